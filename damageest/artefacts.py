@@ -1,0 +1,280 @@
+"""The values that stages hand to one another.
+
+All are frozen and their arrays are read-only: a stage gives a new value, it never edits one. Lengths are in the job's
+unit, coordinates float64 (N,3), faces int64 (F,3). Frames: a `Scan` as read is in the scanner's frame; everything
+after `align` is in the part's. ``T_part_scan`` takes a point from the scanner's frame to the part's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
+"""Labels of a scan point: on the nominal surface; on an inner damage surface; outside the part by more than the
+tolerance (weld bead, dirt, fixture); deviating, but in no site (noise)."""
+
+
+def _frozen(value: Any, dtype: Any) -> Any:
+    array = np.array(value, dtype=dtype, order="C", copy=None)
+    if array.flags.writeable:
+        array = array.view()
+        array.flags.writeable = False
+    return array
+
+
+class _Arrays:
+    """Converts and locks the array fields named in ``_dtypes`` when the dataclass is made."""
+
+    _dtypes: dict[str, Any] = {}
+
+    def __post_init__(self) -> None:
+        for name, dtype in self._dtypes.items():
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _frozen(value, dtype))
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(_Arrays):
+    """A triangle mesh: ``vertices`` (V,3) float64, ``faces`` (F,3) int64, counter-clockwise from outside."""
+
+    vertices: Floats
+    faces: Ints
+    _dtypes = {"vertices": np.float64, "faces": np.int64}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.vertices.ndim != 2 or self.vertices.shape[1] != 3:
+            raise ValueError(f"vertices: expected (V,3), got {self.vertices.shape}")
+        if self.faces.ndim != 2 or self.faces.shape[1] != 3:
+            raise ValueError(f"faces: expected (F,3), got {self.faces.shape}")
+        if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= len(self.vertices)):
+            raise ValueError(f"faces: index outside the {len(self.vertices)} vertices")
+        if not np.isfinite(self.vertices).all():
+            raise ValueError("vertices: not all finite")
+
+    @property
+    def triangles(self) -> Floats:
+        """(F,3,3) corner coordinates."""
+        return self.vertices[self.faces]
+
+    @cached_property
+    def cross(self) -> Floats:
+        """(F,3) face normals scaled by twice the area."""
+        a, b, c = np.moveaxis(self.triangles, 1, 0)
+        return np.cross(b - a, c - a)
+
+    @property
+    def area(self) -> float:
+        return float(np.linalg.norm(self.cross, axis=1).sum() / 2)
+
+    @cached_property
+    def bounds(self) -> Floats:
+        """(2,3) lowest and highest corner."""
+        return np.array([self.vertices.min(0), self.vertices.max(0)])
+
+    @property
+    def diagonal(self) -> float:
+        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+
+def open_edges(faces: Ints) -> int:
+    """How many directed edges lack their opposite exactly once; 0 for a closed, consistently oriented 2-manifold."""
+    if not len(faces):
+        return 0
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    size = int(faces.max()) + 1
+    forward = edges[:, 0] * size + edges[:, 1]
+    backward = edges[:, 1] * size + edges[:, 0]
+    codes, counts = np.unique(forward, return_counts=True)
+    return int((counts > 1).sum() + (~np.isin(codes, backward)).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Solid(Mesh):
+    """A watertight mesh bounding positive volume, of one or more components. The constructor refuses anything else."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not len(self.faces):
+            raise ValueError("a solid needs faces; this mesh is empty")
+        if loose := open_edges(self.faces):
+            raise ValueError(f"not watertight: {loose} of its edges are not shared by two opposite triangles")
+        if self.volume <= 0:
+            raise ValueError(f"inside out or flat: its signed volume is {self.volume:.6g}")
+
+    @cached_property
+    def volume(self) -> float:
+        """By the divergence theorem, about the centre of the bounds (so that far coordinates cost no digits)."""
+        centre = (self.vertices.min(0) + self.vertices.max(0)) / 2
+        a, b, c = np.moveaxis(self.triangles - centre, 1, 0)
+        return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface(Mesh):
+    """An open mesh: the inner damage surface (IDS), normals toward the lost material."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part(Solid):
+    """The part as designed.
+
+    ``faces_brep`` (F,) gives the number of the CAD face that each triangle came from, ``face_names`` and ``face_kinds``
+    what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds the distance between
+    the CAD surface and the triangles. ``notes`` say what was repaired or converted.
+    """
+
+    unit: str = "mm"
+    path: str = ""
+    sha256: str = ""
+    faces_brep: Ints | None = None
+    face_names: tuple[str, ...] = ()
+    face_kinds: tuple[str, ...] = ()
+    tessellation_error: float = 0.0
+    notes: tuple[str, ...] = ()
+    _dtypes = {**Mesh._dtypes, "faces_brep": np.int64}
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What a virtual scanner knows: the true ``damage`` (None if nothing was taken) in the part's frame, and the pose."""
+
+    damage: Solid | None
+    T_part_scan: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Scan(_Arrays):
+    """Points (N,3) on the damaged part; ``normals`` (N,3) outward, or None.
+
+    ``noise`` is the measured standard deviation of the points off the local surface and ``spacing`` the median distance
+    to the nearest neighbours that a surface reconstruction has to bridge; both 0 until measured.
+    """
+
+    points: Floats
+    normals: Floats | None = None
+    unit: str = "mm"
+    paths: tuple[str, ...] = ()
+    noise: float = 0.0
+    spacing: float = 0.0
+    truth: Truth | None = None
+    notes: tuple[str, ...] = ()
+    _dtypes = {"points": np.float64, "normals": np.float64}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.points.ndim != 2 or self.points.shape[1] != 3:
+            raise ValueError(f"points: expected (N,3), got {self.points.shape}")
+        if self.normals is not None and self.normals.shape != self.points.shape:
+            raise ValueError(f"normals: expected {self.points.shape}, got {self.normals.shape}")
+
+    def moved(self, T: Floats) -> Scan:
+        """The same scan in another frame; T is 4x4, rigid."""
+        normals = None if self.normals is None else self.normals @ T[:3, :3].T
+        return replace(self, points=self.points @ T[:3, :3].T + T[:3, 3], normals=normals)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples(_Arrays):
+    """CAD points: ``points`` (N,3) exactly on the part, ``normals`` (N,3) of the face that each lies on (bisecting ones on
+    edges and corners), ``face`` (N,) the triangle, ``kind`` (N,): 0 on a face, 1 on a sharp edge, 2 on a corner.
+    ``spacing`` is the largest intended gap."""
+
+    points: Floats
+    normals: Floats
+    face: Ints
+    kind: NDArray[np.uint8]
+    spacing: float
+    _dtypes = {"points": np.float64, "normals": np.float64, "face": np.int64, "kind": np.uint8}
+
+
+@dataclass(frozen=True, eq=False)
+class Pose(_Arrays):
+    """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
+
+    ``alternatives`` (K,4,4) are other poses that fit the scan as well, as on a symmetric part: where there are any, the
+    pose is one of several right ones and nothing more. ``notes`` say so in words.
+    """
+
+    T_part_scan: Floats
+    rms: float = 0.0
+    inliers: float = 1.0
+    alternatives: Floats | None = None
+    notes: tuple[str, ...] = ()
+    _dtypes = {"T_part_scan": np.float64, "alternatives": np.float64}
+
+
+@dataclass(frozen=True, eq=False)
+class Deviation(_Arrays):
+    """Per scan point, in the part's frame: ``distance`` (N,) signed to the part's surface, positive outside; ``face`` (N,)
+    the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER."""
+
+    distance: Floats
+    face: Ints
+    label: NDArray[np.uint8]
+    _dtypes = {"distance": np.float64, "face": np.int64, "label": np.uint8}
+
+
+@dataclass(frozen=True, eq=False)
+class Sites(_Arrays):
+    """``label`` (N,) int32 per scan point: the number of its site from 1 up, 0 for a point of none. ``count`` sites."""
+
+    label: NDArray[np.int32]
+    count: int
+    notes: tuple[str, ...] = ()
+    _dtypes = {"label": np.int32}
+
+    def members(self, site: int) -> Ints:
+        """Indices of the scan points of one site."""
+        return np.flatnonzero(self.label == site)
+
+
+@dataclass(frozen=True, eq=False)
+class Rims:
+    """Closed loops of vertex indices of an IDS, each following the surface's own boundary edges, longest first."""
+
+    loops: tuple[Ints, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosure:
+    """A solid that holds the damage of ``sites`` and, of the part, only damage; ``notes`` for what the maker doubts."""
+
+    solid: Solid
+    sites: tuple[int, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosures:
+    """What a job-wide `enclose` gives: disjoint enclosures that together cover the sites."""
+
+    items: tuple[Enclosure, ...]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The check of one damage volume (DV) against the scan.
+
+    ``ids_residual``: 95th percentile of the distance from the site's IDS points to the DV's boundary.
+    ``intact_points_inside``: intact scan points deeper than the tolerance inside the DV.
+    ``skin_contradicted``: share of the part's skin that the DV removes which intact scan points lie on.
+    ``skin_unseen``: share of the part's skin beside the DV that carries no scan point: no evidence either way.
+    ``consistent``: whether the scan bears the DV out. ``reasons`` say why not.
+    """
+
+    ids_residual: float = 0.0
+    intact_points_inside: int = 0
+    skin_contradicted: float = 0.0
+    skin_unseen: float = 0.0
+    consistent: bool = True
+    reasons: tuple[str, ...] = field(default=())

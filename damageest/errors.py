@@ -1,0 +1,76 @@
+"""What can go wrong, sorted by who can mend it.
+
+Every error says what is at fault, what would be valid and what to do, and carries the exit status of the command
+line: 2 where the job or an input is at fault, 1 where a sound job met a stage that failed or refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class DamageestError(Exception):
+    """Base of all errors that damageest raises on purpose; its text is meant for the user."""
+
+    exit_status = 1
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong in a job file; ``line`` and ``column`` count from 1, 0 where there is no file."""
+
+    message: str
+    where: str = ""
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.message}" if self.where else self.message
+
+
+class JobError(DamageestError):
+    """The job is at fault. ``faults`` names every fault found, not only the first."""
+
+    exit_status = 2
+
+    def __init__(self, faults: list[Fault], source: str = "job") -> None:
+        self.faults = faults
+        self.source = source
+        super().__init__("\n".join(self.lines()))
+
+    def lines(self) -> list[str]:
+        """One line per fault, as ``file:line:column: what``."""
+        place = [f"{self.source}:{f.line}:{f.column}" if f.line else self.source for f in self.faults]
+        return [f"{where}: {fault}" for where, fault in zip(place, self.faults, strict=True)]
+
+
+class InputError(DamageestError):
+    """A file or array handed in is at fault: unreadable, empty, not a solid, in another unit."""
+
+    exit_status = 2
+
+
+class PluginError(DamageestError):
+    """A stage implementation does not keep its contract, or two packages provide the same name."""
+
+    exit_status = 2
+
+
+class StageError(DamageestError):
+    """A stage failed or refused on sound input.
+
+    Raise it with what is wrong and, as ``remedy``, what the user may try. The engine adds stage, implementation and site.
+    """
+
+    exit_status = 1
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        self.message, self.remedy = message, remedy
+        self.stage, self.use, self.site = "", "", 0
+        super().__init__(message)
+
+    def __str__(self) -> str:
+        place = f"{self.stage}: {self.use}" if self.stage else ""
+        place += f" (site {self.site})" if self.site else ""
+        text = f"{place}: {self.message}" if place else self.message
+        return f"{text}\n  try: {self.remedy}" if self.remedy else text

@@ -1,0 +1,21 @@
+"""Stage `allowance`: its contract."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from damageest.artefacts import Part, Solid
+from damageest.stages import Stage
+
+
+class Allowance(Stage, ABC):
+    """Gives what is to be deposited for one damage volume; None where that is the damage volume itself."""
+
+    stage: ClassVar[str] = "allowance"
+    takes: ClassVar[Mapping[str, object]] = {"damage": Solid, "part": Part, "tolerance": float}
+    gives: ClassVar[str] = "deposit"
+
+    @abstractmethod
+    def run(self, *args: Any, **kwargs: Any) -> Solid | None: ...

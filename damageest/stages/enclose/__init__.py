@@ -1,0 +1,51 @@
+"""Stage `enclose`: its contract."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from damageest.artefacts import Deviation, Enclosures, Floats, Mesh, Part, Rims, Samples, Scan, Sites, Solid, Surface
+from damageest.stages import Stage
+
+
+class Enclose(Stage, ABC):
+    """Gives a closed mesh round the damage of one site: IDS, rim, and the background it cuts off (paper 3.1 steps 8 to 11).
+
+    ``intact`` (K,3): scan points on the nominal surface, which the enclosure must leave out. ``points`` (M,3): the site's
+    own. The mesh need not be watertight yet: `repair` follows.
+    """
+
+    stage: ClassVar[str] = "enclose"
+    takes: ClassVar[Mapping[str, object]] = {
+        "surface": Surface,
+        "rims": Rims,
+        "background": Solid,
+        "part": Part,
+        "intact": Floats,
+        "points": Floats,
+        "tolerance": float,
+    }
+    gives: ClassVar[str] = "enclosure"
+
+    @abstractmethod
+    def run(self, *args: Any, **kwargs: Any) -> Mesh: ...
+
+
+class EncloseAll(Stage, ABC):
+    """Gives enclosures for all sites of the job at once; for routes that do not go site by site."""
+
+    stage: ClassVar[str] = "enclose"
+    takes: ClassVar[Mapping[str, object]] = {
+        "part": Part,
+        "aligned": Scan,
+        "deviation": Deviation,
+        "sites": Sites,
+        "samples": Samples,
+        "tolerance": float,
+    }
+    gives: ClassVar[str] = "enclosures"
+
+    @abstractmethod
+    def run(self, *args: Any, **kwargs: Any) -> Enclosures: ...

@@ -1,0 +1,1 @@
+"""Parts from STEP, IGES and BREP files, by CadQuery and OpenCASCADE."""
