@@ -1,0 +1,32 @@
+"""damageest: from a CAD part and a 3D scan of the damaged one to the watertight volume of the missing metal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from damageest.api import run as run
+    from damageest.hookspecs import hookimpl as hookimpl
+    from damageest.job import Job as Job
+    from damageest.registry import Registry as Registry
+    from damageest.result import Result as Result
+
+_PUBLIC = {
+    "run": "damageest.api",
+    "hookimpl": "damageest.hookspecs",
+    "Job": "damageest.job",
+    "Registry": "damageest.registry",
+    "Result": "damageest.result",
+}
+__all__ = ["Job", "Registry", "Result", "__version__", "hookimpl", "run"]
+
+
+def __getattr__(name: str) -> Any:
+    """Imports the public names when they are first used, so that the command line starts quickly."""
+    if name in _PUBLIC:
+        import importlib
+
+        return getattr(importlib.import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module 'damageest' has no attribute '{name}'")

@@ -1,0 +1,45 @@
+"""The hooks a plugin may implement: two that add, three that only observe.
+
+What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
+what they return is ignored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import pluggy
+
+if TYPE_CHECKING:
+    import typer
+
+    from damageest.stages import Stage
+
+hookspec = pluggy.HookspecMarker("damageest")
+hookimpl = pluggy.HookimplMarker("damageest")
+
+
+@hookspec
+def damageest_stages() -> Sequence[type[Stage]]:  # type: ignore[empty-body]
+    """Gives the stage implementations that this plugin provides: classes derived from a contract."""
+
+
+@hookspec
+def damageest_commands(app: typer.Typer) -> None:
+    """Adds commands to the command line."""
+
+
+@hookspec
+def damageest_before_stage(stage: str, use: str, site: int) -> None:
+    """Called before a stage runs; ``site`` counts from 1 and is 0 for a stage that runs once per job."""
+
+
+@hookspec
+def damageest_after_stage(stage: str, use: str, site: int, output: object, seconds: float, cached: bool) -> None:
+    """Called after a stage gave ``output`` (a read-only artefact); ``cached``: taken from an earlier run."""
+
+
+@hookspec
+def damageest_stage_failed(stage: str, use: str, site: int, error: Exception) -> None:
+    """Called when a stage raised."""
