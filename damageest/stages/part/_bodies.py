@@ -1,0 +1,218 @@
+"""The bodies of a mesh: which triangles belong together, which way they face, and what overlapping ones amount to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints, open_edges
+from damageest.errors import InputError
+
+_PAIRS = 5000
+
+
+def _neighbours(faces: Ints) -> tuple[Ints, Ints, Ints]:
+    """Pairs of triangles over edges that exactly two share, and whether their windings disagree there (0 or 1)."""
+    directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    owner = np.tile(np.arange(len(faces)), 3)
+    low, high = directed.min(1), directed.max(1)
+    code = low * (int(faces.max()) + 1) + high
+    order = np.argsort(code, kind="stable")
+    code, owner, forward = code[order], owner[order], (directed[:, 0] == low)[order]
+    starts = np.flatnonzero(np.concatenate([[True], code[1:] != code[:-1]]))
+    runs = np.diff(np.concatenate([starts, [len(code)]]))
+    two = starts[runs == 2]
+    return owner[two], owner[two + 1], (forward[two] == forward[two + 1]).astype(np.int64)
+
+
+def _labels(a: Ints, b: Ints, count: int) -> tuple[Ints, int]:
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    bodies, label = connected_components(
+        coo_matrix((np.ones(len(a), bool), (a, b)), shape=(count, count)), directed=False
+    )
+    return label.astype(np.int64), int(bodies)
+
+
+def components(faces: Ints) -> tuple[Ints, int]:
+    """Per triangle (F,) the number of its body, joined over shared edges, and how many bodies there are."""
+    a, b, _ = _neighbours(faces)
+    return _labels(a, b, len(faces))
+
+
+def oriented(faces: Ints) -> tuple[Ints, int | None]:
+    """The faces with windings that agree, and how many were turned; None where the surface is one-sided.
+
+    Works on the two-sheeted cover of the triangles' adjacency: triangle f stands twice, as read and turned, and an edge
+    joins the copies that agree. One component then is one consistent choice. In each body the lesser number is turned.
+    """
+    a, b, differ = _neighbours(faces)
+    n = len(faces)
+    label, _ = _labels(np.concatenate([a, a + n]), np.concatenate([b + n * differ, b + n * (1 - differ)]), 2 * n)
+    as_read, turned = label[:n], label[n:]
+    if (as_read == turned).any():
+        return faces, None
+    # a body's two sheets are mirror images; the one that holds more triangles as read wins
+    votes = np.bincount(as_read, minlength=int(label.max()) + 1)
+    flip = votes[as_read] < votes[turned]
+    tie = votes[as_read] == votes[turned]
+    flip |= tie & (as_read > turned)
+    result = faces.copy()
+    result[flip] = result[flip][:, ::-1]
+    return result, int(flip.sum())
+
+
+def signed_volumes(vertices: Floats, faces: Ints, label: Ints, count: int) -> Floats:
+    """(count,) the volume of each closed body, negative where its triangles face inward."""
+    centre = (vertices.min(0) + vertices.max(0)) / 2
+    a, b, c = np.moveaxis((vertices - centre)[faces], 1, 0)
+    each = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    return np.bincount(label, each, minlength=count).astype(np.float64)
+
+
+def _manifold(vertices: Floats, faces: Ints) -> Any:
+    """The mesh as a manifold3d body; coordinates should be near the origin."""
+    import manifold3d as m3
+
+    return m3.Manifold(m3.Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(faces.astype(np.uint64))))
+
+
+def _arrays(body: Any) -> tuple[Floats, Ints]:
+    mesh = body.to_mesh64()
+    return np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
+
+
+def split_pinches(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
+    """Gives each sheet its own vertices where an even number of triangles meet at an edge, as in two touching cubes."""
+    if not open_edges(faces):
+        return vertices, faces
+    import manifold3d as m3
+
+    body = _manifold(vertices, faces)
+    if body.status() != m3.Error.NoError or body.is_empty():
+        return vertices, faces
+    new_vertices, new_faces = _arrays(body)
+    if open_edges(new_faces):
+        return vertices, faces
+    notes.append("doubled the vertices of edges where more than two triangles meet")
+    return new_vertices, new_faces
+
+
+def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
+    """Faces outward, cavities inward, overlapping bodies united. The mesh must be closed."""
+    label, count = components(faces)
+    volumes = signed_volumes(vertices, faces, label, count)
+    size = float(np.prod(np.maximum(np.ptp(vertices, axis=0), 1e-300)))
+    flat = np.abs(volumes) <= 1e-12 * size
+    if flat.all():
+        raise InputError("encloses no volume: its bodies are flat; a part must be a solid")
+    if flat.any():
+        notes.append(f"dropped {int(flat.sum())} bodies without volume")
+        faces = faces[~flat[label]]
+        label, count = components(faces)
+        volumes = signed_volumes(vertices, faces, label, count)
+    depth, crossing = _nesting(vertices, faces, label, count)
+    if not crossing:
+        top = depth == 0
+        if (volumes[top] < 0).all():
+            faces, volumes = faces[:, ::-1], -volumes
+            notes.append("turned the part inside out: all its triangles faced inward")
+        wrong = top & (volumes < 0)
+        if wrong.any():
+            faces, volumes = _flip(faces, wrong[label]), np.abs(volumes) * np.where(wrong, 1, np.sign(volumes))
+            notes.append(f"turned {int(wrong.sum())} of {count} bodies inside out: the triangles faced inward")
+        if ((volumes > 0) == (depth % 2 == 0)).all():
+            cavities = int((volumes < 0).sum())
+            if count - cavities > 1:
+                notes.append(f"{count - cavities} separate bodies, kept as one part")
+            if cavities:
+                notes.append(f"{cavities} inner cavit{'ies' if cavities > 1 else 'y'}, kept")
+            return _compact(vertices, faces)
+    return _unite(vertices, faces, label, volumes, notes)
+
+
+def _flip(faces: Ints, which: Any) -> Ints:
+    faces = faces.copy()
+    faces[which] = faces[which][:, ::-1]
+    return faces
+
+
+def _compact(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    used = np.unique(faces)
+    if len(used) == len(vertices):
+        return vertices, faces
+    index = np.zeros(len(vertices), np.int64)
+    index[used] = np.arange(len(used))
+    return vertices[used], index[faces]
+
+
+def _nesting(vertices: Floats, faces: Ints, label: Ints, count: int) -> tuple[Ints, bool]:
+    """In how many others each body lies (count,), and whether any two cross or touch."""
+    depth = np.zeros(count, np.int64)
+    if count == 1:
+        return depth, False
+    corners = vertices[faces]
+    order = np.argsort(label, kind="stable")
+    starts = np.searchsorted(label[order], np.arange(count))
+    low = np.minimum.reduceat(corners.min(1)[order], starts)
+    high = np.maximum.reduceat(corners.max(1)[order], starts)
+    pairs = [
+        (i, int(j))
+        for i in range(count - 1)
+        for j in i + 1 + np.flatnonzero(((low[i] <= high[i + 1 :]) & (low[i + 1 :] <= high[i])).all(1))
+    ]
+    if len(pairs) > _PAIRS:
+        return depth, True
+    origin = (vertices.min(0) + vertices.max(0)) / 2
+    solids: dict[int, Any] = {}
+    for i in {k for pair in pairs for k in pair}:
+        v, f = _compact(vertices - origin, faces[label == i])
+        body = _manifold(v, f)
+        solids[i] = body if body.volume() > 0 else _manifold(v, f[:, ::-1])
+    for i, j in pairs:
+        a, b = solids[i], solids[j]
+        both = (a + b).volume()
+        area = (a + b).surface_area()
+        va, vb = a.volume(), b.volume()
+        small = 1e-9 * (va + vb)
+        if abs(both - va - vb) <= small:
+            if area < (a.surface_area() + b.surface_area()) * (1 - 1e-9):
+                return depth, True
+        elif abs(both - max(va, vb)) <= small:
+            if abs(area - (a if va > vb else b).surface_area()) > 1e-9 * area:
+                return depth, True
+            depth[i if va < vb else j] += 1
+        else:
+            return depth, True
+    return depth, False
+
+
+def _unite(vertices: Floats, faces: Ints, label: Ints, volumes: Floats, notes: list[str]) -> tuple[Floats, Ints]:
+    """The union of the bodies that face outward, minus that of those that face inward."""
+    import manifold3d as m3
+
+    if (volumes < 0).all():
+        faces, volumes = faces[:, ::-1], -volumes
+        notes.append("turned the part inside out: all its triangles faced inward")
+    origin = (vertices.min(0) + vertices.max(0)) / 2
+    gathered: dict[bool, list[Any]] = {True: [], False: []}
+    for i, volume in enumerate(volumes):
+        mesh = faces[label == i]
+        v, f = _compact(vertices - origin, mesh if volume > 0 else mesh[:, ::-1])
+        body = _manifold(v, f)
+        if body.status() != m3.Error.NoError:
+            raise InputError(
+                f"one of its {len(volumes)} overlapping bodies is no solid ({body.status()}); "
+                "unite them in the CAD system"
+            )
+        gathered[bool(volume > 0)].append(body)
+    result = m3.Manifold.batch_boolean(gathered[True], m3.OpType.Add)
+    if gathered[False]:
+        result -= m3.Manifold.batch_boolean(gathered[False], m3.OpType.Add)
+    if result.status() != m3.Error.NoError or result.is_empty():
+        raise InputError("its overlapping bodies could not be united; unite them in the CAD system and export again")
+    new_vertices, new_faces = _arrays(result)
+    notes.append(f"united {len(volumes)} bodies that overlap, touch or lie in one another into one part")
+    return new_vertices + origin, new_faces
