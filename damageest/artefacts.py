@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ def _frozen(value: Any, dtype: Any) -> Any:
 class _Arrays:
     """Converts and locks the array fields named in ``_dtypes`` when the dataclass is made."""
 
-    _dtypes: dict[str, Any] = {}
+    _dtypes: ClassVar[dict[str, Any]] = {}
 
     def __post_init__(self) -> None:
         for name, dtype in self._dtypes.items():
@@ -48,7 +48,7 @@ class Mesh(_Arrays):
 
     vertices: Floats
     faces: Ints
-    _dtypes = {"vertices": np.float64, "faces": np.int64}
+    _dtypes: ClassVar[dict[str, Any]] = {"vertices": np.float64, "faces": np.int64}
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -128,8 +128,8 @@ class Surface(Mesh):
 class Part(Solid):
     """The part as designed.
 
-    ``faces_brep`` (F,) gives the number of the CAD face that each triangle came from, ``face_names`` and ``face_kinds``
-    what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds the distance between
+    ``faces_brep`` (F,) gives the number of the CAD face that each triangle came from, ``face_names`` and
+    ``face_kinds`` what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds the distance between
     the CAD surface and the triangles. ``notes`` say what was repaired or converted.
     """
 
@@ -141,12 +141,12 @@ class Part(Solid):
     face_kinds: tuple[str, ...] = ()
     tessellation_error: float = 0.0
     notes: tuple[str, ...] = ()
-    _dtypes = {**Mesh._dtypes, "faces_brep": np.int64}
+    _dtypes: ClassVar[dict[str, Any]] = {**Mesh._dtypes, "faces_brep": np.int64}
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What a virtual scanner knows: the true ``damage`` (None if nothing was taken) in the part's frame, and the pose."""
+    """What a virtual scanner knows: the true ``damage`` in the part's frame (None if nothing was taken), and the pose."""
 
     damage: Solid | None
     T_part_scan: Floats
@@ -168,7 +168,7 @@ class Scan(_Arrays):
     spacing: float = 0.0
     truth: Truth | None = None
     notes: tuple[str, ...] = ()
-    _dtypes = {"points": np.float64, "normals": np.float64}
+    _dtypes: ClassVar[dict[str, Any]] = {"points": np.float64, "normals": np.float64}
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -194,7 +194,12 @@ class Samples(_Arrays):
     face: Ints
     kind: NDArray[np.uint8]
     spacing: float
-    _dtypes = {"points": np.float64, "normals": np.float64, "face": np.int64, "kind": np.uint8}
+    _dtypes: ClassVar[dict[str, Any]] = {
+        "points": np.float64,
+        "normals": np.float64,
+        "face": np.int64,
+        "kind": np.uint8,
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +215,7 @@ class Pose(_Arrays):
     inliers: float = 1.0
     alternatives: Floats | None = None
     notes: tuple[str, ...] = ()
-    _dtypes = {"T_part_scan": np.float64, "alternatives": np.float64}
+    _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64}
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +226,7 @@ class Deviation(_Arrays):
     distance: Floats
     face: Ints
     label: NDArray[np.uint8]
-    _dtypes = {"distance": np.float64, "face": np.int64, "label": np.uint8}
+    _dtypes: ClassVar[dict[str, Any]] = {"distance": np.float64, "face": np.int64, "label": np.uint8}
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +236,7 @@ class Sites(_Arrays):
     label: NDArray[np.int32]
     count: int
     notes: tuple[str, ...] = ()
-    _dtypes = {"label": np.int32}
+    _dtypes: ClassVar[dict[str, Any]] = {"label": np.int32}
 
     def members(self, site: int) -> Ints:
         """Indices of the scan points of one site."""

@@ -64,7 +64,7 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
         ]
         unit = str(scene.units) if suffix == ".3mf" and scene.units else None
     except Exception as error:
-        raise InputError(f"{path}: not a readable {suffix} mesh ({_reason(error)})") from None
+        raise InputError(f"{path}: not a readable {suffix} mesh ({reason(error)})") from None
     sizes = np.cumsum([0] + [len(v) for v, _ in meshes])
     vertices = np.concatenate([v for v, _ in meshes]) if meshes else np.empty((0, 3))
     faces = (
@@ -113,7 +113,7 @@ def _read_stl(path: Path) -> tuple[Floats, Ints]:
     return corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int64).reshape(-1, 3)
 
 
-def _reason(error: BaseException) -> str:
+def reason(error: BaseException) -> str:
     """An error of a library in one line."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= 160 else text[:157] + "..."

@@ -1,0 +1,117 @@
+"""`damageest.run`: the whole route from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Part, Scan
+from damageest.cache import digest
+from damageest.contracts import Contract
+from damageest.engine import Engine, State, follow
+from damageest.errors import InputError
+from damageest.job import Job, load
+from damageest.output import workshop, write_report
+from damageest.pipeline import ROUTES
+from damageest.registry import Registry
+from damageest.result import Result
+from damageest.stages.export import Export
+from damageest.stages.part import ReadPart
+from damageest.stages.scan import ReadScan
+
+
+def run(
+    job: str | Path | Mapping[str, Any] | Job,
+    *,
+    part: Any = None,
+    scan: Any = None,
+    output: str | Path | bool = False,
+    settings: Sequence[str] = (),
+    cache: bool = True,
+    registry: Registry | None = None,
+) -> Result:
+    """Runs a job and gives its result; writes nothing unless ``output`` says where (True: where the job says).
+
+    ``job``: a path, a mapping of the same shape, or a checked Job. ``part`` (a Part, a trimesh.Trimesh, or vertices and
+    faces) and ``scan`` (a Scan, an (N,3) array, a trimesh mesh or point cloud) stand in for the job's files; both may
+    also stand in the mapping. ``settings`` are overrides such as ``"cluster.eps=0.4"``. Lengths are in the job's unit.
+
+    Raises JobError or InputError (job or input at fault) and StageError (a stage failed or refused).
+    """
+    registry = registry or Registry.discover()
+    if not isinstance(job, Job):
+        source, given = _split(job, part, scan)
+        job = load(source, registry, settings, given)
+    if output is False:
+        return _follow(Engine(job, registry), job)
+    target = job.output if output is True else Path(output).expanduser().resolve()
+    with workshop(target, cache) as place:
+        engine = Engine(job, registry, place.cache)
+        result = _follow(engine, job)
+        state = State({"result": result, "folder": place.folder}, {"result": "", "folder": ""})
+        files = engine.call(Export, state)["files"]
+        result = replace(result, stages=tuple(engine.records))
+        write_report(result, job, place.folder, target, files)
+        place.finish(engine.stems)
+    return result
+
+
+def _follow(engine: Engine, job: Job) -> Result:
+    values = {"unit": job.units, "tolerance": job.tolerance}
+    state = State(values, {name: digest(value) for name, value in values.items()})
+    (lane,) = follow(ROUTES[job.method], engine, [state])
+    result: Result = lane["result"]
+    return replace(result, stages=tuple(engine.records))
+
+
+def _split(
+    job: str | Path | Mapping[str, Any], part: Any, scan: Any
+) -> tuple[str | Path | Mapping[str, Any], dict[Contract, Any]]:
+    """The job without the arrays in it, and the artefacts made of them."""
+    source: Any = dict(job) if isinstance(job, Mapping) else job
+    units = str(source.get("units", "mm")) if isinstance(source, dict) else "mm"
+    if isinstance(source, dict):
+        for key, value in source.items():
+            if isinstance(value, Path):
+                source[key] = str(value)
+        part = source.pop("part") if part is None and _is_data(source.get("part")) else part
+        scan = source.pop("scan") if scan is None and _is_data(source.get("scan")) else scan
+    given: dict[Contract, Any] = {}
+    if part is not None:
+        given[ReadPart] = _as_part(part, units)
+    if scan is not None:
+        given[ReadScan] = _as_scan(scan, units)
+    return source, given
+
+
+def _is_data(value: Any) -> bool:
+    """Whether a value of `part` or `scan` holds the data itself rather than the name of a file or an implementation."""
+    names_files = isinstance(value, list) and all(isinstance(item, (str, Path)) for item in value)
+    return not (value is None or isinstance(value, (str, Path, Mapping)) or names_files)
+
+
+def _as_part(value: Any, units: str) -> Part:
+    from damageest.stages.part._make import make_part
+
+    if isinstance(value, Part):
+        return value
+    if hasattr(value, "vertices") and hasattr(value, "faces"):
+        value = (value.vertices, value.faces)
+    if not (isinstance(value, (tuple, list)) and len(value) == 2):
+        raise InputError(f"part: give a Part, a trimesh.Trimesh, or (vertices, faces); not a {type(value).__name__}")
+    return make_part(np.asarray(value[0], float), np.asarray(value[1], np.int64), unit=units)
+
+
+def _as_scan(value: Any, units: str) -> Scan:
+    if isinstance(value, Scan):
+        return value
+    points = np.asarray(getattr(value, "vertices", value), dtype=float)
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points):
+        raise InputError(f"scan: give points of shape (N,3), N > 0; not {points.shape}")
+    if not np.isfinite(points).all():
+        raise InputError(f"scan: {int((~np.isfinite(points).all(1)).sum())} of its points are not finite; remove them")
+    return Scan(points, unit=units)

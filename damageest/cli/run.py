@@ -1,0 +1,99 @@
+"""`damageest run`: runs jobs, with progress on stderr and a short table at the end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from damageest.result import Result
+
+
+def command(
+    jobs: Annotated[list[Path], typer.Argument(metavar="JOB...", help="Job files.")],
+    output: Annotated[Path | None, typer.Option(help="Output folder (with one job); default: out/<name>.")] = None,
+    settings: Annotated[list[str] | None, typer.Option("--set", help="stage.option=value or field=value.")] = None,
+    no_cache: Annotated[bool, typer.Option("--no-cache", help="Compute every stage anew.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print result.json, one line per job, on stdout.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table; errors only.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
+) -> None:
+    """Run jobs: from part and scan to damage volumes."""
+    from damageest.cli._progress import Progress
+    from damageest.errors import DamageestError, Fault, JobError
+    from damageest.job import load
+    from damageest.registry import Registry
+
+    if output is not None and len(jobs) > 1:
+        raise JobError([Fault("takes one job; the jobs' own output folders are used with several")], "--output")
+    progress = Progress(quiet)
+    registry = Registry.discover([progress])
+    status = 0
+    loaded = []
+    for path in jobs:  # every job is checked before the first one runs
+        try:
+            loaded.append(load(path, registry, settings or []))
+        except DamageestError as error:
+            status = max(status, _failed(error, str(path), as_json, debug))
+    if status:
+        raise typer.Exit(status)
+    for job in loaded:
+        from damageest.api import run
+
+        try:
+            with progress.job(job.name):
+                result = run(job, output=output or True, cache=not no_cache, registry=registry)
+        except DamageestError as error:
+            status = max(status, _failed(error, job.source, as_json, debug))
+            continue
+        target = (output or job.output).resolve()
+        if as_json:
+            typer.echo(json.dumps(json.loads((target / "result.json").read_text())))
+        elif not quiet:
+            _table(result, target)
+        if result.failures:
+            status = max(status, 1)
+            for failure in result.failures if quiet or as_json else ():
+                typer.echo(f"error: {failure}", err=True)
+    raise typer.Exit(status)
+
+
+def _failed(error: Exception, source: str, as_json: bool, debug: bool) -> int:
+    import traceback
+
+    status = int(getattr(error, "exit_status", 1))
+    if as_json:
+        typer.echo(json.dumps({"schema": 1, "status": "failed", "job": source, "exit": status, "error": str(error)}))
+    if debug:
+        traceback.print_exception(error)
+    typer.echo(f"error: {error}", err=True)
+    return status
+
+
+def _table(result: Result, target: Path) -> None:
+    """The sites, what the check against the scan says of each, and where the files are."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, soft_wrap=True)
+    unit = result.units
+    if result.sites:
+        table = Table(title=None, box=None, pad_edge=False, header_style="bold")
+        for name in ("site", f"volume {unit}³", f"area {unit}²", f"depth {unit}", "method", "scan agrees"):
+            table.add_column(name, justify="left" if name in ("method", "scan agrees") else "right")
+        for site in result.sites:
+            agrees = "yes" if site.evidence.consistent else "NO: " + "; ".join(site.evidence.reasons)
+            numbers = (f"{site.damage.volume:.6g}", f"{site.surface.area:.6g}", f"{site.max_depth:.4g}")
+            table.add_row(str(site.id), *numbers, site.method, agrees)
+        console.print(table)
+        console.print(f"damage {result.damage_volume:.6g} {unit}³ of the part's {result.part.volume:.6g} {unit}³")
+    elif not result.failures:
+        console.print(f"no damage found beyond the tolerance of {result.tolerance:.4g} {unit}")
+    for text in result.failures:
+        console.print(f"[red]failed:[/red] {text}")
+    for text in (*result.warnings, *(f"site {site.id}: {note}" for site in result.sites for note in site.warnings)):
+        console.print(f"[yellow]note:[/yellow] {text}")
+    console.print(f"written to {target}")

@@ -1,0 +1,70 @@
+"""`damageest stages`: what there is, what each option means, and who provides it."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from damageest.registry import Implementation, Registry
+
+
+def command(
+    stage: Annotated[str | None, typer.Argument(help="Show one stage.")] = None,
+    name: Annotated[str | None, typer.Argument(help="Show one implementation, with its options.")] = None,
+) -> None:
+    """List stages, their implementations and options."""
+    from damageest.contracts import STAGES
+    from damageest.errors import Fault, JobError, PluginError
+    from damageest.registry import Registry, near
+
+    registry = Registry.discover()
+    if stage is not None and stage not in STAGES:
+        raise JobError([Fault(f"no stage '{stage}'{near(stage, STAGES)}; there are: {', '.join(STAGES)}")], "stages")
+    if stage and name:
+        try:
+            _options(registry.get(stage, name))
+        except (KeyError, PluginError) as error:
+            raise JobError([Fault(str(error.args[0]))], "stages") from None
+        return
+    for each in [stage] if stage else STAGES:
+        _stage(each, registry, with_options=bool(stage))
+
+
+def _stage(stage: str, registry: Registry, with_options: bool) -> None:
+    from damageest.contracts import DEFAULTS
+
+    items = registry.of(stage)
+    typer.secho(stage, bold=True)
+    for item in items:
+        default = " (default)" if DEFAULTS[item.contract] == item.name else ""
+        typer.echo(f"  {item.name + default:<26} {_first_line(item.cls)}  [{item.provider}]")
+        if with_options:
+            _option_lines(item)
+
+
+def _options(item: Implementation) -> None:
+    typer.echo(f"{item.contract.stage}: {item.name}   by {item.provider}, {item.provider.licence}\n")
+    typer.echo(inspect.getdoc(item.cls) or "")
+    typer.echo("\noptions:" if len(item.cls.model_fields) > 1 else "\nno options")
+    _option_lines(item)
+
+
+def _option_lines(item: Implementation) -> None:
+    for name, field in item.cls.model_fields.items():
+        if name == "use":
+            continue
+        default = (
+            "required" if field.is_required() else f"default {_shown(field.get_default(call_default_factory=True))}"
+        )
+        typer.echo(f"    {name:<20} {field.description or ''} ({default})")
+
+
+def _shown(value: Any) -> str:
+    return "none" if value is None else str(value)
+
+
+def _first_line(cls: type) -> str:
+    return (inspect.getdoc(cls) or "").splitlines()[0] if inspect.getdoc(cls) else ""

@@ -1,0 +1,290 @@
+"""The job file: what to run on what, checked completely before anything is read or computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from damageest import yamlfile
+from damageest.contracts import DEFAULTS, STAGES, Contract
+from damageest.errors import Fault, JobError, PluginError
+from damageest.registry import Implementation, Registry, near
+from damageest.stages import Stage
+from damageest.stages.background import Background
+from damageest.stages.boundary import Boundary
+from damageest.stages.enclose import Enclose, EncloseAll
+from damageest.stages.part import ReadPart
+from damageest.stages.reconstruct import Reconstruct
+from damageest.stages.repair import Repair
+from damageest.stages.scan import ReadScan
+
+SURFACE_ONLY: tuple[Contract, ...] = (Reconstruct, Boundary, Background, Enclose, Repair)
+"""Contracts that only the surface route uses."""
+
+Unit = Literal["um", "mm", "cm", "m", "in", "ft"]
+Method = Literal["auto", "surface", "implicit"]
+
+
+class Header(BaseModel):
+    """The fields of a job that are not stages."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    version: Literal[1] = Field(description="version of the job format")
+    name: str = Field("", pattern=r"^[^/\\\x00]*$", description="name of the job; default: the file's stem")
+    units: Unit = Field("mm", description="unit of every length in the job, and of files that carry none")
+    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] | Literal["auto"] = Field(
+        "auto", description="lambda, the threshold of accuracy, in the job's unit; auto: four times the scan's noise"
+    )
+    method: Method = Field("auto", description="the route; auto: the best measured one, the other where it is refuted")
+    output: Path | None = Field(None, description="output folder; default: out/<name>, beside the job file")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A checked job. ``stages`` holds one implementation with its options for every contract, ``given`` the artefacts that
+    a Python caller handed in instead of files. ``tolerance`` None: from the scan's noise."""
+
+    name: str
+    units: str
+    tolerance: float | None
+    method: str
+    stages: Mapping[Contract, Stage]
+    implementations: Mapping[Contract, Implementation]
+    output: Path
+    source: str
+    given: Mapping[Contract, Any] = field(default_factory=dict)
+
+    def written(self, beside: Path) -> dict[str, Any]:
+        """The job as plain values with every default, its paths relative to the folder ``beside``."""
+        head = {"version": 1, "name": self.name, "units": self.units, "tolerance": self.tolerance or "auto"}
+        head |= {"method": self.method}
+        whole_job = EncloseAll in self.stages
+        used = [c for c in DEFAULTS if c in self.stages and not (whole_job and c in SURFACE_ONLY)]
+        body = {c.stage: plain(self.stages[c].model_dump(), beside) for c in used}
+        return head | body
+
+
+def plain(value: Any, beside: Path) -> Any:
+    """Options as YAML and JSON values; absolute paths become relative to ``beside``."""
+    import os
+
+    if isinstance(value, Path):
+        return Path(os.path.relpath(value, beside)).as_posix() if value.is_absolute() else value.as_posix()
+    if isinstance(value, Mapping):
+        return {key: plain(item, beside) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item, beside) for item in value]
+    return value
+
+
+def load(
+    source: str | Path | Mapping[str, Any],
+    registry: Registry,
+    settings: Sequence[str] = (),
+    given: Mapping[Contract, Any] | None = None,
+) -> Job:
+    """Reads and checks a job: a YAML file, or a mapping of the same shape (its paths relative to the working folder).
+
+    ``settings`` are overrides ``stage.option=value`` or ``field=value``. Raises JobError naming every fault.
+    """
+    if isinstance(source, Mapping):
+        return _Check(dict(source), {}, "job", Path.cwd(), registry, given or {}).job(settings, "job")
+    path = Path(source)
+    tree, positions = yamlfile.read(path)
+    if not isinstance(tree, Mapping):
+        raise JobError([Fault("a job is a mapping with at least version, part and scan")], str(path))
+    return _Check(dict(tree), positions, str(path), path.resolve().parent, registry, given or {}).job(
+        settings, path.stem
+    )
+
+
+@dataclass
+class _Check:
+    """One pass over a job's tree that collects faults instead of stopping at the first."""
+
+    tree: dict[str, Any]
+    positions: yamlfile.Positions
+    source: str
+    folder: Path
+    registry: Registry
+    given: Mapping[Contract, Any]
+    faults: list[Fault] = field(default_factory=list)
+
+    def fault(self, message: str, *path: str | int) -> None:
+        place: tuple[str | int, ...] = path
+        while place and place not in self.positions:
+            place = place[:-1]
+        line, column = self.positions.get(place, (1, 1) if self.positions else (0, 0))
+        self.faults.append(Fault(message, ".".join(map(str, path)), line, column))
+
+    def job(self, settings: Sequence[str], stem: str) -> Job:
+        for setting in settings:
+            self.override(setting)
+        known = [*Header.model_fields, *STAGES]
+        for key in self.tree:
+            if key not in known:
+                self.fault(f"unknown stage or field{near(key, known)}; valid are: {', '.join(known)}", key)
+        header = self.header()
+        named = {key: self.named(key) for key in STAGES if key in self.tree}
+        for contract in (ReadPart, ReadScan):
+            if contract.stage not in named and contract not in self.given:
+                self.fault(f"missing: give  {contract.stage}: path/to/file", contract.stage)
+        chosen = {item.contract: (item, options) for item, options in filter(None, named.values())}
+        method = header.method if header else "auto"
+        contracts, method = self.route(method, set(chosen), {k for k in named if k in self.tree})
+        pairs = {c: chosen.get(c) or self.default(c) for c in contracts if c not in self.given}
+        stages = {c: self.stage(pair[0], pair[1]) for c, pair in pairs.items() if pair}
+        if self.faults or header is None:
+            raise JobError(sorted(self.faults, key=lambda f: (f.line, f.column)), self.source)
+        name = header.name or stem
+        output = header.output or Path("out") / name
+        return Job(
+            name=name,
+            units=header.units,
+            tolerance=None if header.tolerance == "auto" else header.tolerance,
+            method=method,
+            stages={c: s for c, s in stages.items() if s is not None},
+            implementations={c: pair[0] for c, pair in pairs.items() if pair},
+            output=(self.folder / output.expanduser()).resolve(),
+            source=self.source,
+            given=self.given,
+        )
+
+    def override(self, setting: str) -> None:
+        """Applies ``stage.option=value``; the value is read as YAML."""
+        name, equals, text = setting.partition("=")
+        keys = name.strip().split(".")
+        if not equals or not all(keys) or len(keys) > 2:
+            self.fault(f"--set takes stage.option=value or field=value, not '{setting}'")
+            return
+        value, _ = yamlfile.parse(text, f"--set {name}")
+        if len(keys) == 1:
+            self.tree[keys[0]] = value
+        elif keys[0] not in STAGES:
+            self.fault(f"--set {setting}: unknown stage{near(keys[0], STAGES)}; the stages are: {', '.join(STAGES)}")
+        else:
+            old = self.tree.get(keys[0], {})
+            old = old if isinstance(old, dict) else _spelled_out(keys[0], old, self.registry)
+            self.tree[keys[0]] = {**old, keys[1]: value}
+
+    def header(self) -> Header | None:
+        values = {key: value for key, value in self.tree.items() if key in Header.model_fields}
+        if "version" not in values:
+            self.fault("missing: give  version: 1", "version")
+            values["version"] = 1
+        try:
+            return Header.model_validate(values)
+        except ValidationError as error:
+            for item in error.errors():
+                self.fault(_said(item, values), str(item["loc"][0]))
+            return None
+
+    def named(self, key: str) -> tuple[Implementation, dict[str, Any]] | None:
+        """The implementation a stage's value names, and its options still unchecked; None where that is at fault."""
+        value = self.tree[key]
+        if value is None or not isinstance(value, (str, list, dict)) or (isinstance(value, list) and key != "scan"):
+            self.fault(f"give a name, or a mapping with  use: <name>  and options; not {value!r}", key)
+            return None
+        value = dict(value) if isinstance(value, dict) else _spelled_out(key, value, self.registry)
+        default = next(name for contract, name in DEFAULTS.items() if contract.stage == key)
+        name = value.pop("use", default)
+        if name == "file" and "path" in value:
+            name = self.reader(key, value["path"]) or name
+        try:
+            return self.registry.get(key, str(name)), value
+        except (KeyError, PluginError) as error:
+            self.fault(str(error.args[0]), key, "use")
+            return None
+
+    def reader(self, key: str, paths: Any) -> str | None:
+        """The implementation that reads such a file; None leaves it to `file`, which says what it can read."""
+        suffix = Path(str(paths[0] if isinstance(paths, list) and paths else paths)).suffix.lower()
+        readers = [item for item in self.registry.of(key) if suffix in getattr(item.cls, "reads", ())]
+        if not readers and suffix in (".step", ".stp", ".iges", ".igs", ".brep") and key == "part":
+            plugin = "the plugin damageest-cadquery, which is not usable here"
+            self.fault(
+                f"'{suffix}' needs {plugin}: pip install damageest-cadquery{self.registry.missing()}", key, "path"
+            )
+        elif not readers:
+            valid = sorted({s for item in self.registry.of(key) for s in getattr(item.cls, "reads", ())})
+            self.fault(f"no reader for '{suffix}' files; valid are: {', '.join(valid)}", key, "path")
+        return readers[0].name if readers else None
+
+    def route(self, method: str, chosen: set[Contract], named: set[str]) -> tuple[list[Contract], str]:
+        """The contracts that the job's route needs. `auto` is `surface` where the job names one of that route's stages."""
+        whole_job = EncloseAll in chosen
+        surface = chosen & set(SURFACE_ONLY)
+        if method == "auto" and surface and not whole_job:
+            method = "surface"
+        if method == "surface" and whole_job:
+            self.fault(
+                "this implementation goes over all sites at once; it belongs to  method: implicit", "enclose", "use"
+            )
+        if method == "implicit":
+            for contract in sorted(surface, key=list(DEFAULTS).index):
+                self.fault("not a stage of  method: implicit; remove it, or use  method: surface", contract.stage)
+        drop = {"surface": {EncloseAll}, "implicit": set(SURFACE_ONLY), "auto": set[Contract]()}[method]
+        return [contract for contract in DEFAULTS if contract not in drop], method
+
+    def default(self, contract: Contract) -> tuple[Implementation, dict[str, Any]] | None:
+        if contract.stage in ("part", "scan"):
+            return None
+        try:
+            return self.registry.get(contract.stage, DEFAULTS[contract]), {}
+        except (KeyError, PluginError) as error:
+            self.fault(str(error.args[0]), contract.stage)
+            return None
+
+    def stage(self, item: Implementation, options: dict[str, Any]) -> Stage | None:
+        """The implementation with its options checked, files that it names included."""
+        key = item.contract.stage
+        try:
+            stage = item.cls.model_validate({"use": item.name, **options}, context={"folder": self.folder})
+        except ValidationError as error:
+            valid = [name for name in item.cls.model_fields if name != "use"]
+            for fault in error.errors():
+                place = tuple(
+                    p for p in fault["loc"] if (key, p) in self.positions or not isinstance(p, str) or p in valid
+                )
+                self.fault(_said(fault, options, valid, item.name), key, *(place or fault["loc"]))
+            return None
+        for path in _paths(stage.model_dump()):
+            if not path.is_file():
+                what = "is a folder, not a file" if path.is_dir() else "there is no such file"
+                self.fault(f"{path}: {what}", key, "path")
+        return stage
+
+
+def _spelled_out(key: str, value: str | list[Any], registry: Registry) -> dict[str, Any]:
+    """The mapping that a bare value is short for: a name, or for part and scan a path (or paths)."""
+    is_file = key in ("part", "scan") and (value == "file" or value not in {item.name for item in registry.of(key)})
+    return {"use": "file", "path": value} if is_file and value != "file" else {"use": value}
+
+
+def _paths(value: Any) -> list[Path]:
+    if isinstance(value, Path):
+        return [value]
+    items = value.values() if isinstance(value, Mapping) else value if isinstance(value, (list, tuple)) else ()
+    return [path for item in items for path in _paths(item)]
+
+
+def _said(fault: Any, values: Any, valid: Sequence[str] = (), owner: str = "") -> str:
+    """A pydantic error in the words of a job file."""
+    name = str(fault["loc"][-1]) if fault["loc"] else ""
+    if fault["type"] == "extra_forbidden" and len(fault["loc"]) == 1:
+        options = f"its options are: {', '.join(valid)}" if valid else "it has no options"
+        return f"'{owner}' has no option '{name}'{near(name, valid)}; {options}"
+    if fault["type"] == "missing":
+        return f"'{owner}' needs  {name}: ..."
+    given = fault.get("input")
+    shown = f", not {given!r}" if isinstance(given, (str, int, float, bool, type(None))) else ""
+    message = str(fault["msg"])
+    if fault["type"] == "literal_error":
+        expected = fault["ctx"]["expected"]
+        choices = [part.strip("' ") for part in expected.replace(" or ", ", ").split(",")]
+        return f"expected {expected}{shown}{near(str(given), choices)}"
+    return message[:1].lower() + message[1:] + shown

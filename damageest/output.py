@@ -1,0 +1,115 @@
+"""The output folder: written in a hidden sibling, moved into place when it is whole.
+
+A run that fails or is killed leaves the earlier output as it was, and its finished stages where the next run finds them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from damageest import yamlfile
+from damageest.cache import Cache
+from damageest.errors import Fault, JobError
+from damageest.job import Job, plain
+from damageest.result import Result, report
+
+_OURS = {"result.json", "job.yaml", "damage", "surface", "deposit", "stages", "truth", "undamaged", "scan"}
+
+
+@dataclass(frozen=True)
+class Workshop:
+    """Where one run works: ``folder`` takes the files, ``cache`` the stages' outputs; ``target`` is the final place."""
+
+    target: Path
+    hidden: Path
+    folder: Path
+    cache: Cache
+
+    def finish(self, stems: list[str]) -> None:
+        """Moves the result into place; anything in the old output that is not damageest's own moves along."""
+        self.cache.keep_only(stems)
+        os.replace(self.cache.folder, self.folder / "stages")
+        old = _old(self.target)
+        shutil.rmtree(old, ignore_errors=True)
+        if self.target.exists():
+            os.replace(self.target, old)
+        os.replace(self.folder, self.target)
+        if old.exists():
+            for path in old.iterdir():
+                if path.name.split(".")[0] not in _OURS and path.name not in _OURS:
+                    os.replace(path, self.target / path.name)
+            shutil.rmtree(old)
+        shutil.rmtree(self.hidden)
+
+
+@contextmanager
+def workshop(target: Path, use_cache: bool = True) -> Iterator[Workshop]:
+    """Opens the hidden sibling of ``target``. Raises JobError where the target is someone else's, or in use."""
+    hidden = target.parent / f".{target.name}.partial"
+    _refuse_strangers(target)
+    made = not hidden.exists()
+    try:
+        hidden.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise JobError([Fault(f"{target}: cannot be written: {error.strerror}", "output")]) from None
+    with _locked(hidden, target):
+        if _old(target).exists() and not target.exists():
+            os.replace(_old(target), target)
+        stages, folder = hidden / "stages", hidden / "result"
+        shutil.rmtree(folder, ignore_errors=True)
+        if not use_cache:
+            shutil.rmtree(stages, ignore_errors=True)
+        stages.mkdir(exist_ok=True)
+        folder.mkdir()
+        older = (target / "stages",) if use_cache else ()
+        try:
+            yield Workshop(target, hidden, folder, Cache(stages, older))
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            if made and stages.is_dir() and not any(stages.iterdir()):
+                shutil.rmtree(hidden)
+
+
+def write_report(result: Result, job: Job, folder: Path, target: Path, files: tuple[str, ...]) -> None:
+    """Writes result.json and job.yaml into ``folder``, their paths relative to ``target``, where they will stand."""
+    content = report(result, files, lambda path: plain(Path(path), target))
+    (folder / "result.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
+    (folder / "job.yaml").write_text(yamlfile.write(job.written(target)))
+
+
+def _old(target: Path) -> Path:
+    return target.parent / f".{target.name}.old"
+
+
+def _refuse_strangers(target: Path) -> None:
+    """A folder that damageest did not write is never replaced."""
+    if target.is_file():
+        raise JobError([Fault(f"{target} is a file; name a folder", "output")])
+    if target.is_dir() and any(target.iterdir()) and not (target / "result.json").is_file():
+        message = f"{target} holds files but no result.json, so it is not an earlier output; choose another folder"
+        raise JobError([Fault(message, "output")])
+
+
+@contextmanager
+def _locked(hidden: Path, target: Path) -> Iterator[None]:
+    """Holds the folder for one run; the lock goes with the process, however it ends."""
+    try:
+        import fcntl
+    except ImportError:  # no such lock on this system
+        yield
+        return
+    handle = os.open(hidden, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise JobError([Fault(f"another run is writing to {target}; wait, or choose another folder")]) from None
+        yield
+    finally:
+        os.close(handle)

@@ -1,0 +1,100 @@
+"""Loads the built-ins and the installed plugins; a plugin that fails to import is kept with its error."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import Distribution, EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
+
+import pluggy
+
+import damageest
+from damageest import hookspecs
+
+GROUP = "damageest"
+
+
+@dataclass(frozen=True)
+class Provider:
+    """A distribution that provides stages: its ``name``, ``version``, ``licence`` and the ``module`` of its hooks."""
+
+    name: str
+    version: str
+    licence: str
+    module: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.version}"
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Digest over version and source: what a changed implementation gave before is not taken for its own."""
+        digest = hashlib.sha256(str(self).encode())
+        spec = importlib.util.find_spec(self.module.split(".")[0])
+        for place in (spec.submodule_search_locations or [spec.origin]) if spec else []:
+            root = Path(str(place))
+            for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
+                digest.update(path.name.encode() + path.read_bytes())
+        return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A plugin, or one implementation of it, that cannot be used: why, and what to do."""
+
+    provider: Provider
+    reason: str
+    remedy: str
+
+
+def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[tuple[Any, Provider]], list[Broken]]:
+    """The hooks, the plugins that loaded (built-ins first) and those that did not."""
+    manager = pluggy.PluginManager(GROUP)
+    manager.add_hookspecs(hookspecs)
+    loaded: list[tuple[Any, Provider]] = []
+    broken: list[Broken] = []
+    own = EntryPoint("builtins", "damageest.builtins", GROUP)
+    for point, provider in [(own, _own_provider()), *_installed()]:
+        try:
+            plugin = point.load()
+            manager.register(plugin, f"{provider.name}:{point.name}")
+        except (Exception, SystemExit) as error:
+            broken.append(fault_of(error, provider))
+        else:
+            loaded.append((plugin, provider))
+    for observer in observers:
+        manager.register(observer)
+    return manager, loaded, broken
+
+
+def _own_provider() -> Provider:
+    return Provider("damageest", damageest.__version__, "Apache-2.0", "damageest.builtins")
+
+
+def _installed() -> list[tuple[EntryPoint, Provider]]:
+    points = sorted(entry_points(group=GROUP), key=lambda p: (p.dist.name if p.dist else "", p.name))
+    return [(point, _provider(point, point.dist)) for point in points]
+
+
+def _provider(point: EntryPoint, dist: Distribution | None) -> Provider:
+    if dist is None:
+        return Provider(point.name, "?", "?", point.module)
+    meta = dist.metadata
+    licence = meta.get("License-Expression") or meta.get("License") or "not stated"
+    return Provider(dist.name, dist.version, licence.splitlines()[0], point.module)
+
+
+def fault_of(error: BaseException, provider: Provider) -> Broken:
+    """The plugin as broken by an error, with what to do about it."""
+    return Broken(provider, f"{type(error).__name__}: {error}", _remedy(error, provider))
+
+
+def _remedy(error: BaseException, provider: Provider) -> str:
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        return f"pip install {error.name}, or reinstall {provider.name}"
+    return f"update or uninstall {provider.name}"

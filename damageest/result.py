@@ -1,0 +1,266 @@
+"""What a run found, as values and as the report that `result.json` holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from damageest.artefacts import Deviation, Evidence, Floats, Part, Pose, Scan, Solid, Surface
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """One damage: ``damage`` (DV) and ``surface`` (IDS) in the part's frame; ``deposit`` None where it is the DV itself.
+
+    ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into the scan; ``max_depth``:
+    the farthest of them below the nominal surface.
+    """
+
+    id: int
+    clusters: tuple[int, ...]
+    points: NDArray[np.int64]
+    damage: Solid
+    surface: Surface
+    deposit: Solid | None
+    method: str
+    evidence: Evidence
+    max_depth: float
+    warnings: tuple[str, ...] = ()
+
+    @cached_property
+    def centroid(self) -> Floats:
+        """(3,) centre of mass of the damage volume."""
+        centre = self.damage.bounds.mean(0)
+        corners = self.damage.triangles - centre
+        weights = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+        moment: Floats = (weights[:, None] * corners.sum(1)).sum(0) / (4 * weights.sum())
+        return centre + moment
+
+
+@dataclass(frozen=True)
+class StageRecord:
+    """One call of a stage; ``site`` 0 for a stage that runs once per job."""
+
+    stage: str
+    use: str
+    provider: str
+    site: int
+    seconds: float
+    cached: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Everything a run computed. Lengths in ``units``; meshes in the part's frame.
+
+    ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of all DVs and
+    ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which sites have no DV and
+    why: then ``status`` is ``incomplete``.
+    """
+
+    name: str
+    units: str
+    tolerance: float
+    part: Part
+    scan: Scan
+    aligned: Scan
+    pose: Pose
+    deviation: Deviation
+    site_label: NDArray[np.int32]
+    sites: tuple[Site, ...]
+    damage: Solid | None
+    undamaged: Solid | None
+    warnings: tuple[str, ...]
+    failures: tuple[str, ...]
+    truth: Floats | None
+    stages: tuple[StageRecord, ...] = ()
+
+    @property
+    def status(self) -> Literal["ok", "incomplete"]:
+        return "incomplete" if self.failures else "ok"
+
+    @property
+    def damage_volume(self) -> float:
+        return self.damage.volume if self.damage else 0.0
+
+    @property
+    def undamaged_volume(self) -> float:
+        return self.undamaged.volume if self.undamaged else 0.0
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+
+class PartReport(_Model):
+    path: str = Field(description="relative to this file; empty for a part given as arrays")
+    sha256: str
+    volume: float
+    watertight: bool
+    tessellation_error: float = Field(description="bound on the distance between CAD surface and triangles")
+    notes: list[str] = Field(description="what was repaired or converted when the part was read")
+
+
+class ScanReport(_Model):
+    paths: list[str]
+    points: int
+    noise: float = Field(description="measured standard deviation of the points off the local surface")
+    spacing: float = Field(description="measured distance that a surface reconstruction has to bridge")
+    notes: list[str]
+
+
+class AlignmentReport(_Model):
+    transform: list[list[float]] = Field(description="T_part_scan, 4x4: from the scanner's frame to the part's")
+    rms: float = Field(description="of the inliers' distance to the part")
+    inliers: float = Field(description="share of the scan's points")
+    alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
+    notes: list[str]
+
+
+class EvidenceReport(_Model):
+    ids_residual: float = Field(description="95th percentile of the IDS points' distance to the damage volume")
+    intact_points_inside: int = Field(description="intact scan points deeper than the tolerance inside it")
+    skin_contradicted: float = Field(description="share of the removed skin that intact scan points lie on")
+    skin_unseen: float = Field(description="share of the skin beside the damage that the scan does not show")
+    consistent: bool = Field(description="whether the scan bears the damage volume out")
+    reasons: list[str] = Field(description="why it is not")
+
+
+class FilesReport(_Model):
+    damage: str | None
+    surface: str | None
+    deposit: str | None
+
+
+class SiteReport(_Model):
+    id: int
+    points: int
+    volume: float
+    surface_area: float = Field(description="of the inner damage surface")
+    max_depth: float = Field(description="of the scan below the nominal surface")
+    centroid: Vector
+    bounds: tuple[Vector, Vector]
+    method: Literal["surface", "implicit"]
+    evidence: EvidenceReport
+    files: FilesReport
+    warnings: list[str]
+
+
+class TruthReport(_Model):
+    """Only after a virtual scan: how far the result is from what is known to be true."""
+
+    volume: float
+    iou: float = Field(description="intersection over union of found and true damage")
+    transform: list[list[float]] = Field(description="the true T_part_scan")
+
+
+class StageReport(_Model):
+    stage: str
+    use: str
+    provider: str
+    site: int = Field(description="0 for a stage that runs once per job")
+    seconds: float
+    cached: bool
+
+
+class Report(_Model):
+    """The content of result.json. Lengths, areas and volumes in ``units``; coordinates in the part's frame."""
+
+    version: Literal[1] = Field(1, alias="schema", description="version of this format")
+    status: Literal["ok", "incomplete"] = Field(description="incomplete: some sites have no damage volume")
+    name: str
+    units: str
+    tolerance: float
+    part: PartReport
+    scan: ScanReport
+    alignment: AlignmentReport
+    sites: list[SiteReport]
+    damage_volume: float
+    undamaged_volume: float
+    truth: TruthReport | None
+    stages: list[StageReport]
+    failures: list[str] = Field(description="sites without a damage volume, and why")
+    warnings: list[str]
+    versions: dict[str, str]
+
+
+def report(result: Result, files: tuple[str, ...] = (), relative: Any = str) -> dict[str, Any]:
+    """The content of result.json as plain values. ``relative`` turns an absolute input path into the one to write."""
+    import platform
+
+    import damageest
+
+    part, scan, pose = result.part, result.scan, result.pose
+    filled = Report(
+        status=result.status,
+        name=result.name,
+        units=result.units,
+        tolerance=result.tolerance,
+        part=PartReport(
+            path=relative(part.path) if part.path else "",
+            sha256=part.sha256,
+            volume=part.volume,
+            watertight=True,
+            tessellation_error=part.tessellation_error,
+            notes=list(part.notes),
+        ),
+        scan=ScanReport(
+            paths=[relative(path) for path in scan.paths],
+            points=len(scan.points),
+            noise=scan.noise,
+            spacing=scan.spacing,
+            notes=list(scan.notes),
+        ),
+        alignment=AlignmentReport(
+            transform=pose.T_part_scan.tolist(),
+            rms=pose.rms,
+            inliers=pose.inliers,
+            alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
+            notes=list(pose.notes),
+        ),
+        sites=[_site(site, files) for site in result.sites],
+        damage_volume=result.damage_volume,
+        undamaged_volume=result.undamaged_volume,
+        truth=_truth(result),
+        stages=[StageReport(**vars(record)) for record in result.stages],
+        failures=list(result.failures),
+        warnings=list(result.warnings),
+        versions={"damageest": damageest.__version__, "python": platform.python_version()},
+    )
+    return filled.model_dump(mode="json", by_alias=True)
+
+
+def _site(site: Site, files: tuple[str, ...]) -> SiteReport:
+    def file(kind: str) -> str | None:
+        return next((name for name in files if name.startswith(f"{kind}/site-{site.id}.")), None)
+
+    low, high = site.damage.bounds.tolist()
+    evidence = {name: value for name, value in vars(site.evidence).items() if name != "reasons"}
+    return SiteReport(
+        id=site.id,
+        points=len(site.points),
+        volume=site.damage.volume,
+        surface_area=site.surface.area,
+        max_depth=site.max_depth,
+        centroid=tuple(site.centroid.tolist()),
+        bounds=(tuple(low), tuple(high)),
+        method="surface" if site.method == "surface" else "implicit",
+        evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
+        files=FilesReport(damage=file("damage"), surface=file("surface"), deposit=file("deposit")),
+        warnings=list(site.warnings),
+    )
+
+
+def _truth(result: Result) -> TruthReport | None:
+    truth = result.scan.truth
+    if truth is None or result.truth is None:
+        return None
+    volume, iou = result.truth.tolist()
+    return TruthReport(volume=volume, iou=iou, transform=truth.T_part_scan.tolist())
