@@ -139,7 +139,7 @@ def _wind(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
 
 
 def _loops(faces: Ints) -> list[Ints]:
-    """The boundary's simple closed loops of vertices, against the triangles' sense; holes that meet in a vertex apart."""
+    """The boundary's simple closed loops of vertices, against the triangles' sense; parted where they touch."""
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     _, inverse, counts = _edges(faces)
     follow: dict[int, list[int]] = {}

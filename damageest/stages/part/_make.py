@@ -24,7 +24,7 @@ def make_part(
     tessellation_error: float = 0.0,
     notes: tuple[str, ...] = (),
 ) -> Part:
-    """A part from vertices (V,3), already in ``unit``, and faces (F,3); repaired where ``repair`` is on and that is safe.
+    """A part from vertices (V,3), already in ``unit``, and faces (F,3), repaired where that is safe.
 
     A repair that changes the triangles loses ``faces_brep``, which then would name the wrong ones. Raises InputError,
     naming ``path``, for a mesh that is not a solid and cannot safely be made one.
