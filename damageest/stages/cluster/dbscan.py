@@ -1,0 +1,136 @@
+"""Damage sites by density (DBSCAN, paper 3.3)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PositiveFloat
+
+from damageest.artefacts import DAMAGE, Deviation, Floats, Ints, Scan, Sites
+from damageest.stages.cluster import Cluster
+from damageest.stages.cluster._density import dbscan, neighbour_distances
+
+AROUND = 12
+"""Nearest scan points, itself included, among which a damage point looks for others like it."""
+LIKE_IT = 4
+"""How many of those, itself included, must be damage too. Where noise takes one point in 700 beyond the tolerance (a
+pose off by one standard deviation at a tolerance of four), it does so to four of twelve neighbours once in 10^7 points."""
+
+
+class Dbscan(Cluster):
+    """DBSCAN of the points labelled damage; a cluster that chance would produce is noise."""
+
+    use: Literal["dbscan"] = "dbscan"
+    eps: PositiveFloat | Literal["tolerance", "auto"] | None = Field(
+        None,
+        description="radius that holds a point's neighbours, in the job's unit; 'tolerance': the tolerance itself; "
+        "'auto': where the sorted k-distance curve bends most; empty: the tolerance or, where that is shorter, what "
+        "bridges the scan's spacing",
+    )
+    neighbours: int = Field(
+        10, ge=5, le=20, description="k: points within eps, itself included, that make a point dense"
+    )
+    min_points: int = Field(4, ge=3, description="a site of fewer points is noise")
+    min_extent: float = Field(
+        1.0, ge=0, description="a site whose bounding box has a shorter diagonal is noise, in tolerances"
+    )
+    support: float = Field(
+        0.15, ge=0, le=1, description="a site is noise unless this share of its points has mostly damage around it"
+    )
+
+    def run(self, aligned: Scan, deviation: Deviation, tolerance: float) -> Sites:
+        """Sites numbered by their number of points, largest first (ties: the earlier in the scan)."""
+        label = np.zeros(len(aligned.points), np.int32)
+        damage = np.flatnonzero(deviation.label == DAMAGE)
+        if not len(damage):
+            return Sites(label, 0)
+        points = aligned.points[damage]
+        gap, typical = _gaps(aligned.points, self.neighbours)
+        bridging = max(tolerance, 1.25 * gap)
+        eps, why = self._eps(points, tolerance, bridging)
+        # A sparse scan puts fewer than k points on a damage of four tolerances across, which must not go unseen.
+        expected = self.neighbours * (1.5 * tolerance / typical) ** 2 if typical else np.inf
+        dense = int(np.clip(expected / 2, 4, self.neighbours))
+
+        cluster = dbscan(points, eps, dense)
+        supported = _supported(aligned.points, damage, deviation.label == DAMAGE, bridging)
+        cluster = self._without_chance(points, cluster, supported, tolerance)
+        found, first, inverse, count = np.unique(cluster, return_index=True, return_inverse=True, return_counts=True)
+        order = [i for i in np.lexsort((first, -count)) if found[i] >= 0]
+        number = np.zeros(len(found), np.int32)
+        number[order] = np.arange(1, len(order) + 1)
+        label[damage] = number[inverse.ravel()]
+        noise = int((label[damage] == 0).sum())
+        notes = [f"eps {eps:.4g} ({why}), {dense} neighbours: {noise} of {len(damage)} damage points are noise"]
+        if eps < bridging / 2:
+            notes.append(
+                f"eps is shorter than what bridges the scan's spacing ({bridging:.4g}): sites may fall apart or vanish"
+            )
+        if dense < self.neighbours:
+            notes.append(f"the scan is sparse for its tolerance: {dense} neighbours instead of {self.neighbours}")
+        return Sites(label, len(order), tuple(notes))
+
+    def _eps(self, points: Floats, tolerance: float, bridging: float) -> tuple[float, str]:
+        if self.eps == "tolerance":
+            return tolerance, "the tolerance"
+        if self.eps == "auto":
+            bend = sharpest_bend(neighbour_distances(points, self.neighbours))
+            # On a scan without damage the curve is that of strays, metres apart; it says nothing then.
+            eps = float(np.clip(bend, bridging / 2, 4 * bridging)) if np.isfinite(bend) else bridging
+            return eps, f"sharpest bend of the k-distance curve at {bend:.4g}"
+        if self.eps is None:
+            return bridging, "the tolerance" if bridging == tolerance else "the scan's spacing"
+        return self.eps, "set"
+
+    def _without_chance(self, points: Floats, cluster: Ints, supported: NDArray[np.bool_], tolerance: float) -> Ints:
+        """``cluster`` (M,) with -1 for the members of clusters too small, too short or too scattered to be damage."""
+        inside = cluster >= 0
+        if not inside.any():
+            return cluster
+        which = cluster[inside]
+        count = np.bincount(which)
+        share = np.bincount(which, weights=supported[inside]) / np.maximum(count, 1)
+        low, high = np.full((len(count), 3), np.inf), np.full((len(count), 3), -np.inf)
+        np.minimum.at(low, which, points[inside])
+        np.maximum.at(high, which, points[inside])
+        extent = np.linalg.norm(np.where(count[:, None] > 0, high - low, 0), axis=1)
+        sound = (count >= self.min_points) & (extent >= self.min_extent * tolerance) & (share >= self.support)
+        result = cluster.copy()
+        result[inside] = np.where(sound[which], which, -1)
+        return result
+
+
+def sharpest_bend(average: Floats) -> float:
+    """Where the sorted curve of ``average`` (M,) neighbour distances has its largest second difference (paper 3.3).
+
+    Of 200 quantiles, not of single points: between neighbours in a sorted sample the differences are chance.
+    """
+    average = np.sort(average[np.isfinite(average)])
+    if len(average) < 3:
+        return np.inf
+    steps = min(len(average), 201)
+    curve = average[np.linspace(0, len(average) - 1, steps).round().astype(np.int64)]
+    return float(curve[1 + np.argmax(curve[:-2] - 2 * curve[1:-1] + curve[2:])])
+
+
+def _gaps(points: Floats, neighbours: int) -> tuple[float, float]:
+    """95th percentile and median of the distance to the k-th nearest scan point, from 5,000 points evenly picked."""
+    from scipy.spatial import cKDTree
+
+    if len(points) <= neighbours:
+        return 0.0, 0.0
+    picked = points[np.linspace(0, len(points) - 1, min(len(points), 5000)).round().astype(np.int64)]
+    distance = np.asarray(cKDTree(points).query(picked, k=[neighbours + 1], workers=-1)[0])[:, 0]
+    return float(np.percentile(distance, 95)), float(np.median(distance))
+
+
+def _supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:
+    """(M,) whether enough of a damage point's nearest scan points are damage as well."""
+    from scipy.spatial import cKDTree
+
+    _, near = cKDTree(points).query(points[damage], k=AROUND, distance_upper_bound=reach, workers=-1)
+    padded = np.append(is_damage, False)  # the index of a missing neighbour is len(points)
+    result: NDArray[np.bool_] = padded[near].sum(axis=1) >= LIKE_IT
+    return result

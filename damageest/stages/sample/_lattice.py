@@ -1,0 +1,99 @@
+"""Points spread over triangles without a loop over them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints
+
+
+def lattice(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats, Ints]:
+    """Points (N,3) on the ``chosen`` of ``triangles`` (F,3,3) and the triangle (N,) of each; gaps up to ``step``.
+
+    The triangle is cut into bands along its longest edge and the bands into columns; each column has its point in the
+    middle of what of it lies in the triangle, so that thin corners are covered as well as wide ones.
+    """
+    if not len(chosen):
+        return np.empty((0, 3)), np.empty(0, np.int64)
+    corners = triangles[chosen]
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    first = lengths.argmax(axis=1)
+    order = (first[:, None] + np.arange(3)) % 3
+    a, b, c = np.moveaxis(np.take_along_axis(corners, order[:, :, None], axis=1), 1, 0)
+    base = lengths.max(axis=1)
+    along = (b - a) / base[:, None]
+    apex = np.einsum("ij,ij->i", c - a, along)
+    up = c - a - apex[:, None] * along
+    height = np.linalg.norm(up, axis=1)
+    up /= np.maximum(height, np.finfo(float).tiny)[:, None]
+
+    bands = np.maximum(np.ceil(height / (0.8 * step)).astype(np.int64), 1)
+    of = np.repeat(np.arange(len(chosen)), bands)
+    band = np.arange(len(of)) - np.repeat(np.cumsum(bands) - bands, bands)
+    low = band / bands[of] * height[of]
+    high = (band + 1) / bands[of] * height[of]
+    start = low / height[of] * apex[of]
+    width = base[of] * (1 - low / height[of])
+    columns = np.maximum(np.ceil(width / step).astype(np.int64), 1)
+    row = np.repeat(np.arange(len(of)), columns)
+    column = np.arange(len(row)) - np.repeat(np.cumsum(columns) - columns, columns)
+    of, low, high = of[row], low[row], high[row]
+    x = start[row] + (column + 0.5) / columns[row] * width[row]
+    # A lone column of a band leans with the triangle: under the apex it reaches highest.
+    x = np.where(columns[row] == 1, np.clip(apex[of], start[row], start[row] + width[row]), x)
+    left, right = apex[of], base[of] - apex[of]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        roof = height[of] * np.minimum(
+            np.where(left > 0, x / left, np.inf), np.where(right > 0, (base[of] - x) / right, np.inf)
+        )
+    y = (low + np.clip(np.minimum(high, roof), low, None)) / 2
+    return a[of] + x[:, None] * along[of] + y[:, None] * up[of], chosen[of]
+
+
+def thin(points: Floats, apart: float, reach: float) -> Ints:
+    """Indices (sorted) of a subset of ``points`` (N,3), about ``apart`` from one another; every point is within
+    ``reach`` >= ``apart`` of a kept one. Deterministic: ties are broken by a seeded shuffle."""
+    from scipy.spatial import cKDTree
+
+    if not len(points):
+        return np.empty(0, np.int64)
+    # Very fine meshes are first brought down to a few points per disc, else the pairs of points fill the memory.
+    todo = _one_per_cell(points, 0.4 * apart)
+    kept = np.empty(0, np.int64)
+    while len(todo):
+        kept = np.concatenate([kept, todo[_apart(points[todo], apart)]])
+        far, _ = cKDTree(points[kept]).query(points, workers=-1)
+        todo = _one_per_cell(points, 0.2 * apart, np.flatnonzero(far > reach))
+    return np.sort(kept)
+
+
+def _one_per_cell(points: Floats, cell: float, among: Ints | None = None) -> Ints:
+    among = np.arange(len(points)) if among is None else among
+    if not len(among):
+        return among
+    keys = np.floor((points[among] - points.min(axis=0)) / cell).astype(np.int64)
+    size = keys.max(axis=0) + 1
+    _, first = np.unique((keys[:, 0] * size[1] + keys[:, 1]) * size[2] + keys[:, 2], return_index=True)
+    return among[np.sort(first)]
+
+
+def _apart(points: Floats, distance: float) -> Ints:
+    """A maximal set of points no two of which are closer than ``distance``: rounds in which local minima of a random
+    rank win and their neighbours leave (Luby 1986)."""
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(points).query_pairs(distance, output_type="ndarray")
+    rank = np.random.default_rng(0).permutation(len(points))
+    chosen = np.zeros(len(points), bool)
+    open_ = np.ones(len(points), bool)
+    while open_.any():
+        lowest = rank.copy()
+        np.minimum.at(lowest, pairs[:, 0], rank[pairs[:, 1]])
+        np.minimum.at(lowest, pairs[:, 1], rank[pairs[:, 0]])
+        winners = open_ & (lowest == rank)
+        chosen |= winners
+        open_ &= ~winners
+        open_[pairs[winners[pairs[:, 0]], 1]] = False
+        open_[pairs[winners[pairs[:, 1]], 0]] = False
+        pairs = pairs[open_[pairs].all(axis=1)]
+    return np.flatnonzero(chosen)

@@ -1,0 +1,72 @@
+"""Uniform CAD points on faces, and exactly on sharp edges and corners (paper 3.1 step 1)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from damageest.artefacts import Floats, Mesh, Part, Samples
+from damageest.errors import InputError
+from damageest.stages.sample import Sample
+from damageest.stages.sample._edges import sharp_points
+from damageest.stages.sample._lattice import lattice, thin
+
+FINE = 0.4
+"""Step of the candidates on faces too small for a lattice of their own, in units of the spacing."""
+
+
+class EdgeAware(Sample):
+    """Points on the faces, plus points exactly on sharp edges and corners. Deterministic."""
+
+    use: Literal["edge_aware"] = "edge_aware"
+    spacing: float = Field(
+        1.0, gt=0, description="largest distance from the surface to its nearest point, in tolerances"
+    )
+    angle: float = Field(
+        30.0, gt=0, lt=180, description="an edge whose faces turn by more than this is sharp, in degrees"
+    )
+    max_points: int = Field(
+        400_000, ge=1000, description="where the spacing would need more points than this, it is enlarged and says so"
+    )
+
+    def run(self, part: Part, tolerance: float) -> Samples:
+        """Points (N,3) in the part's frame; every point of the surface is within ``Samples.spacing`` of one of them.
+
+        Raises InputError where the part has no area.
+        """
+        area = part.area
+        if not area > 0:
+            raise InputError("the part's surface has no area; check the file it was read from")
+        spacing = max(self.spacing * tolerance, float(np.sqrt(area / self.max_points)))
+        while True:
+            samples = _sample(part, spacing, self.angle)
+            excess = len(samples.points) / self.max_points
+            if excess <= 1:
+                return samples
+            spacing *= 1.02 * np.sqrt(excess)
+
+
+def _sample(part: Mesh, spacing: float, angle: float) -> Samples:
+    triangles = part.triangles
+    cross = part.cross
+    double_area = np.linalg.norm(cross, axis=1)
+    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    # A flat triangle holds next to nothing that its neighbours' points do not cover, and it has no normal.
+    sound = double_area > 1e-12 * part.diagonal * longest
+    # One lattice per triangle wastes points where triangles are small or thin: those share a thinned set of candidates.
+    roomy = sound & (double_area > 0.5 * spacing * longest) & (longest > spacing)
+    points, face = lattice(triangles, np.flatnonzero(roomy), spacing)
+    fine, fine_face = lattice(triangles, np.flatnonzero(sound & ~roomy), FINE * spacing)
+    kept = thin(fine, 0.5 * spacing, (1 - FINE) * spacing)
+    edge_points, edge_normals, edge_face, edge_kind = sharp_points(part, spacing, angle)
+    faces = np.concatenate([face, fine_face[kept]])
+    normals: Floats = cross[faces] / double_area[faces, None]
+    return Samples(
+        points=np.concatenate([points, fine[kept], edge_points]),
+        normals=np.concatenate([normals, edge_normals]),
+        face=np.concatenate([faces, edge_face]),
+        kind=np.concatenate([np.zeros(len(faces), np.uint8), edge_kind]),
+        spacing=spacing,
+    )

@@ -1,0 +1,122 @@
+"""Sites on a plate with pits of known place; nothing on a plate without."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sklearn.cluster import DBSCAN
+
+from damageest.artefacts import DAMAGE, INTACT, Deviation, Scan
+from damageest.stages.cluster import _density
+from damageest.stages.cluster._density import dbscan
+from damageest.stages.cluster.dbscan import Dbscan, sharpest_bend
+
+SIZE = 60.0
+SIGMA = 0.04
+TOLERANCE = 4 * SIGMA
+
+
+def plate(
+    n: int, pits: list[tuple[float, float, float]] = (), shift: float = 0.0, outliers: float = 0.0, uneven: float = 1.0
+) -> tuple[Scan, Deviation, np.ndarray]:
+    """A noisy scan of a plate's top at z=0, its signed distances, and the pit (0: none) that each point is really in.
+
+    ``pits``: x, y, radius of flat-bottomed pits 1 mm deep; ``uneven``: density at one side over that at the other.
+    """
+    rng = np.random.default_rng(7)
+    xy = rng.uniform(0, SIZE, (n, 2))
+    if uneven > 1:
+        xy = xy[rng.uniform(0, uneven, n) < 1 + (uneven - 1) * xy[:, 0] / SIZE]
+    n = len(xy)
+    z = rng.normal(0, SIGMA, n) - shift
+    pit = np.zeros(n, int)
+    for i, (x, y, radius) in enumerate(pits, 1):
+        pit[np.hypot(xy[:, 0] - x, xy[:, 1] - y) < radius] = i
+    z -= pit > 0
+    stray = rng.random(n) < outliers
+    xy[stray] = rng.uniform(0, SIZE, (int(stray.sum()), 2))
+    z[stray] = rng.uniform(-10, 10, int(stray.sum()))
+    pit[stray] = 0
+    label = np.where(z < -TOLERANCE, DAMAGE, INTACT)
+    points = np.column_stack([xy, z])
+    return Scan(points), Deviation(z, np.zeros(n, int), label), pit
+
+
+@pytest.mark.parametrize("n", [150_000, 1_000_000])
+@pytest.mark.parametrize("shift", [0.0, SIGMA])
+@pytest.mark.parametrize("outliers", [0.0, 0.01])
+def test_no_damage_no_site(n: int, shift: float, outliers: float) -> None:
+    scan, deviation, _ = plate(n, shift=shift, outliers=outliers)
+    assert (deviation.label == DAMAGE).any()
+    for eps in (None, "auto"):
+        assert Dbscan(eps=eps).run(scan, deviation, TOLERANCE).count == 0
+
+
+@pytest.mark.parametrize("n", [150_000, 1_000_000])
+@pytest.mark.parametrize("outliers", [0.0, 0.01])
+def test_small_pit_is_kept(n: int, outliers: float) -> None:
+    scan, deviation, pit = plate(n, [(20, 20, 2 * TOLERANCE)], shift=SIGMA, outliers=outliers)
+    sites = Dbscan().run(scan, deviation, TOLERANCE)
+    assert sites.count == 1
+    assert (sites.label[pit == 1] == 1).mean() > 0.95
+    assert (pit[sites.members(1)] == 1).mean() > 0.9
+
+
+def test_sites_are_numbered_by_size_and_repeat() -> None:
+    scan, deviation, pit = plate(150_000, [(10, 10, 2), (40, 40, 6), (15, 45, 4)], outliers=0.01)
+    sites = Dbscan().run(scan, deviation, TOLERANCE)
+    assert sites.count == 3
+    for site, true in ((1, 2), (2, 3), (3, 1)):
+        assert np.bincount(pit[sites.members(site)], minlength=4).argmax() == true
+    assert np.array_equal(Dbscan().run(scan, deviation, TOLERANCE).label, sites.label)
+    assert "noise" in sites.notes[0]
+
+
+def test_uneven_density_leaves_one_damage_whole() -> None:
+    scan, deviation, pit = plate(150_000, [(30, 30, 25)], uneven=5.0)
+    sites = Dbscan().run(scan, deviation, TOLERANCE)
+    assert sites.count == 1
+    assert (sites.label[pit == 1] == 1).mean() > 0.99
+
+
+def test_auto_finds_both_damages_among_strays() -> None:
+    scan, deviation, pit = plate(150_000, [(15, 15, 5), (45, 45, 5)], outliers=0.01)
+    sites = Dbscan(eps="auto").run(scan, deviation, TOLERANCE)
+    assert sites.count == 2
+    assert (sites.label[pit > 0] > 0).mean() > 0.99
+
+
+def test_sharpest_bend() -> None:
+    flat, steep = np.linspace(1, 2, 900), np.linspace(2, 30, 101)[1:]
+    assert sharpest_bend(np.random.default_rng(0).permutation(np.concatenate([flat, steep]))) == pytest.approx(
+        2, abs=0.2
+    )
+    assert sharpest_bend(np.array([1.0])) == np.inf
+
+
+def test_same_clusters_as_scikit_learn() -> None:
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.normal(c, 0.5, (300, 3)) for c in (0, 4, 8)] + [rng.uniform(-5, 12, (200, 3))])
+    ours, theirs = dbscan(points, 0.5, 8), DBSCAN(eps=0.5, min_samples=8, algorithm="kd_tree").fit(points)
+    assert np.array_equal(ours < 0, theirs.labels_ < 0)
+    core = theirs.core_sample_indices_
+    assert len(np.unique(np.stack([ours[core], theirs.labels_[core]]), axis=1).T) == len(
+        np.unique(theirs.labels_[core])
+    )
+
+
+def test_gathering_dense_points_keeps_the_clusters(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.normal(c, 0.5, (3000, 3)) for c in (0, 9)])
+    whole = dbscan(points, 0.8, 10)
+    monkeypatch.setattr(_density, "PAIRS", 1000)
+    gathered = dbscan(points, 0.8, 10)
+    same = (whole >= 0) & (gathered >= 0)
+    assert same.mean() > 0.99
+    assert len(np.unique(np.stack([whole[same], gathered[same]]), axis=1).T) == 2
+
+
+def test_eps_below_the_spacing_is_said() -> None:
+    scan, deviation, _ = plate(20_000, [(30, 30, 10)])
+    sites = Dbscan(eps="tolerance").run(scan, deviation, TOLERANCE)
+    assert any("shorter" in note for note in sites.notes)
