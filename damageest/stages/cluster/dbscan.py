@@ -16,7 +16,7 @@ AROUND = 12
 """Nearest scan points, itself included, among which a damage point looks for others like it."""
 LIKE_IT = 4
 """How many of those, itself included, must be damage too. Where noise takes one point in 700 beyond the tolerance (a
-pose off by one standard deviation at a tolerance of four), it does so to four of twelve neighbours once in 10^7 points."""
+pose off by one standard deviation at a tolerance of four), one stray in two million has three more beside it."""
 
 
 class Dbscan(Cluster):

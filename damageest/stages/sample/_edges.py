@@ -23,8 +23,8 @@ def sharp_edges(mesh: Mesh, angle: float) -> tuple[Ints, Ints]:
     normals = _unit(mesh.cross)
     flat = ~normals.any(axis=1)  # a face without area says nothing about sharpness
     turn = np.einsum("ij,ij->i", normals[sides[:, 0]], normals[sides[:, 1]])
-    sharp = (turn < np.cos(np.radians(angle))) & ~flat[sides].any(axis=1)
-    return pairs[sharp], sides[sharp]
+    sharp: NDArray[np.bool_] = (turn < np.cos(np.radians(angle))) & ~flat[sides].any(axis=1)
+    return pairs[np.flatnonzero(sharp)], sides[np.flatnonzero(sharp)]
 
 
 def sharp_points(mesh: Mesh, spacing: float, angle: float) -> tuple[Floats, Floats, Ints, NDArray[np.uint8]]:
