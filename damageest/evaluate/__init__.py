@@ -1,0 +1,1 @@
+"""Accuracy against known truth: parts, random damages on them, scores, and the suite that brings them together."""
