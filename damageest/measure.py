@@ -1,0 +1,146 @@
+"""What a scan says about itself: how noisy its points are, and how far apart."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints
+
+_SAMPLES = 4000
+_WHOLE = 2_000_000
+_LEVELS = (16, 32, 64, 128, 256, 512)
+_WIDE = 8.0
+_SECTORS = 6
+
+
+def measure(points: Floats, seed: int = 0) -> tuple[float, float]:
+    """Noise and spacing of a scan, ``points`` (N,3), in its unit of length; the same seed gives the same answer.
+
+    Noise: the standard deviation of the points off the local surface. At a few thousand points a quadric is fitted to
+    the nearest neighbours, all of them, however dense; the residual variance, by its degrees of freedom, of those patches
+    that agree with one another is what the scanner's noise makes of a smooth surface. Patches across an edge, a damage or
+    a second wall have more and fall out as long as they are not the great majority. Patches grow until they are wide
+    against the noise: narrower ones would take the noise's own direction for the surface's. On a surface whose bends
+    are all tighter than a patch the answer includes what a quadric cannot follow, hence is too high.
+
+    Spacing: the gap that a reconstruction has to bridge. Round each sample point, in the local plane, the distance to
+    the nearest neighbour in each of six sectors; the median of the six; and of these the median by area covered, not by
+    number of points, so that neither dense rows of points nor dense regions hide the gaps between them. On a randomly
+    sampled surface about 1.1 / sqrt(points per area), on a grid about the pitch.
+
+    Fewer than 16 points: both are 0.
+    """
+    points = np.asarray(points, dtype=np.float64)
+    if len(points) < _LEVELS[0]:
+        return 0.0, 0.0
+    from scipy.spatial import cKDTree
+
+    near, centres = _neighbourhoods(points - (points.min(0) + points.max(0)) / 2, np.random.default_rng(seed))
+    tree = cKDTree(near, balanced_tree=False, compact_nodes=False)
+    noise = spacing = 0.0
+    settled = False
+    for k in sorted({min(k, len(near)) for k in _LEVELS}):
+        some = centres[: max(500, 400_000 // k)]  # wide patches average more points each: fewer of them will do
+        far, index = tree.query(some, k=k)
+        local, roundness = _local(near[index])
+        if k <= 64:
+            spacing = _spacing(local[:, :, :2] - local[:, :1, :2]) or spacing
+        even = roundness > 0.15
+        # rows of points: the patch must span several before it shows the surface
+        if not settled and even.sum() >= 0.3 * len(even):
+            noise = _clean_level(_residual_variance(local[even]), k - 6)
+            settled = bool(np.median(far[:, -1]) >= _WIDE * noise)
+        if settled and k >= 64:
+            break
+    return noise, spacing
+
+
+def _neighbourhoods(points: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """The points to look for neighbours among, and sample points whose neighbours are all among them.
+
+    Up to two million points that is everything. Of more, the points of some boxes, drawn at random, and of the 26 around
+    each: density must not be thinned, but a tree over everything would cost seconds.
+    """
+    if len(points) <= _WHOLE:
+        return points, points[rng.permutation(len(points))[:_SAMPLES]]
+    low = points.min(0)
+    # a thousand points in the box of a typical point
+    some = points[rng.integers(0, len(points), 2000)]
+    cell = float(np.ptp(points, axis=0).max()) / 8
+    while True:
+        here = np.floor((some - low) / cell).astype(np.int64)
+        sizes = np.array([(np.abs(some - some[i]).max(1) < cell / 2).sum() for i in range(200)])
+        if np.median(sizes) * len(points) / len(some) < 3000 or cell < 1e-9 * float(np.ptp(points, axis=0).max()):
+            break
+        cell /= 1.5
+    wide = int(here.max()) + 3
+
+    def code(box: Ints) -> Ints:
+        number: Ints = ((box[..., 0] + 1) * wide + box[..., 1] + 1) * wide + box[..., 2] + 1
+        return number
+
+    boxes = code(np.minimum(np.floor((points - low) / cell).astype(np.int64), wide - 3))
+    chosen = np.unique(here[:100], axis=0)
+    around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), -1).reshape(-1, 3)
+    wanted = np.unique(code(chosen[:, None] + around))
+    near = np.isin(boxes, wanted)
+    inner = np.flatnonzero(np.isin(boxes, code(chosen)))
+    return points[near], points[rng.permutation(inner)[:_SAMPLES]]
+
+
+def _local(patches: Floats) -> tuple[Floats, Floats]:
+    """Patches (m,k,3) in their principal axes, widest first, scaled to their own size; and how round each is, 0 to 1."""
+    centred = patches - patches.mean(1, keepdims=True)
+    spread, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", centred, centred))
+    local = np.einsum("mki,mij->mkj", centred, axes[:, :, ::-1])
+    spread = np.sqrt(np.maximum(spread, 0))
+    return local, spread[:, 1] / np.maximum(spread[:, 2], 1e-300)
+
+
+def _residual_variance(local: Floats) -> Floats:
+    """(m,) variance of each patch's heights over the quadric fitted to them, by k - 6 degrees of freedom."""
+    size = np.maximum(np.abs(local[:, :, :2]).max(axis=(1, 2), keepdims=True), 1e-300)
+    u, v = np.moveaxis(local[:, :, :2] / size, 2, 0)
+    basis = np.linalg.qr(np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)).Q
+    height = local[:, :, 2]
+    rest = height - np.einsum("mki,mi->mk", basis, np.einsum("mki,mk->mi", basis, height))
+    variance: Floats = np.einsum("mk,mk->m", rest, rest) / max(local.shape[1] - 6, 1)
+    return variance
+
+
+def _clean_level(variances: Floats, freedom: int) -> float:
+    """The standard deviation that the lower, agreeing part of the patches' variances has in common.
+
+    Under noise alone they follow sigma^2 chi^2(f) / f. Starts low in the distribution, then takes the median of all that
+    sigma does not rule out, until that stands.
+    """
+    if freedom < 1:
+        return 0.0
+    from scipy.stats import chi2
+
+    level = float(np.quantile(variances, 0.15)) / (chi2.ppf(0.25, freedom) / freedom)
+    cut, middle = chi2.ppf(0.9, freedom) / freedom, chi2.ppf(0.45, freedom) / freedom
+    for _ in range(30):
+        kept = variances[variances <= cut * level]
+        if not len(kept):
+            break
+        level, before = float(np.median(kept)) / middle, level
+        if abs(level - before) <= 1e-6 * before:
+            break
+    return float(np.sqrt(level))
+
+
+def _spacing(around: Floats) -> float:
+    """The area-weighted median gap, from neighbours (m,k,2) in the plane, each patch's sample point at the origin."""
+    distance = np.hypot(around[:, 1:, 0], around[:, 1:, 1])
+    angle = np.arctan2(around[:, 1:, 1], around[:, 1:, 0])
+    sector = np.floor((angle / (2 * np.pi) + 0.5) * _SECTORS).astype(np.int64) % _SECTORS
+    nearest = np.sort(
+        np.stack([np.where(sector == s, distance, np.inf).min(1) for s in range(_SECTORS)], axis=1), axis=1
+    )
+    gap = (nearest[:, 2] + nearest[:, 3]) / 2
+    gap = np.sort(gap[np.isfinite(gap)])  # fewer than four sectors with a neighbour: the patch does not show the gap
+    if len(gap) < 0.1 * len(around):
+        return 0.0
+    area = np.cumsum(np.minimum(gap, 3 * np.median(gap)) ** 2)
+    return float(gap[np.searchsorted(area, area[-1] / 2)])
