@@ -129,8 +129,8 @@ class Part(Solid):
     """The part as designed.
 
     ``faces_brep`` (F,) gives the number of the CAD face that each triangle came from, ``face_names`` and
-    ``face_kinds`` what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds the distance between
-    the CAD surface and the triangles. ``notes`` say what was repaired or converted.
+    ``face_kinds`` what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds
+    the distance between the CAD surface and the triangles. ``notes`` say what was repaired or converted.
     """
 
     unit: str = "mm"
@@ -146,7 +146,7 @@ class Part(Solid):
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What a virtual scanner knows: the true ``damage`` in the part's frame (None if nothing was taken), and the pose."""
+    """What a virtual scanner knows: the true ``damage`` in the part's frame (None if there is none), and the pose."""
 
     damage: Solid | None
     T_part_scan: Floats
@@ -185,8 +185,8 @@ class Scan(_Arrays):
 
 @dataclass(frozen=True, eq=False)
 class Samples(_Arrays):
-    """CAD points: ``points`` (N,3) exactly on the part, ``normals`` (N,3) of the face that each lies on (bisecting ones on
-    edges and corners), ``face`` (N,) the triangle, ``kind`` (N,): 0 on a face, 1 on a sharp edge, 2 on a corner.
+    """CAD points: ``points`` (N,3) exactly on the part, ``normals`` (N,3) of the face that each lies on (bisecting
+    ones on edges and corners), ``face`` (N,) the triangle, ``kind`` (N,): 0 on a face, 1 on a sharp edge, 2 on a corner.
     ``spacing`` is the largest intended gap."""
 
     points: Floats
@@ -220,8 +220,8 @@ class Pose(_Arrays):
 
 @dataclass(frozen=True, eq=False)
 class Deviation(_Arrays):
-    """Per scan point, in the part's frame: ``distance`` (N,) signed to the part's surface, positive outside; ``face`` (N,)
-    the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER."""
+    """Per scan point, in the part's frame: ``distance`` (N,) signed to the part's surface, positive outside; ``face``
+    (N,) the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER."""
 
     distance: Floats
     face: Ints

@@ -18,7 +18,7 @@ from damageest.result import StageRecord
 
 @dataclass(frozen=True)
 class State:
-    """What is known so far: values by name, and for each the key that says how it came about. ``site`` 0: the whole job."""
+    """What is known so far: values by name, and for each the key that says how it came about. ``site`` 0: the job."""
 
     values: Mapping[str, Any]
     keys: Mapping[str, str]

@@ -59,7 +59,7 @@ class PluginError(DamageestError):
 class StageError(DamageestError):
     """A stage failed or refused on sound input.
 
-    Raise it with what is wrong and, as ``remedy``, what the user may try. The engine adds stage, implementation and site.
+    Raise it with what is wrong and, as ``remedy``, what the user may try. The engine adds stage and site.
     """
 
     exit_status = 1

@@ -37,7 +37,7 @@ class Header(BaseModel):
     name: str = Field("", pattern=r"^[^/\\\x00]*$", description="name of the job; default: the file's stem")
     units: Unit = Field("mm", description="unit of every length in the job, and of files that carry none")
     tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] | Literal["auto"] = Field(
-        "auto", description="lambda, the threshold of accuracy, in the job's unit; auto: four times the scan's noise"
+        "auto", description="lambda, the threshold of accuracy; auto: four times the scan's noise"
     )
     method: Method = Field("auto", description="the route; auto: the best measured one, the other where it is refuted")
     output: Path | None = Field(None, description="output folder; default: out/<name>, beside the job file")
@@ -45,8 +45,8 @@ class Header(BaseModel):
 
 @dataclass(frozen=True)
 class Job:
-    """A checked job. ``stages`` holds one implementation with its options for every contract, ``given`` the artefacts that
-    a Python caller handed in instead of files. ``tolerance`` None: from the scan's noise."""
+    """A checked job. ``stages`` holds one implementation with its options for every contract, ``given`` the artefacts
+    that a Python caller handed in instead of files. ``tolerance`` None: from the scan's noise."""
 
     name: str
     units: str
@@ -134,7 +134,7 @@ class _Check:
             if contract.stage not in named and contract not in self.given:
                 self.fault(f"missing: give  {contract.stage}: path/to/file", contract.stage)
         chosen = {item.contract: (item, options) for item, options in filter(None, named.values())}
-        method = header.method if header else "auto"
+        method: str = header.method if header else "auto"
         contracts, method = self.route(method, set(chosen), {k for k in named if k in self.tree})
         pairs = {c: chosen.get(c) or self.default(c) for c in contracts if c not in self.given}
         stages = {c: self.stage(pair[0], pair[1]) for c, pair in pairs.items() if pair}
@@ -203,19 +203,19 @@ class _Check:
     def reader(self, key: str, paths: Any) -> str | None:
         """The implementation that reads such a file; None leaves it to `file`, which says what it can read."""
         suffix = Path(str(paths[0] if isinstance(paths, list) and paths else paths)).suffix.lower()
-        readers = [item for item in self.registry.of(key) if suffix in getattr(item.cls, "reads", ())]
+        readers = [item for item in self.registry.of(key) if suffix in item.cls.reads]
         if not readers and suffix in (".step", ".stp", ".iges", ".igs", ".brep") and key == "part":
             plugin = "the plugin damageest-cadquery, which is not usable here"
             self.fault(
                 f"'{suffix}' needs {plugin}: pip install damageest-cadquery{self.registry.missing()}", key, "path"
             )
         elif not readers:
-            valid = sorted({s for item in self.registry.of(key) for s in getattr(item.cls, "reads", ())})
+            valid = sorted({s for item in self.registry.of(key) for s in item.cls.reads})
             self.fault(f"no reader for '{suffix}' files; valid are: {', '.join(valid)}", key, "path")
         return readers[0].name if readers else None
 
     def route(self, method: str, chosen: set[Contract], named: set[str]) -> tuple[list[Contract], str]:
-        """The contracts that the job's route needs. `auto` is `surface` where the job names one of that route's stages."""
+        """The contracts that the job's route needs. `auto` is `surface` where the job names one of its stages."""
         whole_job = EncloseAll in chosen
         surface = chosen & set(SURFACE_ONLY)
         if method == "auto" and surface and not whole_job:

@@ -27,7 +27,7 @@ AUTO_TOLERANCE = 4.0
 
 
 def measured(engine: Engine, lanes: list[State]) -> list[State]:
-    """Measures the scan's noise and spacing, settles the tolerance, and refuses a scan of another size than the part."""
+    """Measures the scan's noise and spacing, settles the tolerance, and refuses a scan of another size."""
     (state,) = lanes
     scan, part = state["scan"], state["part"]
     if wrong_size := diagnose_scale(scan.points, part.bounds):
@@ -49,13 +49,13 @@ def tolerance_of(wanted: float | None, scan: Scan, part: Part) -> tuple[float, l
     warnings = []
     if tolerance < 3 * scan.noise:
         warnings.append(
-            f"the tolerance {tolerance:.3g} is less than three times the scan's noise {scan.noise:.3g}: sound surface may "
-            f"pass for damage; {AUTO_TOLERANCE * scan.noise:.3g} would be safe"
+            f"the tolerance {tolerance:.3g} is less than three times the scan's noise {scan.noise:.3g}: sound surface "
+            f"may pass for damage; {AUTO_TOLERANCE * scan.noise:.3g} would be safe"
         )
     if part.tessellation_error > tolerance / 2:
         warnings.append(
-            f"the part's triangles deviate from the CAD surface by up to {part.tessellation_error:.3g}, more than half the "
-            f"tolerance {tolerance:.3g}; ask for a finer chord"
+            f"the part's triangles deviate from the CAD surface by up to {part.tessellation_error:.3g}, more than half "
+            f"the tolerance {tolerance:.3g}; ask for a finer chord"
         )
     if scan.spacing > 5 * tolerance:
         warnings.append(

@@ -17,9 +17,9 @@ def measure(points: Floats, seed: int = 0) -> tuple[float, float]:
     """Noise and spacing of a scan, ``points`` (N,3), in its unit of length; the same seed gives the same answer.
 
     Noise: the standard deviation of the points off the local surface. At a few thousand points a quadric is fitted to
-    the nearest neighbours, all of them, however dense; the residual variance, by its degrees of freedom, of those patches
-    that agree with one another is what the scanner's noise makes of a smooth surface. Patches across an edge, a damage or
-    a second wall have more and fall out as long as they are not the great majority. Patches grow until they are wide
+    the nearest neighbours, all of them, however dense; the residual variance, by its degrees of freedom, of those
+    patches that agree with one another is what the scanner's noise makes of a smooth surface. Patches across an edge, a
+    damage or a second wall have more and fall out as long as they are not the great majority. Patches grow until they are wide
     against the noise: narrower ones would take the noise's own direction for the surface's. On a surface whose bends
     are all tighter than a patch the answer includes what a quadric cannot follow, hence is too high.
 
@@ -41,7 +41,7 @@ def measure(points: Floats, seed: int = 0) -> tuple[float, float]:
     settled = False
     for k in sorted({min(k, len(near)) for k in _LEVELS}):
         some = centres[: max(500, 400_000 // k)]  # wide patches average more points each: fewer of them will do
-        far, index = tree.query(some, k=k)
+        far, index = (np.asarray(a) for a in tree.query(some, k=k))
         local, roundness = _local(near[index])
         if k <= 64:
             spacing = _spacing(local[:, :, :2] - local[:, :1, :2]) or spacing
@@ -58,8 +58,8 @@ def measure(points: Floats, seed: int = 0) -> tuple[float, float]:
 def _neighbourhoods(points: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """The points to look for neighbours among, and sample points whose neighbours are all among them.
 
-    Up to two million points that is everything. Of more, the points of some boxes, drawn at random, and of the 26 around
-    each: density must not be thinned, but a tree over everything would cost seconds.
+    Up to two million points that is everything. Of more, the points of some boxes, drawn at random, and of the 26
+    around each: density must not be thinned, but a tree over everything would cost seconds.
     """
     if len(points) <= _WHOLE:
         return points, points[rng.permutation(len(points))[:_SAMPLES]]
@@ -89,7 +89,7 @@ def _neighbourhoods(points: Floats, rng: np.random.Generator) -> tuple[Floats, F
 
 
 def _local(patches: Floats) -> tuple[Floats, Floats]:
-    """Patches (m,k,3) in their principal axes, widest first, scaled to their own size; and how round each is, 0 to 1."""
+    """Patches (m,k,3) in their principal axes, widest first, and how round each is, from 0 to 1."""
     centred = patches - patches.mean(1, keepdims=True)
     spread, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", centred, centred))
     local = np.einsum("mki,mij->mkj", centred, axes[:, :, ::-1])
@@ -111,8 +111,8 @@ def _residual_variance(local: Floats) -> Floats:
 def _clean_level(variances: Floats, freedom: int) -> float:
     """The standard deviation that the lower, agreeing part of the patches' variances has in common.
 
-    Under noise alone they follow sigma^2 chi^2(f) / f. Starts low in the distribution, then takes the median of all that
-    sigma does not rule out, until that stands.
+    Under noise alone they follow sigma^2 chi^2(f) / f. Starts low in the distribution, then takes the median of all
+    that sigma does not rule out, until that stands.
     """
     if freedom < 1:
         return 0.0

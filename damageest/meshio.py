@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from damageest.artefacts import Floats, Ints
+from damageest.artefacts import Floats, Ints, Mesh, Solid, open_edges
 from damageest.errors import InputError
 
 MESH_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf")
@@ -150,3 +152,72 @@ def first_of_equal(points: Floats) -> tuple[Ints, Ints]:
     inverse = np.empty(len(points), np.int64)
     inverse[order] = rank[group]
     return np.sort(first), inverse
+
+
+def write_ply(path: Path, mesh: Mesh) -> None:
+    """A mesh as binary little-endian PLY with coordinates in double precision."""
+    table = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3)])
+    table["count"], table["corners"] = 3, mesh.faces
+    head = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {len(mesh.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    path.write_bytes(head.encode() + mesh.vertices.astype("<f8").tobytes() + table.tobytes())
+
+
+def write_points(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+    """Points as binary little-endian PLY, one property per column (N,), in the columns' own types."""
+    names = {"f8": "double", "f4": "float", "u1": "uchar", "i4": "int"}
+    kind = np.dtype([(name, values.dtype.newbyteorder("<")) for name, values in columns.items()])
+    table = np.empty(len(next(iter(columns.values()))), kind)
+    for name, values in columns.items():
+        table[name] = values
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(table)}\n"
+    head += "".join(f"property {names[values.dtype.str[1:]]} {name}\n" for name, values in columns.items())
+    path.write_bytes(head.encode() + b"end_header\n" + table.tobytes())
+
+
+def write_stl(path: Path, mesh: Mesh) -> None:
+    """A mesh as binary STL, whose coordinates are single precision; see `single_precision`. No date in its header."""
+    corners = mesh.triangles.astype(np.float32)
+    a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
+    normal = np.cross(b - a, c - a)
+    table = np.zeros(len(corners), STL_TRIANGLE)
+    table["normal"] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    table["corners"] = corners
+    path.write_bytes(b"damageest".ljust(80, b"\0") + len(table).to_bytes(4, "little") + table.tobytes())
+
+
+def single_precision(solid: Solid) -> Solid | None:
+    """The solid with coordinates that single precision holds, watertight even where equal vertices count as one.
+
+    Rounding can bring vertices together: the triangles that vanish are taken out. Where that opens the mesh, its smallest
+    details are collapsed first, up to 64 times the rounding. None where even then it does not close.
+    """
+    for steps in (0, 2, 8, 64):
+        mesh: Mesh = solid
+        if steps:
+            mesh = _simplified(solid, steps * float(np.spacing(np.float32(np.abs(solid.vertices).max()))))
+        rounded = mesh.vertices.astype(np.float32).astype(np.float64)
+        keep, inverse = first_of_equal(rounded)
+        faces = inverse[mesh.faces]
+        a, b, c = faces.T
+        faces = faces[(a != b) & (b != c) & (c != a)]
+        if len(faces) and not open_edges(faces):
+            try:
+                return Solid(rounded[keep], faces)
+            except ValueError:  # nothing but rounding is left of its volume
+                return None
+    return None
+
+
+def _simplified(solid: Solid, size: float) -> Mesh:
+    """The solid without details below ``size``."""
+    from damageest.solids import to_arrays, to_manifold
+
+    origin = solid.bounds.mean(0)
+    try:
+        return Mesh(*to_arrays(to_manifold(solid, origin).simplify(size), origin))
+    except ValueError:
+        return solid

@@ -1,6 +1,7 @@
 """The output folder: written in a hidden sibling, moved into place when it is whole.
 
-A run that fails or is killed leaves the earlier output as it was, and its finished stages where the next run finds them.
+A run that fails or is killed leaves the earlier output as it was, and its finished stages where the next run
+finds them.
 """
 
 from __future__ import annotations

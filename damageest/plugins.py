@@ -36,7 +36,7 @@ class Provider:
         """Digest over version and source: what a changed implementation gave before is not taken for its own."""
         digest = hashlib.sha256(str(self).encode())
         spec = importlib.util.find_spec(self.module.split(".")[0])
-        for place in (spec.submodule_search_locations or [spec.origin]) if spec else []:
+        for place in (spec.submodule_search_locations or [spec.origin or ""]) if spec else []:
             root = Path(str(place))
             for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
                 digest.update(path.name.encode() + path.read_bytes())
@@ -85,7 +85,7 @@ def _provider(point: EntryPoint, dist: Distribution | None) -> Provider:
     if dist is None:
         return Provider(point.name, "?", "?", point.module)
     meta = dist.metadata
-    licence = meta.get("License-Expression") or meta.get("License") or "not stated"
+    licence = next((meta[key] for key in ("License-Expression", "License") if key in meta), "not stated")
     return Provider(dist.name, dist.version, licence.splitlines()[0], point.module)
 
 

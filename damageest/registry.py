@@ -31,7 +31,7 @@ class Implementation:
 
 @dataclass(frozen=True)
 class Registry:
-    """All that was found. ``clashes`` are names that two distributions provide: no job can use them until one is gone."""
+    """All that was found. ``clashes`` are names that two distributions provide: no job can use them."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]

@@ -17,7 +17,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """One damage: ``damage`` (DV) and ``surface`` (IDS) in the part's frame; ``deposit`` None where it is the DV itself.
+    """One damage: ``damage`` (DV) and ``surface`` (IDS) in the part's frame; ``deposit`` None where it is the DV.
 
     ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into the scan; ``max_depth``:
     the farthest of them below the nominal surface.
@@ -40,8 +40,8 @@ class Site:
         centre = self.damage.bounds.mean(0)
         corners = self.damage.triangles - centre
         weights = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-        moment: Floats = (weights[:, None] * corners.sum(1)).sum(0) / (4 * weights.sum())
-        return centre + moment
+        moment = (weights[:, None] * corners.sum(1)).sum(0) / (4 * weights.sum())
+        return np.asarray(centre + moment)
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ def command(
     lines = [
         f"# {part.name}: {' x '.join(f'{s:.4g}' for s in solid.bounds[1] - solid.bounds[0])} {units}, "
         f"{solid.volume:.5g} {units}3, {len(solid.faces)} triangles",
-        f"# {scan.name}: {len(cloud.points)} points, noise {cloud.noise:.3g} {units}, spacing {cloud.spacing:.3g} {units}",
+        f"# {scan.name}: {len(cloud.points)} points, noise {cloud.noise:.3g}, spacing {cloud.spacing:.3g} {units}",
         *(f"# note: {note}" for note in (*solid.notes, *cloud.notes)),
         *(f"# CAUTION: {doubt}" for doubt in doubts),
         "version: 1",

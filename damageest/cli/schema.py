@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from enum import Enum
+from enum import StrEnum
 from typing import Annotated
 
 import typer
 
 
-class Which(str, Enum):
+class Which(StrEnum):
     job = "job"
     result = "result"
 

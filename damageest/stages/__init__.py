@@ -28,12 +28,14 @@ JobPath = Annotated[Path, AfterValidator(_beside_job)]
 class Stage(BaseModel):
     """Base of all contracts. ``stage``: its name in a job; ``takes``: what ``run`` may ask for, parameter
     name to type;
-    ``gives``: the name under which later stages find the result."""
+    ``gives``: the name under which later stages find the result. ``reads``: suffixes of the files that
+    a reader of part or scan takes."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
     stage: ClassVar[str] = ""
     takes: ClassVar[Mapping[str, object]] = {}
     gives: ClassVar[str] = ""
+    reads: ClassVar[tuple[str, ...]] = ()
 
     use: str
 

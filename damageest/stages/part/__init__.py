@@ -21,7 +21,6 @@ class ReadPart(Stage, ABC):
     stage: ClassVar[str] = "part"
     takes: ClassVar[Mapping[str, object]] = {"unit": str, "tolerance": float | None}
     gives: ClassVar[str] = "part"
-    reads: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def run(self, *args: Any, **kwargs: Any) -> Part: ...

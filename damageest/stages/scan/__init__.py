@@ -20,7 +20,6 @@ class ReadScan(Stage, ABC):
     stage: ClassVar[str] = "scan"
     takes: ClassVar[Mapping[str, object]] = {"unit": str, "part": Part}
     gives: ClassVar[str] = "scan"
-    reads: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def run(self, *args: Any, **kwargs: Any) -> Scan: ...

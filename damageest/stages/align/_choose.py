@@ -1,0 +1,133 @@
+"""Which of several poses the scan speaks for, and which of them it cannot tell apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import Floats
+from damageest.stages.align._field import Field, Target
+from damageest.stages.align._fine import fit, loss, moved
+from damageest.stages.align._points import Cloud, surface_cloud
+from damageest.stages.align._search import distinct, refine, score
+from damageest.stages.align._turns import Axis, common_axis, families
+
+TRIED = 40
+"""Poses fitted exactly at most: all those of a gear of twenty teeth, either way up."""
+
+COARSE = 0.008
+"""Band, in diagonals, that hands over from the grid to the triangles."""
+
+FEW, SOME = 2000, 10_000
+"""Points of the fits that are only compared, and of the first comparison."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The best ``pose`` (4,4), the ``others`` (K,4,4) that fit as well, an ``axis`` about which any turn does, and the
+    ``band`` within which a point lies on the surface."""
+
+    pose: Floats
+    others: Floats
+    axis: Axis | None
+    band: float
+
+
+def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Floats, noise: float) -> Choice:
+    """Fits the promising ones of the poses (H,4,4) and their counterparts exactly and compares them point by point.
+
+    ``points`` (N,3) well spread and in random order, for the exact fit; ``scan`` for the lookups; lengths in diagonals.
+    """
+    poses, axis = _counterparts(poses, field, scan)
+    fits = [fit(target, points[:FEW], pose, COARSE, noise, 12) for pose in poses]
+    poses = np.array([one.pose for one in fits])
+    some = [target.closest(moved(pose, points[:SOME]))[0] for pose in poses]
+    band = fits[int(np.argmin([loss(distance, 0.75 * COARSE).sum() for distance in some]))].band
+    costs = [loss(distance, band) for distance in some]
+    first = costs[int(np.argmin([cost.sum() for cost in costs]))]
+    poses = poses[[not worse(cost, first) for cost in costs]]
+
+    costs = [loss(target.closest(moved(pose, points))[0], band) for pose in poses]
+    best = int(np.argmin([cost.sum() for cost in costs]))
+    equal = np.array([not worse(cost, costs[best]) for cost in costs])
+    equal[best] = False
+    pose, others = poses[best], poses[equal]
+    if axis is not None:
+        turned = axis.turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose
+        if any(worse(loss(target.closest(moved(one, points))[0], band), costs[best]) for one in turned):
+            axis = None
+    if axis is not None:
+        # One of each set of turns, then a quarter turn of each: endlessly many cannot be listed.
+        every = np.concatenate([pose[None], others])
+        heads = every[families(every, axis, 8)]
+        quarter = axis.turns(np.radians([0, 90.0, 180.0, 270.0]))
+        others = (quarter[:, None] @ heads[None]).reshape(-1, 4, 4)[1:]
+    return Choice(pose, others, axis, band)
+
+
+def _counterparts(poses: Floats, field: Field, scan: Cloud) -> tuple[Floats, Axis | None]:
+    """The promising poses, joined by those turned about the axis by which they differ, and the axis.
+
+    A pose one tooth off differs from the right one only at a keyway, and a shaft's keyway is a few degrees wide: the search
+    would have to be lucky, steps of a degree need not be.
+    """
+    poses, scores = _ranked(poses, field, scan)
+    poses = poses[_good(scores)]
+    axis = common_axis(poses)
+    if axis is not None:
+        heads = poses[families(poses, axis, 4)]
+        turned = (axis.turns(np.radians(np.arange(360)))[None] @ heads[:, None]).reshape(-1, 4, 4)
+        turned = turned[distinct(turned, score(turned, scan, field, COARSE), 2 * COARSE, 2 * TRIED)]
+        turned = refine(turned, scan, field, np.geomspace(1.5 * COARSE, 0.75 * COARSE, 5))
+        poses, scores = _ranked(np.concatenate([poses, turned]), field, scan)
+        poses = poses[_good(scores)]
+    return poses[:TRIED], axis
+
+
+def _ranked(poses: Floats, field: Field, scan: Cloud) -> tuple[Floats, Floats]:
+    scores = score(poses, scan, field, COARSE)
+    order = distinct(poses, scores, 0.5 * COARSE, len(poses))
+    return poses[order], scores[order]
+
+
+def _good(scores: Floats) -> NDArray[np.bool_]:
+    best = float(scores.max())
+    return np.asarray(scores >= best - max(0.06, 0.2 * best))
+
+
+def worse(cost: Floats, best: Floats) -> bool:
+    """Whether points (N,) costing ``cost`` are explained decidedly worse than at ``best``, compared point by point.
+
+    Decidedly: by more than chance (five standard errors) and by more than what fitting and tessellation leave, which over
+    exactly symmetric parts is below a ten-thousandth a point; a keyway makes a hundred times that.
+    """
+    more = cost - best
+    total = float(more.sum())
+    return total > 0.0005 * len(more) and total > 5 * float(np.sqrt((more**2).sum()))
+
+
+def in_words(choice: Choice, target: Target) -> tuple[str, ...]:
+    """What a user should know about the other poses; nothing where there are none."""
+    notes: list[str] = []
+    if choice.axis is not None:
+        x, y, z = choice.axis.direction + 0.0
+        notes.append(
+            f"the part fits in any turn about the axis ({x:.3f}, {y:.3f}, {z:.3f}) of its own frame (continuous symmetry): "
+            "the pose is one of endlessly many right ones; the alternatives list quarter turns"
+        )
+    elif len(choice.others):
+        notes.append(
+            f"the part fits {len(choice.others) + 1} ways equally well: the pose is one of several right ones, listed as alternatives"
+        )
+    if len(choice.others):
+        surface = surface_cloud(target.mesh, 5000, np.random.default_rng(0)).points
+        motions = choice.others @ np.linalg.inv(choice.pose)
+        apart = max(float((np.abs(target.closest(moved(D, surface))[0]) > choice.band).mean()) for D in motions)
+        if apart > 0.002:
+            notes.append(
+                f"these ways are not all symmetries of the part (up to {apart:.1%} of its surface differs): what would tell "
+                "them apart is missing or was not seen, so the damage depends on the way taken; give the pose if it is known"
+            )
+    return tuple(notes)

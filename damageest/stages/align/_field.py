@@ -1,0 +1,83 @@
+"""Where the part's surface is, as seen from anywhere: one lookup instead of one search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import Floats, Ints, Mesh
+
+Singles = NDArray[np.float32]
+
+CELLS = 220_000
+"""Cells of the field: about 1/100 of the diagonal each on a compact part."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """The part, centred and scaled to a diagonal of 1, ready for exact closest-point queries."""
+
+    mesh: Mesh
+
+    @cached_property
+    def _tree(self) -> Any:
+        import igl
+
+        tree = igl.AABB()
+        tree.init(self.mesh.vertices, self.mesh.faces)
+        return tree
+
+    @cached_property
+    def normals(self) -> Floats:
+        """(F,3) unit normals of the faces."""
+        return self.mesh.cross / np.maximum(np.linalg.norm(self.mesh.cross, axis=1), 1e-300)[:, None]
+
+    def closest(self, points: Floats) -> tuple[Floats, Floats, Ints]:
+        """Signed distance (N,), positive outside, closest points (N,3) and the faces (N,) that they lie on.
+
+        The sign is the nearest face's. On a saddle-shaped corner that can be the wrong one, which a robust fit bears.
+        """
+        square, face, foot = self._tree.squared_distance(
+            self.mesh.vertices, self.mesh.faces, np.ascontiguousarray(points, np.float64)
+        )
+        outward = np.einsum("ij,ij->i", points - foot, self.normals[face])
+        return np.copysign(np.sqrt(square), outward), foot, face
+
+
+@dataclass(frozen=True)
+class Field:
+    """A grid over the part's surroundings; each cell knows its centre's closest point and that point's plane.
+
+    A point's distance to that plane is exact on flat parts and good to second order elsewhere, so a coarse grid does. All
+    arrays are float32: ``plane`` (X*Y*Z,4) the plane's unit normal and offset, ``distance`` (X*Y*Z,) signed.
+    """
+
+    low: Singles
+    cell: float
+    shape: tuple[int, int, int]
+    plane: Singles
+    distance: Singles
+
+    @classmethod
+    def of(cls, target: Target, margin: float = 0.12) -> Field:
+        low, high = target.mesh.bounds + np.array([[-margin], [margin]])
+        cell = float(np.prod(high - low) / CELLS) ** (1 / 3)
+        shape = np.ceil((high - low) / cell).astype(int)
+        axes = [low[k] + (np.arange(shape[k]) + 0.5) * cell for k in range(3)]
+        centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        distance, foot, face = target.closest(centres)
+        normal = target.normals[face]
+        offset = -np.einsum("ij,ij->i", normal, foot)
+        plane = np.column_stack([normal, offset]).astype(np.float32)
+        size = (int(shape[0]), int(shape[1]), int(shape[2]))
+        return cls(low.astype(np.float32), cell, size, plane, distance.astype(np.float32))
+
+    def index(self, points: Singles) -> Ints:
+        """The cell of each of (...,3) points; those beyond the grid get the outermost cell, which is far outside."""
+        at = (points - self.low) * np.float32(1 / self.cell)
+        x, y, z = (np.clip(at[..., k], 0, self.shape[k] - 1).astype(np.int64) for k in range(3))
+        return (x * self.shape[1] + y) * self.shape[2] + z

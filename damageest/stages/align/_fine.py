@@ -1,0 +1,68 @@
+"""The robust fit of scan points to the part's exact triangles, and what is left over of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from damageest.artefacts import Floats
+from damageest.stages.align._field import Target
+from damageest.stages.align._search import motion
+
+REACH = 3.5
+"""Where the kernel ends, in standard deviations of the points off the surface."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted ``pose`` (4,4); ``band``: how far off the surface a point may be and still have had a say; ``residue``: by
+    how much (rms) the last step still changed the points' distances from the surface."""
+
+    pose: Floats
+    band: float
+    residue: float
+
+
+def moved(pose: Floats, points: Floats) -> Floats:
+    return points @ pose[:3, :3].T + pose[:3, 3]
+
+
+def fit(target: Target, points: Floats, pose: Floats, band: float, noise: float, rounds: int) -> Fit:
+    """Point-to-plane Gauss-Newton steps on the closest points of the triangles, weighted by Tukey's biweight.
+
+    The kernel starts ``band`` wide and narrows to `REACH` standard deviations, measured on the points within it and at
+    least ``noise``: at the end damage and dirt have no weight at all, where least squares would give them the most.
+    All lengths in diagonals of the part.
+    """
+    narrowest = max(REACH * noise, 2e-5)
+    step = residue = np.inf
+    for _ in range(rounds):
+        at = moved(pose, points)
+        distance, foot, face = target.closest(at)
+        within = np.abs(distance) < band
+        if within.sum() < 12:
+            break
+        deviation = 1.4826 * float(np.median(np.abs(distance[within])))
+        normal = target.normals[face[within]]
+        offset = np.einsum("ij,ij->i", normal, (at - foot)[within])
+        weight = (1 - (distance[within] / band) ** 2) ** 2
+        jacobian = np.column_stack([np.cross(at[within], normal), normal])
+        hessian = jacobian.T @ (jacobian * weight[:, None])
+        # A little damping holds the motions that the surface does not fix, such as a shaft's turning.
+        hessian += np.diag(np.full(6, 1e-6 * max(float(np.trace(hessian)), 1e-12)))
+        twist = -np.linalg.solve(hessian, jacobian.T @ (weight * offset))
+        pose = motion(twist[None])[0] @ pose
+        step = float(np.hypot(np.linalg.norm(twist[:3]) / 2, np.linalg.norm(twist[3:])))
+        residue = float(np.sqrt(np.average((jacobian @ twist) ** 2, weights=weight + 1e-12)))
+        narrower = min(band, max(REACH * deviation, 0.6 * band, narrowest))
+        if step < 0.003 * narrowest and narrower > 0.97 * band:
+            break
+        band = narrower
+    return Fit(pose, max(band, narrowest), residue)
+
+
+def loss(distance: Floats, band: float) -> Floats:
+    """What each point of signed ``distance`` costs: 0 on the surface, 1 beyond the band inside (damage explains it), up to
+    2 outside (nothing does)."""
+    return np.minimum((distance / band) ** 2, 1) + np.clip((distance - band) / (2 * band), 0, 1)

@@ -1,0 +1,79 @@
+"""Scan and part, centred and scaled so that the part's diagonal is 1; and poses given by the user."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import AfterValidator
+
+from damageest.artefacts import Floats, Mesh, Part, Scan
+from damageest.errors import StageError
+from damageest.stages.align._field import Target
+
+FEWEST = 200
+"""Scan points without which an alignment would be guesswork."""
+
+Rows = tuple[float, float, float, float]
+
+
+def _rigid(rows: tuple[Rows, Rows, Rows, Rows]) -> tuple[Rows, Rows, Rows, Rows]:
+    T = np.array(rows)
+    if not np.isfinite(T).all() or np.abs(T[3] - [0, 0, 0, 1]).max() > 1e-9:
+        raise ValueError("not a pose: its numbers must be finite and its last row 0, 0, 0, 1")
+    if np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() > 1e-6:
+        raise ValueError("not rigid: the upper left 3x3 must be a rotation, without scale or shear")
+    if np.linalg.det(T[:3, :3]) < 0:
+        raise ValueError("not rigid: the upper left 3x3 mirrors (its determinant is -1)")
+    return rows
+
+
+Rigid = Annotated[tuple[Rows, Rows, Rows, Rows], AfterValidator(_rigid)]
+"""A 4x4 pose as an option: four rows of four numbers, checked to be rigid."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The ``target`` and what leads to it: the part's ``size`` (its diagonal) and ``centre`` (3,), the scan's ``middle`` (3,)."""
+
+    target: Target
+    size: float
+    centre: Floats
+    middle: Floats
+
+    @classmethod
+    def of(cls, scan: Scan, part: Part) -> Frame:
+        """Raises StageError for a scan of too few or non-finite points, or of a size that cannot be the part's."""
+        from damageest.units import diagnose_scale
+
+        if len(scan.points) < FEWEST:
+            raise StageError(
+                f"the scan has {len(scan.points)} points; to align it takes {FEWEST} at least",
+                "give a denser scan, or align: none with the pose, if it is known",
+            )
+        if not np.isfinite(scan.points).all():
+            raise StageError("the scan has points that are not finite", "remove them from the file")
+        if wrong := diagnose_scale(scan.points, part.vertices, part.unit):
+            raise StageError(wrong, "set the unit of scan or part, or crop the scan to the part")
+        size, centre = part.diagonal, part.bounds.mean(0)
+        middle = np.median(scan.points[:: max(1, len(scan.points) // 100_000)], axis=0)
+        return cls(Target(Mesh((part.vertices - centre) / size, part.faces)), size, centre, middle)
+
+    def points(self, scan: Scan) -> Floats:
+        return (scan.points - self.middle) / self.size
+
+    def given(self, T: Floats) -> Floats:
+        """A pose (4,4) of the job's frames as one of the scaled ones."""
+        pose = np.eye(4)
+        pose[:3, :3] = T[:3, :3]
+        pose[:3, 3] = (T[:3, 3] + T[:3, :3] @ self.middle - self.centre) / self.size
+        return pose
+
+    def result(self, pose: Floats) -> Floats:
+        """The reverse of `given`, with the rotation made exactly one (products of many steps drift)."""
+        u, _, v = np.linalg.svd(pose[:3, :3])
+        T = np.eye(4)
+        T[:3, :3] = u @ v
+        T[:3, 3] = pose[:3, 3] * self.size + self.centre - T[:3, :3] @ self.middle
+        return T

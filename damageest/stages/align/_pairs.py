@@ -1,0 +1,107 @@
+"""Poses to try, from pairs of oriented points that look alike on scan and part.
+
+Two oriented points have four figures that no motion changes: their distance, the angle of each normal with the line
+between them, and the angle between the normals round that line. A pair on the scan and a pair on the part with the
+same four figures give a full pose. The figures of the part's pairs are hashed once (Drost et al. 2010; pairs drawn at
+random as by Papazov and Burschka 2010).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints
+from damageest.stages.align._points import Cloud, by_direction
+
+MODEL_POINTS, MODEL_PAIRS = 1600, 1_600_000
+SCAN_POINTS, SCAN_PAIRS, KEPT_PAIRS = 1200, 40_000, 6000
+SHORTEST = 0.12
+BINS = (26, 18, 18, 24)
+"""Of the distance (0 to 1, in diagonals), the two angles with the line, the angle round the line."""
+
+
+def candidates(scan: Cloud, part: Cloud, wanted: int, rng: np.random.Generator) -> Floats:
+    """About ``wanted`` poses (H,4,4) from scan to part, of which some are near the true one.
+
+    Where the scan's normals have no sign, every pair is tried with both signs at either end.
+    """
+    part_points = by_direction(part, MODEL_POINTS, rng)
+    scan_points = by_direction(scan, SCAN_POINTS, rng)
+    i, j = rng.integers(0, len(part_points.points), (2, MODEL_PAIRS))
+    key, good = _keys(part_points, i, j, np.ones(MODEL_PAIRS), np.ones(MODEL_PAIRS))
+    i, j, key = i[good], j[good], key[good]
+    order = np.argsort(key, kind="stable")
+    i, j, key = i[order], j[order], key[order]
+
+    p, q = rng.integers(0, len(scan_points.points), (2, SCAN_PAIRS))
+    ones = np.ones(SCAN_PAIRS)
+    signs = [(1, 1)] if scan.signed else [(1, 1), (1, -1), (-1, 1), (-1, -1)]
+    tried = [(p, q, ones * a, ones * b, *_keys(scan_points, p, q, ones * a, ones * b)) for a, b in signs]
+    p, q, a, b, wish, good = (np.concatenate(column) for column in zip(*tried, strict=True))
+    first, last = np.searchsorted(key, wish, "left"), np.searchsorted(key, wish, "right")
+    count = np.where(good, last - first, 0)
+    # A pair that looks like a thousand others says little: each pair gets an equal share of the trials, rare ones first.
+    chance = np.where(count > 0, 1 / np.maximum(count, 12), 0)
+    if not chance.any():
+        return np.eye(4)[None]
+    total = np.cumsum(chance)
+    at = (np.arange(KEPT_PAIRS) + rng.random(KEPT_PAIRS)) / KEPT_PAIRS * total[-1]
+    chosen = np.unique(np.minimum(np.searchsorted(total, at), len(total) - 1))
+    share = np.minimum(count[chosen], max(4, wanted // len(chosen)))
+    chosen = np.repeat(chosen, share)
+    match = first[chosen] + (rng.random(len(chosen)) * count[chosen]).astype(np.int64)
+
+    ones, ends = np.ones(len(match)), (p[chosen], q[chosen], a[chosen], b[chosen])
+    cosine = np.einsum("ij,ij->i", scan_points.normals[ends[0]], scan_points.normals[ends[1]]) * ends[2] * ends[3]
+    scan_frame, scan_origin = _frames(scan_points, *ends, cosine)
+    part_frame, part_origin = _frames(part_points, i[match], j[match], ones, ones, cosine)
+    poses = np.tile(np.eye(4), (len(chosen), 1, 1))
+    poses[:, :3, :3] = part_frame @ np.swapaxes(scan_frame, 1, 2)
+    poses[:, :3, 3] = part_origin - np.einsum("hij,hj->hi", poses[:, :3, :3], scan_origin)
+    return poses
+
+
+def _keys(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, np.ndarray]:
+    """The hash (M,) of each pair's four figures, and whether they are well defined. ``a``, ``b``: signs of the normals."""
+    line = cloud.points[j] - cloud.points[i]
+    length = np.linalg.norm(line, axis=1)
+    line = line / np.maximum(length, 1e-12)[:, None]
+    n, m = cloud.normals[i] * a[:, None], cloud.normals[j] * b[:, None]
+    along, beside = np.einsum("ij,ij->i", n, line), np.einsum("ij,ij->i", m, line)
+    side, other = n - along[:, None] * line, m - beside[:, None] * line
+    turn = np.arctan2(np.einsum("ij,ij->i", np.cross(side, other), line), np.einsum("ij,ij->i", side, other))
+    figures = (
+        length,
+        np.arccos(np.clip(along, -1, 1)) / np.pi,
+        np.arccos(np.clip(beside, -1, 1)) / np.pi,
+        (turn / (2 * np.pi) + 0.5 / BINS[3]) % 1.0,
+    )
+    key = np.zeros(len(i), np.int64)
+    for figure, bins in zip(figures, BINS, strict=True):
+        # Half a bin's offset keeps the commonest figures, multiples of a right angle, in the middle of a bin.
+        key = key * (bins + 1) + np.clip(figure * bins + (0.5 if figure is not figures[3] else 0.0), 0, bins).astype(
+            np.int64
+        )
+    # Round a line that both normals follow, nothing is fixed.
+    good = (length > SHORTEST) & (np.abs(along) < 0.94) & (np.abs(beside) < 0.94)
+    return key, good
+
+
+def _frames(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats, cosine: Floats) -> tuple[Floats, Floats]:
+    """A right-handed frame (M,3,3), columns the axes, and an origin (M,3) that move with the pair.
+
+    From the two normals where they differ enough by ``cosine`` (M,), since they are better known than the line; else from
+    their mean and the line.
+    """
+    n, m = cloud.normals[i] * a[:, None], cloud.normals[j] * b[:, None]
+    line = cloud.points[j] - cloud.points[i]
+    alike = np.abs(cosine) > 0.85
+    parallel = n + np.where(cosine < 0, -1.0, 1.0)[:, None] * m
+    x = _unit(np.where(alike[:, None], parallel, n + m))
+    y = np.where(alike[:, None], line, n - m)
+    y = _unit(y - np.einsum("ij,ij->i", x, y)[:, None] * x)
+    return np.stack([x, y, np.cross(x, y)], axis=2), (cloud.points[i] + cloud.points[j]) / 2
+
+
+def _unit(v: Floats) -> Floats:
+    return v / np.maximum(np.linalg.norm(v, axis=1), 1e-12)[:, None]

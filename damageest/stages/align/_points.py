@@ -1,0 +1,116 @@
+"""Few, well-spread, oriented points out of a scan of any size and density."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints, Mesh
+
+DENSE = 120_000
+"""Scan points that the density and the normals are measured on; more of them cost time and teach nothing new."""
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Oriented points: ``points`` (N,3), unit ``normals`` (N,3). ``signed`` tells whether the normals point outward or only
+    lie along the surface's normal, either way round."""
+
+    points: Floats
+    normals: Floats
+    signed: bool
+
+    def take(self, index: Ints) -> Cloud:
+        return Cloud(self.points[index], self.normals[index], self.signed)
+
+
+def strided(count: int, wanted: int, rng: np.random.Generator) -> Ints:
+    """About ``wanted`` of ``count`` indices, one drawn from each of as many equal stretches."""
+    if wanted >= count:
+        return np.arange(count)
+    edges = np.linspace(0, count, wanted + 1)
+    return np.minimum((edges[:-1] + rng.random(wanted) * np.diff(edges)).astype(np.int64), count - 1)
+
+
+def spread(points: Floats, weights: Floats, wanted: int, rng: np.random.Generator) -> Ints:
+    """Draws about ``wanted`` indices with chance proportional to ``weights`` (N,), evenly in space.
+
+    Systematic sampling along a Morton curve: neighbours in the curve are neighbours in space, so equal steps of the
+    summed weight leave neither clumps nor holes. No index comes twice.
+    """
+    if wanted >= len(points):
+        return np.arange(len(points))
+    low = points.min(0)
+    cells = ((points - low) / max(float(np.ptp(points, axis=0).max()), 1e-300) * 1023).astype(np.int64)
+    code = np.zeros(len(points), np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    order = np.argsort(code, kind="stable")
+    total = np.cumsum(weights[order])
+    at = (np.arange(wanted) + rng.random(wanted)) / wanted * total[-1]
+    return np.unique(order[np.minimum(np.searchsorted(total, at), len(order) - 1)])
+
+
+def scan_cloud(
+    points: Floats, normals: Floats | None, noise: float, wanted: int, rng: np.random.Generator
+) -> tuple[Floats, Floats, Cloud]:
+    """The dense subset (D,3), the weight of each of its points (D,), and about ``wanted`` oriented points.
+
+    ``points`` (N,3) and ``noise`` in units of the part's diagonal. A point's weight is the area that it stands for, so
+    that the density of the scan does not matter; a point far from its neighbours is an outlier and weighs nothing.
+    Normals come from the neighbourhood's principal axes, wide enough for the noise; they are signed only where the scan
+    brings normals of its own.
+    """
+    from scipy.spatial import cKDTree
+
+    index = strided(len(points), DENSE, rng)
+    dense = points[index]
+    tree = cKDTree(dense)
+    reach = tree.query(dense, k=min(9, len(dense)), workers=-1)[0][:, -1]
+    typical = float(np.median(reach))
+    weights = np.where(reach < 5 * typical, np.minimum(reach, 2.5 * typical) ** 2, 0.0)
+
+    chosen = spread(dense, weights, wanted, rng)
+    radius = float(np.clip(max(8 * noise, 2.5 * typical), 0.006, 0.03))
+    near = tree.query(dense[chosen], k=min(64, len(dense)), distance_upper_bound=radius, workers=-1)[1]
+    there = near < len(dense)
+    around = dense[np.minimum(near, len(dense) - 1)] - dense[chosen][:, None]
+    count = np.maximum(there.sum(1), 1)[:, None]
+    around = (around - (around * there[..., None]).sum(1, keepdims=True) / count[..., None]) * there[..., None]
+    value, axes = np.linalg.eigh(np.swapaxes(around, 1, 2) @ around)
+    direction = axes[:, :, 0]
+    flat = (there.sum(1) >= 6) & (value[:, 0] < 0.15 * value[:, 1])
+    if normals is not None:
+        given = normals[index][chosen]
+        direction = np.where(np.einsum("ij,ij->i", direction, given)[:, None] < 0, -direction, direction)
+        flat &= np.linalg.norm(given, axis=1) > 0.5
+    keep = np.flatnonzero(flat)
+    return dense, weights, Cloud(dense[chosen][keep], direction[keep], normals is not None)
+
+
+def surface_cloud(part: Mesh, wanted: int, rng: np.random.Generator) -> Cloud:
+    """``wanted`` points spread over a mesh by area, with the normals of their faces."""
+    double = np.linalg.norm(part.cross, axis=1)
+    total = np.cumsum(double)
+    at = (np.arange(wanted) + rng.random(wanted)) / wanted * total[-1]
+    face = np.minimum(np.searchsorted(total, at), len(total) - 1)
+    u, v = rng.random((2, wanted))
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    a, b, c = np.moveaxis(part.triangles[face], 1, 0)
+    points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return Cloud(points, part.cross[face] / np.maximum(double[face], 1e-300)[:, None], True)
+
+
+def by_direction(cloud: Cloud, wanted: int, rng: np.random.Generator) -> Cloud:
+    """``wanted`` points of a cloud, rare directions of the normal over-represented: a plate's rim says more about its
+    pose than another thousand points on its faces."""
+    count = 128
+    step = np.arange(count) + 0.5
+    polar, azimuth = np.arccos(1 - 2 * step / count), np.pi * (1 + 5**0.5) * step
+    compass = np.stack([np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)], 1)
+    match = cloud.normals @ compass.T
+    nearest = np.argmax(match if cloud.signed else np.abs(match), axis=1)
+    weights = 1 / np.sqrt(np.bincount(nearest, minlength=count)[nearest])
+    return cloud.take(spread(cloud.points, weights, wanted, rng))

@@ -1,0 +1,110 @@
+"""From many rough poses to the few that could be true, all of them refined and judged side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import Floats, Ints
+from damageest.stages.align._field import Field, Singles
+from damageest.stages.align._points import Cloud, by_direction
+
+CHUNK = 2_000_000
+"""Points looked up at a time, for the memory's sake."""
+
+
+def score(poses: Floats, scan: Cloud, field: Field, band: float) -> Floats:
+    """How well each of the poses (H,4,4) explains the scan: 1 where all points lie on the surface.
+
+    A point within ``band`` of the surface and facing its way counts for it, the more the closer. A point inside the part
+    is damage and counts nothing. A point outside is what no pose of this part explains: it counts against.
+    """
+    result = np.empty(len(poses))
+    step = max(1, CHUNK // len(scan.points))
+    for start in range(0, len(poses), step):
+        part = slice(start, start + step)
+        _, offset, near, agree, distance = _look(poses[part], scan, field, band)
+        good = np.maximum(1 - (offset / band) ** 2, 0) * agree * near
+        bad = np.clip((distance - band) / (2 * band), 0, 1)
+        result[part] = (good - 0.7 * bad).mean(1, dtype=np.float64)
+    return result
+
+
+def refine(poses: Floats, scan: Cloud, field: Field, bands: Floats) -> Floats:
+    """Robust point-to-plane steps, one per entry of ``bands``, for all poses (H,4,4) at once.
+
+    Weights are Tukey's with the band as their reach, so that points on damage have no say.
+    """
+    poses = poses.copy()
+    step = max(1, CHUNK // 4 // len(scan.points))
+    for band in bands:
+        for start in range(0, len(poses), step):
+            part = slice(start, start + step)
+            moved, offset, near, agree, index = _look(poses[part], scan, field, float(band), planes=True)
+            weight = np.maximum(1 - (offset / np.float32(band)) ** 2, 0) ** 2 * agree * near
+            normal = field.plane[index][..., :3]
+            jacobian = np.concatenate([np.cross(moved, normal), normal], axis=2)
+            weighted = jacobian * weight[..., None]
+            hessian = (np.swapaxes(weighted, 1, 2) @ jacobian).astype(np.float64)
+            gradient = (np.swapaxes(weighted, 1, 2) @ offset[..., None]).astype(np.float64)
+            damping = 1e-3 * len(scan.points) * np.diag([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
+            poses[part] = motion(-np.linalg.solve(hessian + damping, gradient)[..., 0]) @ poses[part]
+    return poses
+
+
+def motion(twist: Floats) -> Floats:
+    """Rigid motions (H,4,4) by rotation vectors and translations (H,6)."""
+    from scipy.spatial.transform import Rotation
+
+    result = np.tile(np.eye(4), (len(twist), 1, 1))
+    result[:, :3, :3] = Rotation.from_rotvec(twist[:, :3]).as_matrix()
+    result[:, :3, 3] = twist[:, 3:]
+    return result
+
+
+def distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:
+    """Indices of the best ``wanted`` poses, none within ``apart`` of a better one, best first.
+
+    The distance of two poses is the rms over the corners of a cube as large as the part.
+    """
+    corner = np.array([[x, y, z, 1.0] for x in (-0.3, 0.3) for y in (-0.3, 0.3) for z in (-0.3, 0.3)])
+    # Corners in the part's frame, taken back to the scan's by each pose: a pose's inverse is as telling as the pose.
+    where = (np.linalg.inv(poses)[:, :3] @ corner.T).reshape(len(poses), -1) / np.sqrt(len(corner))
+    chosen: list[int] = []
+    free = np.ones(len(poses), bool)
+    for index in np.argsort(-scores, kind="stable"):
+        if free[index]:
+            chosen.append(int(index))
+            if len(chosen) == wanted:
+                break
+            free &= ((where - where[index]) ** 2).sum(1) > apart**2
+    return np.array(chosen, np.int64)
+
+
+def _look(
+    poses: Floats, scan: Cloud, field: Field, band: float, planes: bool = False
+) -> tuple[Singles, Singles, NDArray[np.bool_], Singles, NDArray]:
+    """Moved points (H,M,3), their offsets from the nearest plane, whether that plane is near, how well the normals agree
+    (0 to 1), and the cells' signed distances, or with ``planes`` the cells."""
+    turn = np.swapaxes(poses[:, :3, :3], 1, 2).astype(np.float32)
+    moved = scan.points.astype(np.float32) @ turn + poses[:, None, :3, 3].astype(np.float32)
+    facing = scan.normals.astype(np.float32) @ turn
+    index = field.index(moved)
+    plane = field.plane[index]
+    offset = np.einsum("hmk,hmk->hm", moved, plane[..., :3]) + plane[..., 3]
+    distance = field.distance[index]
+    cosine = np.einsum("hmk,hmk->hm", facing, plane[..., :3])
+    agree = np.clip((cosine if scan.signed else np.abs(cosine)) * 2 - 0.8, 0, 1)
+    return moved, offset, np.abs(distance) < band + field.cell, agree, index if planes else distance
+
+
+def search(poses: Floats, scan: Cloud, field: Field, rng: np.random.Generator) -> Floats:
+    """The poses (K,4,4), some 80 at most and best first, that are left of the rough ones (H,4,4) after each was refined."""
+    few, some, many = (by_direction(scan, count, rng) for count in (100, 250, 600))
+    poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:3000]]
+    poses = refine(poses, few, field, np.array([0.06, 0.05, 0.04, 0.03]))
+    poses = poses[distinct(poses, score(poses, some, field, 0.03), 0.03, 400)]
+    poses = refine(poses, some, field, np.geomspace(0.04, 0.012, 5))
+    poses = poses[distinct(poses, score(poses, many, field, 0.012), 0.015, 80)]
+    poses = refine(poses, many, field, np.geomspace(0.015, 0.006, 5))
+    return poses[np.argsort(-score(poses, many, field, 0.008), kind="stable")]

@@ -1,0 +1,36 @@
+"""Scans that are in the part's frame already, or whose pose is known."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field as Option
+
+from damageest.artefacts import Part, Pose, Scan
+from damageest.stages.align import Align
+from damageest.stages.align._frame import Rigid
+
+
+class Unaligned(Align):
+    """Takes the pose as given: no motion, or the one named. Nothing is fitted or checked, only reported."""
+
+    use: Literal["none"] = "none"
+    T_part_scan: Rigid | None = Option(
+        None, description="the pose, 4x4, scanner's frame to the part's, in the job's unit; default: no motion"
+    )
+
+    def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
+        """The given pose; inliers are the scan points within the tolerance of the part (of at most some 100,000)."""
+        from damageest.stages.align._field import Target
+
+        T = np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan)
+        if not len(scan.points):
+            return Pose(T, inliers=0.0, notes=("the scan has no points",))
+        points = scan.points[:: max(1, len(scan.points) // 100_000)]
+        distance = Target(part).closest(points @ T[:3, :3].T + T[:3, 3])[0]
+        hit = np.abs(distance) <= tolerance
+        rms = float(np.sqrt((distance[hit] ** 2).mean())) if hit.any() else 0.0
+        share = float(hit.mean())
+        notes = () if share >= 0.35 else (f"only {share:.0%} of the scan lies on the part in the pose given",)
+        return Pose(T, rms, share, notes=notes)

@@ -1,0 +1,62 @@
+"""Alignment with no initial guess."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field as Option
+
+from damageest.artefacts import Part, Pose, Scan
+from damageest.stages.align import Align
+
+
+class Register(Align):
+    """Finds the pose with no initial guess, then fits it robustly to the exact triangles (paper 3.1 step 3).
+
+    Poses to try come from pairs of scan points with their normals that look like pairs on the part; all are refined and
+    scored side by side, and the best compared point by point with their counterparts under the part's symmetries. A third
+    of the metal missing, a third of the surface unseen, outliers and added metal are borne.
+    """
+
+    use: Literal["register"] = "register"
+    seed: int = Option(0, ge=0, description="seed of the random draws; the same seed gives the same pose, bit by bit")
+    trials: int = Option(60_000, ge=1000, le=2_000_000, description="number of poses tried before the best are refined")
+    points: int = Option(30_000, ge=1000, le=120_000, description="number of scan points that the final fit rests on")
+
+    def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
+        """Raises StageError where no pose explains the scan: another part, another unit, or mostly clutter."""
+        from damageest.errors import StageError
+        from damageest.stages.align._choose import COARSE, choose, in_words
+        from damageest.stages.align._field import Field
+        from damageest.stages.align._fine import fit
+        from damageest.stages.align._frame import FEWEST, Frame
+        from damageest.stages.align._judge import judge
+        from damageest.stages.align._pairs import candidates
+        from damageest.stages.align._points import scan_cloud, spread, strided, surface_cloud
+        from damageest.stages.align._search import search
+
+        frame = Frame.of(scan, part)
+        target, noise = frame.target, scan.noise / frame.size
+        rng = np.random.default_rng(self.seed)
+        dense, weights, oriented = scan_cloud(frame.points(scan), scan.normals, noise, 3000, rng)
+        if len(oriented.points) < FEWEST // 4:
+            raise StageError(
+                f"only {len(oriented.points)} places of the scan look like a surface; the rest is too sparse or too noisy",
+                "give a denser scan, or align: none with the pose, if it is known",
+            )
+        field = Field.of(target)
+        rough = candidates(oriented, surface_cloud(target.mesh, 20_000, rng), self.trials, rng)
+        few = oriented.take(strided(len(oriented.points), 1500, rng))
+        fine = rng.permutation(dense[spread(dense, weights, self.points, rng)])
+        choice = choose(search(rough, oriented, field, rng), target, field, few, fine, noise)
+        best = fit(target, fine, choice.pose, COARSE / 2, noise, 30)
+        verdict = judge(target, best, fine, dense, tolerance / frame.size)
+        if not verdict.sound:
+            raise verdict.refuse(
+                "check that scan and part belong together and have the right unit; crop a fixture or table away; where the "
+                "pose is known, give it to align: icp or align: none"
+            )
+        others = np.array([frame.result(pose) for pose in choice.others]) if len(choice.others) else None
+        notes = in_words(choice, target)
+        return Pose(frame.result(best.pose), verdict.rms * frame.size, verdict.inliers, others, notes)
