@@ -40,7 +40,8 @@ class State:
 
 @dataclass
 class Engine:
-    """One run of a job. ``records`` and ``failures`` grow as it goes; ``stems`` are the cache entries it used."""
+    """One run of a job. ``records`` and ``failures`` grow as it goes; ``stems`` are the cache entries it used,
+    ``whole`` the state of the job as it was when the work was split up by sites."""
 
     job: Job
     registry: Registry
@@ -50,6 +51,7 @@ class Engine:
     warnings: list[str] = field(default_factory=list)
     stems: list[str] = field(default_factory=list)
     memo: dict[str, Any] = field(default_factory=dict)
+    whole: State = field(default_factory=lambda: State({}, {}))
 
     def call(self, contract: Contract, state: State) -> State:
         """Runs the job's implementation of a contract on a state, or takes what it gave before on the same."""

@@ -7,7 +7,7 @@ contract is called once on each lane; a joint takes all lanes and gives the next
 from __future__ import annotations
 
 from damageest.engine import Route
-from damageest.joints import each_cluster, each_enclosure, either, gather, measured, placed, settled
+from damageest.joints import damaged, each_cluster, each_enclosure, either, gather, measured, numbered, placed, settled
 from damageest.stages.align import Align
 from damageest.stages.allowance import Allowance
 from damageest.stages.background import Background
@@ -22,12 +22,12 @@ from damageest.stages.sample import Sample
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
-ACQUIRE: Route = (ReadPart, ReadScan, measured, Sample, Align, placed, Segment, Cluster)
+ACQUIRE: Route = (ReadPart, ReadScan, measured, Sample, Align, placed, Segment, Cluster, damaged)
 BY_SITE: Route = (each_cluster, Reconstruct, Boundary, Background, Enclose, Repair, Boolean, settled)
 AT_ONCE: Route = (EncloseAll, each_enclosure, Boolean, settled)
 
 ROUTES: dict[str, Route] = {
-    "surface": (*ACQUIRE, *BY_SITE, Allowance, gather),
-    "implicit": (*ACQUIRE, *AT_ONCE, Allowance, gather),
-    "auto": (*ACQUIRE, either(AT_ONCE, BY_SITE), Allowance, gather),
+    "surface": (*ACQUIRE, *BY_SITE, numbered, Allowance, gather),
+    "implicit": (*ACQUIRE, *AT_ONCE, numbered, Allowance, gather),
+    "auto": (*ACQUIRE, either(AT_ONCE, BY_SITE), numbered, Allowance, gather),
 }

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from damageest.artefacts import Floats, Ints, Mesh
+from damageest.artefacts import Floats, Ints, Mesh, Solid
 
 
 def to_manifold(mesh: Mesh, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
@@ -29,3 +30,31 @@ def to_arrays(body: Any, origin: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[Floats, I
     mesh = body.to_mesh64()
     vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3] + np.asarray(origin, dtype=np.float64)
     return vertices, np.asarray(mesh.tri_verts).astype(np.int64)
+
+
+def to_solid(body: Any, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Solid | None:
+    """A Manifold as a Solid, moved by ``origin``; None where it is empty or has no volume to speak of."""
+    if body.is_empty():
+        return None
+    vertices, faces = to_arrays(body, origin)
+    try:
+        return Solid(vertices, faces)
+    except ValueError:
+        return None
+
+
+def united(solids: Iterable[Mesh], origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
+    """The union of watertight meshes as a Manifold, relative to ``origin``; empty where there are none."""
+    from manifold3d import Manifold, OpType
+
+    return Manifold.batch_boolean([to_manifold(solid, origin) for solid in solids] or [Manifold()], OpType.Add)
+
+
+def iou(first: Mesh | None, second: Mesh | None) -> float:
+    """Intersection over union of two solids; 1 where both are nothing."""
+    if first is None or second is None:
+        return float(first is second)
+    origin = first.bounds.mean(axis=0)
+    a, b = to_manifold(first, origin), to_manifold(second, origin)
+    common = (a ^ b).volume()
+    return float(common / (a.volume() + b.volume() - common))

@@ -1,0 +1,122 @@
+"""The check of a damage volume (DV) against the scan it came from, whatever method made it.
+
+A right DV has its IDS points on its boundary, no sound point inside it or on the skin it takes away, and scan points
+all over its inner surface. A wrong side, a swallowed neighbour, a flat cap each break one of these.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import INTACT, Deviation, Evidence, Floats, Part, Scan, Solid
+from damageest.settle import inner_faces
+
+MOST = 20_000
+"""Points looked at for each figure; more would not change its second digit."""
+
+
+def weigh(
+    damage: Solid, ids_points: Floats, aligned: Scan, deviation: Deviation, part: Part, tolerance: float
+) -> Evidence:
+    """Weighs one DV.
+
+    Args:
+        ids_points: (M,3) the site's IDS points. aligned, deviation: the whole scan, in the part's frame.
+    """
+    import igl
+    from scipy.spatial import cKDTree
+
+    spacing = aligned.spacing
+    reach = max(2.0 * tolerance, 1.5 * spacing)
+    low, high = damage.bounds[0] - 4 * reach, damage.bounds[1] + 4 * reach
+    here = ((aligned.points > low) & (aligned.points < high)).all(axis=1)
+    points, label = aligned.points[here], deviation.label[here]
+    origin = damage.bounds.mean(axis=0)
+    vertices, faces = np.ascontiguousarray(damage.vertices - origin), np.array(damage.faces)
+
+    ids = ids_points[:: max(1, len(ids_points) // MOST)]
+    squared, _, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(ids - origin), vertices, faces)
+    residual = float(np.quantile(np.sqrt(squared), 0.95))
+
+    intact = points[label == INTACT]
+    inside = 0
+    if len(intact):
+        depth, *_ = igl.signed_distance(
+            np.ascontiguousarray(intact - origin), vertices, faces,
+            sign_type=igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
+        )  # fmt: skip
+        inside = int((depth < -1.5 * tolerance).sum())
+
+    inner = inner_faces(damage, part)
+    on_ids = _sampled(damage, inner, MOST // 2)
+    on_skin = _sampled(damage, ~inner, MOST // 2)
+    bare = _far(on_ids, points, 1.5 * reach)
+    contradicted = 0.0
+    if len(on_skin) and len(intact) and len(on_ids):
+        # Close to the rim sound points are near any skin, so only skin away from the inner surface speaks.
+        clear = cKDTree(on_ids).query(on_skin, distance_upper_bound=1.5 * reach)[0] > 1.5 * reach
+        asked = on_skin[clear]
+        contradicted = float(1 - _far(asked, intact, max(spacing, tolerance))) if len(asked) > 20 else 0.0
+    unseen = _unseen(part, damage, points, on_skin, reach)
+
+    reasons = []
+    if residual > 1.5 * tolerance + 0.25 * spacing:
+        reasons.append(f"its boundary misses the damaged points (95 % within {residual:.3g})")
+    if inside > max(5, 0.005 * len(ids_points)):
+        reasons.append(f"{inside} sound points lie inside it")
+    if contradicted > 0.1:
+        reasons.append(f"sound points lie on {contradicted:.0%} of the skin it takes away")
+    if bare > 0.1:
+        reasons.append(f"{bare:.0%} of its inner surface has no scan point near")
+    if unseen > 0.25:
+        reasons.append(f"{unseen:.0%} of the skin beside it shows no scan point: the damage may go on there")
+    return Evidence(residual, inside, contradicted, unseen, not reasons, tuple(reasons))
+
+
+def _far(places: Floats, points: Floats, distance: float) -> float:
+    """Share of the places (N,3) with none of the points within a distance."""
+    from scipy.spatial import cKDTree
+
+    if not len(places):
+        return 0.0
+    if not len(points):
+        return 1.0
+    return float(np.isinf(cKDTree(points).query(places, distance_upper_bound=distance, workers=2)[0]).mean())
+
+
+def _unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: float) -> float:
+    """Share of the part's skin just outside the DV that carries no scan point."""
+    import igl
+    from scipy.spatial import cKDTree
+
+    if not len(on_skin):
+        return 0.0
+    low, high = damage.bounds[0] - 6 * reach, damage.bounds[1] + 6 * reach
+    corners = part.triangles
+    near = ((corners.min(axis=1) < high) & (corners.max(axis=1) > low)).all(axis=1)
+    count = int(np.clip(np.linalg.norm(part.cross[near], axis=1).sum() / 2 / (0.5 * reach) ** 2, 1000, 10 * MOST))
+    skin = _sampled(part, near, count)
+    skin = skin[cKDTree(on_skin).query(skin, distance_upper_bound=6 * reach)[0] < np.inf]
+    if not len(skin):
+        return 0.0
+    origin = damage.bounds.mean(axis=0)
+    squared, _, _ = igl.point_mesh_squared_distance(
+        np.ascontiguousarray(skin - origin), np.ascontiguousarray(damage.vertices - origin), np.array(damage.faces)
+    )
+    ring = skin[(squared > (2 * reach) ** 2) & (squared < (6 * reach) ** 2)]
+    return _far(ring, points, 2 * reach) if len(ring) > 20 else 0.0
+
+
+def _sampled(mesh: Solid, chosen: np.ndarray[tuple[int], np.dtype[np.bool_]], count: int) -> Floats:
+    """``count`` points spread evenly by area over the chosen faces; the same ones each time."""
+    if not chosen.any():
+        return np.empty((0, 3))
+    rng = np.random.default_rng(0)
+    area = np.linalg.norm(mesh.cross[chosen], axis=1).cumsum()
+    if area[-1] <= 0:
+        return np.empty((0, 3))
+    face = np.searchsorted(area, (np.arange(count) + rng.random(count)) / count * area[-1]).clip(max=len(area) - 1)
+    u, v = rng.random((2, count, 1))
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    a, b, c = np.moveaxis(mesh.triangles[chosen][face], 1, 0)
+    return np.asarray(a + u * (b - a) + v * (c - a))
