@@ -48,6 +48,7 @@ def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Flo
     costs = [loss(distance, band) for distance in some]
     first = costs[int(np.argmin([cost.sum() for cost in costs]))]
     poses = poses[[not worse(cost, first) for cost in costs]]
+    poses = poses[distinct(poses, np.zeros(len(poses)), 0.25 * COARSE, TRIED)]
 
     costs = [loss(target.closest(moved(pose, points))[0], band) for pose in poses]
     best = int(np.argmin([cost.sum() for cost in costs]))
@@ -55,7 +56,9 @@ def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Flo
     equal[best] = False
     pose, others = poses[best], poses[equal]
     if axis is not None:
+        # Fitted again, since the axis is known no better than the candidates were.
         turned = axis.turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose
+        turned = np.array([fit(target, points[:FEW], one, 2 * band, noise, 6).pose for one in turned])
         if any(worse(loss(target.closest(moved(one, points))[0], band), costs[best]) for one in turned):
             axis = None
     if axis is not None:
@@ -70,8 +73,8 @@ def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Flo
 def _counterparts(poses: Floats, field: Field, scan: Cloud) -> tuple[Floats, Axis | None]:
     """The promising poses, joined by those turned about the axis by which they differ, and the axis.
 
-    A pose one tooth off differs from the right one only at a keyway, and a shaft's keyway is a few degrees wide: the search
-    would have to be lucky, steps of a degree need not be.
+    A pose one tooth off differs from the right one only at a keyway, and a shaft's keyway is a few degrees wide: the
+    search would have to be lucky, steps of a degree need not be.
     """
     poses, scores = _ranked(poses, field, scan)
     poses = poses[_good(scores)]
@@ -100,8 +103,8 @@ def _good(scores: Floats) -> NDArray[np.bool_]:
 def worse(cost: Floats, best: Floats) -> bool:
     """Whether points (N,) costing ``cost`` are explained decidedly worse than at ``best``, compared point by point.
 
-    Decidedly: by more than chance (five standard errors) and by more than what fitting and tessellation leave, which over
-    exactly symmetric parts is below a ten-thousandth a point; a keyway makes a hundred times that.
+    Decidedly: by more than chance (five standard errors) and by more than what fitting and tessellation leave, which
+    over exactly symmetric parts is below a ten-thousandth a point; a keyway makes a hundred times that.
     """
     more = cost - best
     total = float(more.sum())
@@ -114,12 +117,13 @@ def in_words(choice: Choice, target: Target) -> tuple[str, ...]:
     if choice.axis is not None:
         x, y, z = choice.axis.direction + 0.0
         notes.append(
-            f"the part fits in any turn about the axis ({x:.3f}, {y:.3f}, {z:.3f}) of its own frame (continuous symmetry): "
-            "the pose is one of endlessly many right ones; the alternatives list quarter turns"
+            f"the part fits in any turn about the axis ({x:.3f}, {y:.3f}, {z:.3f}) of its own frame "
+            "(continuous symmetry): the pose is one of endlessly many right ones; the alternatives list quarter turns"
         )
     elif len(choice.others):
         notes.append(
-            f"the part fits {len(choice.others) + 1} ways equally well: the pose is one of several right ones, listed as alternatives"
+            f"the part fits {len(choice.others) + 1} ways equally well: the pose is one of several right ones, "
+            "listed as alternatives"
         )
     if len(choice.others):
         surface = surface_cloud(target.mesh, 5000, np.random.default_rng(0)).points
@@ -127,7 +131,8 @@ def in_words(choice: Choice, target: Target) -> tuple[str, ...]:
         apart = max(float((np.abs(target.closest(moved(D, surface))[0]) > choice.band).mean()) for D in motions)
         if apart > 0.002:
             notes.append(
-                f"these ways are not all symmetries of the part (up to {apart:.1%} of its surface differs): what would tell "
-                "them apart is missing or was not seen, so the damage depends on the way taken; give the pose if it is known"
+                f"these ways are not all symmetries of the part (up to {apart:.1%} of its surface differs): "
+                "what would tell them apart is missing or was not seen, so the damage depends on the way taken; "
+                "where the pose is known, give it to align: icp or align: none"
             )
     return tuple(notes)

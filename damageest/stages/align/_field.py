@@ -52,8 +52,8 @@ class Target:
 class Field:
     """A grid over the part's surroundings; each cell knows its centre's closest point and that point's plane.
 
-    A point's distance to that plane is exact on flat parts and good to second order elsewhere, so a coarse grid does. All
-    arrays are float32: ``plane`` (X*Y*Z,4) the plane's unit normal and offset, ``distance`` (X*Y*Z,) signed.
+    A point's distance to that plane is exact on flat parts and good to second order elsewhere, so a coarse grid does.
+    All arrays are float32: ``plane`` (X*Y*Z,4) the plane's unit normal and offset, ``distance`` (X*Y*Z,) signed.
     """
 
     low: Singles
@@ -80,4 +80,5 @@ class Field:
         """The cell of each of (...,3) points; those beyond the grid get the outermost cell, which is far outside."""
         at = (points - self.low) * np.float32(1 / self.cell)
         x, y, z = (np.clip(at[..., k], 0, self.shape[k] - 1).astype(np.int64) for k in range(3))
-        return (x * self.shape[1] + y) * self.shape[2] + z
+        cell: Ints = (x * self.shape[1] + y) * self.shape[2] + z
+        return cell

@@ -16,8 +16,8 @@ REACH = 3.5
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted ``pose`` (4,4); ``band``: how far off the surface a point may be and still have had a say; ``residue``: by
-    how much (rms) the last step still changed the points' distances from the surface."""
+    """A fitted ``pose`` (4,4); ``band``: how far off the surface a point may be and still have had a say; ``residue``:
+    by how much (rms) the last step still changed the points' distances from the surface."""
 
     pose: Floats
     band: float
@@ -63,6 +63,6 @@ def fit(target: Target, points: Floats, pose: Floats, band: float, noise: float,
 
 
 def loss(distance: Floats, band: float) -> Floats:
-    """What each point of signed ``distance`` costs: 0 on the surface, 1 beyond the band inside (damage explains it), up to
-    2 outside (nothing does)."""
+    """What each point of signed ``distance`` costs: 0 on the surface, 1 beyond the band inside (damage explains it),
+    up to 2 outside (nothing does)."""
     return np.minimum((distance / band) ** 2, 1) + np.clip((distance - band) / (2 * band), 0, 1)

@@ -35,7 +35,8 @@ Rigid = Annotated[tuple[Rows, Rows, Rows, Rows], AfterValidator(_rigid)]
 
 @dataclass(frozen=True)
 class Frame:
-    """The ``target`` and what leads to it: the part's ``size`` (its diagonal) and ``centre`` (3,), the scan's ``middle`` (3,)."""
+    """The ``target`` and what leads to it: the part's ``size`` (its diagonal) and ``centre`` (3,), and the
+    scan's ``middle`` (3,)."""
 
     target: Target
     size: float

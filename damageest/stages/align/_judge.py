@@ -13,14 +13,14 @@ from damageest.stages.align._fine import Fit, moved
 from damageest.stages.align._points import surface_cloud
 
 LEAST, LEAST_WITH_COVER, COVER = 0.38, 0.15, 0.45
-"""The share of the scanned area that must lie on the part; less will do where that much of the part's surface is covered,
-as when the part stands on a fixture that was scanned along."""
+"""The share of the scanned area that must lie on the part; less will do where that much of the part's surface is
+covered, as when the part stands on a fixture that was scanned along."""
 
 
 @dataclass(frozen=True)
 class Verdict:
     """Shares of the scanned area ``on`` the part's surface, ``inside`` it and ``outside``; ``cover``: the share of the
-    part's surface near points that lie on it; ``rms`` of the inliers' distance and their share ``inliers`` by number."""
+    part's surface near points that lie on it; ``rms`` of the inliers' distance, ``inliers`` their share by number."""
 
     on: float
     inside: float
@@ -43,7 +43,7 @@ class Verdict:
 
 
 def judge(target: Target, best: Fit, even: Floats, raw: Floats, tolerance: float) -> Verdict:
-    """``even`` (N,3): points spread evenly over the scanned area; ``raw`` (M,3): any unbiased subset; lengths in diagonals.
+    """``even`` (N,3): points spread evenly over the scanned area; ``raw`` (M,3): any unbiased subset; in diagonals.
 
     A point counts as on the surface within the tolerance, or within the fit's own band where noise makes that wider.
     """

@@ -9,6 +9,7 @@ random as by Papazov and Burschka 2010).
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
 from damageest.stages.align._points import Cloud, by_direction
@@ -40,7 +41,7 @@ def candidates(scan: Cloud, part: Cloud, wanted: int, rng: np.random.Generator) 
     p, q, a, b, wish, good = (np.concatenate(column) for column in zip(*tried, strict=True))
     first, last = np.searchsorted(key, wish, "left"), np.searchsorted(key, wish, "right")
     count = np.where(good, last - first, 0)
-    # A pair that looks like a thousand others says little: each pair gets an equal share of the trials, rare ones first.
+    # A pair that looks like a thousand others says little: each pair has an equal share of the trials.
     chance = np.where(count > 0, 1 / np.maximum(count, 12), 0)
     if not chance.any():
         return np.eye(4)[None]
@@ -61,8 +62,8 @@ def candidates(scan: Cloud, part: Cloud, wanted: int, rng: np.random.Generator) 
     return poses
 
 
-def _keys(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, np.ndarray]:
-    """The hash (M,) of each pair's four figures, and whether they are well defined. ``a``, ``b``: signs of the normals."""
+def _keys(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, NDArray[np.bool_]]:
+    """The hash (M,) of each pair's four figures, and whether they are well defined. ``a``, ``b``: the normals' signs."""
     line = cloud.points[j] - cloud.points[i]
     length = np.linalg.norm(line, axis=1)
     line = line / np.maximum(length, 1e-12)[:, None]
@@ -90,8 +91,8 @@ def _keys(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, n
 def _frames(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats, cosine: Floats) -> tuple[Floats, Floats]:
     """A right-handed frame (M,3,3), columns the axes, and an origin (M,3) that move with the pair.
 
-    From the two normals where they differ enough by ``cosine`` (M,), since they are better known than the line; else from
-    their mean and the line.
+    From the two normals where they differ enough by ``cosine`` (M,), since they are better known than the line; else
+    from their mean and the line.
     """
     n, m = cloud.normals[i] * a[:, None], cloud.normals[j] * b[:, None]
     line = cloud.points[j] - cloud.points[i]
@@ -104,4 +105,5 @@ def _frames(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats, cosine: Floats
 
 
 def _unit(v: Floats) -> Floats:
-    return v / np.maximum(np.linalg.norm(v, axis=1), 1e-12)[:, None]
+    unit: Floats = v / np.maximum(np.linalg.norm(v, axis=1), 1e-12)[:, None]
+    return unit

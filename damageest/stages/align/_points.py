@@ -14,8 +14,8 @@ DENSE = 120_000
 
 @dataclass(frozen=True)
 class Cloud:
-    """Oriented points: ``points`` (N,3), unit ``normals`` (N,3). ``signed`` tells whether the normals point outward or only
-    lie along the surface's normal, either way round."""
+    """Oriented points: ``points`` (N,3), unit ``normals`` (N,3). ``signed`` tells whether the normals point outward or
+    only lie along the surface's normal, either way round."""
 
     points: Floats
     normals: Floats
@@ -68,13 +68,13 @@ def scan_cloud(
     index = strided(len(points), DENSE, rng)
     dense = points[index]
     tree = cKDTree(dense)
-    reach = tree.query(dense, k=min(9, len(dense)), workers=-1)[0][:, -1]
+    reach = np.asarray(tree.query(dense, k=min(9, len(dense)), workers=-1)[0])[:, -1]
     typical = float(np.median(reach))
     weights = np.where(reach < 5 * typical, np.minimum(reach, 2.5 * typical) ** 2, 0.0)
 
     chosen = spread(dense, weights, wanted, rng)
     radius = float(np.clip(max(8 * noise, 2.5 * typical), 0.006, 0.03))
-    near = tree.query(dense[chosen], k=min(64, len(dense)), distance_upper_bound=radius, workers=-1)[1]
+    near = np.asarray(tree.query(dense[chosen], k=min(64, len(dense)), distance_upper_bound=radius, workers=-1)[1])
     there = near < len(dense)
     around = dense[np.minimum(near, len(dense) - 1)] - dense[chosen][:, None]
     count = np.maximum(there.sum(1), 1)[:, None]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,8 +18,8 @@ CHUNK = 2_000_000
 def score(poses: Floats, scan: Cloud, field: Field, band: float) -> Floats:
     """How well each of the poses (H,4,4) explains the scan: 1 where all points lie on the surface.
 
-    A point within ``band`` of the surface and facing its way counts for it, the more the closer. A point inside the part
-    is damage and counts nothing. A point outside is what no pose of this part explains: it counts against.
+    A point within ``band`` of the surface and facing its way counts for it, the more the closer. A point inside the
+    part is damage and counts nothing. A point outside is what no pose of this part explains: it counts against.
     """
     result = np.empty(len(poses))
     step = max(1, CHUNK // len(scan.points))
@@ -83,9 +85,9 @@ def distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:
 
 def _look(
     poses: Floats, scan: Cloud, field: Field, band: float, planes: bool = False
-) -> tuple[Singles, Singles, NDArray[np.bool_], Singles, NDArray]:
-    """Moved points (H,M,3), their offsets from the nearest plane, whether that plane is near, how well the normals agree
-    (0 to 1), and the cells' signed distances, or with ``planes`` the cells."""
+) -> tuple[Singles, Singles, NDArray[np.bool_], Singles, NDArray[Any]]:
+    """Moved points (H,M,3), their offsets from the nearest plane, whether that plane is near, how well the normals
+    agree (0 to 1), and the cells' signed distances, or with ``planes`` the cells."""
     turn = np.swapaxes(poses[:, :3, :3], 1, 2).astype(np.float32)
     moved = scan.points.astype(np.float32) @ turn + poses[:, None, :3, 3].astype(np.float32)
     facing = scan.normals.astype(np.float32) @ turn
@@ -99,7 +101,7 @@ def _look(
 
 
 def search(poses: Floats, scan: Cloud, field: Field, rng: np.random.Generator) -> Floats:
-    """The poses (K,4,4), some 80 at most and best first, that are left of the rough ones (H,4,4) after each was refined."""
+    """The at most 80 poses (K,4,4), best first, that are left of the rough ones (H,4,4) after refining."""
     few, some, many = (by_direction(scan, count, rng) for count in (100, 250, 600))
     poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:3000]]
     poses = refine(poses, few, field, np.array([0.06, 0.05, 0.04, 0.03]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
 from damageest.stages.align._search import motion
@@ -25,16 +26,16 @@ class Axis:
         result[:, :3, 3] = self.point - np.einsum("kij,j->ki", result[:, :3, :3], self.point)
         return result
 
-    def fixes(self, motions: Floats) -> np.ndarray:
+    def fixes(self, motions: Floats) -> NDArray[np.bool_]:
         """Which of the rigid motions (K,4,4) are turns about this axis, nearly (K,)."""
         direction, angle, point, slide = _screw(motions)
         same = (np.abs(direction @ self.direction) > PARALLEL) & (_gap(point, self.point, self.direction) < NEAR)
         still = (angle < 0.05) & (np.linalg.norm(motions[:, :3, 3], axis=1) < NEAR)
-        return (same & (np.abs(slide) < NEAR) & (angle > 0.05)) | still
+        return np.asarray((same & (np.abs(slide) < NEAR) & (angle > 0.05)) | still)
 
 
 def common_axis(poses: Floats) -> Axis | None:
-    """The axis about which most of the poses (K,4,4) differ from the first by a mere turn; None where fewer than two do."""
+    """The axis about which most of the poses (K,4,4) differ from the first by a turn; None where fewer than two do."""
     motions = poses[1:] @ np.linalg.inv(poses[0])
     direction, angle, point, slide = _screw(motions)
     turn = (angle > 0.1) & (np.abs(slide) < NEAR)
@@ -54,7 +55,7 @@ def common_axis(poses: Floats) -> Axis | None:
 
 
 def families(poses: Floats, axis: Axis, wanted: int) -> list[int]:
-    """Indices of at most ``wanted`` poses, the first of each set that a turn about ``axis`` carries into one another."""
+    """Indices of at most ``wanted`` poses, one of each set that turns about ``axis`` carry into one another."""
     heads: list[int] = []
     for index in range(len(poses)):
         if heads and axis.fixes(poses[index][None] @ np.linalg.inv(poses[heads])).any():
@@ -66,7 +67,7 @@ def families(poses: Floats, axis: Axis, wanted: int) -> list[int]:
 
 
 def _screw(motions: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Direction (K,3), angle (K,) in radians, a point (K,3) nearest to the origin, and slide (K,) along the direction."""
+    """Direction (K,3), angle (K,) in radians, the axis' point (K,3) nearest to the origin, slide (K,) along it."""
     from scipy.spatial.transform import Rotation
 
     vector = Rotation.from_matrix(motions[:, :3, :3]).as_rotvec()
@@ -81,4 +82,4 @@ def _screw(motions: Floats) -> tuple[Floats, Floats, Floats, Floats]:
 
 def _gap(point: Floats, other: Floats, direction: Floats) -> Floats:
     across = point - other
-    return np.linalg.norm(across - (across @ direction)[:, None] * direction, axis=1)
+    return np.asarray(np.linalg.norm(across - (across @ direction)[:, None] * direction, axis=1))

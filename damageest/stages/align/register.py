@@ -15,8 +15,8 @@ class Register(Align):
     """Finds the pose with no initial guess, then fits it robustly to the exact triangles (paper 3.1 step 3).
 
     Poses to try come from pairs of scan points with their normals that look like pairs on the part; all are refined and
-    scored side by side, and the best compared point by point with their counterparts under the part's symmetries. A third
-    of the metal missing, a third of the surface unseen, outliers and added metal are borne.
+    scored side by side, and the best compared point by point with their counterparts under the part's symmetries. A
+    third of the metal missing, a third of the surface unseen, outliers and added metal are borne.
     """
 
     use: Literal["register"] = "register"
@@ -42,7 +42,7 @@ class Register(Align):
         dense, weights, oriented = scan_cloud(frame.points(scan), scan.normals, noise, 3000, rng)
         if len(oriented.points) < FEWEST // 4:
             raise StageError(
-                f"only {len(oriented.points)} places of the scan look like a surface; the rest is too sparse or too noisy",
+                f"only {len(oriented.points)} places of the scan look like a surface, the rest is too sparse or noisy",
                 "give a denser scan, or align: none with the pose, if it is known",
             )
         field = Field.of(target)
@@ -54,8 +54,8 @@ class Register(Align):
         verdict = judge(target, best, fine, dense, tolerance / frame.size)
         if not verdict.sound:
             raise verdict.refuse(
-                "check that scan and part belong together and have the right unit; crop a fixture or table away; where the "
-                "pose is known, give it to align: icp or align: none"
+                "check that scan and part belong together and have the right unit; crop a fixture or table away; where "
+                "the pose is known, give it to align: icp or align: none"
             )
         others = np.array([frame.result(pose) for pose in choice.others]) if len(choice.others) else None
         notes = in_words(choice, target)
