@@ -192,8 +192,8 @@ def write_stl(path: Path, mesh: Mesh) -> None:
 def single_precision(solid: Solid) -> Solid | None:
     """The solid with coordinates that single precision holds, watertight even where equal vertices count as one.
 
-    Rounding can bring vertices together: the triangles that vanish are taken out. Where that opens the mesh, its smallest
-    details are collapsed first, up to 64 times the rounding. None where even then it does not close.
+    Rounding can bring vertices together: the triangles that vanish are taken out. Where that opens the mesh, its
+    smallest details are collapsed first, up to 64 times the rounding. None where even then it does not close.
     """
     for steps in (0, 2, 8, 64):
         mesh: Mesh = solid

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Files(Export):
-    """Solids as STL or PLY, inner damage surfaces as PLY, and the aligned scan with distance, label and site per point."""
+    """Solids as STL or PLY, inner damage surfaces as PLY, the aligned scan with distance, label and site per point."""
 
     use: Literal["files"] = "files"
     format: Literal["stl", "ply"] = Field(
