@@ -227,8 +227,8 @@ class _Check:
         if method == "implicit":
             for contract in sorted(surface, key=list(DEFAULTS).index):
                 self.fault("not a stage of  method: implicit; remove it, or use  method: surface", contract.stage)
-        drop = {"surface": {EncloseAll}, "implicit": set(SURFACE_ONLY), "auto": set[Contract]()}[method]
-        return [contract for contract in DEFAULTS if contract not in drop], method
+        drop: dict[str, tuple[Contract, ...]] = {"surface": (EncloseAll,), "implicit": SURFACE_ONLY, "auto": ()}
+        return [contract for contract in DEFAULTS if contract not in drop[method]], method
 
     def default(self, contract: Contract) -> tuple[Implementation, dict[str, Any]] | None:
         if contract.stage in ("part", "scan"):

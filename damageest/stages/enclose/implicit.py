@@ -1,0 +1,53 @@
+"""One closed surface through everything: all inner damage surfaces, and the sound skin pushed outward."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from damageest.artefacts import Deviation, Enclosure, Enclosures, Part, Samples, Scan, Sites
+from damageest.errors import StageError
+from damageest.stages.enclose import EncloseAll
+
+
+class Implicit(EncloseAll):
+    """A screened Poisson surface round the losses, solved only in their neighbourhood. Takes several losses, worn-through
+    walls and broken-off ends alike, since it neither traces rims nor guesses a side."""
+
+    use: Literal["implicit"] = "implicit"
+    cell: float = Field(0.8, gt=0.1, le=4, description="edge of a grid cell, in tolerances")
+    band: float = Field(2.5, ge=0, le=10, description="skin left free round the damaged points, in tolerances")
+    push: float = Field(1.0, gt=0, le=4, description="how far the sound skin is pushed outward, in tolerances")
+    margin: float = Field(14.0, ge=4, le=60, description="space round a loss that takes part, in tolerances")
+    screening: float = Field(1.0, gt=0, le=100, description="how strongly points pull the surface onto themselves")
+    most_cells: int = Field(
+        4_000_000, ge=50_000, le=60_000_000, description="grid cells of one loss; a larger one gets larger cells"
+    )
+
+    def run(
+        self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
+    ) -> Enclosures:
+        """Raises StageError where no closed surface comes about."""
+        from damageest.stages.enclose._evidence import gathered, groups
+        from damageest.stages.enclose._level import closed_region
+        from damageest.stages.enclose._poisson import box, solve
+
+        found = gathered(part, aligned, deviation, sites, samples, tolerance, self.band, self.push)
+        items = []
+        for group in groups(found, tolerance, aligned.spacing):
+            low = np.minimum(group.points.min(axis=0), group.lost.min(axis=0, initial=np.inf)) - self.margin * tolerance
+            high = np.maximum(group.points.max(axis=0), group.lost.max(axis=0, initial=-np.inf)) + self.margin * tolerance
+            cell = max(self.cell * tolerance, float((np.prod(high - low) / self.most_cells) ** (1 / 3)))
+            notes = ()
+            if cell > 2 * self.cell * tolerance:
+                notes = (f"a loss this large was solved in cells of {cell:.3g}, {cell / tolerance:.1f} tolerances",)
+            grid = box(low, high, cell)
+            points, normals, areas = group.oriented(found, grid)
+            region = closed_region(grid, solve(grid, points, normals, areas, self.screening))
+            if region is not None:
+                items.append(Enclosure(region, group.sites, notes))
+        if not items:
+            raise StageError("no closed surface came about", "method: surface, or a larger tolerance")
+        return Enclosures(tuple(items))
