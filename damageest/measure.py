@@ -19,7 +19,7 @@ def measure(points: Floats, seed: int = 0) -> tuple[float, float]:
     Noise: the standard deviation of the points off the local surface. At a few thousand points a quadric is fitted to
     the nearest neighbours, all of them, however dense; the residual variance, by its degrees of freedom, of those
     patches that agree with one another is what the scanner's noise makes of a smooth surface. Patches across an edge, a
-    damage or a second wall have more and fall out as long as they are not the great majority. Patches grow until they are wide
+    damage or a second wall have more and fall out as long as they are few enough. Patches grow until they are wide
     against the noise: narrower ones would take the noise's own direction for the surface's. On a surface whose bends
     are all tighter than a patch the answer includes what a quadric cannot follow, hence is too high.
 

@@ -1,0 +1,140 @@
+"""Reading CAD files into OpenCASCADE solids, with their unit and the names of their faces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from damageest.errors import InputError
+from damageest.units import MILLIMETRES, canonical
+
+
+@dataclass(frozen=True)
+class Model:
+    """``solids``: OpenCASCADE shapes. ``unit``: the file's, None where it has none. ``length``: how many of OpenCASCADE's
+    units of length are one of the file's. ``name_of`` gives a face's name in the file, '' where it has none.
+    """
+
+    solids: list[Any]
+    unit: str | None
+    length: float
+    name_of: Callable[[Any], str]
+    notes: tuple[str, ...] = ()
+
+
+def read(path: Path, suffix: str) -> Model:
+    """The solids of a file. Raises InputError where it is unreadable or holds no solid, even sewn together."""
+    from OCP.Message import Message
+
+    Message.DefaultMessenger_s().ChangePrinters().Clear()  # else OpenCASCADE writes into the program's own output
+    reader = {".brep": _brep, ".iges": _iges, ".igs": _iges}.get(suffix, _step)
+    shape, unit, name_of = reader(path)
+    if shape is None or shape.IsNull():
+        raise InputError("holds no shape; export the part again as a solid")
+    solids, notes = _solids(shape)
+    return Model(solids, unit, MILLIMETRES[unit] if unit else 1.0, name_of, notes)
+
+
+def _no_name(face: Any) -> str:
+    return ""
+
+
+def _step(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TColStd import TColStd_SequenceOfAsciiString
+
+    reader = STEPControl_Reader()
+    if reader.ReadFile(str(path)) != IFSelect_RetDone:
+        raise InputError("not a readable STEP file; it may be cut short")
+    lengths, angles, solid_angles = (TColStd_SequenceOfAsciiString() for _ in range(3))
+    reader.FileUnits(lengths, angles, solid_angles)
+    named = {lengths.Value(i + 1).ToCString() for i in range(lengths.Length())}
+    units = {_unit(name) for name in named}
+    if len(units) > 1 or None in units:
+        units = {"mm"}  # OpenCASCADE converts each part of the file by its own unit, to millimetres
+    reader.TransferRoots()
+    transfer = reader.WS().TransferReader()
+
+    def name_of(face: Any) -> str:
+        entity = transfer.EntityFromShapeResult(face, 1)
+        name = entity.Name() if entity is not None and hasattr(entity, "Name") else None
+        return name.ToCString() if name is not None else ""
+
+    return reader.OneShape(), units.pop() if units else "mm", name_of
+
+
+def _iges(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.IGESControl import IGESControl_Reader
+
+    reader = IGESControl_Reader()
+    if reader.ReadFile(str(path)) != IFSelect_RetDone:
+        raise InputError("not a readable IGES file; it may be cut short")
+    name = reader.IGESModel().GlobalSection().UnitName()
+    reader.TransferRoots()
+    return reader.OneShape(), (_unit(name.ToCString()) if name is not None else None) or "mm", _no_name
+
+
+def _brep(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepTools import BRepTools
+    from OCP.TopoDS import TopoDS_Shape
+
+    shape = TopoDS_Shape()
+    if not BRepTools.Read_s(shape, str(path), BRep_Builder()):
+        raise InputError("not a readable BREP file; it may be cut short")
+    return shape, None, _no_name
+
+
+def _unit(name: str) -> str | None:
+    """A unit as STEP ('millimetre', 'INCH') or IGES ('MM', '2HIN') names it."""
+    try:
+        return canonical(name.strip().lstrip("0123456789H").lower() if name[:1].isdigit() else name.strip())
+    except InputError:
+        return None
+
+
+def _solids(shape: Any) -> tuple[list[Any], tuple[str, ...]]:
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
+
+    solids = explore(shape, TopAbs_SOLID)
+    if solids:
+        return solids, ()
+    if not explore(shape, TopAbs_FACE):
+        raise InputError("holds no faces, let alone a solid (points and curves only?); export the part as a solid")
+    return _sewn(shape), ("the file holds surfaces only: they were sewn together into a solid",)
+
+
+def _sewn(shape: Any) -> list[Any]:
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+    from OCP.ShapeFix import ShapeFix_Solid
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
+    from OCP.TopoDS import TopoDS
+
+    sewing = BRepBuilderAPI_Sewing(1e-3)
+    for face in explore(shape, TopAbs_FACE):
+        sewing.Add(face)
+    sewing.Perform()
+    shells = [TopoDS.Shell_s(shell) for shell in explore(sewing.SewedShape(), TopAbs_SHELL)]
+    if not shells or not all(BRep_Tool.IsClosed_s(shell) for shell in shells):
+        raise InputError(
+            f"holds surfaces only, no solid; sewn together they leave {sewing.NbFreeEdges()} open edges; "
+            "export the part as a solid"
+        )
+    return [ShapeFix_Solid().SolidFromShell(shell) for shell in shells]
+
+
+def explore(shape: Any, kind: Any) -> list[Any]:
+    """The sub-shapes of a kind, each as often as the shape uses it."""
+    from OCP.TopExp import TopExp_Explorer
+
+    found = []
+    explorer = TopExp_Explorer(shape, kind)
+    while explorer.More():
+        found.append(explorer.Current())
+        explorer.Next()
+    return found

@@ -1,0 +1,208 @@
+"""Triangles of OpenCASCADE solids that close: faces are joined by the topology of their edges, not by coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints
+from damageest.errors import InputError
+from damageest_cadquery._read import explore
+
+_CHECKED = 2000
+
+
+@dataclass(frozen=True)
+class Tessellation:
+    """``vertices`` (V,3), ``faces`` (F,3); ``faces_brep`` (F,), the number of the CAD face of each triangle; those faces'
+    ``names`` and ``kinds``; ``error``, the largest distance found between triangles and CAD surface.
+    """
+
+    vertices: Floats
+    faces: Ints
+    faces_brep: Ints
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    error: float
+
+
+def diagonal(solids: list[Any]) -> float:
+    """Of the box around all solids."""
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+
+    box = Bnd_Box()
+    for solid in solids:
+        BRepBndLib.Add_s(solid, box, False)
+    return float(np.sqrt(box.SquareExtent()))
+
+
+def tessellate(solids: list[Any], chord: float, angle: float, name_of: Callable[[Any], str]) -> Tessellation:
+    """Triangulates within ``chord`` and ``angle`` (degrees) and joins the faces of each solid along their edges.
+
+    On doubly curved faces the mesher can miss the chord it was asked for, by a factor of two or so: where the measured
+    error says it did, it is asked once more, for accordingly less.
+    """
+    first = _tessellated(solids, chord, angle, name_of)
+    if first.error <= 1.1 * chord:
+        return first
+    second = _tessellated(solids, chord * max(chord / first.error, 0.25), angle, name_of)
+    return second if second.error < first.error else first
+
+
+def _tessellated(solids: list[Any], chord: float, angle: float, name_of: Callable[[Any], str]) -> Tessellation:
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.BRepTools import BRepTools
+
+    builder = _Builder(name_of)
+    for solid in solids:
+        BRepTools.Clean_s(solid)  # a file may bring a coarser triangulation along
+        BRepMesh_IncrementalMesh(solid, chord, False, float(np.radians(angle)), False)
+        builder.add(solid)
+    return builder.joined()
+
+
+class _Builder:
+    """Gathers the faces' triangulations and which of their nodes are one point."""
+
+    def __init__(self, name_of: Callable[[Any], str]) -> None:
+        self.name_of = name_of
+        self.points: list[Floats] = []
+        self.triangles: list[Ints] = []
+        self.names: list[str] = []
+        self.kinds: list[str] = []
+        self.same: list[tuple[Ints, Ints]] = []
+        self.count = 0
+        self.error = 0.0
+
+    def add(self, solid: Any) -> None:
+        from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_VERTEX
+        from OCP.TopExp import TopExp
+        from OCP.TopoDS import TopoDS
+        from OCP.TopTools import TopTools_IndexedMapOfShape
+
+        edges, corners = TopTools_IndexedMapOfShape(), TopTools_IndexedMapOfShape()
+        TopExp.MapShapes_s(solid, TopAbs_EDGE, edges)
+        TopExp.MapShapes_s(solid, TopAbs_VERTEX, corners)
+        on_edge: dict[int, Ints] = {}
+        at_corner: dict[int, int] = {}
+        for shape in explore(solid, TopAbs_FACE):
+            face = TopoDS.Face_s(shape)
+            found = self._face(face)
+            if found is None:
+                continue
+            triangulation, location, start = found
+            for item in explore(face, TopAbs_EDGE):
+                edge = TopoDS.Edge_s(item)
+                nodes = _edge_nodes(edge, triangulation, location)
+                if nodes is None:
+                    continue
+                nodes = nodes + start
+                key = edges.FindIndex(edge)
+                first = on_edge.setdefault(key, nodes)
+                if len(first) != len(nodes):
+                    raise InputError("two faces divide their common edge differently; try another chord")
+                self.same.append((first, nodes))
+                # the edge's own sense, whichever way the face runs along it
+                ends = (TopExp.FirstVertex_s(edge, False), TopExp.LastVertex_s(edge, False))
+                for vertex, node in zip(ends, (int(nodes[0]), int(nodes[-1])), strict=True):
+                    if not vertex.IsNull():
+                        known = at_corner.setdefault(corners.FindIndex(vertex), node)
+                        self.same.append((np.array([known]), np.array([node])))
+
+    def _face(self, face: Any) -> tuple[Any, Any, int] | None:
+        from OCP.BRep import BRep_Tool
+        from OCP.BRepAdaptor import BRepAdaptor_Surface
+        from OCP.TopAbs import TopAbs_REVERSED
+        from OCP.TopLoc import TopLoc_Location
+
+        location = TopLoc_Location()
+        triangulation = BRep_Tool.Triangulation_s(face, location)
+        adaptor = BRepAdaptor_Surface(face)
+        kind = adaptor.GetType().name.removeprefix("GeomAbs_")
+        number = len(self.names)
+        self.names.append(self.name_of(face))
+        self.kinds.append("".join(f"_{c.lower()}" if c.isupper() else c for c in kind).lstrip("_"))
+        if triangulation is None:
+            return None  # a face narrower than the mesher's resolution: its edges coincide
+        move = location.Transformation()
+        nodes = range(1, triangulation.NbNodes() + 1)
+        points = np.array([triangulation.Node(i).Transformed(move).Coord() for i in nodes])
+        triangles = np.array(
+            [triangulation.Triangle(i).Get() for i in range(1, triangulation.NbTriangles() + 1)], dtype=np.int64
+        ).reshape(-1, 3)
+        triangles = triangles - 1
+        if triangulation.HasUVNodes() and self.kinds[-1] != "plane" and len(triangles):
+            uv = np.array([triangulation.UVNode(i).Coord() for i in nodes])
+            self.error = max(self.error, _distance(adaptor, points, uv, triangles))
+        if face.Orientation() == TopAbs_REVERSED:
+            triangles = triangles[:, ::-1]
+        start = self.count
+        self.points.append(points)
+        self.triangles.append(np.column_stack([triangles + start, np.full(len(triangles), number)]))
+        self.count += len(points)
+        return triangulation, location, start
+
+    def joined(self) -> Tessellation:
+        """One mesh of all faces."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        if not self.count:
+            raise InputError("none of its faces could be triangulated; try another chord")
+        a = np.concatenate([pair[0] for pair in self.same] or [np.empty(0, np.int64)])
+        b = np.concatenate([pair[1] for pair in self.same] or [np.empty(0, np.int64)])
+        graph = coo_matrix((np.ones(len(a), bool), (a, b)), shape=(self.count, self.count))
+        label = connected_components(graph, directed=False)[1].astype(np.int64)
+        _, first = np.unique(label, return_index=True)
+        rows = np.concatenate(self.triangles)
+        faces = label[rows[:, :3]]
+        i, j, k = faces.T
+        proper = (i != j) & (j != k) & (k != i)
+        return Tessellation(
+            np.concatenate(self.points)[first],
+            faces[proper],
+            rows[proper, 3],
+            tuple(self.names) if any(self.names) else (),
+            tuple(self.kinds),
+            self.error,
+        )
+
+
+def _edge_nodes(edge: Any, triangulation: Any, location: Any) -> Ints | None:
+    """The triangulation's nodes along an edge, in the edge's own sense, from 0."""
+    from OCP.BRep import BRep_Tool
+
+    polygon = BRep_Tool.PolygonOnTriangulation_s(edge, triangulation, location)
+    if polygon is None:
+        return None
+    return np.array([polygon.Node(i) for i in range(1, polygon.NbNodes() + 1)], dtype=np.int64) - 1
+
+
+def _distance(adaptor: Any, points: Floats, uv: Floats, triangles: Ints) -> float:
+    """The largest distance from triangle centres and edge midpoints to the surface.
+
+    Each is compared with the surface at the same place in the surface's parameters, along the normal there, which to
+    second order is the distance. Of a face with many triangles, 2,000 spread over it are checked.
+    """
+    from OCP.gp import gp_Pnt, gp_Vec
+
+    some = triangles[:: max(1, len(triangles) // _CHECKED)]
+    weights = np.array([[1 / 3, 1 / 3, 1 / 3], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
+    flat = np.einsum("wc,tcj->twj", weights, points[some]).reshape(-1, 3)
+    where = np.einsum("wc,tcj->twj", weights, uv[some]).reshape(-1, 2)
+    point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
+    rows = np.empty((len(flat), 9))
+    for row, (u, v) in zip(rows, where.tolist(), strict=True):
+        adaptor.D1(u, v, point, along_u, along_v)
+        row[:3], row[3:6], row[6:] = point.Coord(), along_u.Coord(), along_v.Coord()
+    off = flat - rows[:, :3]
+    normal = np.cross(rows[:, 3:6], rows[:, 6:])
+    length = np.linalg.norm(normal, axis=1)
+    straight = np.linalg.norm(off, axis=1)
+    sound = length > 1e-12 * max(float(length.max()), 1e-300)
+    found = np.where(sound, np.abs(np.einsum("ij,ij->i", off, normal)) / np.where(sound, length, 1), straight)
+    return float(found.max())

@@ -1,0 +1,68 @@
+"""The part from a CAD file with a boundary representation."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from damageest.artefacts import Part
+from damageest.errors import InputError
+from damageest.meshio import checked_file, reason, sha256
+from damageest.stages import JobPath
+from damageest.stages.part import ReadPart
+from damageest.stages.part._make import make_part
+from damageest.units import Unit, canonical, factor
+
+
+class Brep(ReadPart):
+    """A part from STEP, IGES or BREP, triangulated by OpenCASCADE so that neighbouring faces share points."""
+
+    use: Literal["brep"] = "brep"
+    reads: ClassVar[tuple[str, ...]] = (".step", ".stp", ".iges", ".igs", ".brep")
+    path: JobPath = Field(description="the file, relative to the job's folder")
+    chord: float | None = Field(
+        None,
+        gt=0,
+        description="largest distance between CAD surface and triangles, in the job's unit; "
+        "default: an eighth of the tolerance, or 5e-5 of the part's diagonal where that is auto",
+    )
+    angle: float = Field(
+        30.0, gt=0, le=180, description="largest turn from one triangle to the next on a curved face, degrees"
+    )
+    unit: Unit | None = Field(
+        None, description="unit of the file's numbers; default: what the file says, for BREP the job's `units`"
+    )
+
+    def run(self, unit: str, tolerance: float | None) -> Part:
+        """The part in ``unit``. Raises InputError for a file that OpenCASCADE cannot read or that holds no solid."""
+        suffix = checked_file(self.path, self.reads, "a part")
+        from damageest_cadquery._read import read
+        from damageest_cadquery._tessellate import diagonal, tessellate
+
+        try:
+            model = read(self.path, suffix)
+            source = self.unit or model.unit or unit
+            # what OpenCASCADE's own lengths have to be multiplied by to be in the job's unit
+            scale = factor(source, unit) / model.length
+            chord = self.chord or (tolerance / 8 if tolerance else 5e-5 * diagonal(model.solids) * scale)
+            mesh = tessellate(model.solids, chord / scale, self.angle, model.name_of)
+        except InputError as error:
+            raise InputError(f"{self.path}: {error}") from None
+        except Exception as error:  # OpenCASCADE's exceptions share no base of their own
+            raise InputError(f"{self.path}: not a readable {suffix} file ({reason(error)})") from None
+        notes = list(model.notes)
+        if canonical(source) != canonical(unit):
+            notes.append(f"converted from {canonical(source)} to {canonical(unit)}")
+        return make_part(
+            mesh.vertices * scale,
+            mesh.faces,
+            unit,
+            path=str(self.path),
+            sha256=sha256(self.path),
+            faces_brep=mesh.faces_brep,
+            face_names=mesh.names,
+            face_kinds=mesh.kinds,
+            tessellation_error=mesh.error * scale,
+            notes=tuple(notes),
+        )
