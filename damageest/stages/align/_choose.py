@@ -20,6 +20,9 @@ TRIED = 40
 COARSE = 0.008
 """Band, in diagonals, that hands over from the grid to the triangles."""
 
+FAR = 4 * COARSE
+"""Beyond that, what a point costs no longer depends on how far exactly it is off."""
+
 FEW, SOME = 2000, 10_000
 """Points of the fits that are only compared, and of the first comparison."""
 
@@ -41,16 +44,16 @@ def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Flo
     ``points`` (N,3) well spread and in random order, for the exact fit; ``scan`` for the lookups; lengths in diagonals.
     """
     poses, axis = _counterparts(poses, field, scan)
-    fits = [fit(target, points[:FEW], pose, COARSE, noise, 12) for pose in poses]
+    fits = [fit(target, _close(field, points[:FEW], pose), pose, COARSE, noise, 12) for pose in poses]
     poses = np.array([one.pose for one in fits])
-    some = [target.closest(moved(pose, points[:SOME]))[0] for pose in poses]
+    some = [_distance(target, field, points[:SOME], pose) for pose in poses]
     band = fits[int(np.argmin([loss(distance, 0.75 * COARSE).sum() for distance in some]))].band
     costs = [loss(distance, band) for distance in some]
     first = costs[int(np.argmin([cost.sum() for cost in costs]))]
     poses = poses[[not worse(cost, first) for cost in costs]]
     poses = poses[distinct(poses, np.zeros(len(poses)), 0.25 * COARSE, TRIED)]
 
-    costs = [loss(target.closest(moved(pose, points))[0], band) for pose in poses]
+    costs = [loss(_distance(target, field, points, pose), band) for pose in poses]
     best = int(np.argmin([cost.sum() for cost in costs]))
     equal = np.array([not worse(cost, costs[best]) for cost in costs])
     equal[best] = False
@@ -58,8 +61,10 @@ def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Flo
     if axis is not None:
         # Fitted again, since the axis is known no better than the candidates were.
         turned = axis.turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose
-        turned = np.array([fit(target, points[:FEW], one, 2 * band, noise, 6).pose for one in turned])
-        if any(worse(loss(target.closest(moved(one, points))[0], band), costs[best]) for one in turned):
+        turned = np.array(
+            [fit(target, _close(field, points[:FEW], one), one, 2 * band, noise, 6).pose for one in turned]
+        )
+        if any(worse(loss(_distance(target, field, points, one), band), costs[best]) for one in turned):
             axis = None
     if axis is not None:
         # One of each set of turns, then a quarter turn of each: endlessly many cannot be listed.
@@ -68,6 +73,20 @@ def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Flo
         quarter = axis.turns(np.radians([0, 90.0, 180.0, 270.0]))
         others = (quarter[:, None] @ heads[None]).reshape(-1, 4, 4)[1:]
     return Choice(pose, others, axis, band)
+
+
+def _close(field: Field, points: Floats, pose: Floats) -> Floats:
+    """Those of the points that a pose puts near the surface; exact queries of the others are slow and of no use."""
+    return points[np.abs(field.distance[field.index(moved(pose, points).astype(np.float32))]) < FAR]
+
+
+def _distance(target: Target, field: Field, points: Floats, pose: Floats) -> Floats:
+    """Signed distances (N,) of the moved points: exact near the surface, by the grid far from it."""
+    at = moved(pose, points)
+    distance = field.distance[field.index(at.astype(np.float32))].astype(np.float64)
+    near = np.abs(distance) < FAR
+    distance[near] = target.closest(at[near])[0]
+    return distance
 
 
 def _counterparts(poses: Floats, field: Field, scan: Cloud) -> tuple[Floats, Axis | None]:

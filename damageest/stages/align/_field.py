@@ -34,7 +34,8 @@ class Target:
     @cached_property
     def normals(self) -> Floats:
         """(F,3) unit normals of the faces."""
-        return self.mesh.cross / np.maximum(np.linalg.norm(self.mesh.cross, axis=1), 1e-300)[:, None]
+        length = np.linalg.norm(self.mesh.cross, axis=1)
+        return np.asarray(self.mesh.cross / np.maximum(length, 1e-300)[:, None])
 
     def closest(self, points: Floats) -> tuple[Floats, Floats, Ints]:
         """Signed distance (N,), positive outside, closest points (N,3) and the faces (N,) that they lie on.

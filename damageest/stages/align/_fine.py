@@ -37,9 +37,14 @@ def fit(target: Target, points: Floats, pose: Floats, band: float, noise: float,
     """
     narrowest = max(REACH * noise, 2e-5)
     step = residue = np.inf
-    for _ in range(rounds):
+    for turn in range(rounds):
         at = moved(pose, points)
         distance, foot, face = target.closest(at)
+        if (
+            turn == 0
+        ):  # the pose will not move by more than a few bands: what is farther off need not be looked at again
+            close = np.abs(distance) < 4 * band
+            points, at, distance, foot, face = points[close], at[close], distance[close], foot[close], face[close]
         within = np.abs(distance) < band
         if within.sum() < 12:
             break

@@ -63,7 +63,7 @@ def candidates(scan: Cloud, part: Cloud, wanted: int, rng: np.random.Generator) 
 
 
 def _keys(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, NDArray[np.bool_]]:
-    """The hash (M,) of each pair's four figures, and whether they are well defined. ``a``, ``b``: the normals' signs."""
+    """The hash (M,) of each pair's four figures, and whether they are well defined. ``a``, ``b``: signs of normals."""
     line = cloud.points[j] - cloud.points[i]
     length = np.linalg.norm(line, axis=1)
     line = line / np.maximum(length, 1e-12)[:, None]

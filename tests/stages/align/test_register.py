@@ -1,0 +1,83 @@
+"""Alignment with no initial guess finds the pose to a fraction of the noise, or says why not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from align_scenes import error, scene
+
+from damageest.artefacts import Scan
+from damageest.errors import StageError
+from damageest.stages.align.register import Register
+
+
+@pytest.mark.parametrize("name", ["block", "half_torus", "blade", "grille"])
+def test_pose_with_a_third_missing(name: str) -> None:
+    part, scan = scene(name, seed=3, missing=0.33)
+    pose = Register().run(scan, part, 4 * scan.noise)
+    assert error(part, pose.T_part_scan, scan) < 0.5
+    assert np.allclose(pose.T_part_scan[:3, :3] @ pose.T_part_scan[:3, :3].T, np.eye(3), atol=1e-12)
+    assert 0.5 * scan.noise < pose.rms < 2 * scan.noise
+
+
+@pytest.mark.parametrize("name", ["block", "lever"])
+def test_pose_with_a_third_unseen(name: str) -> None:
+    part, scan = scene(name, seed=4, missing=0.05, unseen=0.33)
+    assert error(part, Register().run(scan, part, 4 * scan.noise).T_part_scan, scan) < 0.5
+
+
+def test_keyway_decides() -> None:
+    part, scan = scene("keyed_shaft", seed=5, missing=0.05)
+    pose = Register().run(scan, part, 4 * scan.noise)
+    assert error(part, pose.T_part_scan, scan) < 0.5
+
+
+def test_continuous_symmetry_is_said_and_all_alternatives_are_right() -> None:
+    part, scan = scene("cylinder", seed=6, missing=0.1)
+    pose = Register().run(scan, part, 4 * scan.noise)
+    assert any("continuous" in note for note in pose.notes)
+    assert pose.alternatives is not None
+    assert max(error(part, T, scan) for T in [pose.T_part_scan, *pose.alternatives]) < 1
+
+
+def test_discrete_symmetry_is_said() -> None:
+    part, scan = scene("cuboid", seed=7, missing=0.05)
+    pose = Register().run(scan, part, 4 * scan.noise)
+    assert pose.alternatives is not None
+    assert len(pose.alternatives) == 3
+    assert any("4 ways" in note for note in pose.notes)
+    assert max(error(part, T, scan) for T in pose.alternatives) < 1
+
+
+def test_same_bytes_again() -> None:
+    part, scan = scene("block", seed=8, missing=0.1)
+    first, second = (Register(seed=1).run(scan, part, 4 * scan.noise) for _ in range(2))
+    assert first.T_part_scan.tobytes() == second.T_part_scan.tobytes()
+    assert (first.rms, first.inliers, first.notes) == (second.rms, second.inliers, second.notes)
+
+
+def test_noise_not_measured_and_no_outliers() -> None:
+    part, scan = scene("block", seed=9, clutter=0.0)
+    bare = Scan(scan.points)
+    assert error(part, Register().run(bare, part, 4 * scan.noise).T_part_scan, scan) < 0.5
+
+
+def test_another_part_is_refused() -> None:
+    part, _ = scene("block", seed=0)
+    other, scan = scene("half_torus", seed=1)
+    scale = part.diagonal / other.diagonal
+    with pytest.raises(StageError, match=r"no pose found.*%") as caught:
+        Register().run(Scan(scan.points * scale, noise=scan.noise * scale), part, 4 * scan.noise * scale)
+    assert "belong together" in caught.value.remedy
+
+
+def test_inches_read_as_millimetres_are_named() -> None:
+    part, scan = scene("block", seed=2)
+    with pytest.raises(StageError, match="unit"):
+        Register().run(Scan(scan.points / 25.4), part, 0.1)
+
+
+def test_too_few_points() -> None:
+    part, scan = scene("block", seed=2)
+    with pytest.raises(StageError, match="50 points"):
+        Register().run(Scan(scan.points[:50]), part, 0.1)
