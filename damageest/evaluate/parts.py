@@ -95,15 +95,13 @@ def _tooth(angle: float, root: float, tip: float, pitch_half: float) -> Floats:
 
 def gear() -> Part:
     """A spur gear, 80 mm across, 20 teeth, with bore, keyway and a recessed web."""
-    from manifold3d import CrossSection, Manifold
+    from manifold3d import CrossSection, FillRule, Manifold
 
     teeth = 20
     section = _disc(35.0)
     for k in range(teeth):
         outline = _tooth(2 * math.pi * k / teeth, 35.0, 40.0, math.pi / teeth / 2)
-        if np.cross(outline[1] - outline[0], outline[-1] - outline[0]) < 0:
-            outline = outline[::-1].copy()
-        section += CrossSection([outline])
+        section += CrossSection([outline], FillRule.NonZero)
     section -= _disc(10.0) + _rectangle(6, 8, (0, 9))
     body = Manifold.extrude(section, 18).translate((0, 0, -9))
     web = Manifold.extrude(_disc(29.0) - _disc(16.0), 5)

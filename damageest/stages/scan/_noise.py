@@ -1,0 +1,37 @@
+"""Smooth random fields, repeatable from a seed: for rough fracture surfaces and for uneven scans."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from damageest.artefacts import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """Cosines of random direction and phase; standard deviation about 1 over space, kept within -2.5 to 2.5."""
+
+    waves: Floats
+    phases: Floats
+    heights: Floats
+
+    @classmethod
+    def of(cls, wavelength: float, octaves: int, seed: int, waves: int = 10) -> Field:
+        """``octaves`` bands of ``waves`` cosines each, every band half the wavelength and half the height."""
+        rng = np.random.default_rng([20771, seed])
+        band = np.repeat(np.arange(octaves), waves)
+        direction = rng.normal(size=(len(band), 3))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        heights = 0.5**band
+        heights /= np.sqrt((heights**2).sum() / 2)
+        number = 2 * np.pi / wavelength * 2.0**band * rng.uniform(0.8, 1.25, len(band))
+        return cls(direction * number[:, None], rng.uniform(0, 2 * np.pi, len(band)), heights)
+
+    def at(self, points: Floats) -> Floats:
+        """(N,) the field at points (N,3)."""
+        total = np.zeros(len(points))
+        for wave, phase, height in zip(self.waves, self.phases, self.heights, strict=True):
+            total += height * np.cos(points @ wave + phase)
+        return np.clip(total, -2.5, 2.5)

@@ -1,0 +1,168 @@
+"""What a virtual scanner does: wear a part down to a damaged one, and take points on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import Floats, Mesh, Part, Solid
+from damageest.errors import StageError
+from damageest.solids import to_arrays, to_manifold
+from damageest.stages.scan._tools import Tool
+
+DUST = 1e-9
+"""Share of the part's volume below which a piece is a rounding error of the Booleans."""
+
+
+def wear(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None, tuple[str, ...]]:
+    """The damaged part, the damage and notes; both solids in the part's frame.
+
+    Pieces that the tools cut loose from a body of the part fall off and count as damage, since a scan shows only what
+    still holds together: of every body the largest piece stays. Raises StageError for a tool that misses the part, or
+    is no solid, and for damage that leaves nothing or opens a closed cavity.
+    """
+    if not tools:
+        return part, None, ()
+    from manifold3d import Manifold, OpType
+
+    origin = part.bounds.mean(0)
+    whole = to_manifold(part, origin)
+    cuts = []
+    for number, tool in enumerate(tools, 1):
+        cut = _cut(tool, number, origin, part.diagonal)
+        if (whole ^ cut).volume() < DUST * part.volume:
+            raise StageError(
+                f"damage tool {number} ({tool.tool}) misses the part, which reaches from "
+                f"{_text(part.bounds[0])} to {_text(part.bounds[1])} {part.unit}",
+                remedy="move the tool; its coordinates are in the part's frame and the job's unit",
+            )
+        cuts.append(cut)
+    cutter = Manifold.batch_boolean(cuts, OpType.Add)
+    kept, lost, fallen, cavities = [], [], [], 0
+    for body in _bodies(whole):
+        inside, outside = body.split(cutter)
+        lost.append(inside)
+        cavities -= sum(piece.volume() < 0 for piece in body.decompose())
+        cavities += sum(piece.volume() < -DUST * part.volume for piece in outside.decompose())
+        pieces = [p for p in _bodies(outside) if p.volume() > DUST * part.volume]
+        if pieces:
+            pieces.sort(key=lambda p: p.volume(), reverse=True)
+            kept.append(pieces[0])
+            fallen.extend(pieces[1:])
+    if not kept:
+        raise StageError("the damage tools take the whole part: nothing is left to scan", remedy="make them smaller")
+    if cavities > 0:
+        raise StageError(
+            "the damage tools hollow out a closed cavity, which no scanner sees from outside",
+            remedy="move or enlarge the tool until it breaks through the part's surface",
+        )
+    notes = []
+    if fallen:
+        share = 100 * sum(p.volume() for p in fallen) / part.volume
+        notes.append(f"cut loose and counted as damage: {share:.2g} % of the part, in {len(fallen)} piece(s)")
+    damage = _solid(Manifold.batch_boolean([*lost, *fallen], OpType.Add), origin, part.volume)
+    return _solid(Manifold.compose(kept), origin, part.volume), damage, tuple(notes)
+
+
+def _cut(tool: Tool, number: int, origin: Floats, diagonal: float) -> Any:
+    from manifold3d import Error
+
+    try:
+        body = tool.body(origin, diagonal)
+        fault = "" if body.status() == Error.NoError else body.status().name
+        fault = fault or ("it encloses no volume" if body.volume() <= 0 else "")
+    except ValueError as error:
+        fault = str(error)
+    if fault:
+        raise StageError(f"damage tool {number} ({tool.tool}) is no solid: {fault}", remedy="change its options")
+    return body
+
+
+def _text(point: Floats) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in point) + ")"
+
+
+def _bodies(solid: Any) -> list[Any]:
+    """The solid's connected bodies, each with the cavities inside it."""
+    from manifold3d import Manifold
+
+    shells = solid.decompose()
+    outer = [s for s in shells if s.volume() > 0]
+    inner = [s for s in shells if s.volume() <= 0]
+    if not inner:
+        return list(outer)
+    boxes = np.array([s.bounding_box() for s in outer])
+    owned: list[list[Any]] = [[s] for s in outer]
+    for cavity in inner:
+        box = np.array(cavity.bounding_box())
+        holds = (boxes[:, :3] <= box[:3]).all(1) & (boxes[:, 3:] >= box[3:]).all(1)
+        size = np.where(holds, np.prod(boxes[:, 3:] - boxes[:, :3], axis=1), np.inf)
+        owned[int(np.argmin(size))].append(cavity)
+    return [Manifold.compose(group) if len(group) > 1 else group[0] for group in owned]
+
+
+def _solid(body: Any, origin: Floats, volume: float) -> Solid:
+    """A Solid without the specks that rounding leaves."""
+    from manifold3d import Manifold
+
+    shells = body.decompose()
+    real = [s for s in shells if abs(s.volume()) > DUST * volume]
+    if len(real) < len(shells):
+        body = Manifold.compose(real)
+    return Solid(*to_arrays(body, origin))
+
+
+Thin = Callable[[Floats], Floats]
+"""Points (N,3) to weights (N,): how likely each is kept, 0 for never."""
+
+
+def sample(
+    mesh: Mesh, faces: NDArray[np.bool_], count: int, rng: np.random.Generator, thin: Thin | None, spare: float
+) -> Floats:
+    """(count,3) random points on the triangles that ``faces`` (F,) admits, uniform by area or as ``thin`` weighs them.
+
+    ``spare``: how many candidates to draw per point where points are thinned. Raises StageError where nothing is seen.
+    """
+    area = np.linalg.norm(mesh.cross, axis=1) * faces
+    if not area.any():
+        raise _blind()
+    if thin is None:
+        return _on(mesh, area, count, rng)
+    drawn: list[Floats] = []
+    keys: list[Floats] = []
+    have, tried = 0, 0
+    while have < spare * count:
+        points = _on(mesh, area, int(spare * count), rng)
+        weights = thin(points)
+        seen = weights > 0
+        drawn.append(points[seen])
+        # the smallest of exponential variables over weight: a weighted draw without replacement
+        keys.append(rng.exponential(size=int(seen.sum())) / weights[seen])
+        have, tried = have + int(seen.sum()), tried + 1
+        if have < 1e-3 * tried * count:
+            raise _blind()
+    key = np.concatenate(keys)
+    chosen = np.argpartition(key, count - 1)[:count]
+    return np.asarray(np.concatenate(drawn)[chosen])
+
+
+def _blind() -> StageError:
+    return StageError(
+        "the virtual scanner sees nothing of the part: 'unseen' covers all of it", remedy="narrow 'unseen'"
+    )
+
+
+def _on(mesh: Mesh, area: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """(count,3) points, uniform over triangles of the given areas (F,)."""
+    total = np.cumsum(area)
+    face = np.searchsorted(total, rng.random(count) * total[-1], side="right")
+    face = np.minimum(face, int(np.flatnonzero(area)[-1]))
+    a, b = rng.random((2, count))
+    over = a + b > 1
+    a, b = np.where(over, 1 - a, a), np.where(over, 1 - b, b)
+    corner = mesh.vertices[mesh.faces[face]]
+    origin = corner[:, 0]
+    return np.asarray(origin + a[:, None] * (corner[:, 1] - origin) + b[:, None] * (corner[:, 2] - origin))

@@ -1,0 +1,215 @@
+"""Tools that take virtual damage off a part: each is a solid, given in the part's frame and the job's unit."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, PositiveFloat
+
+from damageest.artefacts import Floats
+from damageest.stages import JobPath
+from damageest.stages.scan import _noise
+
+Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+Row = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
+Matrix = tuple[Row, Row, Row, Row]
+
+
+def _not_zero(value: Vector) -> Vector:
+    if math.hypot(*value) < 1e-12:
+        raise ValueError("a direction must have a length")
+    return value
+
+
+Direction = Annotated[Vector, AfterValidator(_not_zero)]
+
+
+def _rigid(value: Matrix) -> Matrix:
+    T = np.array(value)
+    turn = T[:3, :3]
+    if not (np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0):
+        raise ValueError("not rigid: its upper left 3x3 must be a rotation, without scale or reflection")
+    if not np.allclose(T[3], (0, 0, 0, 1), atol=1e-9):
+        raise ValueError("not rigid: its last row must be 0, 0, 0, 1")
+    return value
+
+
+RigidMatrix = Annotated[Matrix, AfterValidator(_rigid)]
+Seed = Annotated[int, Field(ge=0, description="of the random shape; the same seed gives the same shape")]
+
+
+class Tool(BaseModel, ABC):
+    """Base of the tools."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    tool: str
+
+    @abstractmethod
+    def body(self, origin: Floats, diagonal: float) -> Any:
+        """The tool as a ``manifold3d.Manifold``, coordinates relative to ``origin`` (3,); the part lies within
+        ``diagonal`` of it. Raises ValueError for a tool that encloses no volume."""
+
+
+class Sphere(Tool):
+    """A ball."""
+
+    tool: Literal["sphere"] = "sphere"
+    centre: Vector = Field(description="in the part's frame")
+    radius: PositiveFloat = Field(description="in the job's unit")
+
+    def body(self, origin: Floats, diagonal: float) -> Any:
+        from manifold3d import Manifold
+
+        ball = Manifold.sphere(self.radius, _segments(self.radius, diagonal))
+        return ball.translate(tuple(self.centre - origin))
+
+
+class Box(Tool):
+    """A box, turned about its centre; with ``roughness`` its faces are those of a fracture."""
+
+    tool: Literal["box"] = "box"
+    centre: Vector = Field(description="in the part's frame")
+    size: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = Field(description="edges in the job's unit")
+    rotation: Vector = Field((0.0, 0.0, 0.0), description="degrees about the fixed x, then y, then z axis")
+    roughness: float = Field(0.0, ge=0, description="rms height of the faces' unevenness, in the job's unit")
+    seed: Seed = 0
+
+    def body(self, origin: Floats, diagonal: float) -> Any:
+        from manifold3d import Manifold
+
+        block = Manifold.cube(self.size, True)
+        if self.roughness:
+            wave = max(min(self.size), 12 * self.roughness)
+            block = block.refine_to_length(wave / 10)
+            fields = [_noise.Field.of(wave, 2, 3 * self.seed + axis) for axis in range(3)]
+
+            # each coordinate is moved by a field whose slope stays below 1, so that faces cannot cross
+            def uneven(points: Floats) -> Floats:
+                return points + self.roughness * np.column_stack([field.at(points) for field in fields])
+
+            block = block.warp_batch(uneven)
+        return block.rotate(self.rotation).translate(tuple(self.centre - origin))
+
+
+class Cylinder(Tool):
+    """A round bar that starts at a point and follows an axis; for bores and through holes."""
+
+    tool: Literal["cylinder"] = "cylinder"
+    point: Vector = Field(description="centre of one end, in the part's frame")
+    axis: Direction = Field(description="from that end to the other; its length does not matter")
+    radius: PositiveFloat = Field(description="in the job's unit")
+    length: PositiveFloat = Field(description="in the job's unit")
+
+    def body(self, origin: Floats, diagonal: float) -> Any:
+        from manifold3d import Manifold
+
+        bar = Manifold.cylinder(self.length, self.radius, self.radius, _segments(self.radius, diagonal))
+        return _placed(bar, self.axis, self.point - origin)
+
+
+class Plane(Tool):
+    """Everything on the side of a plane that its normal points to; with ``roughness`` a break instead of a cut."""
+
+    tool: Literal["plane"] = "plane"
+    point: Vector = Field(description="on the plane, in the part's frame")
+    normal: Direction = Field(description="toward what is taken away; its length does not matter")
+    within: PositiveFloat | None = Field(
+        None, description="only within this distance of the line through `point` along `normal`; default: everything"
+    )
+    roughness: float = Field(0.0, ge=0, description="rms height of the break's unevenness, in the job's unit")
+    grain: PositiveFloat | None = Field(
+        None, description="length of the unevenness; default: an eighth of the part's diagonal, or half of `within`"
+    )
+    seed: Seed = 0
+
+    def body(self, origin: Floats, diagonal: float) -> Any:
+        from manifold3d import Manifold, Mesh64
+
+        foot = self.point - origin
+        far = diagonal + float(np.linalg.norm(foot))
+        reach = self.within or far
+        grain = self.grain or (self.within / 2 if self.within else diagonal / 8)
+        # the grid must not bend the field's finest octave; beyond 400 cells a part shows no difference
+        cells = min(400, math.ceil(2.4 * reach / (grain / 12))) if self.roughness else 1
+        # a cone from the grid's border to a far tip: all of the half space as far as the part reaches
+        line = np.linspace(-1.2 * reach, 1.2 * reach, cells + 1)
+        x, y = (a.ravel() for a in np.meshgrid(line, line, indexing="ij"))
+        flat = np.column_stack([x, y, np.zeros_like(x)])
+        height = self.roughness * _noise.Field.of(grain, 3, self.seed).at(flat) if self.roughness else 0 * x
+        tip = (0.0, 0.0, 12 * far)
+        number = np.arange(len(x)).reshape(cells + 1, cells + 1)
+        a, b, c, d = (n.ravel() for n in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+        faces = np.concatenate([np.column_stack([a, c, b]), np.column_stack([a, d, c])])
+        rim = np.concatenate([number[:-1, 0], number[-1, :-1], number[:0:-1, -1], number[0, :0:-1]])
+        faces = np.concatenate([faces, np.column_stack([rim, np.roll(rim, -1), np.full(len(rim), len(x))])])
+        vertices = np.concatenate([np.column_stack([x, y, height]), [tip]])
+        side = Manifold(Mesh64(np.ascontiguousarray(vertices), faces.astype(np.uint64)))
+        if self.within:
+            bar = Manifold.cylinder(2 * far, self.within, self.within, _segments(self.within, diagonal), True)
+            side ^= bar
+        return _placed(side, self.normal, foot)
+
+
+class Blob(Tool):
+    """An irregular lump with the surface of a fracture: a ball whose radius varies at random, smoothly."""
+
+    tool: Literal["blob"] = "blob"
+    centre: Vector = Field(description="in the part's frame")
+    radius: PositiveFloat = Field(description="mean radius in the job's unit")
+    roughness: float | None = Field(
+        None, ge=0, description="rms variation of the radius, in the job's unit; default: 0.12 of the radius"
+    )
+    seed: Seed = 0
+
+    def body(self, origin: Floats, diagonal: float) -> Any:
+        from manifold3d import Manifold
+
+        share = 0.12 if self.roughness is None else self.roughness / self.radius
+        field = _noise.Field.of(1.6, 3, self.seed)
+
+        # the radius is a function of the direction alone and stays positive, so the lump cannot cut itself
+        def uneven(points: Floats) -> Floats:
+            out = points / np.linalg.norm(points, axis=1, keepdims=True)
+            return np.asarray(out * (self.radius * np.maximum(1 + share * field.at(out), 0.2))[:, None])
+
+        segments = max(96, _segments(self.radius, diagonal))
+        return Manifold.sphere(1.0, segments).warp_batch(uneven).translate(tuple(self.centre - origin))
+
+
+class MeshTool(Tool):
+    """A closed mesh from a file, taken to be in the job's unit."""
+
+    tool: Literal["mesh"] = "mesh"
+    path: JobPath = Field(description="STL, PLY, OBJ, OFF or 3MF, relative to the job's folder")
+    transform: RigidMatrix | None = Field(None, description="4x4, rigid, to the part's frame; default: as it is")
+
+    def body(self, origin: Floats, diagonal: float) -> Any:
+        from damageest.meshio import read_mesh
+        from damageest.solids import to_manifold
+        from damageest.stages.part._make import make_part
+
+        vertices, faces, _ = read_mesh(self.path)
+        solid = make_part(vertices, faces, path=str(self.path))
+        T = np.eye(4) if self.transform is None else np.array(self.transform)
+        body = to_manifold(solid).transform(np.ascontiguousarray(T[:3]))
+        return body.translate(tuple(-origin))
+
+
+AnyTool = Annotated[Sphere | Box | Cylinder | Plane | Blob | MeshTool, Field(discriminator="tool")]
+
+
+def _segments(radius: float, diagonal: float) -> int:
+    """Divisions of a circle so that chords stay within 0.00005 of the part's diagonal."""
+    step = math.acos(max(0.0, 1 - 5e-5 * diagonal / radius))
+    return 4 * min(150, max(8, math.ceil(math.pi / step / 4)))
+
+
+def _placed(body: Any, axis: Vector, foot: Floats) -> Any:
+    """The body, made along z, turned to ``axis`` and moved to ``foot``."""
+    z = np.array(axis) / np.linalg.norm(axis)
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    return body.transform(np.ascontiguousarray(np.column_stack([x, np.cross(z, x), z, foot])))

@@ -1,0 +1,107 @@
+"""A virtual scan of a virtually damaged part, for jobs whose right answer is known."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic import types as kinds
+
+from damageest.artefacts import Floats, Part, Scan, Solid, Truth
+from damageest.stages.scan import ReadScan, _noise
+from damageest.stages.scan._scanner import sample, wear
+from damageest.stages.scan._tools import AnyTool, Direction, RigidMatrix, Vector
+from damageest.units import canonical
+
+
+class Unseen(BaseModel):
+    """A part of the surface that the virtual scanner does not see."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    direction: Direction = Field(description="in the part's frame; its length does not matter")
+    angle: float = Field(
+        60.0, gt=0, le=180, description="degrees; no points where the outward normal is this close to `direction`"
+    )
+    beyond: Vector | None = Field(
+        None, description="instead of `angle`: no points beyond the plane through this point, facing `direction`"
+    )
+
+
+class Simulate(ReadScan):
+    """A virtual scanner: takes damage off the part with tools, then points on what is left; the truth is known.
+
+    The scan's `truth` holds the damage and the pose. Lengths and tools are in the job's unit and the part's frame.
+    Points that the part itself hides from a scanner are not left out; name such regions in `unseen`.
+    """
+
+    use: Literal["simulate"] = "simulate"
+    damage: tuple[AnyTool, ...] = Field((), description="tools that each take material off; none: an undamaged part")
+    points: kinds.PositiveInt = Field(150_000, description="number of points, outliers included")
+    noise: float | None = Field(
+        None, ge=0, description="standard deviation along each axis; default: 0.0005 of the part's diagonal"
+    )
+    outliers: float = Field(0.0, ge=0, lt=1, description="share of points strewn over the bounds, widened by a fifth")
+    density: float = Field(
+        0.0, ge=0, le=1.5, description="unevenness: standard deviation of the logarithm of the points' density; 0: even"
+    )
+    unseen: tuple[Unseen, ...] = Field((), description="directions or half-spaces without points")
+    pose: Literal["identity", "random"] | Annotated[RigidMatrix, Field(description="4x4, rigid")] = Field(
+        "identity", description="of the part in the scanner's frame: identity, random, or a 4x4 matrix"
+    )
+    seed: int = Field(0, ge=0, description="of all that is random, beside the tools' own shapes")
+
+    def run(self, unit: str, part: Part) -> Scan:
+        """The scan in the scanner's frame. Raises StageError for a tool that misses the part or is no solid, and for
+        damage that leaves nothing or nothing to be seen."""
+        rng = np.random.default_rng([4409, self.seed])
+        pose = self._pose(part, rng)
+        left, damage, notes = wear(part, self.damage)
+        sigma = 0.0005 * part.diagonal if self.noise is None else self.noise
+        stray = round(self.outliers * self.points)
+        points = self._seen(left, self.points - stray, part.diagonal, rng)
+        points += rng.normal(scale=sigma, size=points.shape) if sigma else 0.0
+        if stray:
+            margin = 0.1 * (part.bounds[1] - part.bounds[0])
+            strewn = rng.uniform(part.bounds[0] - margin, part.bounds[1] + margin, (stray, 3))
+            points = np.concatenate([points, strewn])[rng.permutation(self.points)]
+        inverse = np.eye(4)
+        inverse[:3, :3] = pose[:3, :3].T
+        inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
+        if not np.array_equal(pose, np.eye(4)):
+            points = points @ pose[:3, :3].T + pose[:3, 3]
+        notes = (f"simulated: damage tools: {len(self.damage)}, noise {sigma:.4g} {canonical(unit)}", *notes)
+        return Scan(points, None, canonical(unit), truth=Truth(damage, inverse), notes=notes)
+
+    def _seen(self, left: Solid, count: int, diagonal: float, rng: np.random.Generator) -> Floats:
+        normal = left.cross / np.maximum(np.linalg.norm(left.cross, axis=1), 1e-300)[:, None]
+        faces = np.ones(len(left.faces), dtype=bool)
+        planes = []
+        for item in self.unseen:
+            toward = np.array(item.direction) / np.linalg.norm(item.direction)
+            if item.beyond is None:
+                faces &= normal @ toward < np.cos(np.radians(item.angle))
+            else:
+                planes.append((toward, float(toward @ item.beyond)))
+        field = _noise.Field.of(diagonal / 2, 1, self.seed, waves=8)
+
+        def thin(points: Floats) -> Floats:
+            weights = np.exp(self.density * field.at(points)) if self.density else np.ones(len(points))
+            for toward, height in planes:
+                weights[points @ toward > height] = 0
+            return weights
+
+        uneven = bool(self.density or planes)
+        return sample(left, faces, count, rng, thin if uneven else None, 2.5 if self.density else 1.0)
+
+    def _pose(self, part: Part, rng: np.random.Generator) -> Floats:
+        if self.pose == "identity":
+            return np.eye(4)
+        if self.pose != "random":
+            return np.array(self.pose, dtype=np.float64)
+        from scipy.spatial.transform import Rotation
+
+        pose = np.eye(4)
+        pose[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+        pose[:3, 3] = rng.uniform(-2, 2, 3) * part.diagonal
+        return pose
