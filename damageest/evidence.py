@@ -62,7 +62,7 @@ def weigh(
     reasons = []
     if residual > 1.5 * tolerance + 0.25 * spacing:
         reasons.append(f"its boundary misses the damaged points (95 % within {residual:.3g})")
-    if inside > max(5, 0.005 * len(ids_points)):
+    if inside > max(10, 0.02 * len(ids_points)):
         reasons.append(f"{inside} sound points lie inside it")
     if contradicted > 0.1:
         reasons.append(f"sound points lie on {contradicted:.0%} of the skin it takes away")

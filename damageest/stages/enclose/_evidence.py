@@ -14,6 +14,9 @@ from damageest.stages.enclose._poisson import Grid
 
 Flags = NDArray[np.bool_]
 
+import os
+SURE, CLEAR, FREE = [float(x) for x in os.environ.get("SCF","0.5,1.3,1.2").split(",")]
+
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -77,13 +80,14 @@ def gathered(
     here = ((samples.points > low - 20 * tolerance) & (samples.points < high + 20 * tolerance)).all(axis=1)
     skin, outward = samples.points[here], samples.normals[here]
     gap = _gaps(skin, outward, hit, normals[face], max(2 * tolerance, 2 * aligned.spacing))
-    reach = np.maximum(2.0 * tolerance, 1.6 * _local_spacing(skin, hit, aligned.spacing))
-    supported = gap < reach
-    free = cKDTree(points).query(skin, distance_upper_bound=band * tolerance, workers=2)[0] < np.inf
+    usual = _local_spacing(skin, hit, aligned.spacing)
+    supported = gap < np.maximum(SURE * usual, tolerance)
+    gone = gap > np.maximum(CLEAR * usual, 2 * tolerance)
+    free = cKDTree(points).query(skin, workers=2)[0] < np.maximum(band * tolerance, FREE * usual)
     kept = supported & ~free
     pushed = _pushed(part, skin[kept], outward[kept], push * tolerance)
     return Found(
-        points, label, normals[deviation.face][grown | (sites.label > 0)], skin[~supported & (gap > reach)], pushed,
+        points, label, normals[deviation.face][grown | (sites.label > 0)], skin[gone], pushed,
         outward[kept], aligned.noise, max(tolerance, aligned.spacing),
     )  # fmt: skip
 
@@ -115,25 +119,46 @@ def groups(found: Found, tolerance: float, spacing: float) -> Iterator[Group]:
 def toward_void(points: Floats, normals: Floats, skin: Floats, lost: Floats, fine: float) -> Floats:
     """Turns normals (N,3) of either sign toward the lost side.
 
-    Each point asks the lost skin nearest to it, and the nominal skin above it where it lies shallow; then neighbours
-    agree among themselves, so that a few wrong answers are overruled.
+    Smooth patches are oriented as one (a spanning tree that prefers parallel neighbours, after Hoppe et al. 1992, cut at
+    sharp edges); each patch then asks the lost skin, above all where that is near, and the nominal skin above it where
+    it lies shallow. Last, patches that had little to go by follow their neighbours.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
     from scipy.spatial import cKDTree
 
-    vote = 0.3 * np.einsum("ij,ij->i", normals, skin)
+    vote = 0.1 * np.einsum("ij,ij->i", normals, skin)
     if len(lost) >= 8:
-        _, index = cKDTree(lost).query(points, k=8, workers=2)
+        distance, index = cKDTree(lost).query(points, k=8, workers=2)
         toward = lost[index] - points[:, None]
         toward /= np.linalg.norm(toward, axis=2, keepdims=True) + 0.1 * fine
-        vote = vote + np.einsum("ij,ij->i", normals, toward.mean(axis=1))
+        vote = vote + np.einsum("ij,ij->i", normals, toward.mean(axis=1)) / (1 + distance.mean(axis=1) / (4 * fine))
     _, index = neighbours(points, 13)
-    index = index[:, 1:]
-    agree = np.einsum("ij,ikj->ik", normals, normals[index])
-    agree = agree * np.abs(agree)
-    state = np.tanh(2 * vote)
-    for _ in range(60):
-        state = np.tanh(0.5 * vote + 0.5 * (agree * state[index]).sum(axis=1))
-    return np.where(state < 0, -1.0, 1.0)[:, None] * normals
+    count = index.shape[1] - 1
+    rows, columns = np.repeat(np.arange(len(points)), count), index[:, 1:].ravel()
+    dots = np.einsum("ij,ij->i", normals[rows], normals[columns])
+    smooth = np.abs(dots) > 0.8
+    graph = coo_array((1.001 - np.abs(dots[smooth]), (rows[smooth], columns[smooth])), shape=(len(points),) * 2)
+    tree = minimum_spanning_tree(graph.tocsr())
+    number, patch = connected_components(tree, directed=False)
+    sign = np.ones(len(points))
+    both = (tree + tree.T).tocsr()
+    for start in np.unique(patch, return_index=True)[1]:
+        order, before = breadth_first_order(both, start, directed=False)
+        child, parent = order[1:], before[order[1:]]
+        turn = np.sign(np.einsum("ij,ij->i", normals[child], normals[parent]))
+        for here, there, way in zip(child.tolist(), parent.tolist(), turn.tolist(), strict=True):
+            sign[here] = sign[there] * way
+    total = np.bincount(patch, sign * vote, number)
+    size = np.bincount(patch, minlength=number)
+    sure = np.abs(total) / np.sqrt(size) > 0.05
+    sign *= np.where(total < 0, -1.0, 1.0)[patch]
+    agree = dots * np.abs(dots) * sign[rows] * sign[columns]
+    state = sure[patch].astype(float)
+    for _ in range(20):
+        pull = np.bincount(rows, agree * state[columns], len(points))
+        state = np.where(sure[patch], 1.0, np.tanh(pull + 0.2))
+    return (sign * np.where(state < 0, -1.0, 1.0))[:, None] * normals
 
 
 def local_areas(points: Floats) -> Floats:
