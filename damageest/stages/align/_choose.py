@@ -11,7 +11,7 @@ from damageest.artefacts import Floats
 from damageest.stages.align._field import Field, Target
 from damageest.stages.align._fine import fit, loss, moved
 from damageest.stages.align._points import Cloud, surface_cloud
-from damageest.stages.align._search import distinct, refine, score
+from damageest.stages.align._search import distinct, motion, refine, score
 from damageest.stages.align._turns import Axis, common_axis, families
 
 TRIED = 40
@@ -128,6 +128,27 @@ def worse(cost: Floats, best: Floats) -> bool:
     more = cost - best
     total = float(more.sum())
     return total > 0.0005 * len(more) and total > 5 * float(np.sqrt((more**2).sum()))
+
+
+def unfixed(pose: Floats, target: Target, points: Floats, band: float) -> tuple[str, ...]:
+    """A note where the scan leaves the part free to slide: a bar of which both ends are missing or unseen fits anywhere
+    along itself. Every slide or turn that the points' planes hardly resist is tried, a few bands far, either way."""
+    at = moved(pose, points)
+    distance, _, face = target.closest(at)
+    on = np.abs(distance) < band
+    jacobian = np.column_stack([np.cross(at[on], target.normals[face[on]]), target.normals[face[on]]])
+    stiffness, motions = np.linalg.eigh(jacobian.T @ jacobian / max(int(on.sum()), 1))
+    surface = surface_cloud(target.mesh, 5000, np.random.default_rng(0)).points
+    here = loss(distance, band)
+    for twist in motions.T[stiffness < 0.01]:
+        for D in motion(np.stack([twist, -twist]) * 6 * band):
+            differs = float((np.abs(target.closest(moved(D, surface))[0]) > band).mean())
+            if differs > 0.002 and not worse(loss(target.closest(moved(D @ pose, points))[0], band), here):
+                return (
+                    "the scan does not fix the pose: the part can be slid or turned a little and fit as well: "
+                    "what would hold it is missing or was not seen; where the pose is known, give it to align: none",
+                )
+    return ()
 
 
 def in_words(choice: Choice, target: Target) -> tuple[str, ...]:

@@ -27,7 +27,7 @@ class Register(Align):
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """Raises StageError where no pose explains the scan: another part, another unit, or mostly clutter."""
         from damageest.errors import StageError
-        from damageest.stages.align._choose import COARSE, choose, in_words
+        from damageest.stages.align._choose import COARSE, choose, in_words, unfixed
         from damageest.stages.align._field import Field
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import FEWEST, Frame
@@ -58,5 +58,5 @@ class Register(Align):
                 "the pose is known, give it to align: icp or align: none"
             )
         others = np.array([frame.result(pose) for pose in choice.others]) if len(choice.others) else None
-        notes = in_words(choice, target)
+        notes = in_words(choice, target) + unfixed(best.pose, target, fine, best.band)
         return Pose(frame.result(best.pose), verdict.rms * frame.size, verdict.inliers, others, notes)

@@ -40,6 +40,19 @@ def test_continuous_symmetry_is_said_and_all_alternatives_are_right() -> None:
     assert max(error(part, T, scan) for T in [pose.T_part_scan, *pose.alternatives]) < 1
 
 
+def test_a_scan_that_leaves_the_part_free_to_slide_says_so() -> None:
+    part, scan = scene("cylinder", seed=6, clutter=0.0)
+    assert scan.truth is not None
+    height = (scan.moved(scan.truth.T_part_scan).points - part.bounds.mean(0))[:, 2] / (
+        part.bounds[1] - part.bounds[0]
+    )[2]
+    ends_unseen = Scan(scan.points[np.abs(height) < 0.4], noise=scan.noise)
+    pose = Register().run(ends_unseen, part, 4 * scan.noise)
+    assert any("does not fix the pose" in note for note in pose.notes)
+    whole = Register().run(scan, part, 4 * scan.noise)
+    assert not any("does not fix" in note for note in whole.notes)
+
+
 def test_discrete_symmetry_is_said() -> None:
     part, scan = scene("cuboid", seed=7, missing=0.05)
     pose = Register().run(scan, part, 4 * scan.noise)
