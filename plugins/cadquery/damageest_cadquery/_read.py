@@ -13,8 +13,8 @@ from damageest.units import MILLIMETRES, canonical
 
 @dataclass(frozen=True)
 class Model:
-    """``solids``: OpenCASCADE shapes. ``unit``: the file's, None where it has none. ``length``: how many of OpenCASCADE's
-    units of length are one of the file's. ``name_of`` gives a face's name in the file, '' where it has none.
+    """``solids``: OpenCASCADE shapes. ``unit``: the file's, None where it has none. ``length``: how many of
+    OpenCASCADE's units of length are one of the file's. ``name_of`` gives a face's name in the file, or ''.
     """
 
     solids: list[Any]
@@ -83,6 +83,9 @@ def _brep(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
     from OCP.BRepTools import BRepTools
     from OCP.TopoDS import TopoDS_Shape
 
+    with path.open("rb") as stream:
+        if b"CASCADE Topology" not in stream.read(1000):  # OpenCASCADE would print its complaint
+            raise InputError("not a BREP file: it does not name OpenCASCADE's topology")
     shape = TopoDS_Shape()
     if not BRepTools.Read_s(shape, str(path), BRep_Builder()):
         raise InputError("not a readable BREP file; it may be cut short")

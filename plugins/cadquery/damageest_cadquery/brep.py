@@ -54,6 +54,10 @@ class Brep(ReadPart):
         notes = list(model.notes)
         if canonical(source) != canonical(unit):
             notes.append(f"converted from {canonical(source)} to {canonical(unit)}")
+        if mesh.error * scale > 1.5 * chord:
+            notes.append(
+                f"triangles are up to {mesh.error * scale:.3g} {unit} off the CAD surface; {chord:.3g} was asked"
+            )
         return make_part(
             mesh.vertices * scale,
             mesh.faces,

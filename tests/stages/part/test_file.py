@@ -97,7 +97,7 @@ SPOILED = {
     ),
     "a triangle missing": ((box().vertices, box().faces[1:]), 1000, "closed 1 small hole with 1 triangle"),
     "a repeated corner": (
-        (box().vertices, np.concatenate([box().faces, [[0, 0, 1]]])), 1000, "dropped 1 triangles with a repeated corner",
+        (box().vertices, np.vstack([box().faces, [[0, 0, 1]]])), 1000, "dropped 1 triangles with a repeated corner",
     ),
     "every face twice": ((box().vertices, np.concatenate([box().faces] * 2)), 1000, "dropped 12 triangles"),
     "both sides": (
