@@ -24,7 +24,6 @@ def weigh(
         ids_points: (M,3) the site's IDS points. aligned, deviation: the whole scan, in the part's frame.
     """
     import igl
-    from scipy.spatial import cKDTree
 
     spacing = aligned.spacing
     reach = max(2.0 * tolerance, 1.5 * spacing)
@@ -38,32 +37,27 @@ def weigh(
     squared, _, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(ids - origin), vertices, faces)
     residual = float(np.quantile(np.sqrt(squared), 0.95))
 
-    intact = points[label == INTACT]
-    inside = 0
-    if len(intact):
-        depth, *_ = igl.signed_distance(
-            np.ascontiguousarray(intact - origin), vertices, faces,
-            sign_type=igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
-        )  # fmt: skip
-        inside = int((depth < -1.5 * tolerance).sum())
-
     inner = inner_faces(damage, part)
     on_ids = _sampled(damage, inner, MOST // 2)
     on_skin = _sampled(damage, ~inner, MOST // 2)
     bare = _far(on_ids, points, 1.5 * reach)
-    contradicted = 0.0
-    if len(on_skin) and len(intact) and len(on_ids):
-        # Close to the rim sound points are near any skin, so only skin away from the inner surface speaks.
-        clear = cKDTree(on_ids).query(on_skin, distance_upper_bound=1.5 * reach)[0] > 1.5 * reach
-        asked = on_skin[clear]
-        contradicted = float(1 - _far(asked, intact, max(spacing, tolerance))) if len(asked) > 20 else 0.0
+    # Close to the rim sound points are near any skin, so only what is away from the inner surface speaks.
+    intact = points[label == INTACT]
+    intact = intact[_gap(intact, on_ids, 1.5 * reach) > 1.5 * reach]
+    inside, contradicted = 0, 0.0
+    if len(intact):
+        squared, face, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(intact - origin), vertices, faces)
+        taken = intact[(squared < tolerance**2) & ~inner[face]]
+        inside = len(taken)
+        asked = on_skin[_gap(on_skin, on_ids, 1.5 * reach) > 1.5 * reach]
+        contradicted = 1 - _far(asked, taken, max(spacing, tolerance)) if len(asked) > 20 else 0.0
     unseen = _unseen(part, damage, points, on_skin, reach)
 
     reasons = []
     if residual > 1.5 * tolerance + 0.25 * spacing:
         reasons.append(f"its boundary misses the damaged points (95 % within {residual:.3g})")
     if inside > max(10, 0.02 * len(ids_points)):
-        reasons.append(f"{inside} sound points lie inside it")
+        reasons.append(f"{inside} sound points lie on what it takes away")
     if contradicted > 0.1:
         reasons.append(f"sound points lie on {contradicted:.0%} of the skin it takes away")
     if bare > 0.1:
@@ -73,21 +67,23 @@ def weigh(
     return Evidence(residual, inside, contradicted, unseen, not reasons, tuple(reasons))
 
 
-def _far(places: Floats, points: Floats, distance: float) -> float:
-    """Share of the places (N,3) with none of the points within a distance."""
+def _gap(places: Floats, points: Floats, most: float) -> Floats:
+    """Distance (N,) from each place to the nearest of the points; inf beyond ``most``."""
     from scipy.spatial import cKDTree
 
-    if not len(places):
-        return 0.0
-    if not len(points):
-        return 1.0
-    return float(np.isinf(cKDTree(points).query(places, distance_upper_bound=distance, workers=2)[0]).mean())
+    if not len(places) or not len(points):
+        return np.full(len(places), np.inf)
+    return np.asarray(cKDTree(points).query(places, distance_upper_bound=1.001 * most, workers=2)[0])
+
+
+def _far(places: Floats, points: Floats, distance: float) -> float:
+    """Share of the places (N,3) with none of the points within a distance."""
+    return float((_gap(places, points, distance) > distance).mean()) if len(places) else 0.0
 
 
 def _unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: float) -> float:
     """Share of the part's skin just outside the DV that carries no scan point."""
     import igl
-    from scipy.spatial import cKDTree
 
     if not len(on_skin):
         return 0.0
@@ -96,7 +92,7 @@ def _unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: f
     near = ((corners.min(axis=1) < high) & (corners.max(axis=1) > low)).all(axis=1)
     count = int(np.clip(np.linalg.norm(part.cross[near], axis=1).sum() / 2 / (0.5 * reach) ** 2, 1000, 10 * MOST))
     skin = _sampled(part, near, count)
-    skin = skin[cKDTree(on_skin).query(skin, distance_upper_bound=6 * reach)[0] < np.inf]
+    skin = skin[_gap(skin, on_skin, 6 * reach) < 6 * reach]
     if not len(skin):
         return 0.0
     origin = damage.bounds.mean(axis=0)
