@@ -1,0 +1,130 @@
+"""Which side of an inner damage surface the metal was lost on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints
+from damageest.stages.enclose._fit import neighbours, subset
+
+SMOOTH = 0.8
+"""Agreement of two neighbours above which they lie on the same smooth patch."""
+
+
+def toward_void(
+    points: Floats, normals: Floats, depth: Floats, skin: Floats, skin_normals: Floats, charge: Floats, cell: float
+) -> Floats:
+    """Turns normals (N,3) of either sign toward the lost side.
+
+    Neighbours agree on relative signs first: within smooth patches, then between patches, where all the pairs along a
+    crease count together. What remains is one sign for each connected surface: there the nominal skin decides. A point
+    sees each patch of it under a solid angle; what is gone pulls, what is there pushes, and skin behind other skin cancels
+    out. The damage surface itself hides nothing, so points near the skin, at the rims, count most.
+
+    Args:
+        depth: (N,) of the points under the nominal skin.
+        skin, skin_normals: (S,3) samples of the nominal skin. charge: (S,) area of each, negative where it is still there.
+        cell: length below which nothing is resolved.
+    """
+    from scipy.spatial import cKDTree
+
+    eyes = points[subset(points, 2 * cell)] if len(points) > 1500 else points
+    pull = _pull(eyes, skin, skin_normals, charge, cell)
+    nearest = cKDTree(eyes).query(points, workers=2)[1]
+    vote = np.einsum("ij,ij->i", normals, pull[nearest]) / np.pi
+    sign = _signs(points, normals, vote / (1 + (depth / (4 * cell)) ** 2))
+    return sign[:, None] * normals
+
+
+def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
+    """Sign (N,) of each normal, from the neighbours' and the votes."""
+    distance, index = neighbours(points, 11)
+    first = np.repeat(np.arange(len(points)), index.shape[1] - 1)
+    second = index[:, 1:].ravel()
+    step = points[second] - points[first]
+    step /= np.maximum(np.linalg.norm(step, axis=1), 1e-300)[:, None]
+    # Mirrored in the plane halfway between two points, the normal of one is that of the other on any circular arc, and
+    # on either side of a crease; after Koenig and Gumhold (2009), who transport normals along curves.
+    across = normals[first] - 2 * np.einsum("ij,ij->i", normals[first], step)[:, None] * step
+    agree = np.einsum("ij,ij->i", across, normals[second])
+    near = 1 / (1 + (distance[:, 1:].ravel() / np.median(distance[:, -1])) ** 2)
+
+    firm = np.abs(agree) > SMOOTH
+    sign, patch = _spanned(len(points), first[firm], second[firm], agree[firm])
+    strength = near * agree**3 * sign[first] * sign[second]
+    a, b = patch[first], patch[second]
+    size = int(patch.max()) + 1
+    total = _summed(size, a, b, strength)
+    patch_vote = np.bincount(patch, vote * sign, size)
+    patch_sign, island = _spanned(size, total.row, total.col, total.data)
+    # One sign for each connected surface, then single patches that all their evidence contradicts.
+    whole = np.bincount(island, patch_vote * patch_sign)
+    patch_sign = patch_sign * np.where(whole[island] < 0, -1.0, 1.0)
+    links = total.tocsr()
+    for _ in range(10):
+        field = 0.5 * (links @ patch_sign) + patch_vote
+        wrong = field * patch_sign < 0
+        if not wrong.any():
+            break
+        worst = np.argmin(np.where(wrong, field * patch_sign, np.inf))
+        patch_sign[worst] *= -1
+    return sign * patch_sign[patch]
+
+
+def _summed(size: int, a: Ints, b: Ints, strength: Floats) -> Any:
+    """Symmetric couplings between patches, those of one pair added up."""
+    from scipy.sparse import coo_array, csr_array
+
+    apart = a != b
+    one = csr_array(coo_array((strength[apart], (a[apart], b[apart])), shape=(size, size)))
+    return (one + one.T).tocoo()
+
+
+def _spanned(size: int, first: Ints, second: Ints, agree: Floats) -> tuple[Floats, Ints]:
+    """Signs along the spanning trees of the firmest agreements, 1 at each root, and the tree of each node."""
+    from scipy.sparse import coo_array, csr_array
+    from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
+
+    keys, where = np.unique(np.minimum(first, second) * size + np.maximum(first, second), return_index=True)
+    a, b, c = keys // size, keys % size, agree[where]
+    cost = 1.0 + 1e-9 - np.abs(c) / np.abs(c).max(initial=1e-300)
+    tree = minimum_spanning_tree(csr_array(coo_array((cost, (a, b)), shape=(size, size)))).tocoo()
+    at = np.searchsorted(keys, np.minimum(tree.row, tree.col).astype(np.int64) * size + np.maximum(tree.row, tree.col))
+    edge_sign = np.where(c[at] < 0, -1.0, 1.0)
+    count, island = connected_components(tree, directed=False)
+    # Doubled nodes: one for each sign. A node and the root's plus side end up in one component where its sign is plus.
+    plus = edge_sign > 0
+    i, j = tree.row, tree.col
+    twice = coo_array(
+        (
+            np.ones(2 * len(i)),
+            (np.concatenate([i, i + size]), np.concatenate([np.where(plus, j, j + size), np.where(plus, j + size, j)])),
+        ),
+        shape=(2 * size, 2 * size),
+    )
+    _, side = connected_components(twice, directed=False)
+    root = np.zeros(count, np.int64)
+    root[island[::-1]] = np.arange(size)[::-1]
+    return np.where(side[:size] == side[root[island]], 1.0, -1.0), island.astype(np.int64)
+
+
+def _pull(eyes: Floats, skin: Floats, normals: Floats, charge: Floats, cell: float) -> Floats:
+    """Sum (E,3) over the skin of solid angle times direction times the sign of the charge."""
+    out = np.zeros((len(eyes), 3), np.float32)
+    if not len(skin):
+        return out.astype(np.float64)
+    middle = skin.mean(axis=0)
+    skin32, normals32 = (skin - middle).astype(np.float32), normals.astype(np.float32)
+    weight = charge.astype(np.float32)
+    soft = np.abs(weight).mean() + np.float32((0.5 * cell) ** 2)
+    step = max(1, 4_000_000 // len(skin))
+    for start in range(0, len(eyes), step):
+        eye = (eyes[start : start + step] - middle).astype(np.float32)
+        # |s-q|^2 and n.(s-q) by matrix products: the sum over the skin never forms an (E,S,3) array
+        square = (eye**2).sum(1)[:, None] - 2 * eye @ skin32.T + (skin32**2).sum(1)[None]
+        facing = (normals32 * skin32).sum(1)[None] - eye @ normals32.T
+        share = weight * facing / (np.maximum(square, 0) + soft) ** 2
+        out[start : start + step] = share @ skin32 - share.sum(1)[:, None] * eye
+    return out.astype(np.float64)

@@ -1,0 +1,105 @@
+"""What the scan says about the part's skin near the losses: still there, or gone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import INTACT, Deviation, Floats, Part, Samples, Scan, Sites
+from damageest.stages.enclose._fit import subset
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Samples (S,3) of the part's skin round the losses, their outward ``normals``, and whether each is ``gone``: no sound
+    scan point near, though the scan is dense enough there to show one. ``usual`` (S,): the gap that the scan leaves."""
+
+    points: Floats
+    normals: Floats
+    gone: Flags
+    usual: Floats
+
+
+def skin_near(
+    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, grown: Flags, samples: Samples, tolerance: float
+) -> Skin:
+    """The skin in the neighbourhood of the sites, and as far from them as it seems to be gone."""
+    from scipy.spatial import cKDTree
+
+    sound = (deviation.label == INTACT) & ~grown
+    flat = samples.kind == 0
+    points, normals = samples.points[flat], samples.normals[flat]
+    skin, hits = _lattice(aligned.points, sites.label > 0, sound, points, 40 * tolerance)
+    points, normals = points[skin], normals[skin]
+    keep = np.flatnonzero(hits)
+    hit = aligned.points[keep]
+    if not len(hit) or not len(points):
+        return Skin(points, normals, np.ones(len(points), bool), np.full(len(points), aligned.spacing))
+    thin = subset(hit, 0.7 * tolerance)
+    hit, face = hit[thin], deviation.face[keep][thin]
+    cross = part.cross[face]
+    outward = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    usual = _usual(points, hit, tolerance)
+    clear = np.maximum(1.5 * usual, 2 * tolerance)
+    # Direction counts as a fourth to sixth coordinate: the far side of a thin wall does not vouch for the near one.
+    weight = 1.5 * tolerance
+    tree = cKDTree(np.concatenate([hit, weight * outward], axis=1))
+    gap = tree.query(np.concatenate([points, weight * normals], axis=1), workers=2)[0]
+    return Skin(points, normals, gap > clear, usual)
+
+
+def _usual(points: Floats, hit: Floats, tolerance: float) -> Floats:
+    """Radius (S,) that holds six sound points on the sound surface nearest to each skin sample."""
+    from scipy.spatial import cKDTree
+
+    count = min(7, len(hit))
+    some = hit[subset(hit, 3 * tolerance)]
+    radius = cKDTree(hit).query(some, k=count, workers=2)[0][:, -1]
+    _, index = cKDTree(some).query(points, k=min(6, len(some)), workers=2)
+    return np.asarray(np.median(radius[index.reshape(len(points), -1)], axis=1))
+
+
+def _lattice(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size: float) -> tuple[Flags, Flags]:
+    """Which skin samples and which sound points matter, by the cubes of a coarse lattice that they lie in.
+
+    Cubes with damage count, cubes joined to them whose skin is poor in sound points, and the cubes round both.
+    """
+    from scipy.ndimage import binary_dilation, label
+
+    low = np.minimum(scan.min(axis=0), skin.min(axis=0)) - 2 * size
+    shape = np.ceil((np.maximum(scan.max(axis=0), skin.max(axis=0)) - low) / size).astype(int) + 3
+    flat = [
+        np.ravel_multi_index(tuple(np.floor((p - low) / size).astype(np.int64).T), tuple(shape)) for p in (scan, skin)
+    ]
+    total = int(np.prod(shape))
+    seen = np.bincount(flat[0][sound], minlength=total)
+    asked = np.bincount(flat[1], minlength=total)
+    usual = np.median(seen[asked > 0] / asked[asked > 0])
+    hurt = np.bincount(flat[0][damaged], minlength=total) > 0
+    poor = (asked > 0) & (seen < 0.15 * usual * asked)
+    joined, _ = label((hurt | poor).reshape(shape), np.ones((3, 3, 3)))
+    core = np.isin(joined, np.unique(joined.ravel()[hurt]))
+    wide = binary_dilation(core, np.ones((3, 3, 3)))
+    wider = binary_dilation(wide, np.ones((3, 3, 3)))
+    return wide.ravel()[flat[1]], sound & wider.ravel()[flat[0]]
+
+
+def pushed(part: Part, skin: Floats, outward: Floats, push: float) -> tuple[Floats, Flags]:
+    """The samples moved outward by ``push``, or by less where another wall stands in the way, and which of them serve:
+    beside an inner corner the moved ones of one face end up too near the other and say nothing."""
+    import igl
+
+    if not len(skin):
+        return skin, np.ones(0, bool)
+    origin = part.bounds.mean(axis=0)
+    distance, *_ = igl.signed_distance(
+        np.ascontiguousarray(skin + push * outward - origin), np.ascontiguousarray(part.vertices - origin),
+        np.array(part.faces), sign_type=igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
+    )  # fmt: skip
+    by = np.clip(0.45 * (distance + push), 0.05 * push, push)
+    by = np.where(distance > 0.9 * push, push, by)
+    return np.asarray(skin + by[:, None] * outward), np.ones(len(skin), bool)
