@@ -6,6 +6,7 @@ Rows are appended to a file of JSON lines as they come; a case that has its row 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import subprocess
 import sys
@@ -88,9 +89,18 @@ def _apart(case: Case, timeout: float) -> dict[str, Any]:
 
 
 def _read(out: Path | None) -> list[dict[str, Any]]:
+    """The whole rows of a file; one cut short, as by a run that was killed, is dropped from it."""
     if out is None or not out.is_file():
         return []
-    return [json.loads(text) for text in out.read_text().splitlines() if text.endswith("}")]
+    rows, lines = [], out.read_text().splitlines(keepends=True)
+    for text in lines:
+        with contextlib.suppress(json.JSONDecodeError):
+            rows.append(json.loads(text))
+    if len(rows) < len(lines):
+        out.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    elif lines and not lines[-1].endswith("\n"):
+        out.write_text("".join(lines) + "\n")
+    return rows
 
 
 HEADER = (
@@ -104,7 +114,7 @@ def line(row: dict[str, Any]) -> str:
 
     def number(name: str, form: str, width: int) -> str:
         value = row.get(name)
-        return f"{'-':>{width}s}" if value is None else f"{value:{width}{form}}"
+        return ("-" if value is None else format(value, form)).rjust(width)
 
     text = (
         f"{row['part']:12s} {row['seed']:6d} {'+'.join(row['kinds'])[:30]:30s} {100 * row['share']:5.1f}% "

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+from damageest.artefacts import Floats, Solid
+from damageest.evaluate.parts import PARTS
+from damageest.evaluate.scores import inner_area, iou, score
+
+
+def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Solid:
+    mesh = trimesh.creation.box(bounds=(low, high))
+    return Solid(mesh.vertices, mesh.faces)
+
+
+def turned(degrees: float) -> Floats:
+    return np.asarray(trimesh.transformations.rotation_matrix(math.radians(degrees), (0, 0, 1)))
+
+
+def test_iou_of_boxes() -> None:
+    a, b = box((0, 0, 0), (2, 1, 1)), box((1, 0, 0), (3, 1, 1))
+    assert iou([a], [b]) == pytest.approx(1 / 3)
+    assert iou([a], [a]) == pytest.approx(1)
+    assert iou([a], [box((5, 0, 0), (6, 1, 1))]) == 0
+    assert iou([], []) == 1
+    assert iou([a], []) == iou([], [a]) == 0
+
+
+def test_many_solids_count_as_their_union() -> None:
+    halves = [box((0, 0, 0), (1.2, 1, 1)), box((0.8, 0, 0), (2, 1, 1))]
+    assert iou(halves, [box((0, 0, 0), (2, 1, 1))]) == pytest.approx(1)
+
+
+def test_score_of_a_cut_that_is_too_shallow() -> None:
+    part = PARTS["cuboid"]()  # 70 x 50 x 30
+    true, found = box((25, -25, -15), (35, 25, 15)), box((26, -25, -15), (35, 25, 15))
+    result = score(part, [found], true, 0.5)
+    assert result.iou == pytest.approx(0.9)
+    assert result.volume_error == pytest.approx(-0.1)
+    assert inner_area(true, part) == pytest.approx(50 * 30)
+    assert result.surface_error == pytest.approx(1 / 0.5)
+    assert math.isnan(result.pose_error)
+
+
+def test_nothing_found_and_nothing_there() -> None:
+    part = PARTS["cuboid"]()
+    piece = box((25, -25, -15), (35, 25, 15))
+    assert score(part, [], None, 0.1).iou == 1
+    assert score(part, [piece], None, 0.1).iou == 0
+    assert score(part, [], piece, 0.1).iou == 0
+    assert score(part, [], piece, 0.1).volume_error == -1
+
+
+def test_a_pose_that_the_symmetry_allows_is_right() -> None:
+    part = PARTS["cuboid"]()
+    true, mirrored = box((25, -25, -15), (35, 0, 15)), box((-35, 0, -15), (-25, 25, 15))
+    result = score(part, [mirrored], true, 0.2, turned(180), np.eye(4))
+    assert result.pose_error == pytest.approx(0, abs=1e-9)
+    assert result.iou == pytest.approx(1)
+    # the same damage found without that turn of the pose is at the wrong end
+    assert score(part, [mirrored], true, 0.2, np.eye(4), np.eye(4)).iou == 0
+
+
+def test_a_wrong_pose_is_wrong() -> None:
+    part = PARTS["cuboid"]()
+    true = box((25, -25, -15), (35, 0, 15))
+    quarter = score(part, [true], true, 0.2, turned(90), np.eye(4))
+    assert quarter.pose_error > 1
+    shifted = np.eye(4)
+    shifted[0, 3] = 0.1
+    assert score(part, [true], true, 0.2, shifted, np.eye(4)).pose_error == pytest.approx(
+        0.1 * math.sqrt(2 * 50 * 30 / part.area), rel=0.1
+    )
