@@ -63,24 +63,25 @@ def _neighbourhoods(points: Floats, rng: np.random.Generator) -> tuple[Floats, F
     """
     if len(points) <= _WHOLE:
         return points, points[rng.permutation(len(points))[:_SAMPLES]]
-    low = points.min(0)
-    # a thousand points in the box of a typical point
-    some = points[rng.integers(0, len(points), 2000)]
-    cell = float(np.ptp(points, axis=0).max()) / 8
-    while True:
-        here = np.floor((some - low) / cell).astype(np.int64)
-        sizes = np.array([(np.abs(some - some[i]).max(1) < cell / 2).sum() for i in range(200)])
-        if np.median(sizes) * len(points) / len(some) < 3000 or cell < 1e-9 * float(np.ptp(points, axis=0).max()):
+    low = np.array([axis.min() for axis in points.T])
+    some = points[rng.integers(0, len(points), 100_000)]
+    centres = some[:40]
+    columns = np.ascontiguousarray(some.T)
+    cell = float(np.ptp(columns, axis=1).max()) / 4
+    while True:  # until the box of a typical point holds a few thousand
+        inside = [int((np.abs(columns - centre[:, None]).max(0) < cell / 2).sum()) for centre in centres]
+        if float(np.median(inside)) * len(points) / len(some) <= 4000 or max(inside) <= 20:
             break
-        cell /= 1.5
+        cell /= 1.4
+    here = np.floor((points - low) / cell).astype(np.int64)
     wide = int(here.max()) + 3
 
     def code(box: Ints) -> Ints:
         number: Ints = ((box[..., 0] + 1) * wide + box[..., 1] + 1) * wide + box[..., 2] + 1
         return number
 
-    boxes = code(np.minimum(np.floor((points - low) / cell).astype(np.int64), wide - 3))
-    chosen = np.unique(here[:100], axis=0)
+    boxes = code(here)
+    chosen = np.unique(np.floor((centres - low) / cell).astype(np.int64), axis=0)
     around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), -1).reshape(-1, 3)
     wanted = np.unique(code(chosen[:, None] + around))
     near = np.isin(boxes, wanted)
