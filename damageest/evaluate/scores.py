@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Solid
-from damageest.solids import to_arrays, to_manifold
+from damageest.solids import to_manifold
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,3 @@ def score(
     differs = max(a + b - 2 * common, 0.0)
     area = inner_area(true, part)
     return Score(common / (a + b - common), b / a - 1, differs / area / tolerance if area else nan, after)
-
-
-def to_solid(body: Any, origin: Floats) -> Solid:
-    """A Solid of a Manifold whose coordinates are relative to ``origin``."""
-    return Solid(*to_arrays(body, origin))
