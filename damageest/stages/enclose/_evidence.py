@@ -9,7 +9,7 @@ import numpy as np
 from damageest.artefacts import Deviation, Floats, Ints, Part, Samples, Scan, Sites
 from damageest.stages.enclose._fit import neighbours, smoothed, subset
 from damageest.stages.enclose._orient import toward_void
-from damageest.stages.enclose._poisson import Grid
+from damageest.stages.enclose._poisson import Field, Grid, refined
 from damageest.stages.enclose._skin import Flags, Skin, pushed, skin_near
 
 Surfels = tuple[Floats, Floats, Floats]
@@ -65,6 +65,33 @@ def oriented(found: Found, grid: Grid) -> tuple[Floats, Floats, Floats]:
     areas = np.concatenate([*(group.areas for group in found.groups), found.kept_areas])
     inside = grid.inside(points)
     return points[inside], normals[inside], areas[inside]
+
+
+def within_reach(grid: Grid, field: Field, found: Found, number: int, slack: float) -> Field:
+    """The field made negative where a sound or another group's surface is nearer, by more than ``slack``, than this one's.
+
+    From inside a loss, the way to any surface that does not bound it leads through one that does. So only the void
+    outside the part is cut, and what the field invents far from the group.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    group = found.groups[number]
+    ours = np.concatenate([group.points, group.lost])
+    rest = [np.concatenate([other.points, other.lost]) for k, other in enumerate(found.groups) if k != number]
+    theirs = np.concatenate([found.kept, *rest])
+    half = grid.coarser()
+    away = []
+    for points in (ours, theirs):
+        points = points[half.inside(points)]
+        if not len(points):
+            return field
+        free = np.ones(half.shape, bool)
+        free[tuple(np.rint((points - half.origin) / half.cell).astype(np.int64).T)] = False
+        away.append(distance_transform_edt(free).astype(np.float32))
+    cut = (away[1] - away[0]) * np.float32(half.cell) + np.float32(slack)
+    # in units of the field, whose step across a surface is about a half over two cells
+    cut *= np.float32(0.25 / grid.cell)
+    return np.minimum(field, refined(cut))
 
 
 def _surface(points: Floats, depth: Floats, skin: Skin, charge: Flags, noise: float, cell: float) -> Surfels:

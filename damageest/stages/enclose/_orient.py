@@ -52,7 +52,7 @@ def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     near = 1 / (1 + (distance[:, 1:].ravel() / np.median(distance[:, -1])) ** 2)
 
     # Small patches, so that the few wrong agreements (across a thin fin, a narrow slot) are outvoted along their borders.
-    block = _blocks(points, 3 * float(np.median(distance[:, -1])))
+    block = _blocks(points, max(3 * float(np.median(distance[:, -1])), 1e-9 * float(np.ptp(points)), 1e-300))
     firm = (np.abs(agree) > SMOOTH) & (block[first] == block[second])
     sign, patch = _spanned(len(points), first[firm], second[firm], agree[firm])
     strength = near * agree * np.abs(agree)

@@ -30,24 +30,26 @@ class Implicit(EncloseAll):
         self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
     ) -> Enclosures:
         """Raises StageError where no closed surface comes about."""
-        from damageest.stages.enclose._evidence import gathered, oriented
+        from damageest.stages.enclose._evidence import gathered, oriented, within_reach
         from damageest.stages.enclose._level import closed_region
-        from damageest.stages.enclose._poisson import box, solve
+        from damageest.stages.enclose._poisson import box, solve_by_halves
 
         found = gathered(part, aligned, deviation, sites, samples, tolerance, self.band, self.push)
         items = []
-        for group in found.groups:
+        for number, group in enumerate(found.groups):
             low = np.minimum(group.points.min(axis=0), group.lost.min(axis=0, initial=np.inf)) - self.margin * tolerance
             high = (
                 np.maximum(group.points.max(axis=0), group.lost.max(axis=0, initial=-np.inf)) + self.margin * tolerance
             )
             cell = max(self.cell * tolerance, float((np.prod(high - low) / self.most_cells) ** (1 / 3)))
-            notes = ()
+            notes: tuple[str, ...] = ()
             if cell > 2 * self.cell * tolerance:
                 notes = (f"a loss this large was solved in cells of {cell:.3g}, {cell / tolerance:.1f} tolerances",)
             grid = box(low, high, cell)
             points, normals, areas = oriented(found, grid)
-            region = closed_region(grid, solve(grid, points, normals, areas, self.screening))
+            field = solve_by_halves(grid, points, normals, areas, self.screening)
+            field = within_reach(grid, field, found, number, 4 * tolerance)
+            region = closed_region(grid, field)
             if region is not None:
                 items.append(Enclosure(region, group.sites, notes))
         if not items:
