@@ -186,8 +186,8 @@ class Scan(_Arrays):
 @dataclass(frozen=True, eq=False)
 class Samples(_Arrays):
     """CAD points: ``points`` (N,3) exactly on the part, ``normals`` (N,3) of the face that each lies on (bisecting
-    ones on edges and corners), ``face`` (N,) the triangle, ``kind`` (N,): 0 on a face, 1 on a sharp edge, 2 on a corner.
-    ``spacing`` is the largest intended gap."""
+    ones on edges and corners), ``face`` (N,) the triangle, ``kind`` (N,): 0 on a face, 1 on a sharp edge, 2 on a
+    corner. ``spacing`` is the largest intended gap."""
 
     points: Floats
     normals: Floats

@@ -117,10 +117,13 @@ def _clean_level(variances: Floats, freedom: int) -> float:
     """
     if freedom < 1:
         return 0.0
-    from scipy.stats import chi2
+    from scipy.special import gammaincinv
 
-    level = float(np.quantile(variances, 0.15)) / (chi2.ppf(0.25, freedom) / freedom)
-    cut, middle = chi2.ppf(0.9, freedom) / freedom, chi2.ppf(0.45, freedom) / freedom
+    def quantile(share: float) -> float:
+        return float(2 * gammaincinv(freedom / 2, share) / freedom)
+
+    level = float(np.quantile(variances, 0.15)) / quantile(0.25)
+    cut, middle = quantile(0.9), quantile(0.45)
     for _ in range(30):
         kept = variances[variances <= cut * level]
         if not len(kept):

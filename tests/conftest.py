@@ -23,8 +23,10 @@ def job_file(tmp_path: Path) -> Callable[..., Path]:
     trimesh.creation.box((40, 30, 20)).export(tmp_path / "box.stl")
     np.savetxt(tmp_path / "scan.xyz", np.random.default_rng(0).normal(size=(50, 3)))
 
-    def write(body: str = "", name: str = "job.yaml", head: str = "version: 1\npart: box.stl\nscan: scan.xyz\n") -> Path:
-        path = tmp_path / name
+    least = "version: 1\npart: box.stl\nscan: scan.xyz\n"
+
+    def write(body: str = "", head: str = least) -> Path:
+        path = tmp_path / "job.yaml"
         path.write_text(head + body)
         return path
 

@@ -13,8 +13,8 @@ from damageest.stages import Stage
 class ReadScan(Stage, ABC):
     """Gives the scan, in the scanner's frame and the job's unit.
 
-    ``unit``: the job's unit. ``part``: for virtual scanners only; a reader of files has no use for it. Raises InputError
-    for a file that cannot be read or holds no points.
+    ``unit``: the job's unit. ``part``: for virtual scanners only; a reader of files has no use for it. Raises
+    InputError for a file that cannot be read or holds no points.
     """
 
     stage: ClassVar[str] = "scan"
