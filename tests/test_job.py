@@ -146,9 +146,7 @@ _VALUES = st.recursive(
 
 
 @settings(max_examples=150, deadline=None)
-@given(
-    tree=st.dictionaries(st.sampled_from(["version", "part", "scan", "cluster", "method", "x"]), _VALUES, max_size=5)
-)
+@given(tree=st.dictionaries(st.sampled_from(["version", "part", "scan", "cluster", "method"]), _VALUES, max_size=5))
 def test_any_mapping_is_sound_or_a_job_error(tree: dict[str, object], registry: Registry) -> None:
     with contextlib.suppress(JobError):
         load(tree, registry)

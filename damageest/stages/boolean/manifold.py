@@ -15,7 +15,7 @@ class Manifold(Boolean):
     use: Literal["manifold"] = "manifold"
 
     def run(self, solid: Solid, part: Part) -> Solid | None:
-        """The part of ``solid`` inside ``part`` (paper 3.1 step 12). Raises StageError where manifold3d refuses a mesh."""
+        """The part of ``solid`` inside ``part`` (paper 3.1 step 12). Raises StageError where a mesh is refused."""
         from manifold3d import Error
 
         from damageest.solids import to_manifold, to_solid

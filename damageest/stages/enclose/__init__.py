@@ -11,10 +11,10 @@ from damageest.stages import Stage
 
 
 class Enclose(Stage, ABC):
-    """Gives a closed mesh round the damage of one site: IDS, rim, and the background it cuts off (paper 3.1 steps 8 to 11).
+    """Gives a closed mesh round the damage of one site: IDS, rim, and the background that they cut off.
 
-    ``intact`` (K,3): scan points on the nominal surface, which the enclosure must leave out. ``points`` (M,3): the site's
-    own. The mesh need not be watertight yet: `repair` follows.
+    Paper 3.1 steps 8 to 11. ``intact`` (K,3): scan points on the nominal surface, which the enclosure must leave out.
+    ``points`` (M,3): the site's own. The mesh need not be watertight yet: `repair` follows.
     """
 
     stage: ClassVar[str] = "enclose"

@@ -13,9 +13,10 @@ from damageest.stages import Stage
 class ReadPart(Stage, ABC):
     """Gives the part as designed, in the job's unit.
 
-    ``unit``: the job's unit. ``tolerance``: lambda, or None where it is still to be measured from the scan. ``reads``
-    names the file suffixes (lower case, with the dot) that an implementation with a ``path`` option reads: a bare path in
-    the job picks the implementation by it. Raises InputError for a file that is not a solid and cannot safely be made one.
+    ``unit``: the job's unit. ``tolerance``: lambda, or None where it is still to be measured from the scan.
+    ``reads`` names the file suffixes (lower case, with the dot) that an implementation with a ``path`` option
+    reads: a bare path in the job picks the implementation by it. Raises InputError for a file that is not a solid
+    and cannot safely be made one.
     """
 
     stage: ClassVar[str] = "part"

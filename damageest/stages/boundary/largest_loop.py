@@ -1,0 +1,20 @@
+"""The longest rim alone."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from damageest.artefacts import Rims, Surface
+from damageest.stages.boundary import Boundary
+
+
+class LargestLoop(Boundary):
+    """The loop with the most nodes (paper 3.1 step 6 and 3.2). The others are closed flat."""
+
+    use: Literal["largest_loop"] = "largest_loop"
+
+    def run(self, surface: Surface) -> Rims:
+        """Raises StageError where there is no loop of more than ten nodes."""
+        from damageest.stages.boundary._loops import rims
+
+        return Rims(tuple(rims(surface)[:1]))

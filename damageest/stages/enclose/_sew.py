@@ -1,0 +1,154 @@
+"""The pieces of which a closed mesh is sewn: carried-on rim, closed path, strip between the two, cut-off background."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints, Rims, Solid, Surface
+from damageest.errors import StageError
+from damageest.stages.boundary._loops import loops
+
+
+@dataclass(frozen=True, eq=False)
+class Wide:
+    """A surface carried on beyond its rims: ``loops`` are the new rims; unlisted loops are still to be filled."""
+
+    vertices: Floats
+    faces: Ints
+    loops: tuple[Ints, ...]
+
+
+def carried_on(surface: Surface, rims: Rims, by: float) -> Wide:
+    """Adds a strip of width ``by`` along each rim, in the direction in which the surface leaves it."""
+    vertices, faces, ends = [surface.vertices], [surface.faces], []
+    start = len(surface.vertices)
+    normals = np.zeros_like(surface.vertices)
+    for corner in range(3):
+        np.add.at(normals, surface.faces[:, corner], surface.cross)
+    for loop in rims.loops:
+        at = surface.vertices[loop]
+        along = np.roll(at, -2, axis=0) - np.roll(at, 2, axis=0)
+        out = np.cross(along, normals[loop])
+        out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
+        for _ in range(3):
+            out = out + np.roll(out, 1, axis=0) + np.roll(out, -1, axis=0)
+        out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
+        new = np.arange(start, start + len(loop))
+        vertices.append(at + by * out)
+        before, after = loop, np.roll(loop, -1)
+        far, far_after = new, np.roll(new, -1)
+        faces.append(np.stack([after, before, far], axis=1))
+        faces.append(np.stack([after, far, far_after], axis=1))
+        ends.append(new)
+        start += len(loop)
+    return Wide(np.concatenate(vertices), np.concatenate(faces), tuple(ends))
+
+
+def filled(wide: Wide) -> Ints:
+    """Faces with every loop closed that is no rim, by a fan from its first node (paper 3.2: small loops are closed)."""
+    rim = {int(loop.min()) for loop in wide.loops}
+    fans = [wide.faces]
+    for loop in loops(wide.faces):
+        if int(loop.min()) not in rim:
+            fans.append(np.stack([np.full(len(loop) - 2, loop[0]), loop[2:], loop[1:-1]], axis=1))
+    return np.concatenate(fans)
+
+
+def cycle(background: Solid, nodes: Floats) -> Ints:
+    """A closed path of background vertices, each once, that follows the nodes (N,3) round.
+
+    Raises StageError where it collapses or finds no way.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+    from scipy.spatial import cKDTree
+
+    image = cKDTree(background.vertices).query(nodes, workers=2)[1]
+    image = image[image != np.roll(image, 1)]
+    if len(image) < 3:
+        raise StageError("the rim falls together on the background", "a smaller background edge, or method: implicit")
+    edges = np.unique(np.sort(background.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    length = np.linalg.norm(background.vertices[edges[:, 0]] - background.vertices[edges[:, 1]], axis=1)
+    size = len(background.vertices)
+    graph = csr_array((length, (edges[:, 0], edges[:, 1])), shape=(size, size))
+    walk: list[int] = []
+    for here, there in zip(image.tolist(), np.roll(image, -1).tolist(), strict=True):
+        gap = float(np.linalg.norm(background.vertices[here] - background.vertices[there]))
+        far, before = dijkstra(
+            graph, directed=False, indices=here, return_predecessors=True, limit=6 * gap + 4 * float(length.max())
+        )
+        if not np.isfinite(far[there]):
+            raise StageError("no path on the background joins the rim", "background: bbox, or method: implicit")
+        path = [there]
+        while path[-1] != here:
+            path.append(int(before[path[-1]]))
+        walk += path[:0:-1]
+    return _simple(walk)
+
+
+def _simple(walk: list[int]) -> Ints:
+    """The closed walk without its detours: of two loops that meet in a vertex the longer one stays."""
+    while True:
+        seen: dict[int, int] = {}
+        for place, node in enumerate(walk):
+            if node in seen:
+                inner = walk[seen[node] : place]
+                outer = walk[: seen[node]] + walk[place:]
+                walk = inner if len(inner) > len(outer) else outer
+                break
+            seen[node] = place
+        else:
+            break
+    if len(walk) < 3:
+        raise StageError("the rim falls together on the background", "a smaller background edge, or method: implicit")
+    return np.array(walk, dtype=np.int64)
+
+
+def strip(loop: Ints, other: Ints, vertices: Floats, across: Floats) -> Ints:
+    """Triangles between two closed loops that run side by side; ``across`` (M,3) are the places of ``other``."""
+    from scipy.spatial import cKDTree
+
+    turn = int(cKDTree(across).query(vertices[loop[0]])[1])
+    other, across = np.roll(other, -turn), np.roll(across, -turn, axis=0)
+    first, second = _stations(vertices[loop]), _stations(across)
+    # Walk both loops by their share of the way round; each step makes one triangle.
+    steps = np.concatenate([first[1:], second[1:]])
+    which = np.argsort(steps, kind="stable")
+    is_first = which < len(first) - 1
+    i = np.concatenate([[0], np.cumsum(is_first)])[:-1]
+    j = np.concatenate([[0], np.cumsum(~is_first)])[:-1]
+    n, m = len(loop), len(other)
+    a, a_next = loop[i % n], loop[(i + 1) % n]
+    b, b_next = other[j % m], other[(j + 1) % m]
+    return np.where(is_first[:, None], np.stack([a_next, a, b], axis=1), np.stack([a, b, b_next], axis=1))
+
+
+def _stations(places: Floats) -> Floats:
+    step = np.linalg.norm(np.roll(places, -1, axis=0) - places, axis=1)
+    return np.concatenate([[0.0], np.cumsum(step) / max(step.sum(), 1e-300)])
+
+
+def cut_off(background: Solid, cycles: list[Ints], against: bool) -> Ints | None:
+    """The faces on one side of the cycles: whose own edges run along them, or ``against``; None where it is no side."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    faces, size = background.faces, len(background.vertices)
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    code, back = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
+    along = np.concatenate([c * size + np.roll(c, -1) for c in cycles])
+    counter = np.concatenate([np.roll(c, -1) * size + c for c in cycles])
+    order = np.argsort(code)
+    twin = order[np.searchsorted(code[order], back)]
+    cut = np.isin(code, along) | np.isin(code, counter)
+    owner = np.arange(len(edges)) // 3
+    links = coo_array((np.ones((~cut).sum()), (owner[~cut], owner[twin[~cut]])), shape=(len(faces),) * 2)
+    _, piece = connected_components(links, directed=False)
+    # With the body turned, its rim runs the other way, and so must the side it is sewn to.
+    wanted = np.unique(piece[owner[np.isin(code, along if against else counter)]])
+    unwanted = np.unique(piece[owner[np.isin(code, counter if against else along)]])
+    if np.intersect1d(wanted, unwanted).size:
+        return None
+    return np.asarray(faces[np.isin(piece, wanted)])
