@@ -21,7 +21,7 @@ def sharp_edges(mesh: Mesh, angle: float) -> tuple[Ints, Ints]:
     twin = np.flatnonzero((edges[1:, 0] == edges[:-1, 0]) & (edges[1:, 1] == edges[:-1, 1]))
     pairs, sides = edges[twin], np.stack([face[twin], face[twin + 1]], axis=1)
     normals = _unit(mesh.cross)
-    flat = ~normals.any(axis=1)  # a face without area says nothing about sharpness
+    flat: NDArray[np.bool_] = np.asarray(~normals.any(axis=1))  # a face without area says nothing about sharpness
     turn = np.einsum("ij,ij->i", normals[sides[:, 0]], normals[sides[:, 1]])
     sharp: NDArray[np.bool_] = (turn < np.cos(np.radians(angle))) & ~flat[sides].any(axis=1)
     return pairs[np.flatnonzero(sharp)], sides[np.flatnonzero(sharp)]
