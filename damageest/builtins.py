@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from damageest.hookspecs import hookimpl
-from damageest.stages import Stage
+
+if TYPE_CHECKING:
+    from damageest.stages import Stage
 
 
 @hookimpl
 def damageest_stages() -> list[type[Stage]]:
-    """Every built-in implementation."""
-    import importlib
-    import pathlib
+    """Every built-in implementation. Imported here, so that loading the built-ins costs a command line little."""
+    from damageest.stages.align.icp import Icp
+    from damageest.stages.align.none import Unaligned
+    from damageest.stages.align.register import Register
+    from damageest.stages.allowance.none import Nothing as NoAllowance
+    from damageest.stages.background.bbox import BoundingBox
+    from damageest.stages.background.offset import Offset
+    from damageest.stages.boolean.manifold import Manifold
+    from damageest.stages.boundary.all_loops import AllLoops
+    from damageest.stages.boundary.largest_loop import LargestLoop
+    from damageest.stages.cluster.dbscan import Dbscan
+    from damageest.stages.enclose.implicit import Implicit
+    from damageest.stages.enclose.shortest_path import ShortestPath
+    from damageest.stages.export.files import Files
+    from damageest.stages.part.file import PartFile
+    from damageest.stages.reconstruct.pyvista import PyVista
+    from damageest.stages.repair.none import Nothing as NoRepair
+    from damageest.stages.sample.edge_aware import EdgeAware
+    from damageest.stages.scan.file import ScanFile
+    from damageest.stages.scan.simulate import Simulate
+    from damageest.stages.segment.mesh_distance import MeshDistance
 
-    from damageest.contracts import contract_of
-
-    out = []
-    root = pathlib.Path(__file__).parent / "stages"
-    for p in sorted(root.glob("*/*.py")):
-        if p.name.startswith("_"):
-            continue
-        m = importlib.import_module(f"damageest.stages.{p.parent.name}.{p.stem}")
-        for v in vars(m).values():
-            if (
-                isinstance(v, type)
-                and v.__module__ == m.__name__
-                and issubclass(v, Stage)
-                and contract_of(v) not in (None, v)
-            ):
-                out.append(v)
-    return out
+    return [
+        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Unaligned, MeshDistance, Dbscan, PyVista, LargestLoop,
+        AllLoops, Offset, BoundingBox, ShortestPath, Implicit, NoRepair, Manifold, NoAllowance, Files,
+    ]  # fmt: skip

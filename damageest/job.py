@@ -121,6 +121,11 @@ class _Check:
         line, column = self.positions.get(place, (1, 1) if self.positions else (0, 0))
         self.faults.append(Fault(message, ".".join(map(str, path)), line, column))
 
+    def said(self, told: list[tuple[tuple[str | int, ...], str]]) -> None:
+        """Notes faults found by pydantic; what an option with several valid kinds says of each is one fault."""
+        for place in dict.fromkeys(place for place, _ in told):
+            self.fault("; or ".join(dict.fromkeys(text for where, text in told if where == place)), *place)
+
     def job(self, settings: Sequence[str], stem: str) -> Job:
         for setting in settings:
             self.override(setting)
@@ -179,8 +184,7 @@ class _Check:
         try:
             return Header.model_validate(values)
         except ValidationError as error:
-            for item in error.errors():
-                self.fault(_said(item, values), str(item["loc"][0]))
+            self.said([((str(item["loc"][0]),), _said(item, values)) for item in error.errors()])
             return None
 
     def named(self, key: str) -> tuple[Implementation, dict[str, Any]] | None:
@@ -246,11 +250,13 @@ class _Check:
             stage = item.cls.model_validate({"use": item.name, **options}, context={"folder": self.folder})
         except ValidationError as error:
             valid = [name for name in item.cls.model_fields if name != "use"]
+            told = []
             for fault in error.errors():
                 place = tuple(
                     p for p in fault["loc"] if (key, p) in self.positions or not isinstance(p, str) or p in valid
                 )
-                self.fault(_said(fault, options, valid, item.name), key, *(place or fault["loc"]))
+                told.append(((key, *(place or fault["loc"])), _said(fault, options, valid, item.name)))
+            self.said(told)
             return None
         for path in _paths(stage.model_dump()):
             if not path.is_file():
@@ -261,8 +267,8 @@ class _Check:
 
 def _spelled_out(key: str, value: str | list[Any], registry: Registry) -> dict[str, Any]:
     """The mapping that a bare value is short for: a name, or for part and scan a path (or paths)."""
-    is_file = key in ("part", "scan") and (value == "file" or value not in {item.name for item in registry.of(key)})
-    return {"use": "file", "path": value} if is_file and value != "file" else {"use": value}
+    is_file = key in ("part", "scan") and value not in [item.name for item in registry.of(key)]
+    return {"use": "file", "path": value} if is_file else {"use": value}
 
 
 def _paths(value: Any) -> list[Path]:
