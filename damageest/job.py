@@ -194,8 +194,7 @@ class _Check:
             self.fault(f"give a name, or a mapping with  use: <name>  and options; not {value!r}", key)
             return None
         value = dict(value) if isinstance(value, dict) else _spelled_out(key, value, self.registry)
-        default = next(name for contract, name in DEFAULTS.items() if contract.stage == key)
-        name = value.pop("use", default)
+        name = value.pop("use", self.usual(key))
         if name == "file" and "path" in value:
             name = self.reader(key, value["path"]) or name
         try:
@@ -203,6 +202,14 @@ class _Check:
         except (KeyError, PluginError) as error:
             self.fault(str(error.args[0]), key, "use")
             return None
+
+    def usual(self, key: str) -> str:
+        """The implementation meant where a stage is given options and no name."""
+        by_site = self.tree.get("method") == "surface" or any(
+            c.stage in self.tree for c in SURFACE_ONLY if c is not Enclose
+        )
+        contracts = [c for c in DEFAULTS if c.stage == key and not (by_site and c is EncloseAll)]
+        return DEFAULTS[contracts[0] if by_site else contracts[-1]]
 
     def reader(self, key: str, paths: Any) -> str | None:
         """The implementation that reads such a file; None leaves it to `file`, which says what it can read."""

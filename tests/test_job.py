@@ -16,7 +16,7 @@ from damageest.errors import JobError
 from damageest.job import load
 from damageest.registry import Registry
 from damageest.stages.cluster import Cluster
-from damageest.stages.enclose import EncloseAll
+from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.part import ReadPart
 from damageest.stages.reconstruct import Reconstruct
 
@@ -50,6 +50,13 @@ def test_both_spellings_mean_the_same(job_file: JobFile, registry: Registry) -> 
 def test_yaml_1_2_numbers_and_words(job_file: JobFile, registry: Registry) -> None:
     assert load(job_file("tolerance: 1e-3\n"), registry).tolerance == 0.001
     assert load(job_file("name: no\n"), registry).name == "no"
+
+
+def test_options_without_a_name_are_the_routes_own(job_file: JobFile, registry: Registry) -> None:
+    assert EncloseAll in load(job_file("enclose: {screening: 2}\n"), registry).stages
+    surface = load(job_file("method: surface\nenclose: {overhang: 2}\n"), registry)
+    assert surface.stages[Enclose].use == "shortest_path"
+    assert load(job_file("boundary: all_loops\nenclose: {overhang: 2}\n"), registry).method == "surface"
 
 
 def test_naming_a_surface_stage_chooses_that_route(job_file: JobFile, registry: Registry) -> None:

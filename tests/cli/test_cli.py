@@ -1,0 +1,115 @@
+"""The command line, as a user calls it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from damageest.contracts import STAGES
+from tests import scenes
+
+ROOT = Path(__file__).parents[2]
+
+
+def call(*words: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    code = "from damageest.cli import main; main()"
+    return subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True, cwd=cwd)
+
+
+def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
+    done = call("run", scenes.write(tmp_path))
+    assert done.returncode == 0, done.stderr
+    assert "implicit" in done.stdout
+    assert "yes" in done.stdout
+    assert [line.split(":")[0].strip() for line in done.stderr.splitlines()[1:3]] == ["part", "scan"]
+    written = {p.name for p in (tmp_path / "out/job").iterdir()}
+    assert {
+        "result.json",
+        "job.yaml",
+        "damage.stl",
+        "undamaged.stl",
+        "damage",
+        "surface",
+        "scan.ply",
+        "stages",
+    } == written
+    again = call("run", tmp_path / "out/job/job.yaml", "--output", tmp_path / "again", "--quiet")
+    assert (again.returncode, again.stdout, again.stderr) == (0, "", "")
+    assert (tmp_path / "again/damage.stl").read_bytes() == (tmp_path / "out/job/damage.stl").read_bytes()
+
+
+def test_json_is_the_result_and_fits_its_schema(tmp_path: Path) -> None:
+    done = call("run", scenes.write(tmp_path), "--json", "--set", "method=implicit", "--no-cache")
+    report = json.loads(done.stdout)
+    assert report == json.loads((tmp_path / "out/job/result.json").read_text())
+    schema = json.loads((ROOT / "schemas/result.schema.json").read_text())
+    jsonschema.Draft202012Validator(schema).validate(report)
+    assert report["sites"][0]["volume"] == pytest.approx(scenes.TRUE_VOLUME, rel=0.02)
+
+
+def test_every_job_is_checked_before_the_first_runs(tmp_path: Path) -> None:
+    good = scenes.write(tmp_path)
+    bad = tmp_path / "bad.yaml"
+    bad.write_text(scenes.JOB + "clutser: x\n")
+    done = call("run", good, bad)
+    assert done.returncode == 2
+    assert f"{bad}:6:1" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_validate(tmp_path: Path) -> None:
+    good = scenes.write(tmp_path)
+    assert call("validate", good).returncode == 0
+    good.write_text(scenes.JOB + "clutser: x\nsegment: y\n")
+    done = call("validate", good)
+    assert done.returncode == 2
+    assert [line.split(":")[1] for line in done.stderr.splitlines()] == ["6", "7"]
+    assert done.stdout == ""
+
+
+def test_init_writes_a_job_that_runs(tmp_path: Path) -> None:
+    scenes.write(tmp_path)
+    done = call("init", "box.stl", "scan.ply", "--job", "new.yaml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "noise 0.04" in (tmp_path / "new.yaml").read_text()
+    assert call("run", "new.yaml", cwd=tmp_path).returncode == 0
+    refused = call("init", "box.stl", "scan.ply", "--job", "new.yaml", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "--force" in refused.stderr
+
+
+def test_stages_lists_everything_and_each_option() -> None:
+    listed = call("stages").stdout
+    assert all(f"\n{stage}\n" in f"\n{listed}" for stage in STAGES)
+    shown = call("stages", "cluster", "dbscan").stdout
+    assert "neighbours" in shown
+    assert "default 10" in shown
+    assert "did you mean 'cluster'?" in call("stages", "clutser").stderr
+
+
+def test_plugins_and_schema() -> None:
+    assert "damageest-cadquery" in call("plugins").stdout
+    assert json.loads(call("schema").stdout) == json.loads((ROOT / "schemas/job.schema.json").read_text())
+    assert json.loads(call("schema", "result").stdout)["title"] == "damageest result"
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom damageest.cli import main\nsys.argv = ['damageest', '--help']\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "print([m for m in ('numpy', 'scipy', 'trimesh', 'vtkmodules', 'pyvista', 'igl', 'cadquery') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_debug_shows_where_an_error_came_from(tmp_path: Path) -> None:
+    path = scenes.write(tmp_path)
+    (tmp_path / "box.stl").write_bytes(b"nonsense")
+    assert "Traceback" not in call("run", path).stderr
+    assert "Traceback" in call("run", path, "--debug").stderr

@@ -1,0 +1,13 @@
+"""No deposit beyond the damage volume."""
+
+from __future__ import annotations
+
+import trimesh
+
+from damageest.artefacts import Solid
+from damageest.stages.allowance.none import Nothing
+
+
+def test_gives_nothing() -> None:
+    box = trimesh.creation.box((3, 2, 1))
+    assert Nothing().run(Solid(box.vertices, box.faces)) is None

@@ -1,0 +1,43 @@
+"""The moved skin runs beside the part's, or it is refused."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+import pytest
+import trimesh
+
+from damageest.artefacts import Mesh, Part
+from damageest.errors import StageError
+from damageest.evaluate.parts import PARTS
+from damageest.stages.background.offset import Offset
+from damageest.stages.segment.mesh_distance import signed_distance
+from tests.stages._open import bowl
+
+
+@pytest.mark.parametrize("name", ["gear", "half_torus", "tube", "cuboid"])
+def test_runs_beside_the_part_at_the_clearance(name: str) -> None:
+    part = PARTS[name]()
+    tolerance = 0.002 * part.diagonal
+    inside = Mesh(part.vertices[:3] * 0.99, np.array([[0, 1, 2]]))
+    moved = Offset().run(part, inside, tolerance, 0.1 * tolerance)
+    middles = moved.triangles.mean(axis=1)
+    distance, _ = signed_distance(middles, part)
+    # Flat faces move by the clearance exactly; at corners the skin is farther out, never nearer than chords make it.
+    assert np.median(distance) == pytest.approx(2 * tolerance, rel=0.02)
+    assert distance.min() > tolerance
+    assert distance.max() < 3.5 * 2 * tolerance
+    winding = igl.fast_winding_number(np.array(moved.vertices), np.array(moved.faces), np.array(part.vertices))
+    assert winding.min() > 0.5
+
+
+def test_bounded_however_small_the_tolerance() -> None:
+    part = PARTS["cuboid"]()
+    assert len(Offset().run(part, bowl(6, 10, 0.01), 1e-3, 1e-3).faces) < 500_000
+
+
+def test_a_surface_outside_is_refused() -> None:
+    box = trimesh.creation.box((40, 30, 20))
+    with pytest.raises(StageError, match="does not hold") as caught:
+        Offset().run(Part(box.vertices, box.faces), bowl(6, 25, 0.5), 0.1, 0.1)
+    assert "bbox" in caught.value.remedy

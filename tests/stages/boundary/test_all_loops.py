@@ -1,0 +1,58 @@
+"""Rims follow the surface's own boundary."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from damageest.artefacts import Surface
+from damageest.errors import StageError
+from damageest.stages.boundary.all_loops import AllLoops
+from tests.stages._open import bowl, pipe, revolved
+
+
+def directed(faces: np.ndarray) -> set[tuple[int, int]]:
+    return {(int(a), int(b)) for a, b in faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)}
+
+
+def test_pipe_has_two_rims_along_its_own_edges() -> None:
+    surface = pipe(5, -3, 3)
+    rims = AllLoops().run(surface).loops
+    edges = directed(surface.faces)
+    assert [len(loop) for loop in rims] == [96, 96]
+    heights = {float(surface.vertices[loop, 2][0]) for loop in rims}
+    assert heights == {-3.0, 3.0}
+    for loop in rims:
+        assert len(set(loop.tolist())) == len(loop)
+        for a, b in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True):
+            assert (a, b) in edges
+            assert (b, a) not in edges
+
+
+def test_longest_first_and_specks_are_no_rims() -> None:
+    surface = bowl(5, 0, 0.2)
+    speck = np.flatnonzero((surface.faces == surface.faces[200, 0]).any(axis=1))
+    gash = np.arange(1000, 1030)
+    whole = np.delete(surface.faces, np.concatenate([speck, gash]), axis=0)
+    rims = AllLoops().run(Surface(surface.vertices, whole)).loops
+    assert len(rims) == 2
+    assert len(rims[0]) == 96 > len(rims[1]) > 10
+
+
+def test_closed_surface_has_no_rim() -> None:
+    polar = np.linspace(0, np.pi / 2, 20)
+    half = revolved(np.stack([np.sin(polar), -np.cos(polar)], axis=1))
+    lid = np.stack(
+        [np.full(94, half.faces[-96:, 0][0]) * 0 + 18 * 96, 18 * 96 + np.arange(1, 95), 18 * 96 + np.arange(2, 96)], 1
+    )
+    with pytest.raises(StageError, match="no rim"):
+        AllLoops().run(Surface(half.vertices, np.concatenate([half.faces, lid])))
+
+
+def test_rims_that_touch_are_refused() -> None:
+    surface = pipe(5, -3, 3)
+    ring = 96 * 28
+    hole = np.flatnonzero(((surface.faces >= ring) & (surface.faces < ring + 12)).any(axis=1))
+    near_rim = hole[(surface.faces[hole] >= ring + 96).sum(axis=1) == 1]
+    with pytest.raises(StageError, match="meet in a point"):
+        AllLoops().run(Surface(surface.vertices, np.delete(surface.faces, near_rim[3], axis=0)))

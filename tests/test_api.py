@@ -1,0 +1,83 @@
+"""`damageest.run` with a path, a mapping, and arrays."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import damageest
+from damageest.errors import InputError, JobError
+from tests import scenes
+
+LEAST = {"version": 1, "tolerance": 0.2, "align": "none"}
+
+
+def test_path_mapping_and_arrays_give_the_same(tmp_path: Path) -> None:
+    path = scenes.write(tmp_path)
+    before = scenes.content(tmp_path)
+    mesh = trimesh.creation.box(scenes.SIZE)
+    runs = [
+        damageest.run(path),
+        damageest.run({**LEAST, "part": str(tmp_path / "box.stl"), "scan": [str(tmp_path / "scan.ply")]}),
+        damageest.run({**LEAST, "part": mesh, "scan": scenes.scan()}),
+        damageest.run(LEAST, part=(mesh.vertices, mesh.faces), scan=trimesh.PointCloud(scenes.scan())),
+    ]
+    for result in runs:
+        assert len(result.sites) == 1
+        assert result.damage_volume == pytest.approx(scenes.TRUE_VOLUME, rel=0.02)
+        assert result.sites[0].evidence.consistent
+        assert result.sites[0].max_depth == pytest.approx(6, abs=0.3)
+        assert result.sites[0].centroid[2] == pytest.approx(10 - 6 * 3 / 8, abs=0.1)
+    assert scenes.content(tmp_path) == before, "writes nothing unless asked"
+
+
+def test_output_where_asked(tmp_path: Path) -> None:
+    result = damageest.run(scenes.write(tmp_path), output=tmp_path / "here")
+    report = json.loads((tmp_path / "here/result.json").read_text())
+    assert report["damage_volume"] == result.damage_volume
+    assert report["sites"][0]["files"]["damage"] == "damage/site-1.stl"
+    again = trimesh.load(tmp_path / "here/damage/site-1.stl")
+    assert again.is_watertight
+    assert again.volume == pytest.approx(result.damage_volume, rel=1e-4)
+
+
+def test_the_same_job_gives_the_same_bytes(tmp_path: Path) -> None:
+    path = scenes.write(tmp_path)
+    for name in "ab":
+        damageest.run(path, output=tmp_path / name, cache=False)
+    first, second = (scenes.content(tmp_path / name) for name in "ab")
+    assert first.keys() == second.keys()
+    differing = {name for name in first if first[name] != second[name] and not name.endswith(".npz")}
+    assert differing <= {"result.json"}
+    reports = [json.loads(c["result.json"]) for c in (first, second)]
+    for report in reports:
+        report["stages"] = [{k: v for k, v in s.items() if k not in ("seconds", "cached")} for s in report["stages"]]
+    assert reports[0] == reports[1]
+
+
+def test_no_damage_is_a_result(tmp_path: Path) -> None:
+    points = trimesh.sample.sample_surface(trimesh.creation.box(scenes.SIZE), 20_000, seed=1)[0]
+    points = points + np.random.default_rng(2).normal(scale=0.04, size=points.shape)
+    result = damageest.run(LEAST, part=trimesh.creation.box(scenes.SIZE), scan=points, output=tmp_path / "out")
+    assert (result.status, result.sites, result.damage) == ("ok", (), None)
+    assert not (tmp_path / "out/damage.stl").exists()
+    assert (tmp_path / "out/result.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("part", "scan", "error"),
+    [
+        (scenes.box(), np.empty((0, 3)), InputError),
+        (scenes.box(), np.full((9, 3), np.nan), InputError),
+        (scenes.box(), np.zeros((9, 2)), InputError),
+        (7, np.zeros((9, 3)), InputError),
+        (None, np.zeros((9, 3)), JobError),
+    ],
+)
+def test_bad_arrays_are_refused(part: object, scan: np.ndarray, error: type[Exception]) -> None:
+    with pytest.raises(error):
+        damageest.run(LEAST, part=part, scan=scan)

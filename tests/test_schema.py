@@ -1,0 +1,55 @@
+"""The committed schemas are the ones the code gives, and they say of files what the code says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from damageest import yamlfile
+from damageest.registry import Registry
+from damageest.schema import job_schema, result_schema
+
+ROOT = Path(__file__).parents[1]
+
+
+def committed(name: str) -> Any:
+    return json.loads((ROOT / "schemas" / f"{name}.schema.json").read_text())
+
+
+def test_job_schema_is_current(registry: Registry) -> None:
+    current = json.loads(json.dumps(job_schema(registry)))
+    remedy = "run: uv run damageest schema job > schemas/job.schema.json"
+    assert committed("job") == current, remedy
+
+
+def test_result_schema_is_current() -> None:
+    current = json.loads(json.dumps(result_schema()))
+    remedy = "run: uv run damageest schema result > schemas/result.schema.json"
+    assert committed("result") == current, remedy
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
+def test_example_jobs_fit_the_schema(path: Path) -> None:
+    jsonschema.Draft202012Validator(committed("job")).validate(yamlfile.read(path)[0])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"clutser": "dbscan"},
+        {"cluster": "dbscam"},
+        {"cluster": {"use": "dbscan", "neighbors": 5}},
+        {"units": "parsec"},
+        {"tolerance": -1},
+        {"version": 2},
+        {"scan": 3},
+    ],
+)
+def test_the_schema_refuses_what_the_code_refuses(change: dict[str, Any]) -> None:
+    job = {"version": 1, "part": "a.stl", "scan": "b.ply", **change}
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft202012Validator(committed("job")).validate(job)
