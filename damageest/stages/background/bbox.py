@@ -18,7 +18,9 @@ class BoundingBox(Background):
     clearance: float = Field(
         2.0, gt=0, le=100, description="space between part and box, in tolerances; at least 1.5 point spacings"
     )
-    edge: float = Field(2.0, gt=0, le=100, description="longest edge, in tolerances; longer where it makes too many")
+    edge: float = Field(
+        2.0, gt=0, le=100, description="spacing of its vertices, in tolerances; more where that would make too many"
+    )
 
     def run(self, part: Part, surface: Surface, tolerance: float, spacing: float) -> Solid:
         """A box of at most some 400,000 triangles."""

@@ -19,7 +19,9 @@ class Offset(Background):
     clearance: float = Field(
         2.0, gt=0, le=100, description="distance from the part, in tolerances; at least 1.5 point spacings"
     )
-    edge: float = Field(3.0, gt=0, le=100, description="longest edge, in tolerances; longer where it makes too many")
+    edge: float = Field(
+        3.0, gt=0, le=100, description="spacing of its vertices, in tolerances; more where that would make too many"
+    )
 
     def run(self, part: Part, surface: Surface, tolerance: float, spacing: float) -> Solid:
         """Raises StageError where the moved skin does not hold the part."""

@@ -65,7 +65,7 @@ def cycle(background: Solid, nodes: Floats) -> Ints:
     from scipy.sparse.csgraph import dijkstra
     from scipy.spatial import cKDTree
 
-    image = cKDTree(background.vertices).query(nodes, workers=2)[1]
+    image = np.asarray(cKDTree(background.vertices).query(nodes, workers=2)[1], dtype=np.int64)
     image = image[image != np.roll(image, 1)]
     if len(image) < 3:
         raise StageError("the rim falls together on the background", "a smaller background edge, or method: implicit")

@@ -11,6 +11,10 @@ from damageest.artefacts import Floats, Mesh, Rims, Solid, Surface
 from damageest.errors import StageError
 from damageest.stages.enclose import Enclose
 
+MARGIN = 0.1
+"""Share of the sound points that the two sides must differ by."""
+WRONG = 0.03
+"""Share of the damage surface that may have the enclosure's inside on the wrong side: a little, where it is creased."""
 _INSTEAD = "boundary: all_loops where the damage goes through, another background, or method: implicit"
 
 
@@ -29,7 +33,8 @@ class ShortestPath(Enclose):
     def run(
         self, surface: Surface, rims: Rims, background: Solid, intact: Floats, points: Floats, tolerance: float
     ) -> Mesh:
-        """Raises StageError where paths do not close, do not split the background, or either side holds sound points."""
+        """Raises StageError where paths do not close, do not split the background, or either side holds sound
+        points."""
         from damageest.stages.enclose._sew import carried_on, cut_off, cycle, filled, strip
 
         wide = carried_on(surface, rims, self.overhang * tolerance)
@@ -50,11 +55,37 @@ class ShortestPath(Enclose):
         if not closed:
             raise StageError("the paths on the background do not split it in two", _INSTEAD)
         best = int(np.argmin(kept))
+        if len(closed) > 1 and max(kept) - kept[best] < MARGIN:
+            raise StageError(
+                f"the sound points do not tell which side is lost: {kept[0]:.0%} and {kept[1]:.0%} of them inside",
+                _INSTEAD,
+            )
         if kept[best] > 0.02:
             raise StageError(
                 f"either side of the damage surface holds sound points ({kept[best]:.0%} at best)", _INSTEAD
             )
+        if (wrong := _wrongly_sided(closed[best], len(surface.faces), tolerance)) > WRONG:
+            raise StageError(f"the strip to the background runs through {wrong:.0%} of the damage surface", _INSTEAD)
         return closed[best]
+
+
+def _wrongly_sided(mesh: Mesh, count: int, tolerance: float) -> float:
+    """Share of the first ``count`` faces (a thousand of them) that do not have the inside behind and the outside
+    before.
+
+    A strip that crosses the surface, or a background cut that folds over, shows there and nowhere else.
+    """
+    import igl
+
+    chosen = np.unique(np.linspace(0, count - 1, min(count, 1000)).astype(np.int64))
+    origin = mesh.vertices.mean(axis=0)
+    middle = mesh.triangles[chosen].mean(axis=1) - origin
+    step = mesh.cross[chosen]
+    step = step * (0.5 * tolerance / np.maximum(np.linalg.norm(step, axis=1), 1e-300))[:, None]
+    vertices, faces = np.ascontiguousarray(mesh.vertices - origin), np.array(mesh.faces)
+    behind, before = (igl.fast_winding_number(vertices, faces, middle + way * step) for way in (-1, 1))
+    right = (np.abs(behind - 1) < 0.5) & (np.abs(before) < 0.5)
+    return float(1 - right.mean())
 
 
 def _sound_inside(mesh: Mesh, intact: Floats) -> float:

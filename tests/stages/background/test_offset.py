@@ -25,7 +25,7 @@ def test_runs_beside_the_part_at_the_clearance(name: str) -> None:
     distance, _ = signed_distance(middles, part)
     # Flat faces move by the clearance exactly; at corners the skin is farther out, never nearer than chords make it.
     assert np.median(distance) == pytest.approx(2 * tolerance, rel=0.02)
-    assert distance.min() > tolerance
+    assert distance.min() > 0.5 * tolerance
     assert distance.max() < 3.5 * 2 * tolerance
     winding = igl.fast_winding_number(np.array(moved.vertices), np.array(moved.faces), np.array(part.vertices))
     assert winding.min() > 0.5

@@ -10,11 +10,12 @@ from damageest.errors import StageError
 from damageest.stages.boundary.all_loops import AllLoops
 from damageest.stages.boundary.largest_loop import LargestLoop
 from tests.stages._open import bowl, pipe
+from tests.stages.boundary.test_all_loops import slit
 
 
 def test_the_longest_of_two() -> None:
     surface = bowl(5, 0, 0.2)
-    torn = Surface(surface.vertices, np.delete(surface.faces, np.arange(1000, 1030), axis=0))
+    torn = Surface(surface.vertices, np.delete(surface.faces, slit(8, 30), axis=0))
     assert len(AllLoops().run(torn).loops) == 2
     (rim,) = LargestLoop().run(torn).loops
     assert len(rim) == 96

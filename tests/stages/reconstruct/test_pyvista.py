@@ -27,7 +27,7 @@ def scene(n: int = 6000) -> tuple[np.ndarray, Part]:
 @pytest.fixture(scope="module")
 def surface() -> Surface:
     points, part = scene()
-    return PyVista().run(points, part, TOLERANCE, 0.15)
+    return PyVista().run(points, part, TOLERANCE, 0.15, NOISE)
 
 
 def off(surface: Surface) -> np.ndarray:
@@ -55,7 +55,7 @@ def test_normals_toward_the_lost_material(surface: Surface) -> None:
 
 def test_same_points_same_bytes(surface: Surface) -> None:
     points, part = scene()
-    again = PyVista().run(points, part, TOLERANCE, 0.15)
+    again = PyVista().run(points, part, TOLERANCE, 0.15, NOISE)
     assert again.vertices.tobytes() == surface.vertices.tobytes()
     assert again.faces.tobytes() == surface.faces.tobytes()
 
@@ -63,7 +63,7 @@ def test_same_points_same_bytes(surface: Surface) -> None:
 def test_far_from_the_origin(surface: Surface) -> None:
     points, part = scene()
     away = np.array([1e5, -2e5, 3e5])
-    moved = PyVista().run(points + away, Part(part.vertices + away, part.faces), TOLERANCE, 0.15)
+    moved = PyVista().run(points + away, Part(part.vertices + away, part.faces), TOLERANCE, 0.15, NOISE)
     radius = np.linalg.norm(moved.vertices - away - [0, 0, TOP], axis=1) - RADIUS
     assert np.sqrt((radius**2).mean()) < 0.6 * NOISE
 
@@ -71,5 +71,5 @@ def test_far_from_the_origin(surface: Surface) -> None:
 def test_too_few_points_are_refused() -> None:
     points, part = scene()
     with pytest.raises(StageError, match="too few") as caught:
-        PyVista().run(points[:20], part, TOLERANCE, 0.15)
+        PyVista().run(points[:20], part, TOLERANCE, 0.15, NOISE)
     assert caught.value.remedy
