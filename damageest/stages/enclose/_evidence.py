@@ -68,7 +68,8 @@ def oriented(found: Found, grid: Grid) -> tuple[Floats, Floats, Floats]:
 
 
 def within_reach(grid: Grid, field: Field, found: Found, number: int, slack: float) -> Field:
-    """The field made negative where a sound or another group's surface is nearer, by more than ``slack``, than this one's.
+    """The field made negative where a sound or another group's surface is nearer, by more than ``slack``, than this
+    one's.
 
     From inside a loss, the way to any surface that does not bound it leads through one that does. So only the void
     outside the part is cut, and what the field invents far from the group.
@@ -127,8 +128,9 @@ def _thin_skin(skin: Skin, charge: Flags, here: Ints, cell: float) -> Surfels:
 def _groups(
     points: Floats, depth: Floats, label: Ints, skin: Skin, tolerance: float, spacing: float, noise: float
 ) -> tuple[tuple[Group, ...], Ints]:
-    """Losses whose points or lost skin come within reach of one another are one group; and for each skin sample the group
-    that lost it. Skin that shows no scan point but belongs to no damaged point is not lost: the scanner did not see it."""
+    """Losses whose points or lost skin come within reach of one another are one group; and for each skin sample the
+    group that lost it. Skin that shows no scan point but belongs to no damaged point is not lost: the scanner did not
+    see it."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
@@ -146,14 +148,14 @@ def _groups(
     _, component = connected_components(links, directed=False)
     group = component[cube]
     of_points, of_gone = group[: len(points)], group[len(points) :]
-    found = []
+    found: list[Group] = []
     lost_by = np.full(len(skin.points), -1, np.int64)
     for number in np.unique(of_points):
         members = of_points == number
         labels = tuple(int(k) for k in np.unique(label[members]) if k > 0)
         lost = gone[of_gone == number]
         lost_by[lost] = len(found)
-        surface = _surface(points[members], depth[members], skin, lost_by == len(found), noise, 0.8 * tolerance)
+        surface = _surface(points[members], depth[members], skin, np.equal(lost_by, len(found)), noise, 0.8 * tolerance)
         found.append(Group(*surface, skin.points[lost], labels))
     return tuple(found), lost_by
 
@@ -165,7 +167,7 @@ def local_areas(points: Floats) -> Floats:
     distance, _ = neighbours(points, 9)
     count = distance.shape[1] - 1
     area = np.pi * distance[:, -1] ** 2 / count
-    return np.minimum(area, 4 * np.median(area))
+    return np.asarray(np.minimum(area, 4 * np.median(area)))
 
 
 def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) -> tuple[Floats, Ints, Flags, Floats]:
@@ -184,7 +186,7 @@ def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) 
             aligned.points[candidates], distance_upper_bound=reach, workers=2
         )
         hit = np.isfinite(distance)
-        label[candidates[hit]] = label[seeds[index[hit]]]
+        label[candidates[hit]] = label[seeds[np.asarray(index)[hit]]]
     grown = (label > 0) & (sites.label == 0)
     chosen = label > 0
     return aligned.points[chosen], label[chosen], grown, deviation.distance[chosen]

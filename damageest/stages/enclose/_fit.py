@@ -30,13 +30,14 @@ def neighbours(points: Floats, count: int) -> tuple[Floats, Ints]:
 
     count = min(count, len(points))
     distance, index = cKDTree(points).query(points, k=count, workers=2)
-    return distance.reshape(len(points), count), index.reshape(len(points), count)
+    return np.reshape(distance, (len(points), count)), np.reshape(index, (len(points), count)).astype(np.int64)
 
 
 def smoothed(points: Floats, noise: float, count: int = 20, rounds: int = 3) -> tuple[Floats, Floats, Floats]:
     """Points moved onto a local fit, unit normals of either sign, and the radius of each fit.
 
-    Planes are fitted to the neighbours that agree in direction (bilateral weights, after Fleishman et al. 2003), so that an
+    Planes are fitted to the neighbours that agree in direction (bilateral weights, after Fleishman et al. 2003), so
+    that an
     edge between two faces stays one; then a quadric in the plane's frame takes the curvature. A point moves along its
     normal only, by three times the noise at most.
     """

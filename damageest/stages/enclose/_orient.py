@@ -20,13 +20,13 @@ def toward_void(
 
     Neighbours agree on relative signs first: within smooth patches, then between patches, where all the pairs along a
     crease count together. What remains is one sign for each connected surface: there the nominal skin decides. A point
-    sees each patch of it under a solid angle; what is gone pulls, what is there pushes, and skin behind other skin cancels
-    out. The damage surface itself hides nothing, so points near the skin, at the rims, count most.
+    sees each patch of it under a solid angle; what is gone pulls, what is there pushes, and skin behind other skin
+    cancels out. The damage surface itself hides nothing, so points near the skin, at the rims, count most.
 
     Args:
         depth: (N,) of the points under the nominal skin.
-        skin, skin_normals: (S,3) samples of the nominal skin. charge: (S,) area of each, negative where it is still there.
-        cell: length below which nothing is resolved.
+        skin, skin_normals: (S,3) samples of the nominal skin. charge: (S,) area of each, negative where it is still
+        there. cell: length below which nothing is resolved.
     """
     from scipy.spatial import cKDTree
 
@@ -51,7 +51,8 @@ def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     agree = np.einsum("ij,ij->i", across, normals[second])
     near = 1 / (1 + (distance[:, 1:].ravel() / np.median(distance[:, -1])) ** 2)
 
-    # Small patches, so that the few wrong agreements (across a thin fin, a narrow slot) are outvoted along their borders.
+    # Small patches, so that the few wrong agreements (across a thin fin, a narrow slot) are outvoted along their
+    # borders.
     block = _blocks(points, max(3 * float(np.median(distance[:, -1])), 1e-9 * float(np.ptp(points)), 1e-300))
     firm = (np.abs(agree) > SMOOTH) & (block[first] == block[second])
     sign, patch = _spanned(len(points), first[firm], second[firm], agree[firm])
@@ -59,14 +60,15 @@ def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     a, b = patch[first], patch[second]
     size = int(patch.max()) + 1
     total = _summed(size, a, b, strength * sign[first] * sign[second])
-    patch_vote = np.bincount(patch, vote * sign, size)
+    patch_vote = np.bincount(patch, vote * sign, size).astype(np.float64)
     patch_sign = _relaxed(total.tocsr(), patch_vote)
     links = _summed(len(points), first, second, strength).tocsr()
     return _settled(sign * patch_sign[patch], links, np.zeros(len(points)), 5 * len(points) // 100)
 
 
 def _relaxed(links: Any, vote: Floats) -> Floats:
-    """Signs (P,) that agree with links and votes as well as they can: the least-squares relaxation, then single flips."""
+    """Signs (P,) that agree with links and votes as well as they can: the least-squares relaxation, then single
+    flips."""
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import spsolve
 

@@ -1,8 +1,8 @@
 """A screened Poisson solve on a regular grid: one indicator-like field through oriented points.
 
 Kazhdan and Hoppe, "Screened Poisson surface reconstruction" (2013), discretised on a staggered grid: the normals are
-splatted to the grid's edges, the field lives at its nodes, and the constant-coefficient part of the operator is inverted
-by a cosine transform (free, i.e. Neumann, sides), which makes conjugate gradients converge in a few steps.
+splatted to the grid's edges, the field lives at its nodes, and the constant-coefficient part of the operator is
+inverted by a cosine transform (free, i.e. Neumann, sides), which makes conjugate gradients converge in a few steps.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ class Grid:
         return np.asarray(((at >= 0) & (at <= np.array(self.shape) - 1.001)).all(axis=1))
 
     def corners(self, points: Floats, shift: Floats | None = None) -> tuple[NDArray[np.int64], Floats]:
-        """Flat node indices (N,8) round each point and their trilinear weights (N,8); ``shift`` moves the nodes, in cells."""
+        """Flat node indices (N,8) round each point and their trilinear weights (N,8); ``shift`` moves the nodes, in
+        cells."""
         at = (points - self.origin) / self.cell - (0 if shift is None else shift)
         at = np.clip(at, 0, np.array(self.shape) - 1.001)
         low = np.floor(at).astype(np.int64)
@@ -91,7 +92,8 @@ def solve(
     symbol = _symbol(grid) + shift
 
     def apply(x: Field) -> Field:
-        return _laplacian(x) + (back @ (pull * (look @ x.ravel()))).reshape(grid.shape)
+        drawn: Field = back @ (pull * (look @ x.ravel()))
+        return _laplacian(x) + drawn.reshape(grid.shape)
 
     x = _precondition(right, symbol) if start is None else start.copy()
     r = right - apply(x)
@@ -126,9 +128,9 @@ def refined(coarse: Field) -> Field:
     """The field of ``Grid.coarser()`` carried to the nodes of the finer grid, linearly."""
     out = coarse
     for axis in range(3):
-        x = np.moveaxis(out, axis, 0)
+        x: Field = np.moveaxis(out, axis, 0)
         low, high = np.concatenate([x[:1], x[:-1]]), np.concatenate([x[1:], x[-1:]])
-        pair = np.stack([0.75 * x + 0.25 * low, 0.75 * x + 0.25 * high], axis=1)
+        pair = np.stack([0.75 * x + 0.25 * low, 0.75 * x + 0.25 * high], axis=1).astype(np.float32)
         out = np.moveaxis(pair.reshape(-1, *x.shape[1:]), 0, axis)
     return np.ascontiguousarray(out, dtype=np.float32)
 

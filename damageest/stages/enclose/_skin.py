@@ -15,8 +15,8 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Samples (S,3) of the part's skin round the losses, their outward ``normals``, and whether each is ``gone``: no sound
-    scan point near, though the scan is dense enough there to show one. ``usual`` (S,): the gap that the scan leaves."""
+    """Samples (S,3) of the part's skin round the losses, their outward ``normals``, and whether each is ``gone``: no
+    sound scan point near, though the scan is dense enough there to show one. ``usual`` (S,): the gap that the scan leaves."""
 
     points: Floats
     normals: Floats
@@ -58,7 +58,7 @@ def _usual(points: Floats, hit: Floats, tolerance: float) -> Floats:
 
     count = min(7, len(hit))
     some = hit[subset(hit, 3 * tolerance)]
-    radius = cKDTree(hit).query(some, k=count, workers=2)[0][:, -1]
+    radius = np.asarray(cKDTree(hit).query(some, k=count, workers=2)[0])[:, -1]
     _, index = cKDTree(some).query(points, k=min(6, len(some)), workers=2)
     return np.asarray(np.median(radius[index.reshape(len(points), -1)], axis=1))
 
@@ -81,10 +81,10 @@ def _lattice(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size: flo
     usual = np.median(seen[asked > 0] / asked[asked > 0])
     hurt = np.bincount(flat[0][damaged], minlength=total) > 0
     poor = (asked > 0) & (seen < 0.15 * usual * asked)
-    joined, _ = label((hurt | poor).reshape(shape), np.ones((3, 3, 3)))
+    joined, _ = label((hurt | poor).reshape(shape), np.ones((3, 3, 3), bool))
     core = np.isin(joined, np.unique(joined.ravel()[hurt]))
-    wide = binary_dilation(core, np.ones((3, 3, 3)))
-    wider = binary_dilation(wide, np.ones((3, 3, 3)))
+    wide = binary_dilation(core, np.ones((3, 3, 3), bool))
+    wider = binary_dilation(wide, np.ones((3, 3, 3), bool))
     return wide.ravel()[flat[1]], sound & wider.ravel()[flat[0]]
 
 

@@ -13,8 +13,8 @@ from damageest.stages.enclose import EncloseAll
 
 
 class Implicit(EncloseAll):
-    """A screened Poisson surface round the losses, solved only in their neighbourhood. Takes several losses, worn-through
-    walls and broken-off ends alike, since it neither traces rims nor guesses a side."""
+    """A screened Poisson surface round the losses, solved only in their neighbourhood. Takes several losses,
+    worn-through walls and broken-off ends alike, since it neither traces rims nor guesses a side."""
 
     use: Literal["implicit"] = "implicit"
     cell: float = Field(0.8, gt=0.1, le=4, description="edge of a grid cell, in tolerances")

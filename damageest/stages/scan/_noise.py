@@ -24,7 +24,7 @@ class Field:
         band = np.repeat(np.arange(octaves), waves)
         direction = rng.normal(size=(len(band), 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        heights = 0.5**band
+        heights = np.asarray(0.5**band, dtype=np.float64)
         heights /= np.sqrt((heights**2).sum() / 2)
         number = 2 * np.pi / wavelength * 2.0**band * rng.uniform(0.8, 1.25, len(band))
         return cls(direction * number[:, None], rng.uniform(0, 2 * np.pi, len(band)), heights)
