@@ -47,15 +47,16 @@ def gathered(
     """Sorts scan and skin into damaged, lost and sound; ``band`` and ``push`` in tolerances."""
     from scipy.spatial import cKDTree
 
-    points, label, grown, depth = _grown(aligned, deviation, sites, tolerance)
+    points, label, grown, face = _grown(aligned, deviation, sites, tolerance)
     skin = skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
-    groups, lost_by = _groups(points, np.maximum(-depth, 0), label, skin, tolerance, aligned.spacing, aligned.noise)
-    areas = local_areas(skin.points)
     free = cKDTree(points).query(skin.points, workers=2)[0] < np.maximum(band * tolerance, 1.2 * skin.usual)
+    cross = part.cross[face]
+    above = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    groups, lost_by = _groups(points, above, label, skin, free, tolerance, aligned.spacing, aligned.noise)
+    areas = local_areas(skin.points)
     kept = np.flatnonzero((lost_by < 0) & ~free)
-    moved, useful = pushed(part, skin.points[kept], skin.normals[kept], push * tolerance)
-    kept = kept[useful]
-    return Found(groups, skin, lost_by, moved[useful], skin.normals[kept], areas[kept])
+    moved = pushed(part, skin.points[kept], skin.normals[kept], push * tolerance)
+    return Found(groups, skin, lost_by, moved, skin.normals[kept], areas[kept])
 
 
 def oriented(found: Found, grid: Grid) -> tuple[Floats, Floats, Floats]:
@@ -95,47 +96,38 @@ def within_reach(grid: Grid, field: Field, found: Found, number: int, slack: flo
     return np.minimum(field, refined(cut))
 
 
-def _surface(points: Floats, depth: Floats, skin: Skin, charge: Flags, noise: float, cell: float) -> Surfels:
-    """The points of one group smoothed, thinned and turned toward the lost side, with the area of each.
+def _surface(points: Floats, above: Floats, lost: Floats, lost_normals: Floats, noise: float, cell: float) -> Surfels:
+    """The points (M,3) of one group smoothed, thinned and turned toward the lost side, with the area of each.
 
-    ``charge`` (S,): which samples of the skin this group lost."""
+    ``above`` (M,3): the normal of the nominal skin nearest to each; ``lost`` (L,3): samples of the skin lost with them.
+    """
     if len(points) > 40_000:
         keep = subset(points, 0.5 * cell)
-        points, depth = points[keep], depth[keep]
+        points, above = points[keep], above[keep]
     points, normals, _ = smoothed(points, noise)
     keep = subset(points, 0.5 * cell)
-    points, normals, depth = points[keep], normals[keep], depth[keep]
-    low, high = points.min(axis=0), points.max(axis=0)
-    if charge.any():
-        low, high = np.minimum(low, skin.points[charge].min(axis=0)), np.maximum(high, skin.points[charge].max(axis=0))
-    here = np.flatnonzero(((skin.points > low - 15 * cell) & (skin.points < high + 15 * cell)).all(axis=1))
-    places, outward, weight = _thin_skin(skin, charge, here, cell)
-    normals = toward_void(points, normals, depth, places, outward, weight, cell)
+    points, normals, above = points[keep], normals[keep], above[keep]
+    size, chosen = cell, np.arange(len(lost))
+    while len(chosen) > 5000:
+        size *= 1.3
+        chosen = subset(lost, size)
+    places = lost[chosen]
+    normals = toward_void(points, normals, above, places, lost_normals[chosen], local_areas(places), cell)
     return points, normals, local_areas(points)
 
 
-def _thin_skin(skin: Skin, charge: Flags, here: Ints, cell: float) -> Surfels:
-    """Few enough samples of the skin, with their areas as charges, for every point to look at each."""
-    size = cell
-    chosen = here
-    while len(chosen) > 6000:
-        size *= 1.3
-        chosen = here[subset(skin.points[here], size)]
-    places = skin.points[chosen]
-    return places, skin.normals[chosen], local_areas(places) * np.where(charge[chosen], 1.0, -1.0)
-
-
 def _groups(
-    points: Floats, depth: Floats, label: Ints, skin: Skin, tolerance: float, spacing: float, noise: float
+    points: Floats, above: Floats, label: Ints, skin: Skin, free: Flags, tolerance: float, spacing: float, noise: float
 ) -> tuple[tuple[Group, ...], Ints]:
     """Losses whose points or lost skin come within reach of one another are one group; and for each skin sample the
     group that lost it. Skin that shows no scan point but belongs to no damaged point is not lost: the scanner did not
-    see it."""
+    see it. A few stray points of a site whose others form a group are none of their own."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    link = max(3 * tolerance, 1.5 * spacing)
+    around = skin.usual[free] if free.any() else skin.usual
+    link = max(3 * tolerance, 1.5 * spacing, 1.2 * float(np.quantile(around, 0.9)) if len(around) else 0.0)
     gone = np.flatnonzero(skin.gone)
     every = np.concatenate([points, skin.points[gone]])
     cubes = np.floor((every - every.min(axis=0)) / (link / 2)).astype(np.int64)
@@ -149,13 +141,19 @@ def _groups(
     group = component[cube]
     of_points, of_gone = group[: len(points)], group[len(points) :]
     found: list[Group] = []
+    whole = np.bincount(label)
     lost_by = np.full(len(skin.points), -1, np.int64)
     for number in np.unique(of_points):
         members = of_points == number
-        labels = tuple(int(k) for k in np.unique(label[members]) if k > 0)
+        share = np.bincount(label[members], minlength=len(whole))
+        labels = tuple(int(k) for k in np.flatnonzero(share > 0.05 * whole))
+        if not labels:
+            continue
         lost = gone[of_gone == number]
         lost_by[lost] = len(found)
-        surface = _surface(points[members], depth[members], skin, np.equal(lost_by, len(found)), noise, 0.8 * tolerance)
+        surface = _surface(
+            points[members], above[members], skin.points[lost], skin.normals[lost], noise, 0.8 * tolerance
+        )
         found.append(Group(*surface, skin.points[lost], labels))
     return tuple(found), lost_by
 
@@ -170,11 +168,9 @@ def local_areas(points: Floats) -> Floats:
     return np.asarray(np.minimum(area, 4 * np.median(area)))
 
 
-def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) -> tuple[Floats, Ints, Flags, Floats]:
+def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) -> tuple[Floats, Ints, Flags, Ints]:
     """The sites' points and their neighbours that are deeper than the noise makes likely: the rim, where the damage is
     still shallower than the tolerance."""
-    from scipy.spatial import cKDTree
-
     deep = (sites.label == 0) & (deviation.distance < -max(1.5 * aligned.noise, 0.1 * tolerance))
     deep &= deviation.distance >= -tolerance * 1.0001
     candidates = np.flatnonzero(deep)
@@ -182,11 +178,9 @@ def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) 
     label = sites.label.astype(np.int64)
     if len(candidates):
         reach = max(2 * tolerance, 0.7 * aligned.spacing)
-        distance, index = cKDTree(aligned.points[seeds]).query(
-            aligned.points[candidates], distance_upper_bound=reach, workers=2
-        )
-        hit = np.isfinite(distance)
-        label[candidates[hit]] = label[seeds[np.asarray(index)[hit]]]
+        distance, index = neighbours(aligned.points[candidates], 1, aligned.points[seeds])
+        hit = distance[:, 0] < reach
+        label[candidates[hit]] = label[seeds[index[hit, 0]]]
     grown = (label > 0) & (sites.label == 0)
     chosen = label > 0
-    return aligned.points[chosen], label[chosen], grown, deviation.distance[chosen]
+    return aligned.points[chosen], label[chosen], grown, deviation.face[chosen]

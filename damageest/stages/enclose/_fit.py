@@ -24,22 +24,22 @@ def subset(points: Floats, cell: float) -> Ints:
     return np.sort(np.unique((keys[:, 0] * size[1] + keys[:, 1]) * size[2] + keys[:, 2], return_index=True)[1])
 
 
-def neighbours(points: Floats, count: int) -> tuple[Floats, Ints]:
-    """Distances and indices (N,count) of each point's nearest, itself first."""
+def neighbours(points: Floats, count: int, among: Floats | None = None) -> tuple[Floats, Ints]:
+    """Distances and indices (N,count) of each point's nearest ``among`` others, or among all, itself first."""
     from scipy.spatial import cKDTree
 
-    count = min(count, len(points))
-    distance, index = cKDTree(points).query(points, k=count, workers=2)
-    return np.reshape(distance, (len(points), count)), np.reshape(index, (len(points), count)).astype(np.int64)
+    among = points if among is None else among
+    count = min(count, len(among))
+    distance, index = cKDTree(among).query(points, k=count, workers=2)
+    return np.reshape(distance, (len(points), count)), np.reshape(index, (len(points), count))
 
 
-def smoothed(points: Floats, noise: float, count: int = 20, rounds: int = 3) -> tuple[Floats, Floats, Floats]:
+def smoothed(points: Floats, noise: float, count: int = 32, rounds: int = 3) -> tuple[Floats, Floats, Floats]:
     """Points moved onto a local fit, unit normals of either sign, and the radius of each fit.
 
     Planes are fitted to the neighbours that agree in direction (bilateral weights, after Fleishman et al. 2003), so
-    that an
-    edge between two faces stays one; then a quadric in the plane's frame takes the curvature. A point moves along its
-    normal only, by three times the noise at most.
+    that an edge between two faces stays one; then a quadric in the plane's frame takes the curvature. A point moves
+    along its normal only, by three times the noise at most.
     """
     distance, index = neighbours(points, count)
     reach = np.maximum(distance[:, -1], 1e-12)

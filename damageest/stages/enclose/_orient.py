@@ -14,28 +14,26 @@ SMOOTH = 0.8
 
 
 def toward_void(
-    points: Floats, normals: Floats, depth: Floats, skin: Floats, skin_normals: Floats, charge: Floats, cell: float
+    points: Floats, normals: Floats, above: Floats, lost: Floats, lost_normals: Floats, areas: Floats, cell: float
 ) -> Floats:
     """Turns normals (N,3) of either sign toward the lost side.
 
-    Neighbours agree on relative signs first: within smooth patches, then between patches, where all the pairs along a
-    crease count together. What remains is one sign for each connected surface: there the nominal skin decides. A point
-    sees each patch of it under a solid angle; what is gone pulls, what is there pushes, and skin behind other skin
-    cancels out. The damage surface itself hides nothing, so points near the skin, at the rims, count most.
+    Each point sees the skin that is gone under a solid angle, and its lost side is where that lies; skin that faces the
+    other way, behind a void, cancels out. Neighbours agree on relative signs: within smooth patches, and between
+    patches, where all the pairs along a border count together.
 
     Args:
-        depth: (N,) of the points under the nominal skin.
-        skin, skin_normals: (S,3) samples of the nominal skin. charge: (S,) area of each, negative where it is still
-        there. cell: length below which nothing is resolved.
+        above: (N,3) normal of the nominal skin nearest to each point; it decides where no skin is gone.
+        lost, lost_normals: (S,3) samples of the skin that is gone, each standing for one of the ``areas`` (S,).
+        cell: length below which nothing is resolved.
     """
     from scipy.spatial import cKDTree
 
     eyes = points[subset(points, 2 * cell)] if len(points) > 1500 else points
-    pull = _pull(eyes, skin, skin_normals, charge, cell)
+    pull = _pull(eyes, lost, lost_normals, areas, cell)
     nearest = cKDTree(eyes).query(points, workers=2)[1]
-    vote = np.einsum("ij,ij->i", normals, pull[nearest]) / np.pi
-    sign = _signs(points, normals, vote / (1 + (depth / (4 * cell)) ** 2))
-    return sign[:, None] * normals
+    vote = np.einsum("ij,ij->i", normals, pull[nearest] / np.pi + 0.01 * above)
+    return _signs(points, normals, vote)[:, None] * normals
 
 
 def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
@@ -51,8 +49,7 @@ def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     agree = np.einsum("ij,ij->i", across, normals[second])
     near = 1 / (1 + (distance[:, 1:].ravel() / np.median(distance[:, -1])) ** 2)
 
-    # Small patches, so that the few wrong agreements (across a thin fin, a narrow slot) are outvoted along their
-    # borders.
+    # Small patches, so that the few wrong agreements (across a thin fin, a narrow slot) are outvoted along borders.
     block = _blocks(points, max(3 * float(np.median(distance[:, -1])), 1e-9 * float(np.ptp(points)), 1e-300))
     firm = (np.abs(agree) > SMOOTH) & (block[first] == block[second])
     sign, patch = _spanned(len(points), first[firm], second[firm], agree[firm])
@@ -60,15 +57,14 @@ def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     a, b = patch[first], patch[second]
     size = int(patch.max()) + 1
     total = _summed(size, a, b, strength * sign[first] * sign[second])
-    patch_vote = np.bincount(patch, vote * sign, size).astype(np.float64)
-    patch_sign = _relaxed(total.tocsr(), patch_vote)
+    patch_vote = np.bincount(patch, vote * sign, size)
+    patch_sign = _relaxed(total.tocsr(), np.asarray(patch_vote, np.float64))
     links = _summed(len(points), first, second, strength).tocsr()
     return _settled(sign * patch_sign[patch], links, np.zeros(len(points)), 5 * len(points) // 100)
 
 
 def _relaxed(links: Any, vote: Floats) -> Floats:
-    """Signs (P,) that agree with links and votes as well as they can: the least-squares relaxation, then single
-    flips."""
+    """Signs (P,) that agree with links and votes as well as they can: least squares, relaxed, then single flips."""
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import spsolve
 
@@ -136,15 +132,15 @@ def _spanned(size: int, first: Ints, second: Ints, agree: Floats) -> tuple[Float
     return np.where(side[:size] == side[root[island]], 1.0, -1.0), island.astype(np.int64)
 
 
-def _pull(eyes: Floats, skin: Floats, normals: Floats, charge: Floats, cell: float) -> Floats:
-    """Sum (E,3) over the skin of solid angle times direction times the sign of the charge."""
+def _pull(eyes: Floats, skin: Floats, normals: Floats, areas: Floats, cell: float) -> Floats:
+    """Sum (E,3) over the skin of solid angle times direction."""
     out = np.zeros((len(eyes), 3), np.float32)
     if not len(skin):
         return out.astype(np.float64)
     middle = skin.mean(axis=0)
     skin32, normals32 = (skin - middle).astype(np.float32), normals.astype(np.float32)
-    weight = charge.astype(np.float32)
-    soft = np.abs(weight).mean() + np.float32((0.5 * cell) ** 2)
+    weight = areas.astype(np.float32)
+    soft = weight.mean() + np.float32((0.5 * cell) ** 2)
     step = max(1, 4_000_000 // len(skin))
     for start in range(0, len(eyes), step):
         eye = (eyes[start : start + step] - middle).astype(np.float32)

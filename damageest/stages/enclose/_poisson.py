@@ -40,8 +40,7 @@ class Grid:
         return np.asarray(((at >= 0) & (at <= np.array(self.shape) - 1.001)).all(axis=1))
 
     def corners(self, points: Floats, shift: Floats | None = None) -> tuple[NDArray[np.int64], Floats]:
-        """Flat node indices (N,8) round each point and their trilinear weights (N,8); ``shift`` moves the nodes, in
-        cells."""
+        """Flat node indices (N,8) round each point and trilinear weights (N,8); ``shift`` moves the nodes, in cells."""
         at = (points - self.origin) / self.cell - (0 if shift is None else shift)
         at = np.clip(at, 0, np.array(self.shape) - 1.001)
         low = np.floor(at).astype(np.int64)
@@ -92,10 +91,10 @@ def solve(
     symbol = _symbol(grid) + shift
 
     def apply(x: Field) -> Field:
-        drawn: Field = back @ (pull * (look @ x.ravel()))
-        return _laplacian(x) + drawn.reshape(grid.shape)
+        drawn: Field = (back @ (pull * (look @ x.ravel()))).reshape(grid.shape)
+        return _laplacian(x) + drawn
 
-    x = _precondition(right, symbol) if start is None else start.copy()
+    x: Field = _precondition(right, symbol) if start is None else start.copy()
     r = right - apply(x)
     goal = accuracy * float(np.sqrt(np.vdot(right, right)))
     z = _precondition(r, symbol)
@@ -126,12 +125,12 @@ def solve_by_halves(grid: Grid, points: Floats, normals: Floats, areas: Floats, 
 
 def refined(coarse: Field) -> Field:
     """The field of ``Grid.coarser()`` carried to the nodes of the finer grid, linearly."""
-    out = coarse
+    out: Field = coarse
     for axis in range(3):
         x: Field = np.moveaxis(out, axis, 0)
         low, high = np.concatenate([x[:1], x[:-1]]), np.concatenate([x[1:], x[-1:]])
-        pair = np.stack([0.75 * x + 0.25 * low, 0.75 * x + 0.25 * high], axis=1).astype(np.float32)
-        out = np.moveaxis(pair.reshape(-1, *x.shape[1:]), 0, axis)
+        pair = np.stack([0.75 * x + 0.25 * low, 0.75 * x + 0.25 * high], axis=1)
+        out = np.moveaxis(pair.reshape(-1, *x.shape[1:]).astype(np.float32), 0, axis)
     return np.ascontiguousarray(out, dtype=np.float32)
 
 
@@ -143,10 +142,10 @@ def _divergence(grid: Grid, points: Floats, vectors: Floats) -> Field:
         shift[axis] = 0.5
         nodes, weights = grid.corners(points, shift)
         flow = np.bincount(nodes.ravel(), (weights * vectors[:, axis, None]).ravel(), grid.size)
-        flow = np.moveaxis(flow.reshape(grid.shape).astype(np.float32), axis, 0)
+        along: Field = np.moveaxis(flow.reshape(grid.shape).astype(np.float32), axis, 0)
         out = np.moveaxis(total, axis, 0)
-        out[1:] += flow[:-1]
-        out[:-1] -= flow[:-1]
+        out[1:] += along[:-1]
+        out[:-1] -= along[:-1]
     return total
 
 

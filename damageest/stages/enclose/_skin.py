@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Samples, Scan, Sites
-from damageest.stages.enclose._fit import subset
+from damageest.stages.enclose._fit import neighbours, subset
 
 Flags = NDArray[np.bool_]
 
@@ -16,7 +16,8 @@ Flags = NDArray[np.bool_]
 @dataclass(frozen=True, eq=False)
 class Skin:
     """Samples (S,3) of the part's skin round the losses, their outward ``normals``, and whether each is ``gone``: no
-    sound scan point near, though the scan is dense enough there to show one. ``usual`` (S,): the gap that the scan leaves."""
+    sound scan point near, though the scan is dense enough there to show one. ``usual`` (S,): the gap that the scan
+    leaves."""
 
     points: Floats
     normals: Floats
@@ -54,13 +55,11 @@ def skin_near(
 
 def _usual(points: Floats, hit: Floats, tolerance: float) -> Floats:
     """Radius (S,) that holds six sound points on the sound surface nearest to each skin sample."""
-    from scipy.spatial import cKDTree
-
     count = min(7, len(hit))
     some = hit[subset(hit, 3 * tolerance)]
-    radius = np.asarray(cKDTree(hit).query(some, k=count, workers=2)[0])[:, -1]
-    _, index = cKDTree(some).query(points, k=min(6, len(some)), workers=2)
-    return np.asarray(np.median(radius[index.reshape(len(points), -1)], axis=1))
+    radius = neighbours(some, count, hit)[0][:, -1]
+    _, index = neighbours(points, 6, some)
+    return np.asarray(np.median(radius[index], axis=1))
 
 
 def _lattice(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size: float) -> tuple[Flags, Flags]:
@@ -88,13 +87,12 @@ def _lattice(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size: flo
     return wide.ravel()[flat[1]], sound & wider.ravel()[flat[0]]
 
 
-def pushed(part: Part, skin: Floats, outward: Floats, push: float) -> tuple[Floats, Flags]:
-    """The samples moved outward by ``push``, or by less where another wall stands in the way, and which of them serve:
-    beside an inner corner the moved ones of one face end up too near the other and say nothing."""
+def pushed(part: Part, skin: Floats, outward: Floats, push: float) -> Floats:
+    """The samples moved outward by ``push``, or by less where another wall stands in the way."""
     import igl
 
     if not len(skin):
-        return skin, np.ones(0, bool)
+        return skin
     origin = part.bounds.mean(axis=0)
     distance, *_ = igl.signed_distance(
         np.ascontiguousarray(skin + push * outward - origin), np.ascontiguousarray(part.vertices - origin),
@@ -102,4 +100,4 @@ def pushed(part: Part, skin: Floats, outward: Floats, push: float) -> tuple[Floa
     )  # fmt: skip
     by = np.clip(0.45 * (distance + push), 0.05 * push, push)
     by = np.where(distance > 0.9 * push, push, by)
-    return np.asarray(skin + by[:, None] * outward), np.ones(len(skin), bool)
+    return np.asarray(skin + by[:, None] * outward)

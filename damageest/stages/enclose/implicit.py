@@ -17,10 +17,10 @@ class Implicit(EncloseAll):
     worn-through walls and broken-off ends alike, since it neither traces rims nor guesses a side."""
 
     use: Literal["implicit"] = "implicit"
-    cell: float = Field(0.8, gt=0.1, le=4, description="edge of a grid cell, in tolerances")
+    cell: float = Field(1.0, gt=0.1, le=4, description="edge of a grid cell, in tolerances")
     band: float = Field(2.5, ge=0, le=10, description="skin left free round the damaged points, in tolerances")
     push: float = Field(1.0, gt=0, le=4, description="how far the sound skin is pushed outward, in tolerances")
-    margin: float = Field(14.0, ge=4, le=60, description="space round a loss that takes part, in tolerances")
+    margin: float = Field(8.0, ge=4, le=60, description="space round a loss that takes part, in tolerances")
     screening: float = Field(1.0, gt=0, le=100, description="how strongly points pull the surface onto themselves")
     most_cells: int = Field(
         4_000_000, ge=50_000, le=60_000_000, description="grid cells of one loss; a larger one gets larger cells"
