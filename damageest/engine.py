@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import typing
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -63,7 +64,7 @@ class Engine:
         named = dict(zip(("stage", "use", "site"), where, strict=True))
         needs = item.cls.needs()
         key = digest(*where[:2], item.provider.fingerprint, stage.model_dump(), [state.keys[name] for name in needs])
-        hooks.damageest_before_stage(**named)
+        _tell(hooks.damageest_before_stage, **named)
         start = time.perf_counter()
         try:
             cached, value = self.remember(
@@ -73,11 +74,11 @@ class Engine:
                 keep=contract.stage != "export",
             )
         except Exception as error:
-            hooks.damageest_stage_failed(**named, error=error)
+            _tell(hooks.damageest_stage_failed, **named, error=error)
             raise _placed(error, *where) from error
         seconds = time.perf_counter() - start
         self.records.append(StageRecord(*where[:2], str(item.provider), state.site, round(seconds, 3), cached))
-        hooks.damageest_after_stage(**named, output=value, seconds=seconds, cached=cached)
+        _tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
         return state.add(contract.gives, value, key)
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
@@ -119,6 +120,15 @@ def follow(route: Sequence[Contract | Joint], engine: Engine, lanes: list[State]
                 engine.failures.append(error)
         lanes = ahead
     return lanes
+
+
+def _tell(hook: Callable[..., Any], **what: Any) -> None:
+    """Calls observers. One that fails has no say in what is computed, nor in whether it is."""
+    try:
+        hook(**what)
+    except Exception as error:
+        text = f"a plugin that observes stage {what['stage']} failed: {type(error).__name__}: {error}"
+        warnings.warn(text, RuntimeWarning, stacklevel=2)
 
 
 def _checked(value: Any, contract: Contract) -> Any:

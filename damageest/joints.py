@@ -26,6 +26,9 @@ from damageest.units import diagnose_scale
 AUTO_TOLERANCE = 4.0
 """Lambda over the scan's noise where the job says auto: 6 in 100,000 sound points deviate by more."""
 
+FEW = 100
+"""Damaged points below which a site's volume is that of a sketch: a chip of 30 points came out 15 % small."""
+
 
 def measured(engine: Engine, lanes: list[State]) -> list[State]:
     """Measures the scan's noise and spacing, settles the tolerance, and refuses a scan of another size."""
@@ -228,6 +231,11 @@ def gather(engine: Engine, lanes: list[State]) -> list[State]:
 def _site(lane: State, part: Part, deviation: Deviation) -> Site:
     evidence, members = lane["evidence"], lane["members"]
     warnings = tuple(lane["doubts"])
+    if len(members) < FEW:
+        warnings = (
+            f"only {len(members)} scan points lie on it; for a volume to rely on, scan it more densely",
+            *warnings,
+        )
     if not evidence.consistent:
         warnings = (f"the scan does not bear this damage volume out: {'; '.join(evidence.reasons)}", *warnings)
     return Site(

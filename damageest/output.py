@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +21,11 @@ from damageest.errors import Fault, JobError
 from damageest.job import Job, plain
 from damageest.result import Result, report
 
-_OURS = {"result.json", "job.yaml", "damage", "surface", "deposit", "stages", "truth", "undamaged", "scan"}
+_OURS = re.compile(
+    r"result\.json|job\.yaml|scan\.ply|(damage|undamaged)\.(stl|ply)|(damage|surface|deposit)/site-\d+\.(stl|ply)"
+    r"|truth/(damage\.(stl|ply)|pose\.json)|stages/.*"
+)
+"""What a run writes, by its path in the output folder. Whatever else stands there is the user's, and stays."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +42,10 @@ class Workshop:
         self.cache.keep_only(stems)
         os.replace(self.cache.folder, self.folder / "stages")
         old = _old(self.target)
-        shutil.rmtree(old, ignore_errors=True)
         if self.target.exists():
             os.replace(self.target, old)
         os.replace(self.folder, self.target)
-        if old.exists():
-            for path in old.iterdir():
-                if path.name.split(".")[0] not in _OURS and path.name not in _OURS:
-                    os.replace(path, self.target / path.name)
-            shutil.rmtree(old)
+        _hand_over(old, self.target)
         shutil.rmtree(self.hidden)
 
 
@@ -62,6 +62,7 @@ def workshop(target: Path, use_cache: bool = True) -> Iterator[Workshop]:
     with _locked(hidden, target):
         if _old(target).exists() and not target.exists():
             os.replace(_old(target), target)
+        _hand_over(_old(target), target)  # left where a run was killed in the middle of finishing
         stages, folder = hidden / "stages", hidden / "result"
         shutil.rmtree(folder, ignore_errors=True)
         if not use_cache:
@@ -86,6 +87,19 @@ def write_report(result: Result, job: Job, folder: Path, target: Path, files: tu
 
 def _old(target: Path) -> Path:
     return target.parent / f".{target.name}.old"
+
+
+def _hand_over(old: Path, target: Path) -> None:
+    """Moves the user's own files from the earlier output to the new one, and drops the rest of it."""
+    if not old.exists():
+        return
+    for path in sorted(old.rglob("*")):
+        name = path.relative_to(old)
+        if (path.is_dir() and not path.is_symlink()) or _OURS.fullmatch(name.as_posix()):
+            continue
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        os.replace(path, target / name)
+    shutil.rmtree(old)
 
 
 def _refuse_strangers(target: Path) -> None:
