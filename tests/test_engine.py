@@ -131,7 +131,7 @@ def test_an_observer_that_fails_does_not_stop_the_run(tmp_path: Path) -> None:
 
 
 def test_only_what_changed_runs_again(tmp_path: Path) -> None:
-    """Another scan under the same name leaves what came from the part alone, and touches all that came from the scan."""
+    """Another scan under the same name leaves what came from the part alone, and nothing that came from the scan."""
     path = scenes.write(tmp_path)
     damageest.run(path, output=True)
     assert not [r for r in damageest.run(path, output=True).stages if not r.cached and r.stage != "export"]

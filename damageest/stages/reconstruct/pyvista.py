@@ -11,6 +11,7 @@ from damageest.artefacts import Floats, Ints, Part, Surface
 from damageest.errors import StageError
 from damageest.stages.reconstruct import Reconstruct
 
+FEWEST = 16
 MOST_CELLS = 3e6
 """Cells in the box of a damage; VTK visits each, at some 2 microseconds."""
 
@@ -20,7 +21,7 @@ class PyVista(Reconstruct):
     tangent planes through the points as they are. Wants fairly even density."""
 
     use: Literal["pyvista"] = "pyvista"
-    neighbours: int = Field(20, ge=5, le=200, description="points of each tangent plane")
+    neighbours: int = Field(20, ge=5, le=200, description="points of each tangent plane; half of a small site")
     spacing: float | None = Field(
         None,
         gt=0,
@@ -42,13 +43,14 @@ class PyVista(Reconstruct):
         least = float(np.prod(np.ptp(local, axis=0)) / MOST_CELLS) ** (1 / 3)
         cell = self.spacing or max(tolerance, spacing, least)
         cloud, _ = thinned(local, 0.7 * cell)
-        if len(cloud) < 2 * self.neighbours:
+        if len(cloud) < FEWEST:
             raise StageError(
-                f"{len(points)} points, {len(cloud)} after thinning, are too few for {self.neighbours} neighbours",
-                "fewer neighbours, a smaller spacing, or method: implicit",
+                f"{len(points)} points, {len(cloud)} after thinning, are too few for a surface",
+                "a smaller spacing, or method: implicit",
             )
-        cloud, _, _ = smoothed(cloud, noise, self.neighbours)
-        mesh = pyvista.PolyData(cloud).reconstruct_surface(nbr_sz=self.neighbours, sample_spacing=cell)
+        count = min(self.neighbours, len(cloud) // 2)
+        cloud, _, _ = smoothed(cloud, noise, count)
+        mesh = pyvista.PolyData(cloud).reconstruct_surface(nbr_sz=count, sample_spacing=cell)
         if not mesh.n_cells:
             raise StageError("no surface came about", "another spacing, or method: implicit")
         mesh = mesh.triangulate().clean()

@@ -71,5 +71,13 @@ def test_far_from_the_origin(surface: Surface) -> None:
 def test_too_few_points_are_refused() -> None:
     points, part = scene()
     with pytest.raises(StageError, match="too few") as caught:
-        PyVista().run(points[:20], part, TOLERANCE, 0.15, NOISE)
+        PyVista().run(points[:12], part, TOLERANCE, 0.15, NOISE)
     assert caught.value.remedy
+
+
+def test_a_small_damage_has_a_surface() -> None:
+    points, part = scene()
+    small = points[np.argsort(np.linalg.norm(points - points[0], axis=1))[:40]]
+    surface = PyVista().run(small, part, TOLERANCE, 0.15, NOISE)
+    assert len(surface.faces) > 20
+    assert np.linalg.norm(surface.vertices - points[0], axis=1).max() < 2
