@@ -145,11 +145,12 @@ class Part(Solid):
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class Truth(_Arrays):
     """What a virtual scanner knows: the true ``damage`` in the part's frame (None if there is none), and the pose."""
 
     damage: Solid | None
     T_part_scan: Floats
+    _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64}
 
 
 @dataclass(frozen=True, eq=False)

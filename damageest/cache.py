@@ -99,7 +99,7 @@ class Cache:
                 with np.load(folder / f"{stem}.npz", allow_pickle=False) as stored:
                     arrays = {n: stored[n] for n in stored.files}
                 value = _decode(meta, arrays)
-            except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+            except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
                 continue
             if folder != self.folder:
                 self._carry_over(folder, stem)

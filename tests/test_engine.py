@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import Field
 
 import damageest
 from damageest.cache import Cache
@@ -28,7 +29,7 @@ class Counting(Allowance):
     """A stage that does what the test says."""
 
     use: str = "none"
-    act: Any = None
+    act: Any = Field(None, exclude=True)
 
     def run(self, damage: Any) -> Any:
         return self.act(damage)
