@@ -1,44 +1,99 @@
-"""A small damaged box, scanned, as files: quick enough to run the whole route on in every test."""
+"""Damaged parts of known truth, scanned with noise at known pose, for the tests of what follows alignment."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
-import trimesh
+from manifold3d import Manifold
 
-from damageest.artefacts import Part
-from damageest.meshio import write_points
-from damageest.stages.scan.simulate import Simulate
+from damageest.artefacts import Deviation, Floats, Mesh, Part, Samples, Scan, Sites, Solid
+from damageest.solids import to_arrays
+from damageest.stages.cluster.dbscan import Dbscan
+from damageest.stages.sample.edge_aware import EdgeAware
+from damageest.stages.segment.mesh_distance import MeshDistance
 
-SIZE = (40.0, 30.0, 20.0)
-TRUE_VOLUME = np.pi * 6**3 * 2 / 3
-"""mm3 of the half ball of radius 6 taken off the top."""
-JOB = "version: 1\ntolerance: 0.2\nalign: none\npart: box.stl\nscan: scan.ply\n"
-
-
-def box() -> Part:
-    mesh = trimesh.creation.box(SIZE)
-    return Part(mesh.vertices, mesh.faces)
+NOISE = 0.02
+TOLERANCE = 0.08
 
 
-def scan(points: int = 20_000) -> np.ndarray:
-    tool = {"tool": "sphere", "centre": [0, 0, SIZE[2] / 2], "radius": 6}
-    scanner = Simulate.model_validate({"damage": [tool], "points": points, "noise": 0.04})
-    return np.asarray(scanner.run("mm", box()).points)
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that an enclosure takes, and ``truth``, the damage."""
+
+    part: Part
+    truth: Solid
+    aligned: Scan
+    deviation: Deviation
+    sites: Sites
+    samples: Samples
+    tolerance: float = TOLERANCE
+
+    def inputs(self) -> dict[str, Any]:
+        names = ("part", "aligned", "deviation", "sites", "samples", "tolerance")
+        return {name: getattr(self, name) for name in names}
+
+    def of_sites(self) -> Floats:
+        return self.aligned.points[self.sites.label > 0]
+
+    def without(self, hidden: np.ndarray[Any, Any]) -> Scene:
+        """The same scene where the scanner missed some points (N,) of it."""
+        return _seen(self.part, self.truth, self.aligned.points[~hidden])
 
 
-def write(folder: Path, job: str = JOB) -> Path:
-    """Writes part, scan and job; gives the job's path."""
-    folder.mkdir(parents=True, exist_ok=True)
-    trimesh.creation.box(SIZE).export(folder / "box.stl")
-    x, y, z = scan().T
-    write_points(folder / "scan.ply", {"x": x, "y": y, "z": z})
-    path = folder / "job.yaml"
-    path.write_text(job)
-    return path
+def block() -> Any:
+    return Manifold.cube((30, 20, 12)) - Manifold.cylinder(30, 2.5, 2.5, 96, True).translate((22, 10, 0))
 
 
-def content(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder, by its relative path."""
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+def plate() -> Any:
+    return Manifold.cube((30, 20, 0.8)) + Manifold.cube((30, 0.8, 6))
+
+
+TOOLS: dict[str, tuple[Any, Any]] = {
+    "pit": (block, lambda: Manifold.sphere(4, 128).translate((9, 9, 14))),
+    "edge": (block, lambda: Manifold.cube((8, 8, 8), True).rotate((35, 20, 10)).translate((1, 4, 12))),
+    "deep hole": (block, lambda: Manifold.cylinder(9, 1.2, 1.2, 96).translate((10, 10, 4))),
+    "end": (block, lambda: Manifold.cube((40, 60, 60), True).rotate((0, 12, 7)).translate((38, 10, 6))),
+    "beside the bore": (block, lambda: Manifold.sphere(3, 128).translate((18.5, 9, 12.5))),
+    "worn through": (plate, lambda: Manifold.sphere(4, 128).translate((12, 11, 2.5))),
+    "two": (
+        block,
+        lambda: Manifold.sphere(2, 96).translate((5, 5, 12.5)) + Manifold.sphere(2, 96).translate((12, 15, 12.5)),
+    ),
+}
+
+
+@lru_cache
+def scene(name: str) -> Scene:
+    """One of TOOLS, scanned with 12 points per square millimetre."""
+    make, tool = TOOLS[name]
+    whole = make()
+    left, lost = whole - tool(), whole ^ tool()
+    mesh = Mesh(*to_arrays(left))
+    rng = np.random.default_rng(7)
+    points, normals = spread(mesh, int(12 * mesh.area), rng)
+    points = points + NOISE * rng.normal(size=len(points))[:, None] * normals
+    return _seen(Part(*to_arrays(whole)), Solid(*to_arrays(lost)), points)
+
+
+def spread(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Random points (N,3) on a mesh, even by area, and their normals."""
+    area = np.linalg.norm(mesh.cross, axis=1)
+    face = rng.choice(len(area), count, p=area / area.sum())
+    u, v = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
+    a, b, c = np.moveaxis(mesh.triangles[face], 1, 0)
+    return a * (1 - u) + b * u * (1 - v) + c * u * v, mesh.cross[face] / area[face, None]
+
+
+@lru_cache
+def _samples(part: Part) -> Samples:
+    return EdgeAware().run(part=part, tolerance=TOLERANCE)
+
+
+def _seen(part: Part, truth: Solid, points: Floats) -> Scene:
+    aligned = Scan(points, noise=NOISE, spacing=0.32)
+    deviation = MeshDistance().run(aligned=aligned, part=part, tolerance=TOLERANCE)
+    sites = Dbscan().run(aligned=aligned, deviation=deviation, tolerance=TOLERANCE)
+    return Scene(part, truth, aligned, deviation, sites, _samples(part))

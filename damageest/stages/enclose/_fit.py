@@ -78,7 +78,7 @@ def _onto_quadric(
     heavy = weights[:, :, None] * terms
     left = np.einsum("iks,ikt->ist", heavy, terms, optimize=True)
     # Bending is only taken where the neighbours ask for it: a light penalty keeps thin neighbourhoods flat.
-    left += np.diag([1e-9, 1e-6, 1e-6, 2e-2, 2e-2, 2e-2]) * weights.sum(axis=1)[:, None, None]
+    left += np.diag([1e-9, 1e-6, 1e-6, 3e-4, 3e-4, 3e-4]) * weights.sum(axis=1)[:, None, None]
     right = np.einsum("iks,ik->is", heavy, h)
     fit = np.linalg.solve(left, right[:, :, None])[:, :, 0]
     move = np.clip(fit[:, 0] * reach, -3 * noise, 3 * noise)

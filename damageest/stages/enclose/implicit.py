@@ -34,6 +34,8 @@ class Implicit(EncloseAll):
         from damageest.stages.enclose._level import closed_region
         from damageest.stages.enclose._poisson import box, solve_by_halves
 
+        if not sites.count:
+            return Enclosures(())
         found = gathered(part, aligned, deviation, sites, samples, tolerance, self.band, self.push)
         items = []
         for number, group in enumerate(found.groups):

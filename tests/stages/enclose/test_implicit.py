@@ -1,0 +1,86 @@
+"""The implicit enclosure, intersected with the part, is the damage: on losses of every kind that a part can have."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from damageest.artefacts import Enclosures, Sites
+from damageest.solids import iou, to_manifold, to_solid, united
+from damageest.stages.enclose.implicit import Implicit
+from tests.scenes import TOLERANCE, Scene, scene
+
+
+@lru_cache
+def enclosed(name: str) -> Enclosures:
+    return Implicit().run(**scene(name).inputs())
+
+
+def lost(case: Scene, enclosures: Enclosures) -> list[object]:
+    bodies = (to_solid(to_manifold(case.part) ^ to_manifold(item.solid)) for item in enclosures.items)
+    return [body for body in bodies if body is not None]
+
+
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [
+        ("pit", 0.97),
+        ("edge", 0.97),
+        ("deep hole", 0.95),
+        ("end", 0.985),
+        ("beside the bore", 0.96),
+        ("worn through", 0.95),
+        ("two", 0.95),
+    ],
+)
+def test_the_part_inside_it_is_the_damage(name: str, least: float) -> None:
+    case = scene(name)
+    pieces = lost(case, enclosed(name))
+    assert iou(to_solid(united(pieces)), case.truth) > least
+
+
+def test_every_site_is_in_an_enclosure_and_none_in_two() -> None:
+    case = scene("two")
+    enclosures = enclosed("two")
+    assert sorted(k for item in enclosures.items for k in item.sites) == list(range(1, case.sites.count + 1))
+    first, second = (to_manifold(body) for body in lost(case, enclosures))
+    assert (first ^ second).volume() == pytest.approx(0, abs=1e-6)
+
+
+def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
+    case = scene("pit")
+    away = np.linalg.norm(case.aligned.points - [26, 3, 12], axis=1) < 3
+    assert away.sum() > 100
+    partial = case.without(away)
+    pieces = lost(partial, Implicit().run(**partial.inputs()))
+    assert iou(to_solid(united(pieces)), case.truth) > 0.97
+
+
+def test_the_same_input_gives_the_same_bytes() -> None:
+    first, again = enclosed("pit").items[0], Implicit().run(**scene("pit").inputs()).items[0]
+    assert first.solid.vertices.tobytes() == again.solid.vertices.tobytes()
+    assert first.solid.faces.tobytes() == again.solid.faces.tobytes()
+
+
+def test_a_loss_too_large_for_its_grid_is_solved_coarsely_and_says_so() -> None:
+    case = scene("end")
+    (item,) = Implicit(most_cells=60_000).run(**case.inputs()).items
+    assert "cells of" in item.notes[0]
+    (piece,) = (to_solid(body) for body in (to_manifold(case.part) ^ to_manifold(item.solid)).decompose()[:1])
+    assert iou(piece, case.truth) > 0.9
+
+
+def test_no_site_no_enclosure() -> None:
+    case = scene("pit")
+    none = Sites(np.zeros(len(case.aligned.points), np.int32), 0)
+    assert Implicit().run(**{**case.inputs(), "sites": none}).items == ()
+
+
+def test_the_void_outside_the_part_is_only_taken_near_the_loss() -> None:
+    case = scene("pit")
+    (item,) = enclosed("pit").items
+    reach = 25 * TOLERANCE
+    assert (item.solid.bounds[0] > case.truth.bounds[0] - reach).all()
+    assert (item.solid.bounds[1] < case.truth.bounds[1] + reach).all()
