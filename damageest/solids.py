@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from damageest.artefacts import Floats, Ints, Mesh, Solid
+
+BALANCE = 1e-7
+"""Share of a solid's volume by which what is cut off and what is left may differ from it together."""
 
 
 def to_manifold(mesh: Mesh, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
@@ -48,6 +51,28 @@ def united(solids: Iterable[Mesh], origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
     from manifold3d import Manifold, OpType
 
     return Manifold.batch_boolean([to_manifold(solid, origin) for solid in solids] or [Manifold()], OpType.Add)
+
+
+def remainder(whole: Any, lost: Any) -> Any:
+    """``whole`` minus ``lost``, which lies inside it; both Manifolds, and so is what is given.
+
+    Where faces of the two coincide, as a damage volume's outer ones do with the part's, manifold3d 3.5 was seen to take
+    off an eighth too little without a word. So volumes are balanced: of several ways to the same difference, the first
+    that leaves no volume unaccounted for is taken, else the nearest.
+    """
+    nudge = 1e-9 * max(abs(bound) for bound in whole.bounding_box())
+    ways: tuple[Callable[[], Any], ...] = (
+        lambda: whole - lost,
+        lambda: whole - (whole ^ lost),
+        lambda: whole - lost.translate((nudge, 0.7 * nudge, -0.3 * nudge)),
+    )
+    tried: list[tuple[float, Any]] = []
+    for way in ways:
+        left = way()
+        tried.append((abs(whole.volume() - lost.volume() - left.volume()), left))
+        if tried[-1][0] <= BALANCE * whole.volume():
+            break
+    return min(tried, key=lambda item: item[0])[1]
 
 
 def iou(first: Mesh | None, second: Mesh | None) -> float:
