@@ -35,6 +35,7 @@ class PyVista(Reconstruct):
         from scipy.spatial import cKDTree
 
         from damageest.stages.enclose._fit import smoothed, thinned
+        from damageest.stages.segment.mesh_distance import signed_distance
 
         origin = points.mean(axis=0)
         # VTK fills the bounding box with cells; along its own axes a damage's box is a fraction of the part's.
@@ -57,6 +58,8 @@ class PyVista(Reconstruct):
         vertices, faces = np.asarray(mesh.points, np.float64), mesh.regular_faces.astype(np.int64)
         # The filter's level goes on beyond the data; what no point vouches for is cut away.
         near = np.asarray(cKDTree(cloud).query(vertices, workers=2)[0]) < 1.4 * cell
+        # Where it overshoots the part it bounds no lost material, and a background close to the part would not hold it.
+        near &= signed_distance(vertices @ axes.T + origin, part)[0] < 0.5 * tolerance
         faces = _largest(faces[near[faces].all(axis=1)])
         if not len(faces):
             raise StageError("no surface came about", "another spacing, or method: implicit")
