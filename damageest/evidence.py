@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Evidence, Floats, Ints, Part, Scan, Solid
+from damageest.artefacts import INTACT, Deviation, Evidence, Floats, Part, Scan, Solid
 from damageest.settle import inner_faces
 
 MOST = 20_000
@@ -43,14 +43,9 @@ def weigh(
     bare = _far(on_ids, points, 1.5 * reach)
     # Close to the rim sound points are near any skin, so only what is away from the inner surface speaks.
     intact = points[label == INTACT]
-    inside = _deep_inside(intact - origin, vertices, faces, 1.5 * tolerance)
-
-    inner = inner_faces(damage, part)
-    on_ids = _sampled(damage, inner, MOST // 2)
-    on_skin = _sampled(damage, ~inner, MOST // 2)
-    bare = _far(on_ids, points, 1.5 * reach)
-    # Close to the rim sound points are near any skin, so only what is away from the inner surface speaks.
-    intact = points[label == INTACT]
+    grain = float(np.sqrt(np.linalg.norm(damage.cross[~inner], axis=1).sum() / MOST))
+    close = tolerance + 4 * grain
+    intact = intact[_gap(intact, on_skin, close) <= close]
     intact = intact[_gap(intact, on_ids, 1.5 * reach) > 1.5 * reach]
     inside, contradicted = 0, 0.0
     if len(intact):
@@ -82,21 +77,6 @@ def _gap(places: Floats, points: Floats, most: float) -> Floats:
     if not len(places) or not len(points):
         return np.full(len(places), np.inf)
     return np.asarray(cKDTree(points).query(places, distance_upper_bound=1.001 * most, workers=2)[0])
-
-
-def _deep_inside(points: Floats, vertices: Floats, faces: Ints, depth: float) -> int:
-    """How many points lie inside a solid and deeper than ``depth``. By the winding number: the slivers that a Boolean
-    leaves spoil the sign of a pseudonormal."""
-    import igl
-
-    points = np.ascontiguousarray(points[((points > vertices.min(0)) & (points < vertices.max(0))).all(axis=1)])
-    if not len(points):
-        return 0
-    points = np.ascontiguousarray(points[np.asarray(igl.fast_winding_number(vertices, faces, points)) > 0.5])
-    if not len(points):
-        return 0
-    squared, _, _ = igl.point_mesh_squared_distance(points, vertices, faces)
-    return int((squared > depth**2).sum())
 
 
 def _far(places: Floats, points: Floats, distance: float) -> float:

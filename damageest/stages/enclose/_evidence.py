@@ -178,8 +178,8 @@ def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) 
     label = sites.label.astype(np.int64)
     if len(candidates):
         reach = max(2 * tolerance, 0.7 * aligned.spacing)
-        distance, index = neighbours(aligned.points[candidates], 1, aligned.points[seeds])
-        hit = distance[:, 0] < reach
+        distance, index = neighbours(aligned.points[candidates], 1, aligned.points[seeds], reach)
+        hit = np.isfinite(distance[:, 0])
         label[candidates[hit]] = label[seeds[index[hit, 0]]]
     grown = (label > 0) & (sites.label == 0)
     chosen = label > 0

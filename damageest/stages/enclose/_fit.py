@@ -24,13 +24,14 @@ def subset(points: Floats, cell: float) -> Ints:
     return np.sort(np.unique((keys[:, 0] * size[1] + keys[:, 1]) * size[2] + keys[:, 2], return_index=True)[1])
 
 
-def neighbours(points: Floats, count: int, among: Floats | None = None) -> tuple[Floats, Ints]:
-    """Distances and indices (N,count) of each point's nearest ``among`` others, or among all, itself first."""
+def neighbours(points: Floats, count: int, among: Floats | None = None, reach: float = np.inf) -> tuple[Floats, Ints]:
+    """Distances and indices (N,count) of each point's nearest ``among`` others, or among all, itself first. Beyond
+    ``reach`` the distance is infinite and the index no point's."""
     from scipy.spatial import cKDTree
 
     among = points if among is None else among
     count = min(count, len(among))
-    distance, index = cKDTree(among).query(points, k=count, workers=2)
+    distance, index = cKDTree(among).query(points, k=count, distance_upper_bound=reach, workers=2)
     return np.reshape(distance, (len(points), count)), np.reshape(index, (len(points), count))
 
 

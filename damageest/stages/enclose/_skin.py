@@ -49,7 +49,8 @@ def skin_near(
     # Direction counts as a fourth to sixth coordinate: the far side of a thin wall does not vouch for the near one.
     weight = 1.5 * tolerance
     tree = cKDTree(np.concatenate([hit, weight * outward], axis=1))
-    gap = tree.query(np.concatenate([points, weight * normals], axis=1), workers=2)[0]
+    most = float(clear.max()) * 1.001
+    gap = tree.query(np.concatenate([points, weight * normals], axis=1), distance_upper_bound=most, workers=2)[0]
     return Skin(points, normals, gap > clear, usual)
 
 
