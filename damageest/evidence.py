@@ -33,7 +33,7 @@ def weigh(
     origin = damage.bounds.mean(axis=0)
     vertices, faces = np.ascontiguousarray(damage.vertices - origin), np.array(damage.faces)
 
-    ids = ids_points[:: max(1, len(ids_points) // MOST)]
+    ids = ids_points[:: max(1, len(ids_points) // (MOST // 4))]
     squared, _, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(ids - origin), vertices, faces)
     residual = float(np.quantile(np.sqrt(squared), 0.95))
 
@@ -93,7 +93,7 @@ def _unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: f
     low, high = damage.bounds[0] - 6 * reach, damage.bounds[1] + 6 * reach
     corners = part.triangles
     near = ((corners.min(axis=1) < high) & (corners.max(axis=1) > low)).all(axis=1)
-    count = int(np.clip(np.linalg.norm(part.cross[near], axis=1).sum() / 2 / (0.5 * reach) ** 2, 1000, 10 * MOST))
+    count = int(np.clip(np.linalg.norm(part.cross[near], axis=1).sum() / 2 / (0.7 * reach) ** 2, 1000, 2 * MOST))
     skin = _sampled(part, near, count)
     skin = skin[_gap(skin, on_skin, 6 * reach) < 6 * reach]
     if not len(skin):
