@@ -11,32 +11,32 @@ import trimesh
 
 import damageest
 from damageest.errors import InputError, JobError
-from tests import scenes
+from tests import damaged_box
 
 LEAST = {"version": 1, "tolerance": 0.2, "align": "none"}
 
 
 def test_path_mapping_and_arrays_give_the_same(tmp_path: Path) -> None:
-    path = scenes.write(tmp_path)
-    before = scenes.content(tmp_path)
-    mesh = trimesh.creation.box(scenes.SIZE)
+    path = damaged_box.write(tmp_path)
+    before = damaged_box.content(tmp_path)
+    mesh = trimesh.creation.box(damaged_box.SIZE)
     runs = [
         damageest.run(path),
         damageest.run({**LEAST, "part": str(tmp_path / "box.stl"), "scan": [str(tmp_path / "scan.ply")]}),
-        damageest.run({**LEAST, "part": mesh, "scan": scenes.scan()}),
-        damageest.run(LEAST, part=(mesh.vertices, mesh.faces), scan=trimesh.PointCloud(scenes.scan())),
+        damageest.run({**LEAST, "part": mesh, "scan": damaged_box.scan()}),
+        damageest.run(LEAST, part=(mesh.vertices, mesh.faces), scan=trimesh.PointCloud(damaged_box.scan())),
     ]
     for result in runs:
         assert len(result.sites) == 1
-        assert result.damage_volume == pytest.approx(scenes.TRUE_VOLUME, rel=0.02)
+        assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.02)
         assert result.sites[0].evidence.consistent
         assert result.sites[0].max_depth == pytest.approx(6, abs=0.3)
         assert result.sites[0].centroid[2] == pytest.approx(10 - 6 * 3 / 8, abs=0.1)
-    assert scenes.content(tmp_path) == before, "writes nothing unless asked"
+    assert damaged_box.content(tmp_path) == before, "writes nothing unless asked"
 
 
 def test_output_where_asked(tmp_path: Path) -> None:
-    result = damageest.run(scenes.write(tmp_path), output=tmp_path / "here")
+    result = damageest.run(damaged_box.write(tmp_path), output=tmp_path / "here")
     report = json.loads((tmp_path / "here/result.json").read_text())
     assert report["damage_volume"] == result.damage_volume
     assert report["sites"][0]["files"]["damage"] == "damage/site-1.stl"
@@ -46,10 +46,10 @@ def test_output_where_asked(tmp_path: Path) -> None:
 
 
 def test_the_same_job_gives_the_same_bytes(tmp_path: Path) -> None:
-    path = scenes.write(tmp_path)
+    path = damaged_box.write(tmp_path)
     for name in "ab":
         damageest.run(path, output=tmp_path / name, cache=False)
-    first, second = (scenes.content(tmp_path / name) for name in "ab")
+    first, second = (damaged_box.content(tmp_path / name) for name in "ab")
     assert first.keys() == second.keys()
     differing = {name for name in first if first[name] != second[name] and not name.endswith(".npz")}
     assert differing <= {"result.json"}
@@ -60,9 +60,9 @@ def test_the_same_job_gives_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_no_damage_is_a_result(tmp_path: Path) -> None:
-    points = trimesh.sample.sample_surface(trimesh.creation.box(scenes.SIZE), 20_000, seed=1)[0]
+    points = trimesh.sample.sample_surface(trimesh.creation.box(damaged_box.SIZE), 20_000, seed=1)[0]
     points = points + np.random.default_rng(2).normal(scale=0.04, size=points.shape)
-    result = damageest.run(LEAST, part=trimesh.creation.box(scenes.SIZE), scan=points, output=tmp_path / "out")
+    result = damageest.run(LEAST, part=trimesh.creation.box(damaged_box.SIZE), scan=points, output=tmp_path / "out")
     assert (result.status, result.sites, result.damage) == ("ok", (), None)
     assert not (tmp_path / "out/damage.stl").exists()
     assert (tmp_path / "out/result.json").exists()
@@ -71,9 +71,9 @@ def test_no_damage_is_a_result(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("part", "scan", "error"),
     [
-        (scenes.box(), np.empty((0, 3)), InputError),
-        (scenes.box(), np.full((9, 3), np.nan), InputError),
-        (scenes.box(), np.zeros((9, 2)), InputError),
+        (damaged_box.box(), np.empty((0, 3)), InputError),
+        (damaged_box.box(), np.full((9, 3), np.nan), InputError),
+        (damaged_box.box(), np.zeros((9, 2)), InputError),
         (7, np.zeros((9, 3)), InputError),
         (None, np.zeros((9, 3)), JobError),
     ],

@@ -13,13 +13,13 @@ from typer.testing import CliRunner
 from damageest.cli import app
 from damageest.errors import DamageestError
 from damageest.meshio import write_points
-from tests import scenes
+from tests import damaged_box
 
 Spoil = Callable[[Path], None]
 
 
 def job(text: str, whole: bool = False) -> Spoil:
-    return lambda folder: (folder / "job.yaml").write_text(text if whole else scenes.JOB + text) and None
+    return lambda folder: (folder / "job.yaml").write_text(text if whole else damaged_box.JOB + text) and None
 
 
 def file(name: str, content: bytes) -> Spoil:
@@ -28,15 +28,15 @@ def file(name: str, content: bytes) -> Spoil:
 
 def scan(change: Callable[[np.ndarray], np.ndarray], extra: str = "") -> Spoil:
     def spoil(folder: Path) -> None:
-        x, y, z = change(scenes.scan()).T
+        x, y, z = change(damaged_box.scan()).T
         write_points(folder / "scan.ply", {"x": x, "y": y, "z": z})
-        (folder / "job.yaml").write_text(scenes.JOB.replace("align: none\n", extra))
+        (folder / "job.yaml").write_text(damaged_box.JOB.replace("align: none\n", extra))
 
     return spoil
 
 
 def part(make: Callable[[trimesh.Trimesh], trimesh.Trimesh]) -> Spoil:
-    return lambda folder: make(trimesh.creation.box(scenes.SIZE)).export(folder / "box.stl") and None
+    return lambda folder: make(trimesh.creation.box(damaged_box.SIZE)).export(folder / "box.stl") and None
 
 
 def without_a_face(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -78,7 +78,11 @@ CASES: dict[str, tuple[Spoil, int, str]] = {
     "part of an unknown kind": (job("version: 1\npart: job.yaml\nscan: scan.ply\n", True), 2, "no reader for '.yaml'"),
     "empty part": (file("box.stl", b""), 2, "empty"),
     "garbage part": (file("box.stl", bytes(range(256)) * 9), 2, "box.stl"),
-    "truncated part": (file("box.stl", trimesh.creation.box(scenes.SIZE).export(file_type="stl")[:300]), 2, "box.stl"),
+    "truncated part": (
+        file("box.stl", trimesh.creation.box(damaged_box.SIZE).export(file_type="stl")[:300]),
+        2,
+        "box.stl",
+    ),
     "web page as part": (file("box.stl", b"<!DOCTYPE html><html>"), 2, "web page"),
     "open part": (part(without_a_face), 2, "open"),
     "empty scan": (file("scan.ply", b""), 2, "empty"),
@@ -100,14 +104,14 @@ CASES: dict[str, tuple[Spoil, int, str]] = {
 @pytest.mark.parametrize("case", CASES)
 def test_refused_with_a_reason(case: str, tmp_path: Path) -> None:
     spoil, status, text = CASES[case]
-    path = scenes.write(tmp_path)
+    path = damaged_box.write(tmp_path)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/notes.txt").write_text("mine")
     out = tmp_path / "out/job"
     out.mkdir(parents=True)
     (out / "result.json").write_text("an earlier result")
     spoil(tmp_path)
-    outside = {name: data for name, data in scenes.content(tmp_path).items() if name not in ("job.yaml",)}
+    outside = {name: data for name, data in damaged_box.content(tmp_path).items() if name not in ("job.yaml",)}
 
     done = CliRunner().invoke(app, ["run", str(path), "--quiet"])
     if done.exception and not isinstance(done.exception, SystemExit):
@@ -116,5 +120,5 @@ def test_refused_with_a_reason(case: str, tmp_path: Path) -> None:
     assert text in done.stderr
     assert "Traceback" not in done.output
     assert len(done.stderr.splitlines()) <= 6
-    after = scenes.content(tmp_path)
+    after = damaged_box.content(tmp_path)
     assert {name: after.get(name) for name in outside} == outside

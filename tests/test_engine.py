@@ -20,7 +20,7 @@ from damageest.job import Job, load
 from damageest.meshio import write_points
 from damageest.registry import Registry
 from damageest.stages.allowance import Allowance
-from tests import scenes
+from tests import damaged_box
 
 LEAST = {"version": 1, "part": "box.stl", "scan": "scan.ply"}
 
@@ -36,7 +36,7 @@ class Counting(Allowance):
 
 
 def engine_with(act: Any, registry: Registry, tmp_path: Path, **more: Any) -> Engine:
-    scenes.write(tmp_path)
+    damaged_box.write(tmp_path)
     job: Job = load(tmp_path / "job.yaml", registry)
     stage = Counting.model_construct(use="none", act=act)
     item = dataclasses.replace(job.implementations[Allowance], cls=Counting)
@@ -47,7 +47,7 @@ def engine_with(act: Any, registry: Registry, tmp_path: Path, **more: Any) -> En
 
 
 def state(site: int = 0, key: str = "k") -> State:
-    return State({"damage": scenes.box(), "unit": "mm", "part": None, "tolerance": 0.1}, dict.fromkeys(
+    return State({"damage": damaged_box.box(), "unit": "mm", "part": None, "tolerance": 0.1}, dict.fromkeys(
         ("damage", "unit", "part", "tolerance"), key), site)  # fmt: skip
 
 
@@ -124,7 +124,7 @@ class Noisy:
 
 
 def test_an_observer_that_fails_does_not_stop_the_run(tmp_path: Path) -> None:
-    path = scenes.write(tmp_path)
+    path = damaged_box.write(tmp_path)
     with pytest.warns(RuntimeWarning, match="no disk for my log"):
         watched = damageest.run(path, registry=Registry.discover([Noisy()]), output=True)
     assert watched.status == "ok"
@@ -133,10 +133,10 @@ def test_an_observer_that_fails_does_not_stop_the_run(tmp_path: Path) -> None:
 
 def test_only_what_changed_runs_again(tmp_path: Path) -> None:
     """Another scan under the same name leaves what came from the part alone, and nothing that came from the scan."""
-    path = scenes.write(tmp_path)
+    path = damaged_box.write(tmp_path)
     damageest.run(path, output=True)
     assert not [r for r in damageest.run(path, output=True).stages if not r.cached and r.stage != "export"]
-    x, y, z = scenes.scan(15_000).T
+    x, y, z = damaged_box.scan(15_000).T
     write_points(tmp_path / "scan.ply", {"x": x, "y": y, "z": z})
     again = damageest.run(path, output=True)
     assert {record.stage for record in again.stages if record.cached} == {"part", "sample"}

@@ -13,7 +13,7 @@ from damageest.contracts import DEFAULTS
 from damageest.errors import DamageestError, JobError, StageError
 from damageest.hookspecs import hookimpl
 from damageest.registry import Registry
-from tests import scenes
+from tests import damaged_box
 
 HEAD = "from typing import Literal\nfrom damageest.hookspecs import hookimpl\n"
 GROWN = '''
@@ -70,7 +70,7 @@ def test_every_default_is_there(registry: Registry) -> None:
 def test_a_plugins_stage_runs(site: Site, tmp_path: Path) -> None:
     site.add("acme-grow", GROWN)
     assert any(str(p) == "acme-grow 1.2" and p.licence == "MIT" for p in Registry.discover().providers)
-    result = damageest.run(scenes.write(tmp_path, scenes.JOB + "allowance: {use: doubled, factor: 1.5}\n"))
+    result = damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "allowance: {use: doubled, factor: 1.5}\n"))
     assert result.sites[0].deposit is not None
     assert result.sites[0].deposit.volume == pytest.approx(1.5**3 * result.damage_volume)
 
@@ -91,7 +91,7 @@ def test_a_broken_plugin_stops_nothing(source: str, site: Site, tmp_path: Path) 
     registry = Registry.discover()
     assert len(registry.broken) == 1
     assert FAULTS[source] in registry.broken[0].reason + registry.broken[0].remedy
-    assert damageest.run(scenes.write(tmp_path), registry=registry).status == "ok"
+    assert damageest.run(damaged_box.write(tmp_path), registry=registry).status == "ok"
     with pytest.raises(JobError, match=r"acme-broken 1\.2 is broken"):
         damageest.run(tmp_path / "job.yaml", settings=["allowance=doubled"], registry=registry)
 
@@ -99,7 +99,7 @@ def test_a_broken_plugin_stops_nothing(source: str, site: Site, tmp_path: Path) 
 def test_a_clash_names_both(site: Site, tmp_path: Path) -> None:
     site.add("acme-one", GROWN)
     site.add("acme-two", GROWN)
-    assert damageest.run(scenes.write(tmp_path)).status == "ok"
+    assert damageest.run(damaged_box.write(tmp_path)).status == "ok"
     with pytest.raises(JobError, match=r"acme-one 1\.2 and acme-two 1\.2"):
         damageest.run(tmp_path / "job.yaml", settings=["allowance=doubled"])
 
@@ -115,7 +115,7 @@ def test_a_clash_names_both(site: Site, tmp_path: Path) -> None:
 def test_a_stage_that_misbehaves_is_named(body: str, text: str, site: Site, tmp_path: Path) -> None:
     site.add("acme-bad", GROWN.replace("return Solid(damage.vertices * self.factor, damage.faces)", body))
     with pytest.raises(StageError, match="allowance: doubled") as caught:
-        damageest.run(scenes.write(tmp_path, scenes.JOB + "allowance: doubled\n"))
+        damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n"))
     assert text in str(caught.value)
     assert caught.value.exit_status == 1
 
@@ -140,7 +140,7 @@ class Observer:
 
 def test_observers_see_every_stage(tmp_path: Path) -> None:
     observer = Observer()
-    result = damageest.run(scenes.write(tmp_path), registry=Registry.discover([observer]))
+    result = damageest.run(damaged_box.write(tmp_path), registry=Registry.discover([observer]))
     assert [stage for what, stage in observer.seen if what == "after"] == [record.stage for record in result.stages]
     observer.seen.clear()
     (tmp_path / "box.stl").write_bytes(b"solid nothing")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import damageest
-from tests import scenes
+from tests import damaged_box
 
 DRIVER = """
 import os, signal, sys
@@ -32,15 +32,15 @@ ROUTE = ["part", "scan", "sample", "align", "segment", "cluster", "enclose", "bo
 
 @pytest.mark.parametrize("stage", ROUTE)
 def test_killed_in(stage: str, tmp_path: Path) -> None:
-    path = scenes.write(tmp_path)
+    path = damaged_box.write(tmp_path)
     damageest.run(path, output=True)
     out = tmp_path / "out/job"
     for name in (out / "stages").iterdir():  # so that only what the killed run finished can be found again
         name.unlink()
-    before = scenes.content(out)
+    before = damaged_box.content(out)
     killed = subprocess.run([sys.executable, "-c", DRIVER, str(path), stage], capture_output=True)
     assert killed.returncode == -signal.SIGKILL
-    assert scenes.content(out) == before
+    assert damaged_box.content(out) == before
     result = damageest.run(path, output=True, settings=["cluster.neighbours=9"])
     cached = {record.stage: record.cached for record in result.stages}
     place = ROUTE.index(stage)
@@ -51,7 +51,7 @@ def test_killed_in(stage: str, tmp_path: Path) -> None:
 
 
 def test_only_what_depends_on_a_change_runs_again(tmp_path: Path) -> None:
-    path = scenes.write(tmp_path)
+    path = damaged_box.write(tmp_path)
     damageest.run(path, output=True)
     result = damageest.run(path, output=True, settings=["export.format=ply"])
     assert [r.stage for r in result.stages if not r.cached] == ["export"]
@@ -67,7 +67,7 @@ def test_only_what_depends_on_a_change_runs_again(tmp_path: Path) -> None:
 
 
 def test_what_is_not_ours_stays(tmp_path: Path) -> None:
-    path = scenes.write(tmp_path)
+    path = damaged_box.write(tmp_path)
     damageest.run(path, output=True)
     (tmp_path / "out/job/notes.txt").write_text("mine")
     damageest.run(path, output=True)
@@ -77,10 +77,10 @@ def test_what_is_not_ours_stays(tmp_path: Path) -> None:
 
 
 def test_a_damaged_cache_is_computed_anew(tmp_path: Path) -> None:
-    path = scenes.write(tmp_path)
+    path = damaged_box.write(tmp_path)
     damageest.run(path, output=True)
     for file in (tmp_path / "out/job/stages").glob("segment-*"):
         file.write_bytes(b"\x00garbage")
     result = damageest.run(path, output=True)
     assert not next(r for r in result.stages if r.stage == "segment").cached
-    assert result.damage_volume == pytest.approx(scenes.TRUE_VOLUME, rel=0.02)
+    assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.02)

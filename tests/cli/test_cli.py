@@ -11,7 +11,7 @@ import jsonschema
 import pytest
 
 from damageest.contracts import STAGES
-from tests import scenes
+from tests import damaged_box
 
 ROOT = Path(__file__).parents[2]
 
@@ -22,7 +22,7 @@ def call(*words: object, cwd: Path | None = None) -> subprocess.CompletedProcess
 
 
 def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
-    done = call("run", scenes.write(tmp_path))
+    done = call("run", damaged_box.write(tmp_path))
     assert done.returncode == 0, done.stderr
     assert "implicit" in done.stdout
     assert "yes" in done.stdout
@@ -44,18 +44,18 @@ def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
 
 
 def test_json_is_the_result_and_fits_its_schema(tmp_path: Path) -> None:
-    done = call("run", scenes.write(tmp_path), "--json", "--set", "method=implicit", "--no-cache")
+    done = call("run", damaged_box.write(tmp_path), "--json", "--set", "method=implicit", "--no-cache")
     report = json.loads(done.stdout)
     assert report == json.loads((tmp_path / "out/job/result.json").read_text())
     schema = json.loads((ROOT / "schemas/result.schema.json").read_text())
     jsonschema.Draft202012Validator(schema).validate(report)
-    assert report["sites"][0]["volume"] == pytest.approx(scenes.TRUE_VOLUME, rel=0.02)
+    assert report["sites"][0]["volume"] == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.02)
 
 
 def test_every_job_is_checked_before_the_first_runs(tmp_path: Path) -> None:
-    good = scenes.write(tmp_path)
+    good = damaged_box.write(tmp_path)
     bad = tmp_path / "bad.yaml"
-    bad.write_text(scenes.JOB + "clutser: x\n")
+    bad.write_text(damaged_box.JOB + "clutser: x\n")
     done = call("run", good, bad)
     assert done.returncode == 2
     assert f"{bad}:6:1" in done.stderr
@@ -63,9 +63,9 @@ def test_every_job_is_checked_before_the_first_runs(tmp_path: Path) -> None:
 
 
 def test_validate(tmp_path: Path) -> None:
-    good = scenes.write(tmp_path)
+    good = damaged_box.write(tmp_path)
     assert call("validate", good).returncode == 0
-    good.write_text(scenes.JOB + "clutser: x\nsegment: y\n")
+    good.write_text(damaged_box.JOB + "clutser: x\nsegment: y\n")
     done = call("validate", good)
     assert done.returncode == 2
     assert [line.split(":")[1] for line in done.stderr.splitlines()] == ["6", "7"]
@@ -73,7 +73,7 @@ def test_validate(tmp_path: Path) -> None:
 
 
 def test_init_writes_a_job_that_runs(tmp_path: Path) -> None:
-    scenes.write(tmp_path)
+    damaged_box.write(tmp_path)
     done = call("init", "box.stl", "scan.ply", "--job", "new.yaml", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "noise 0.04" in (tmp_path / "new.yaml").read_text()
@@ -110,7 +110,7 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 def test_debug_shows_where_an_error_came_from(tmp_path: Path) -> None:
-    path = scenes.write(tmp_path)
+    path = damaged_box.write(tmp_path)
     (tmp_path / "box.stl").write_bytes(b"nonsense")
     assert "Traceback" not in call("run", path).stderr
     assert "Traceback" in call("run", path, "--debug").stderr

@@ -1,0 +1,44 @@
+"""A small damaged box, scanned, as files: quick enough to run the whole route on in every test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from damageest.artefacts import Part
+from damageest.meshio import write_points
+from damageest.stages.scan.simulate import Simulate
+
+SIZE = (40.0, 30.0, 20.0)
+TRUE_VOLUME = np.pi * 6**3 * 2 / 3
+"""mm3 of the half ball of radius 6 taken off the top."""
+JOB = "version: 1\ntolerance: 0.2\nalign: none\npart: box.stl\nscan: scan.ply\n"
+
+
+def box() -> Part:
+    mesh = trimesh.creation.box(SIZE)
+    return Part(mesh.vertices, mesh.faces)
+
+
+def scan(points: int = 20_000) -> np.ndarray:
+    tool = {"tool": "sphere", "centre": [0, 0, SIZE[2] / 2], "radius": 6}
+    scanner = Simulate.model_validate({"damage": [tool], "points": points, "noise": 0.04})
+    return np.asarray(scanner.run("mm", box()).points)
+
+
+def write(folder: Path, job: str = JOB) -> Path:
+    """Writes part, scan and job; gives the job's path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    trimesh.creation.box(SIZE).export(folder / "box.stl")
+    x, y, z = scan().T
+    write_points(folder / "scan.ply", {"x": x, "y": y, "z": z})
+    path = folder / "job.yaml"
+    path.write_text(job)
+    return path
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder, by its relative path."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
