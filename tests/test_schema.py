@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +22,16 @@ def committed(name: str) -> Any:
     return json.loads((ROOT / "schemas" / f"{name}.schema.json").read_text())
 
 
+def own(registry: Registry) -> Registry:
+    """What this repository provides, whatever else is installed here."""
+    plugins = [tomllib.loads(path.read_text()) for path in (ROOT / "plugins").glob("*/pyproject.toml")]
+    names = {"damageest", *(plugin["project"]["name"] for plugin in plugins)}
+    kept = tuple(item for item in registry.implementations if item.provider.name in names)
+    return dataclasses.replace(registry, implementations=kept)
+
+
 def test_job_schema_is_current(registry: Registry) -> None:
-    current = json.loads(json.dumps(job_schema(registry)))
+    current = json.loads(json.dumps(job_schema(own(registry))))
     remedy = "run: uv run damageest schema job > schemas/job.schema.json"
     assert committed("job") == current, remedy
 
