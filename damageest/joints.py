@@ -18,7 +18,7 @@ from damageest.measure import measure
 from damageest.registry import Registry
 from damageest.result import Result, Site
 from damageest.settle import ids_surface, pieces_of, sites_of
-from damageest.solids import iou, to_manifold, to_solid, united
+from damageest.solids import iou, remainder, to_manifold, to_solid, united
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 from damageest.units import diagnose_scale
@@ -220,7 +220,7 @@ def gather(engine: Engine, lanes: list[State]) -> list[State]:
         site_label=label,
         sites=sites,
         damage=damage,
-        undamaged=to_solid(to_manifold(part, origin) - lost, origin) if sites else part,
+        undamaged=to_solid(remainder(to_manifold(part, origin), lost), origin) if sites else part,
         warnings=tuple(dict.fromkeys(engine.warnings)),
         failures=tuple(str(error) for error in engine.failures),
         truth=_against_truth(damage, scan, whole["pose"], whole["tolerance"]),
