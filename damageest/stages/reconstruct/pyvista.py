@@ -12,6 +12,8 @@ from damageest.errors import StageError
 from damageest.stages.reconstruct import Reconstruct
 
 FEWEST = 16
+SMOOTHED = 32
+"""Points of each local fit, which takes curvature and so averages less than a plane through as many."""
 MOST_CELLS = 3e6
 """Cells in the box of a damage; VTK visits each, at some 2 microseconds."""
 
@@ -50,7 +52,7 @@ class PyVista(Reconstruct):
                 "a smaller spacing, or method: implicit",
             )
         count = min(self.neighbours, len(cloud) // 2)
-        cloud, _, _ = smoothed(cloud, noise, count)
+        cloud, _, _ = smoothed(cloud, noise, min(max(count, SMOOTHED), len(cloud) // 2))
         mesh = pyvista.PolyData(cloud).reconstruct_surface(nbr_sz=count, sample_spacing=cell)
         if not mesh.n_cells:
             raise StageError("no surface came about", "another spacing, or method: implicit")
