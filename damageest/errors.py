@@ -51,9 +51,14 @@ class InputError(DamageestError):
 
 
 class PluginError(DamageestError):
-    """A stage implementation does not keep its contract, or two packages provide the same name."""
+    """A stage implementation does not keep its contract, two packages provide the same name, or a plugin's hook finds
+    that what it needs is not there: it then says with ``remedy`` what to do."""
 
     exit_status = 2
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        self.remedy = remedy
+        super().__init__(message)
 
 
 class StageError(DamageestError):

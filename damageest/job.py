@@ -26,7 +26,7 @@ SURFACE_ONLY: tuple[Contract, ...] = (Reconstruct, Boundary, Background, Enclose
 """Contracts that only the surface route uses."""
 
 Unit = Literal["um", "mm", "cm", "m", "in", "ft"]
-Method = Literal["auto", "surface", "implicit"]
+Method = Literal["auto", "surface", "implicit", "octree"]
 
 
 class Header(BaseModel):
@@ -141,7 +141,7 @@ class _Check:
         chosen = {item.contract: (item, options) for item, options in filter(None, named.values())}
         method: str = header.method if header else "auto"
         contracts, method = self.route(method, set(chosen), {k for k in named if k in self.tree})
-        pairs = {c: chosen.get(c) or self.default(c) for c in contracts if c not in self.given}
+        pairs = {c: chosen.get(c) or self.default(c, method) for c in contracts if c not in self.given}
         stages = {c: self.stage(pair[0], pair[1]) for c, pair in pairs.items() if pair}
         if self.faults or header is None:
             raise JobError(sorted(self.faults, key=lambda f: (f.line, f.column)), self.source)
@@ -205,6 +205,8 @@ class _Check:
 
     def usual(self, key: str) -> str:
         """The implementation meant where a stage is given options and no name."""
+        if key == "enclose" and self.tree.get("method") == "octree":
+            return "octree"
         by_site = self.tree.get("method") == "surface" or any(
             c.stage in self.tree for c in SURFACE_ONLY if c is not Enclose
         )
@@ -229,23 +231,35 @@ class _Check:
         """The contracts that the job's route needs. `auto` is `surface` where the job names one of its stages."""
         whole_job = EncloseAll in chosen
         surface = chosen & set(SURFACE_ONLY)
+        octree = self.enclosing() == "octree"
         if method == "auto" and surface and not whole_job:
             method = "surface"
+        if method == "auto" and whole_job and self.enclosing() not in ("", DEFAULTS[EncloseAll]):
+            method = "octree" if octree else "implicit"
         if method == "surface" and whole_job:
             self.fault(
                 "this implementation goes over all sites at once; it belongs to  method: implicit", "enclose", "use"
             )
-        if method == "implicit":
+        if whole_job and method != "surface" and octree != (method == "octree"):
+            which = "octree" if octree else "implicit"
+            self.fault(f"this implementation belongs to  method: {which}", "enclose", "use")
+        if method in ("implicit", "octree"):
             for contract in sorted(surface, key=list(DEFAULTS).index):
-                self.fault("not a stage of  method: implicit; remove it, or use  method: surface", contract.stage)
-        drop: dict[str, tuple[Contract, ...]] = {"surface": (EncloseAll,), "implicit": SURFACE_ONLY, "auto": ()}
-        return [contract for contract in DEFAULTS if contract not in drop[method]], method
+                self.fault(f"not a stage of  method: {method}; remove it, or use  method: surface", contract.stage)
+        drop: dict[str, tuple[Contract, ...]] = {"surface": (EncloseAll,), "auto": ()}
+        return [contract for contract in DEFAULTS if contract not in drop.get(method, SURFACE_ONLY)], method
 
-    def default(self, contract: Contract) -> tuple[Implementation, dict[str, Any]] | None:
+    def enclosing(self) -> str:
+        """The name that the job gives for stage `enclose`; empty where it gives none."""
+        value = self.tree.get("enclose", "")
+        return str(value.get("use", "") if isinstance(value, dict) else value)
+
+    def default(self, contract: Contract, method: str) -> tuple[Implementation, dict[str, Any]] | None:
         if contract.stage in ("part", "scan"):
             return None
+        name = "octree" if contract is EncloseAll and method == "octree" else DEFAULTS[contract]
         try:
-            return self.registry.get(contract.stage, DEFAULTS[contract]), {}
+            return self.registry.get(contract.stage, name), {}
         except (KeyError, PluginError) as error:
             self.fault(str(error.args[0]), contract.stage)
             return None

@@ -19,6 +19,7 @@ from damageest.registry import Registry
 from damageest.result import Result, Site
 from damageest.settle import ids_surface, pieces_of, sites_of
 from damageest.solids import iou, remainder, to_manifold, to_solid, united
+from damageest.stages.enclose import EncloseAll
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 from damageest.units import diagnose_scale
@@ -107,7 +108,7 @@ def each_enclosure(engine: Engine, lanes: list[State]) -> list[State]:
         .derive("solid", item.solid, "enclosures")
         .derive("clusters", item.sites, "enclosures")
         .derive("notes", item.notes, "enclosures")
-        .derive("method", "implicit")
+        .derive("method", engine.job.stages[EncloseAll].use)
         for state in lanes
         for k, item in enumerate(state["enclosures"].items, 1)
     ]

@@ -29,5 +29,6 @@ AT_ONCE: Route = (EncloseAll, each_enclosure, Boolean, settled)
 ROUTES: dict[str, Route] = {
     "surface": (*ACQUIRE, *BY_SITE, numbered, Allowance, gather),
     "implicit": (*ACQUIRE, *AT_ONCE, numbered, Allowance, gather),
+    "octree": (*ACQUIRE, *AT_ONCE, numbered, Allowance, gather),
     "auto": (*ACQUIRE, either(AT_ONCE, BY_SITE), numbered, Allowance, gather),
 }

@@ -15,6 +15,7 @@ import pluggy
 
 import damageest
 from damageest import hookspecs
+from damageest.errors import PluginError
 
 GROUP = "damageest"
 
@@ -95,6 +96,8 @@ def fault_of(error: BaseException, provider: Provider) -> Broken:
 
 
 def _remedy(error: BaseException, provider: Provider) -> str:
+    if isinstance(error, PluginError) and error.remedy:
+        return error.remedy
     if isinstance(error, ModuleNotFoundError) and error.name:
         return f"pip install {error.name}, or reinstall {provider.name}"
     return f"update or uninstall {provider.name}"

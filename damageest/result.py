@@ -147,7 +147,7 @@ class SiteReport(_Model):
     max_depth: float = Field(description="of the scan below the nominal surface")
     centroid: Vector
     bounds: tuple[Vector, Vector]
-    method: Literal["surface", "implicit"]
+    method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
     evidence: EvidenceReport
     files: FilesReport
     warnings: list[str]
