@@ -19,7 +19,7 @@ from damageest.registry import Registry
 from damageest.result import Result, Site
 from damageest.settle import ids_surface, pieces_of, sites_of
 from damageest.solids import iou, remainder, to_manifold, to_solid, united
-from damageest.stages.enclose import EncloseAll
+from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 from damageest.units import diagnose_scale
@@ -91,11 +91,13 @@ def damaged(engine: Engine, lanes: list[State]) -> list[State]:
 
 def each_cluster(engine: Engine, lanes: list[State]) -> list[State]:
     """From the job to its sites: one lane for each cluster of points, or for those still ``wanted``."""
+    fine = not getattr(engine.job.stages[Enclose], "refines", False)
     return [
         state.at(k)
         .derive("points", state["aligned"].points[state["sites"].members(k)], "aligned", "sites")
         .derive("clusters", (k,), "sites")
         .derive("method", "surface")
+        .add("fine", fine, digest(fine))
         for state in lanes
         for k in state.values.get("wanted", range(1, state["sites"].count + 1))
     ]

@@ -6,15 +6,27 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from damageest.artefacts import Part, Solid, Surface
+from damageest.artefacts import Floats, Part, Samples, Solid, Surface
 from damageest.stages import Stage
 
 
 class Background(Stage, ABC):
-    """Gives a closed mesh that holds part and IDS completely (paper 3.1 step 7)."""
+    """Gives a closed mesh that holds the IDS, the lost material and the part around them (paper 3.1 step 7).
+
+    ``fine``: whether its vertices have to lie close together everywhere, as they have to where `enclose` does not refine
+    it itself. ``intact`` (K,3): scan points on the nominal surface; ``samples``: CAD points on all of it.
+    """
 
     stage: ClassVar[str] = "background"
-    takes: ClassVar[Mapping[str, object]] = {"part": Part, "surface": Surface, "tolerance": float, "spacing": float}
+    takes: ClassVar[Mapping[str, object]] = {
+        "part": Part,
+        "surface": Surface,
+        "tolerance": float,
+        "spacing": float,
+        "fine": bool,
+        "intact": Floats,
+        "samples": Samples,
+    }
     gives: ClassVar[str] = "background"
 
     @abstractmethod

@@ -7,15 +7,24 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from damageest.artefacts import Deviation, Enclosures, Floats, Mesh, Part, Rims, Samples, Scan, Sites, Solid, Surface
+from damageest.errors import StageError
 from damageest.stages import Stage
+
+
+class NotSeparated(StageError):
+    """The rims of an IDS do not split the background: it bounds a loss only together with others."""
 
 
 class Enclose(Stage, ABC):
     """Gives a closed mesh round the damage of one site: IDS, rim, and the background that they cut off.
 
     Paper 3.1 steps 8 to 11. ``intact`` (K,3): scan points on the nominal surface, which the enclosure must leave out.
-    ``points`` (M,3): the site's own. The mesh need not be watertight yet: `repair` follows.
+    ``points`` (M,3): the site's own. The mesh need not be watertight yet: `repair` follows. Raises NotSeparated where the
+    IDS alone cuts nothing off; such IDSs are then tried together, as the two faces of a ring's missing piece.
+    ``refines``: whether it refines the background itself where it needs to.
     """
+
+    refines: ClassVar[bool] = False
 
     stage: ClassVar[str] = "enclose"
     takes: ClassVar[Mapping[str, object]] = {
