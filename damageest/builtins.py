@@ -18,11 +18,16 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.align.register import Register
     from damageest.stages.allowance.none import Nothing as NoAllowance
     from damageest.stages.background.bbox import BoundingBox
+    from damageest.stages.background.build_volume import BuildVolume
+    from damageest.stages.background.capsule import Capsule
+    from damageest.stages.background.cylinder import Cylinder
+    from damageest.stages.background.minkowski import Minkowski
     from damageest.stages.background.offset import Offset
     from damageest.stages.boolean.manifold import Manifold
     from damageest.stages.boundary.all_loops import AllLoops
     from damageest.stages.boundary.largest_loop import LargestLoop
     from damageest.stages.cluster.dbscan import Dbscan
+    from damageest.stages.enclose.adaptive import Adaptive
     from damageest.stages.enclose.implicit import Implicit
     from damageest.stages.enclose.shortest_path import ShortestPath
     from damageest.stages.export.files import Files
@@ -36,5 +41,6 @@ def damageest_stages() -> list[type[Stage]]:
 
     return [
         PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Unaligned, MeshDistance, Dbscan, PyVista, LargestLoop,
-        AllLoops, Offset, BoundingBox, ShortestPath, Implicit, NoRepair, Manifold, NoAllowance, Files,
+        AllLoops, Offset, BoundingBox, Capsule, Cylinder, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
+        NoRepair, Manifold, NoAllowance, Files,
     ]  # fmt: skip

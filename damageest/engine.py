@@ -17,7 +17,7 @@ from damageest.registry import Registry
 from damageest.result import StageRecord
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class State:
     """What is known so far: values by name, and for each the key that says how it came about. ``site`` 0: the job."""
 

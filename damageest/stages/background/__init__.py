@@ -13,8 +13,8 @@ from damageest.stages import Stage
 class Background(Stage, ABC):
     """Gives a closed mesh that holds the IDS, the lost material and the part around them (paper 3.1 step 7).
 
-    ``fine``: whether its vertices have to lie close together everywhere, as they have to where `enclose` does not refine
-    it itself. ``intact`` (K,3): scan points on the nominal surface; ``samples``: CAD points on all of it.
+    ``fine``: whether its vertices have to lie close together everywhere, as where `enclose` does not refine it itself.
+    ``intact`` (K,3): scan points on the nominal surface; ``samples``: CAD points on all of it.
     """
 
     stage: ClassVar[str] = "background"

@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
-from damageest.artefacts import Mesh, Part, Solid, Surface
-from damageest.stages.background import Background
+from damageest.artefacts import Floats, Mesh, Part, Surface
+from damageest.solids import to_manifold
+from damageest.stages.background._generated import Generated
 
 
-class Offset(Background):
-    """The part scaled up along its vertex normals and subdivided (paper 3.2): follows concave parts. It refuses parts
-    whose gaps are narrower than twice the clearance."""
+class Offset(Generated):
+    """The part scaled up along its vertex normals (paper 3.2): follows concave parts, edge by edge. It refuses parts
+    whose gaps are narrower than twice the clearance, and vertices where faces meet that face both ways."""
 
     use: Literal["offset"] = "offset"
-    clearance: float = Field(
-        2.0, gt=0, le=100, description="distance from the part, in tolerances; at least 1.5 point spacings"
-    )
-    edge: float = Field(
-        3.0, gt=0, le=100, description="spacing of its vertices, in tolerances; more where that would make too many"
-    )
 
-    def run(self, part: Part, surface: Surface, tolerance: float, spacing: float) -> Solid:
-        """Raises StageError where the moved skin does not hold the part."""
-        from damageest.solids import to_manifold
-        from damageest.stages.background._refine import check_holds, refined
-
-        origin = part.bounds.mean(axis=0)
-        by = max(self.clearance * tolerance, 1.5 * spacing)
+    def shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
+        """The part with its vertices moved."""
         normals = part.cross / np.maximum(np.linalg.norm(part.cross, axis=1), 1e-300)[:, None]
         # Each vertex moves so that all planes through it move by the same: least squares over the distinct planes.
         pairs = np.stack([part.faces.ravel(), np.repeat(np.arange(len(part.faces)), 3)], axis=1)
@@ -42,6 +31,4 @@ class Offset(Background):
         np.add.at(right, chosen[:, 0], n)
         move = np.linalg.solve(left + 1e-3 * np.eye(3), right[:, :, None])[:, :, 0]
         move *= np.minimum(1, 3 / np.maximum(np.linalg.norm(move, axis=1), 1e-12))[:, None]
-        skin = Mesh(part.vertices + by * move, part.faces)
-        moved = refined(to_manifold(skin, origin), self.edge * max(tolerance, 0.5 * spacing), origin)
-        return check_holds(moved, part, surface)
+        return to_manifold(Mesh(part.vertices + by * move, part.faces), origin)

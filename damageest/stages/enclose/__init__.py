@@ -11,7 +11,7 @@ from damageest.errors import StageError
 from damageest.stages import Stage
 
 
-class NotSeparated(StageError):
+class NotSeparatedError(StageError):
     """The rims of an IDS do not split the background: it bounds a loss only together with others."""
 
 
@@ -19,9 +19,9 @@ class Enclose(Stage, ABC):
     """Gives a closed mesh round the damage of one site: IDS, rim, and the background that they cut off.
 
     Paper 3.1 steps 8 to 11. ``intact`` (K,3): scan points on the nominal surface, which the enclosure must leave out.
-    ``points`` (M,3): the site's own. The mesh need not be watertight yet: `repair` follows. Raises NotSeparated where the
-    IDS alone cuts nothing off; such IDSs are then tried together, as the two faces of a ring's missing piece.
-    ``refines``: whether it refines the background itself where it needs to.
+    ``points`` (M,3): the site's own. The mesh need not be watertight yet: `repair` follows. ``refines``: whether it
+    refines the background itself where it needs to. Raises NotSeparatedError where the IDS alone cuts nothing off; such
+    IDSs are then tried together, as the two faces of a ring's missing piece.
     """
 
     refines: ClassVar[bool] = False

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Rims, Solid, Surface
+from damageest.artefacts import Floats, Ints, Rims, Surface
 from damageest.errors import StageError
 from damageest.stages.boundary._loops import loops
 
@@ -56,43 +56,57 @@ def filled(wide: Wide) -> Ints:
     return np.concatenate(fans)
 
 
-def cycle(background: Solid, nodes: Floats) -> Ints:
-    """A closed path of background vertices, each once, that follows the nodes (N,3) round.
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """A closed path of background vertices ``path`` (M,), each once. ``station`` (M,), rising: how far round the rim
+    each is, counted in rim nodes."""
+
+    path: Ints
+    station: Floats
+
+
+def cycle(vertices: Floats, faces: Ints, image: Ints) -> Cycle:
+    """The closed path on a mesh that joins the images (N,) of the rim's nodes, in their order, by shortest paths.
 
     Raises StageError where it collapses or finds no way.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
-    from scipy.spatial import cKDTree
 
-    image = np.asarray(cKDTree(background.vertices).query(nodes, workers=2)[1], dtype=np.int64)
-    image = image[image != np.roll(image, 1)]
-    if len(image) < 3:
-        raise StageError("the rim falls together on the background", "a smaller background edge, or method: implicit")
-    edges = np.unique(np.sort(background.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    length = np.linalg.norm(background.vertices[edges[:, 0]] - background.vertices[edges[:, 1]], axis=1)
-    size = len(background.vertices)
-    graph = csr_array((length, (edges[:, 0], edges[:, 1])), shape=(size, size))
-    walk: list[int] = []
-    for here, there in zip(image.tolist(), np.roll(image, -1).tolist(), strict=True):
-        gap = float(np.linalg.norm(background.vertices[here] - background.vertices[there]))
-        far, before = dijkstra(
-            graph, directed=False, indices=here, return_predecessors=True, limit=6 * gap + 4 * float(length.max())
-        )
+    after = np.roll(image, -1)
+    moves = np.flatnonzero(image != after)
+    if len(moves) < 3:
+        raise StageError(_FLAT, "a smaller background edge, or method: implicit")
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    used, edges = np.unique(edges, return_inverse=True)
+    edges = edges.reshape(-1, 2)
+    place = vertices[used]
+    image, after = np.searchsorted(used, image), np.searchsorted(used, after)
+    length = np.linalg.norm(place[edges[:, 0]] - place[edges[:, 1]], axis=1)
+    graph = csr_array((length, (edges[:, 0], edges[:, 1])), shape=(len(used),) * 2)
+    slack = 4 * float(length.max())
+    walk: list[tuple[int, float]] = []
+    for node, here, there in zip(moves.tolist(), image[moves].tolist(), after[moves].tolist(), strict=True):
+        gap = float(np.linalg.norm(place[here] - place[there]))
+        far, before = dijkstra(graph, directed=False, indices=here, return_predecessors=True, limit=6 * gap + slack)
         if not np.isfinite(far[there]):
             raise StageError("no path on the background joins the rim", "background: bbox, or method: implicit")
         path = [there]
         while path[-1] != here:
             path.append(int(before[path[-1]]))
-        walk += path[:0:-1]
-    return _simple(walk)
+        walk += [(step, node + k / (len(path) - 1)) for k, step in enumerate(path[:0:-1])]
+    walk = _simple(walk)
+    return Cycle(used[[step for step, _ in walk]], np.array([station for _, station in walk]))
 
 
-def _simple(walk: list[int]) -> Ints:
+_FLAT = "the rim falls together on the background"
+
+
+def _simple(walk: list[tuple[int, float]]) -> list[tuple[int, float]]:
     """The closed walk without its detours: of two loops that meet in a vertex the longer one stays."""
     while True:
         seen: dict[int, int] = {}
-        for place, node in enumerate(walk):
+        for place, (node, _) in enumerate(walk):
             if node in seen:
                 inner = walk[seen[node] : place]
                 outer = walk[: seen[node]] + walk[place:]
@@ -102,40 +116,32 @@ def _simple(walk: list[int]) -> Ints:
         else:
             break
     if len(walk) < 3:
-        raise StageError("the rim falls together on the background", "a smaller background edge, or method: implicit")
-    return np.array(walk, dtype=np.int64)
+        raise StageError(_FLAT, "a smaller background edge, or method: implicit")
+    return walk
 
 
-def strip(loop: Ints, other: Ints, vertices: Floats, across: Floats) -> Ints:
-    """Triangles between two closed loops that run side by side; ``across`` (M,3) are the places of ``other``."""
-    from scipy.spatial import cKDTree
-
-    turn = int(cKDTree(across).query(vertices[loop[0]])[1])
-    other, across = np.roll(other, -turn), np.roll(across, -turn, axis=0)
-    first, second = _stations(vertices[loop]), _stations(across)
-    # Walk both loops by their share of the way round; each step makes one triangle.
-    steps = np.concatenate([first[1:], second[1:]])
+def strip(loop: Ints, other: Cycle, start: int) -> Ints:
+    """Triangles between a rim and the cycle that follows it, whose vertices count from ``start`` on: each rim node is
+    joined to its image and to what lies nearer to it on the paths than to the next (paper 3.2)."""
+    n, m = len(loop), len(other.path)
+    # Walk both by their stations; each step makes one triangle. A node gives way to the next one halfway to it.
+    steps = np.concatenate([np.arange(n) + 0.5, other.station[1:], [n + other.station[0]]])
     which = np.argsort(steps, kind="stable")
-    is_first = which < len(first) - 1
+    is_first = which < n
     i = np.concatenate([[0], np.cumsum(is_first)])[:-1]
     j = np.concatenate([[0], np.cumsum(~is_first)])[:-1]
-    n, m = len(loop), len(other)
     a, a_next = loop[i % n], loop[(i + 1) % n]
-    b, b_next = other[j % m], other[(j + 1) % m]
+    b, b_next = other.path[j % m] + start, other.path[(j + 1) % m] + start
     return np.where(is_first[:, None], np.stack([a_next, a, b], axis=1), np.stack([a, b, b_next], axis=1))
 
 
-def _stations(places: Floats) -> Floats:
-    step = np.linalg.norm(np.roll(places, -1, axis=0) - places, axis=1)
-    return np.concatenate([[0.0], np.cumsum(step) / max(step.sum(), 1e-300)])
-
-
-def cut_off(background: Solid, cycles: list[Ints], against: bool) -> Ints | None:
-    """The faces on one side of the cycles: whose own edges run along them, or ``against``; None where it is no side."""
+def cut_off(faces: Ints, cycles: list[Ints], against: bool) -> Ints | None:
+    """Of a closed mesh, the faces on one side of the cycles: whose own edges run along them, or ``against``; None where
+    it is no side."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    faces, size = background.faces, len(background.vertices)
+    size = int(faces.max()) + 1
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     code, back = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
     along = np.concatenate([c * size + np.roll(c, -1) for c in cycles])

@@ -20,7 +20,7 @@ def test_runs_beside_the_part_at_the_clearance(name: str) -> None:
     part = PARTS[name]()
     tolerance = 0.002 * part.diagonal
     inside = Mesh(part.vertices[:3] * 0.99, np.array([[0, 1, 2]]))
-    moved = Offset().run(part, inside, tolerance, 0.1 * tolerance)
+    moved = Offset().run(part, inside, tolerance, 0.1 * tolerance, True)
     middles = moved.triangles.mean(axis=1)
     distance, _ = signed_distance(middles, part)
     # Flat faces move by the clearance exactly; at corners the skin is farther out, never nearer than chords make it.
@@ -33,11 +33,11 @@ def test_runs_beside_the_part_at_the_clearance(name: str) -> None:
 
 def test_bounded_however_small_the_tolerance() -> None:
     part = PARTS["cuboid"]()
-    assert len(Offset().run(part, bowl(6, 10, 0.01), 1e-3, 1e-3).faces) < 500_000
+    assert len(Offset().run(part, bowl(6, 10, 0.01), 1e-3, 1e-3, True).faces) < 500_000
 
 
 def test_a_surface_outside_is_refused() -> None:
     box = trimesh.creation.box((40, 30, 20))
     with pytest.raises(StageError, match="does not hold") as caught:
-        Offset().run(Part(box.vertices, box.faces), bowl(6, 25, 0.5), 0.1, 0.1)
-    assert "bbox" in caught.value.remedy
+        Offset().run(Part(box.vertices, box.faces), bowl(6, 25, 0.5), 0.1, 0.1, True)
+    assert "minkowski" in caught.value.remedy

@@ -1,0 +1,98 @@
+"""What all backgrounds made from a shape have in common: clearance, subdivision, the check that they hold the part."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from damageest.artefacts import Floats, Part, Solid, Surface
+from damageest.errors import StageError
+from damageest.solids import to_arrays, to_manifold, to_solid
+from damageest.stages.background import Background
+
+MOST_FACES = 400_000
+Subdivision = Literal["linear", "loop", "butterfly", "adaptive"]
+
+
+class Generated(Background, ABC):
+    """A shape round part and damage surface, subdivided where `enclose` wants it fine everywhere (paper 3.2)."""
+
+    clearance: float = Field(
+        2.0, gt=0, le=100, description="distance from the part, in tolerances; at least 1.5 point spacings"
+    )
+    edge: float = Field(
+        3.0, gt=0, le=100, description="spacing of its vertices, in tolerances; more where that would make too many"
+    )
+    subdivide: Subdivision = Field(
+        "linear",
+        description="how it is refined to that spacing: linear (edges into equal parts), adaptive (long edges halved), "
+        "loop or butterfly (smoothing; not for shapes with sharp corners)",
+    )
+
+    def run(self, part: Part, surface: Surface, tolerance: float, spacing: float, fine: bool) -> Solid:
+        """Raises StageError where the mesh does not hold part and damage surface."""
+        by = max(self.clearance * tolerance, 1.5 * spacing)
+        origin = (part.bounds[0] + part.bounds[1]) / 2
+        body = self.shape(part, surface, by, origin)
+        if fine:
+            body = refined(body, self.edge * max(tolerance, 0.5 * spacing), self.subdivide)
+        solid = to_solid(body, origin)
+        if solid is None:
+            raise StageError("the background came out empty", "background: minkowski, or method: implicit")
+        return check_holds(solid, np.concatenate([part.vertices, part.triangles.mean(axis=1)]), surface)
+
+    @abstractmethod
+    def shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
+        """A closed shape as a ``manifold3d.Manifold`` relative to ``origin`` (3,), at least ``by`` from the part."""
+
+
+def refined(body: Any, edge: float, how: Subdivision = "linear") -> Any:
+    """A Manifold with no edge longer than ``edge``, or than what some 400,000 triangles allow."""
+    least = float(np.sqrt(8 * body.surface_area() / np.sqrt(3) / MOST_FACES))
+    edge = max(edge, least)
+    if how == "linear":
+        return body.refine_to_length(edge)
+    import pyvista
+
+    from damageest.artefacts import Mesh
+
+    vertices, faces = to_arrays(body)
+    mesh = pyvista.PolyData.from_regular_faces(vertices, faces)
+    if how == "adaptive":
+        mesh = mesh.subdivide_adaptive(max_edge_len=edge)
+    else:
+        corners = vertices[faces]
+        longest = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
+        passes = int(np.ceil(np.log2(max(longest / edge, 1))))
+        passes = min(passes, int(np.log(max(MOST_FACES / len(faces), 1)) / np.log(4)))
+        mesh = mesh.subdivide(passes, subfilter=how) if passes else mesh
+    try:
+        fine = to_manifold(Mesh(np.asarray(mesh.points), mesh.regular_faces))
+    except ValueError as error:
+        raise StageError(
+            f"subdivide: {how} does not leave this background closed ({error})", "subdivide: linear"
+        ) from error
+    # The smoothing kinds quarter all triangles alike: what is still too long on uneven ones is divided evenly.
+    return fine.refine_to_length(edge)
+
+
+def check_holds(background: Solid, skin: Floats, surface: Surface) -> Solid:
+    """The background, if IDS and ``skin``, points (N,3) of the part, lie inside it. Raises StageError otherwise."""
+    import igl
+
+    inner = np.concatenate([skin, surface.vertices])
+    origin = background.bounds.mean(axis=0)
+    number = igl.fast_winding_number(
+        np.ascontiguousarray(background.vertices - origin),
+        np.array(background.faces),
+        np.ascontiguousarray(inner - origin),
+    )
+    if outside := int((number < 0.5).sum()):
+        raise StageError(
+            f"the background does not hold part and damage surface: {outside} of {len(inner)} points lie outside",
+            "subdivide: linear, background: minkowski, or method: implicit",
+        )
+    return background

@@ -1,0 +1,98 @@
+"""The printer's own working volume."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, PositiveFloat
+
+from damageest.artefacts import Floats, Part, Samples, Solid, Surface
+from damageest.errors import StageError
+from damageest.stages.background import Background
+
+Vector = tuple[float, float, float]
+
+
+class BuildVolume(Background):
+    """The lattice of the printer's working volume (paper 3.2), the same for every part: of its cells, those round the
+    site alone are ever made, and of these the background is the surface that keeps clear of the part. For shops that
+    repair many kinds of parts in one machine: one background to set up, and a part that does not fit in is refused."""
+
+    use: Literal["build_volume"] = "build_volume"
+    size: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = Field(
+        description="extent of the working volume along x, y, z, in the job's unit"
+    )
+    corner: Vector | None = Field(
+        None,
+        description="its lowest corner in the part's frame, in the job's unit; default: it lies round the origin",
+    )
+    cell: float | None = Field(
+        None,
+        gt=0,
+        description="edge of its cells in the job's unit, the finest that the deposition head resolves; default: the "
+        "clearance",
+    )
+    clearance: float = Field(
+        2.0, gt=0, le=100, description="distance from the part, in tolerances; at least 1.5 point spacings"
+    )
+    margin: float = Field(
+        12.0, ge=6, le=1000, description="how far round the site cells are made, in tolerances or point spacings"
+    )
+
+    def run(
+        self, part: Part, surface: Surface, samples: Samples, intact: Floats, tolerance: float, spacing: float
+    ) -> Solid:
+        """Raises StageError where the part does not fit in, or the cells round the site would not fit in memory."""
+        from damageest.stages.background._contour import contour
+        from damageest.stages.background._generated import check_holds
+        from damageest.stages.segment.mesh_distance import signed_distance
+
+        by = max(self.clearance * tolerance, 1.5 * spacing)
+        cell = self.cell or by
+        size = np.array(self.size)
+        corner = -size / 2 if self.corner is None else np.array(self.corner)
+        over = np.maximum(corner + by + cell - part.bounds[0], part.bounds[1] - (corner + size - by - cell))
+        if (over > 0).any():
+            text = ", ".join(f"{amount:.3g} in {name}" for name, amount in zip("xyz", over, strict=True) if amount > 0)
+            raise StageError(
+                f"the part with its clearance does not fit into the build volume: too far by {text}",
+                "another corner or size, in the part's frame",
+            )
+        reach = self.margin * max(tolerance, spacing)
+        low, high = _neighbourhood(surface, samples, intact, max(3 * tolerance, 3 * spacing), samples.spacing)
+        limit = np.round(size / cell).astype(np.int64)
+        first = np.clip(np.floor((low - reach - corner) / cell).astype(np.int64), 0, limit)
+        last = np.clip(np.ceil((high + reach - corner) / cell).astype(np.int64), 0, limit)
+        nx, ny, nz = (int(n) for n in last - first + 1)
+
+        def outside(points: Floats) -> Floats:
+            return signed_distance(points, part)[0] - by - 0.1 * cell
+
+        solid = contour(outside, corner + cell * first, (nx, ny, nz), cell)
+        inside = ((part.vertices > low) & (part.vertices < high)).all(axis=1)
+        return check_holds(solid, part.vertices[inside], surface)
+
+
+def _neighbourhood(
+    surface: Surface, samples: Samples, intact: Floats, reach: float, gap: float
+) -> tuple[Floats, Floats]:
+    """Lowest and highest corner of the damage surface and of the skin that is lost with it: all that hangs together
+    with its rim and has no sound point within ``reach``."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    bare = samples.points
+    if len(intact):
+        bare = bare[~np.isfinite(cKDTree(intact).query(bare, distance_upper_bound=reach, workers=2)[0])]
+    places = [surface.vertices]
+    if len(bare):
+        tree = cKDTree(bare)
+        pairs = tree.query_pairs(2 * gap, output_type="ndarray")
+        links = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(bare),) * 2)
+        label = connected_components(links, directed=False)[1]
+        near, _ = cKDTree(surface.vertices).query(bare, distance_upper_bound=2 * reach, workers=2)
+        places.append(bare[np.isin(label, label[np.isfinite(near)])])
+    points = np.concatenate(places)
+    return points.min(axis=0), points.max(axis=0)
