@@ -52,12 +52,14 @@ def closed(
     few = few[_inside(few, background)]
     kept = [float(_inside(few, mesh).mean()) if len(few) else 0.0 for mesh in found]
     best = int(np.argmin(kept))
+    if kept[best] > 0.02:
+        raise NotSeparatedError(
+            f"either side of the damage surface holds sound points ({kept[best]:.0%} at best)", INSTEAD
+        )
     if len(found) > 1 and max(kept) - kept[best] < MARGIN:
         raise StageError(
             f"the sound points do not tell which side is lost: {kept[0]:.0%} and {kept[1]:.0%} of them inside", INSTEAD
         )
-    if kept[best] > 0.02:
-        raise StageError(f"either side of the damage surface holds sound points ({kept[best]:.0%} at best)", INSTEAD)
     if (wrong := _wrongly_sided(found[best], len(surface.faces), tolerance)) > WRONG:
         raise StageError(f"the strip to the background runs through {wrong:.0%} of the damage surface", INSTEAD)
     return found[best]

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from damageest.artefacts import Floats, Mesh, Part, Rims, Solid, Surface
+from damageest.artefacts import Floats, Ints, Mesh, Part, Rims, Solid, Surface
+from damageest.errors import StageError
 from damageest.stages.enclose import Enclose
+
+if TYPE_CHECKING:
+    from damageest.stages.enclose._sew import Cycle
+
+ROUNDS = 12
+MOST_BETWEEN = 1000
+"""Points put between two images at a time."""
 
 
 class Adaptive(Enclose):
@@ -34,11 +43,9 @@ class Adaptive(Enclose):
     ) -> Mesh:
         """Raises StageError where paths do not close or lead through the part, or either side holds sound points, and
         NotSeparatedError where they do not split the background."""
-        from scipy.spatial import cKDTree
-
         from damageest.stages.enclose._close import agreed, closed
         from damageest.stages.enclose._refine import inserted, nearest, refined_at
-        from damageest.stages.enclose._sew import carried_on, cycle
+        from damageest.stages.enclose._sew import carried_on
 
         surface, rims = agreed(surface, rims, intact)
         wide = carried_on(surface, rims, self.overhang * tolerance)
@@ -46,24 +53,49 @@ class Adaptive(Enclose):
         steps = [np.linalg.norm(np.diff(wide.vertices[loop], axis=0), axis=1) for loop in wide.loops]
         edge = max(self.edge * tolerance, float(np.median(np.concatenate(steps))))
         face, foot = nearest(background, nodes)
-        ends = np.cumsum([len(loop) for loop in wide.loops])
-        more, way = nearest(background, np.concatenate([_between(one, edge) for one in np.split(foot, ends[:-1])]))
+        ends = np.cumsum([len(loop) for loop in wide.loops])[:-1]
+        trails = [trail(background, one, edge) for one in np.split(foot, ends)]
+        more, way = nearest(background, np.concatenate(trails))
         mesh, held = refined_at(background, np.concatenate([face, more]), np.concatenate([foot, way]), edge)
         mesh, image = inserted(mesh, held[: len(foot)], foot)
-        # Paths stay where the mesh is fine: what is nearest to the ways between the images was refined with them.
-        trail = cKDTree(np.concatenate([foot, way]))
-        close = np.isfinite(trail.query(mesh.vertices, distance_upper_bound=3 * edge, workers=2)[0])
-        close[image] = True
-        near = close[mesh.faces].any(axis=1)
-        cycles = [cycle(mesh.vertices, mesh.faces[near], one) for one in np.split(image, ends[:-1])]
+        near = _along(mesh, np.concatenate([foot, way]), 3 * edge) | np.isin(mesh.faces, image).any(axis=1)
+        cycles = [_cycle(mesh, near, one) for one in np.split(image, ends)]
         return closed(surface, wide, mesh, cycles, intact, part, tolerance)
 
 
-def _between(foot: Floats, edge: float) -> Floats:
-    """Points (K,3) on the straight ways between the images of neighbouring nodes that lie more than an edge apart: what
-    is nearest to them is where the path between the two will run."""
-    after = np.roll(foot, -1, axis=0)
-    count = np.minimum(np.linalg.norm(after - foot, axis=1) // edge, 1000).astype(np.int64)
-    which = np.repeat(np.arange(len(foot)), count)
-    place = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 1) / (count[which] + 1)
-    return np.asarray(foot[which] + place[:, None] * (after - foot)[which])
+def trail(background: Mesh, foot: Floats, edge: float) -> Floats:
+    """Points (K,3) on a background where the closed path through its points ``foot`` (N,3) will run, none farther than
+    an edge from the next unless the background has no surface between them."""
+    from damageest.stages.enclose._refine import nearest
+
+    at = foot
+    for _ in range(ROUNDS):
+        after = np.roll(at, -1, axis=0)
+        count = np.minimum(np.linalg.norm(after - at, axis=1) // edge, MOST_BETWEEN).astype(np.int64)
+        if not count.any():
+            break
+        which = np.repeat(np.arange(len(at)), count)
+        place = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 1) / (count[which] + 1)
+        # The straight way leaves the surface at an edge; what is nearest to it leaves a smaller gap each time.
+        _, between = nearest(background, at[which] + place[:, None] * (after - at)[which])
+        order = np.argsort(np.concatenate([np.arange(len(at)), which + place]), kind="stable")
+        at = np.concatenate([at, between])[order]
+    return at
+
+
+def _along(mesh: Mesh, places: Floats, reach: float) -> NDArray[np.bool_]:
+    """(F,) which faces have a corner within ``reach`` of places (K,3)."""
+    from scipy.spatial import cKDTree
+
+    far, _ = cKDTree(places).query(mesh.vertices, distance_upper_bound=reach, workers=2)
+    return np.asarray(np.isfinite(far)[mesh.faces].any(axis=1))
+
+
+def _cycle(mesh: Mesh, near: NDArray[np.bool_], image: Ints) -> Cycle:
+    """The cycle within the ``near`` faces, where the mesh is fine; on all of it where they do not hang together."""
+    from damageest.stages.enclose._sew import cycle
+
+    try:
+        return cycle(mesh.vertices, mesh.faces[near], image)
+    except StageError:
+        return cycle(mesh.vertices, mesh.faces, image)
