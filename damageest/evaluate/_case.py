@@ -20,7 +20,8 @@ SIGMA = 0.0005
 
 @dataclass(frozen=True)
 class Case:
-    """What makes a case; equal cases give equal scans. ``tolerance`` is ``auto`` or the noise's multiple."""
+    """What makes a case; equal cases give equal scans. ``tolerance`` is ``auto`` or the noise's multiple; ``settings``
+    are ``stage.option=value`` for the job."""
 
     number: int
     part: str
@@ -31,6 +32,7 @@ class Case:
     density: float = 0.4
     undamaged: bool = False
     tolerance: str = "4"
+    settings: tuple[str, ...] = ()
 
     def key(self) -> str:
         """Names the case among the rows of a file."""
@@ -38,11 +40,19 @@ class Case:
 
 
 def cases(
-    count: int, seed: int, parts: list[str], pose: str, method: str, undamaged: bool, points: int, tolerance: str
+    count: int,
+    seed: int,
+    parts: list[str],
+    pose: str,
+    method: str,
+    undamaged: bool,
+    points: int,
+    tolerance: str,
+    settings: tuple[str, ...] = (),
 ) -> list[Case]:
     """``count`` cases that go through the parts in turn."""
     return [
-        Case(k, parts[k % len(parts)], 1000 * seed + k, pose, method, points, undamaged=undamaged, tolerance=tolerance)
+        Case(k, parts[k % len(parts)], 1000 * seed + k, pose, method, points, 0.4, undamaged, tolerance, settings)
         for k in range(count)
     ]
 
@@ -105,4 +115,4 @@ def _run(part: Part, scan: Scan, case: Case, tolerance: float) -> Any:
     job: dict[str, Any] = {"version": 1, "method": case.method, "tolerance": wanted}
     if case.pose == "identity":
         job["align"] = "none"
-    return damageest.run(job, part=part, scan=Scan(scan.points, unit=scan.unit))
+    return damageest.run(job, part=part, scan=Scan(scan.points, unit=scan.unit), settings=case.settings)

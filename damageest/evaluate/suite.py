@@ -44,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.undamaged,
         options.points,
         options.tolerance,
+        tuple(options.set),
     )
     rows = run_all(wanted, options.out, options.jobs, options.timeout)
     print("\n" + summary(rows, options.undamaged))
@@ -172,6 +173,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--undamaged", action="store_true", help="scans without damage; right is to find no site")
     parser.add_argument("--timeout", type=float, default=300, help="seconds for a case")
     parser.add_argument("--out", type=Path, default=None, help="file of JSON lines, to go on from and to append to")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="STAGE.OPTION=VALUE", help="for the job; may be given repeatedly"
+    )
     parser.add_argument("--case", default="", help=argparse.SUPPRESS)
     return parser
 

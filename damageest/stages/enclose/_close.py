@@ -29,6 +29,8 @@ def closed(
     Raises NotSeparatedError where they cut nothing off, StageError where the sound points do not tell the sides apart,
     or a strip runs through the part.
     """
+    from scipy.spatial import cKDTree
+
     start = len(wide.vertices)
     vertices = np.concatenate([wide.vertices, background.vertices])
     strips = [strip(loop, other, start) for loop, other in zip(wide.loops, cycles, strict=True)]
@@ -47,9 +49,11 @@ def closed(
         raise NotSeparatedError("the paths on the background do not split it in two", INSTEAD)
     low, high = background.bounds
     near = intact[((intact > low) & (intact < high)).all(axis=1)]
-    # A few thousand tell; of a background that is made round the site alone, those that lie in it.
+    # A few thousand tell; of a background that is made round the site alone, those that lie in it. Points beside the
+    # rim, no deeper than the tolerance, belong to either side.
     few = near[:: max(1, len(near) // 4000)]
     few = few[_inside(few, background)]
+    few = few[cKDTree(surface.vertices).query(few, workers=2)[0] > 3 * tolerance] if len(few) else few
     kept = [float(_inside(few, mesh).mean()) if len(few) else 0.0 for mesh in found]
     best = int(np.argmin(kept))
     if kept[best] > 0.02:
