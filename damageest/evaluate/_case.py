@@ -36,7 +36,7 @@ class Case:
 
     def key(self) -> str:
         """Names the case among the rows of a file."""
-        return "|".join(str(value) for value in vars(self).values())
+        return "|".join(str(value) for value in {**vars(self), "settings": " ".join(self.settings)}.values())
 
 
 def cases(

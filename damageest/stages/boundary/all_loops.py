@@ -4,17 +4,27 @@ from __future__ import annotations
 
 from typing import Literal
 
-from damageest.artefacts import Rims, Surface
+import numpy as np
+
+from damageest.artefacts import Part, Rims, Surface
 from damageest.stages.boundary import Boundary
+
+DEEP = 5.0
+"""Tolerances below the skin: the damage surface begins at one, and at two where the scan is thin at its rim."""
 
 
 class AllLoops(Boundary):
-    """Every loop of more than ten nodes: for walls worn through and grooves round a shaft."""
+    """Every loop of more than ten nodes that comes near the part's skin: for walls worn through and grooves round a
+    shaft. Loops deep inside are gaps of the scan, and closed."""
 
     use: Literal["all_loops"] = "all_loops"
 
-    def run(self, surface: Surface) -> Rims:
-        """Raises StageError where there is no loop of more than ten nodes."""
+    def run(self, surface: Surface, part: Part, tolerance: float) -> Rims:
+        """Raises StageError where there is no such loop."""
         from damageest.stages.boundary._loops import rims
+        from damageest.stages.segment.mesh_distance import signed_distance
 
-        return Rims(tuple(rims(surface)))
+        found = rims(surface)
+        depth = [-signed_distance(surface.vertices[loop], part)[0] for loop in found]
+        near = [loop for loop, one in zip(found, depth, strict=True) if np.quantile(one, 0.25) < DEEP * tolerance]
+        return Rims(tuple(near or found[:1]))

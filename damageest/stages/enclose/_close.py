@@ -17,7 +17,7 @@ WRONG = 0.03
 THROUGH = 0.1
 """Share of the damage surface's area that the strips' area inside the part may have: where the scan has a gap at the
 rim, the straight way out is as good as any."""
-INSTEAD = "boundary: all_loops where the damage goes through, another background, or method: implicit"
+INSTEAD = "background: minkowski, boundary: all_loops, or method: implicit"
 
 
 def closed(

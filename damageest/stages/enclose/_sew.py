@@ -88,7 +88,11 @@ def cycle(vertices: Floats, faces: Ints, image: Ints) -> Cycle:
     walk: list[tuple[int, float]] = []
     for node, here, there in zip(moves.tolist(), image[moves].tolist(), after[moves].tolist(), strict=True):
         gap = float(np.linalg.norm(place[here] - place[there]))
-        far, before = dijkstra(graph, directed=False, indices=here, return_predecessors=True, limit=6 * gap + slack)
+        # Most images are neighbours, and their path is short; where the background folds between them it may be long.
+        for limit in (6 * gap + slack, np.inf):
+            far, before = dijkstra(graph, directed=False, indices=here, return_predecessors=True, limit=limit)
+            if np.isfinite(far[there]):
+                break
         if not np.isfinite(far[there]):
             raise StageError("no path on the background joins the rim", "background: bbox, or method: implicit")
         path = [there]

@@ -10,13 +10,13 @@ from damageest.errors import StageError
 from damageest.stages.boundary.all_loops import AllLoops
 from damageest.stages.boundary.largest_loop import LargestLoop
 from tests.stages._open import bowl, pipe
-from tests.stages.boundary.test_all_loops import slit
+from tests.stages.boundary.test_all_loops import block, slit
 
 
 def test_the_longest_of_two() -> None:
     surface = bowl(5, 0, 0.2)
     torn = Surface(surface.vertices, np.delete(surface.faces, slit(8, 30), axis=0))
-    assert len(AllLoops().run(torn).loops) == 2
+    assert len(AllLoops().run(torn, block(0.4), 1.0).loops) == 2
     (rim,) = LargestLoop().run(torn).loops
     assert len(rim) == 96
     assert np.allclose(torn.vertices[rim, 2], -0.2)

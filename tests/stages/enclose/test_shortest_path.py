@@ -39,7 +39,7 @@ def volume(enclosure: Mesh, part: Part) -> float:
 
 
 def enclosed(part: Part, surface: Surface, intact: np.ndarray, background: str = "offset", loops: str = "all") -> Mesh:
-    rims = (AllLoops() if loops == "all" else LargestLoop()).run(surface)
+    rims = AllLoops().run(surface, part, TOLERANCE) if loops == "all" else LargestLoop().run(surface)
     maker = Offset() if background == "offset" else BoundingBox()
     behind = maker.run(part, surface, TOLERANCE, TOLERANCE / 2, True)
     return ShortestPath().run(surface, rims, behind, part, intact, TOLERANCE)
@@ -112,13 +112,15 @@ def test_rim_smaller_than_the_mesh_behind_it_is_refused(part: Part) -> None:
     surface = bowl(0.4, 10, 0.2)
     behind = BoundingBox(edge=100).run(part, surface, TOLERANCE, 0.1, True)
     with pytest.raises(StageError, match="falls together"):
-        ShortestPath(overhang=0).run(surface, AllLoops().run(surface), behind, part, sound(part, 1), TOLERANCE)
+        ShortestPath(overhang=0).run(
+            surface, AllLoops().run(surface, part, TOLERANCE), behind, part, sound(part, 1), TOLERANCE
+        )
 
 
 def test_rims_come_from_the_boundary_stage(part: Part) -> None:
     """A rim that boundary left out is closed flat, so no open edge is left whichever it took."""
     surface = pipe(5, -8, 8)
-    rims = AllLoops().run(surface)
+    rims = AllLoops().run(surface, part, 1.0)
     behind = BoundingBox().run(part, surface, TOLERANCE, 0.1, True)
     for loop in rims.loops:
         mesh = ShortestPath().run(surface, Rims((loop,)), behind, part, sound(part, 5), TOLERANCE)

@@ -42,7 +42,7 @@ def test_averages_the_noise(surface: Surface) -> None:
 def test_one_piece_with_one_rim_that_ends_where_the_points_do(surface: Surface) -> None:
     from damageest.stages.boundary.all_loops import AllLoops
 
-    (rim,) = AllLoops().run(surface).loops
+    (rim,) = AllLoops().run(surface, scene()[1], TOLERANCE).loops
     assert surface.vertices[:, 2].max() < TOP - TOLERANCE + 1.5 * TOLERANCE
     assert surface.vertices[rim, 2].min() > TOP - 6 * TOLERANCE
     assert surface.area == pytest.approx(2 * np.pi * RADIUS**2, rel=0.08)
