@@ -8,12 +8,14 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from damageest.artefacts import Floats, Part, Solid, Surface
+from damageest.artefacts import Floats, Mesh, Part, Solid, Surface
 from damageest.errors import StageError
 from damageest.solids import to_arrays, to_manifold, to_solid
 from damageest.stages.background import Background
+from damageest.stages.enclose._refine import halved
 
 MOST_FACES = 400_000
+PASSES = 6
 Subdivision = Literal["linear", "loop", "butterfly", "adaptive"]
 
 
@@ -54,21 +56,17 @@ def refined(body: Any, edge: float, how: Subdivision = "linear") -> Any:
     least = float(np.sqrt(8 * body.surface_area() / np.sqrt(3) / MOST_FACES))
     edge = max(edge, least)
     if how == "linear":
-        return body.refine_to_length(edge)
+        return _divided(body, edge)
+    vertices, faces = to_arrays(body)
+    if how == "adaptive":
+        # VTK's own adaptive subdivision leaves cracks beside slender triangles.
+        return to_manifold(halved(Mesh(vertices, faces), edge))
     import pyvista
 
-    from damageest.artefacts import Mesh
-
-    vertices, faces = to_arrays(body)
     mesh = pyvista.PolyData.from_regular_faces(vertices, faces)
-    if how == "adaptive":
-        mesh = mesh.subdivide_adaptive(max_edge_len=edge)
-    else:
-        corners = vertices[faces]
-        longest = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
-        passes = int(np.ceil(np.log2(max(longest / edge, 1))))
-        passes = min(passes, int(np.log(max(MOST_FACES / len(faces), 1)) / np.log(4)))
-        mesh = mesh.subdivide(passes, subfilter=how) if passes else mesh
+    passes = int(np.ceil(np.log2(max(_longest(vertices[faces]) / edge, 1))))
+    passes = min(passes, int(np.log(max(MOST_FACES / len(faces), 1)) / np.log(4)))
+    mesh = mesh.subdivide(passes, subfilter=how) if passes else mesh
     try:
         fine = to_manifold(Mesh(np.asarray(mesh.points), mesh.regular_faces))
     except ValueError as error:
@@ -76,7 +74,21 @@ def refined(body: Any, edge: float, how: Subdivision = "linear") -> Any:
             f"subdivide: {how} does not leave this background closed ({error})", "subdivide: linear"
         ) from error
     # The smoothing kinds quarter all triangles alike: what is still too long on uneven ones is divided evenly.
-    return fine.refine_to_length(edge)
+    return _divided(fine, edge)
+
+
+def _divided(body: Any, edge: float) -> Any:
+    """A Manifold with its edges in equal parts. What lies across a slender triangle is divided by another pass."""
+    for _ in range(PASSES):
+        vertices, faces = to_arrays(body)
+        if _longest(vertices[faces]) <= edge:
+            break
+        body = body.refine_to_length(edge)
+    return body
+
+
+def _longest(corners: Floats) -> float:
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
 
 
 def check_holds(background: Solid, skin: Floats, surface: Surface) -> Solid:

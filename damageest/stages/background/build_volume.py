@@ -67,7 +67,7 @@ class BuildVolume(Background):
         nx, ny, nz = (int(n) for n in last - first + 1)
 
         def outside(points: Floats) -> Floats:
-            return signed_distance(points, part)[0] - by - 0.1 * cell
+            return signed_distance(points, part)[0] - max(by, 0.6 * cell) - 0.1 * cell
 
         solid = contour(outside, corner + cell * first, (nx, ny, nz), cell)
         inside = ((part.vertices > low) & (part.vertices < high)).all(axis=1)

@@ -24,11 +24,11 @@ class Minkowski(Generated):
 
         # Two triangles to a cell: a lattice as fine as the clearance, or as the number of triangles allows.
         cell = max(by, float(np.sqrt(2.5 * part.area / MOST_FACES)))
-        low = part.bounds[0] - by - 2 * cell
-        nx, ny, nz = (int(n) for n in np.ceil((part.bounds[1] + by + 2 * cell - low) / cell).astype(int) + 1)
+        low = part.bounds[0] - by - 3 * cell
+        nx, ny, nz = (int(n) for n in np.ceil((part.bounds[1] + by + 3 * cell - low) / cell).astype(int) + 1)
 
         def outside(points: Floats) -> Floats:
-            # Between nodes the level runs straight, cutting corners by up to a third of a cell.
-            return signed_distance(points, part)[0] - by - 0.1 * cell
+            # Between nodes the level runs straight and cuts corners, which a coarse lattice has to be farther off for.
+            return signed_distance(points, part)[0] - max(by, 0.6 * cell) - 0.1 * cell
 
         return to_manifold(contour(outside, low, (nx, ny, nz), cell), origin)

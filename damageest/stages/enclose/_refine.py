@@ -38,6 +38,18 @@ def refined_at(mesh: Mesh, face: Ints, foot: Floats, edge: float) -> tuple[Mesh,
     return Mesh(vertices, faces), face
 
 
+def halved(mesh: Mesh, edge: float) -> Mesh:
+    """The mesh, conforming as it was, with no edge longer than ``edge``, by halving the longest of each triangle."""
+    vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
+    for _ in range(MOST_ROUNDS):
+        corners = vertices[faces]
+        long = (np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2) > edge).any(axis=1)
+        if not long.any():
+            break
+        vertices, faces, _ = _split(vertices, faces, np.flatnonzero(long))
+    return Mesh(vertices, faces)
+
+
 def _split(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, Ints]:
     """Halves the longest edge of the ``wanted`` faces and of all that this would leave with a node on their edge.
 

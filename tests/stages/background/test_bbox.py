@@ -4,39 +4,44 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import trimesh
 
-from damageest.artefacts import Part
+from damageest.errors import StageError
 from damageest.stages.background.bbox import BoundingBox
-from tests.stages._open import bowl
+from tests.stages.background.holding import box, dent, longest_edge
 
 
-@pytest.fixture
-def part() -> Part:
-    box = trimesh.creation.box((40, 30, 20))
-    return Part(box.vertices, box.faces)
-
-
-def longest_edge(vertices: np.ndarray, faces: np.ndarray) -> float:
-    corners = vertices[faces]
-    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
-
-
-def test_holds_both_with_the_clearance(part: Part) -> None:
-    surface = bowl(6, 15, 0.5)  # reaches above the part
-    box = BoundingBox(clearance=3).run(part, surface, 0.5, 0.1, True)
+def test_holds_both_with_the_clearance() -> None:
+    part, surface = box(), dent(15)  # reaches above the part
+    found = BoundingBox(clearance=3).run(part, surface, 0.5, 0.1, True)
     low = np.minimum(part.bounds[0], surface.bounds[0])
     high = np.maximum(part.bounds[1], surface.bounds[1])
-    assert np.allclose(box.bounds, [low - 1.5, high + 1.5])
-    assert box.volume == pytest.approx(np.prod(np.ptp(box.bounds, axis=0)))
-    assert longest_edge(box.vertices, box.faces) <= 2.0
+    assert np.allclose(found.bounds, [low - 1.5, high + 1.5])
+    assert found.volume == pytest.approx(np.prod(np.ptp(found.bounds, axis=0)))
+    assert longest_edge(found) <= 2.0
 
 
-def test_a_tiny_tolerance_does_not_fill_the_memory(part: Part) -> None:
-    box = BoundingBox().run(part, bowl(6, 10, 0.01), 1e-4, 1e-3, True)
-    assert len(box.faces) < 500_000
+def test_left_coarse_where_enclose_refines() -> None:
+    assert len(BoundingBox().run(box(), dent(), 0.5, 0.1, False).faces) == 12
 
 
-def test_a_sparse_scan_widens_the_clearance(part: Part) -> None:
-    box = BoundingBox().run(part, bowl(6, 10, 0.1), 0.1, 2.0, True)
-    assert np.allclose(box.bounds[0], part.bounds[0] - 3.0)
+def test_a_tiny_tolerance_does_not_fill_the_memory() -> None:
+    assert len(BoundingBox().run(box(), dent(), 1e-4, 1e-3, True).faces) < 500_000
+
+
+def test_a_sparse_scan_widens_the_clearance() -> None:
+    found = BoundingBox().run(box(), dent(), 0.1, 2.0, True)
+    assert np.allclose(found.bounds[0], box().bounds[0] - 3.0)
+
+
+@pytest.mark.parametrize("how", ["linear", "adaptive"])
+def test_subdivision_keeps_the_box(how: str) -> None:
+    found = BoundingBox.model_validate({"use": "bbox", "subdivide": how}).run(box(), dent(), 0.5, 0.1, True)
+    assert longest_edge(found) <= 1.0
+    assert found.volume == pytest.approx(np.prod(np.ptp(found.bounds, axis=0)))
+    assert np.allclose(found.bounds, [box().bounds[0] - 1, box().bounds[1] + 1])
+
+
+def test_smoothing_a_box_cuts_its_corners_and_is_refused() -> None:
+    with pytest.raises(StageError, match="does not hold") as caught:
+        BoundingBox(subdivide="loop").run(box(), dent(), 0.5, 0.1, True)
+    assert "subdivide: linear" in caught.value.remedy

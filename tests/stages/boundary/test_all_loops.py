@@ -16,7 +16,7 @@ def block(height: float) -> Part:
     """A block about the origin, its top at half the ``height``, or above it where a bowl hangs down from 0."""
     box = trimesh.creation.box((40, 30, 20 if height < 1 else height), np.eye(4))
     lift = -10 + height / 2 if height < 1 else 0.0
-    return Part(box.vertices + [0, 0, lift], box.faces)
+    return Part(np.add(box.vertices, (0, 0, lift)), box.faces)
 
 
 def slit(ring: int, wide: int) -> np.ndarray:

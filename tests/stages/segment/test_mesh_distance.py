@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import igl
 import numpy as np
 import trimesh
 
 from damageest.artefacts import ADDED, DAMAGE, INTACT, Mesh, Part, Scan
 from damageest.stages.segment.mesh_distance import MeshDistance, signed_distance
 
+KIND = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
 HALF = np.array([20.0, 15.0, 0.2])
 
 
@@ -90,3 +92,16 @@ def test_labels() -> None:
 def test_empty_scan() -> None:
     mesh = trimesh.creation.box((10, 10, 10))
     assert len(MeshDistance().run(Scan(np.empty((0, 3))), Part(mesh.vertices, mesh.faces), 0.2).label) == 0
+
+
+def test_sign_beside_the_short_edges_of_slender_triangles() -> None:
+    """Round a bore with a cross hole, where long strips end on the hole's edge: the sign is that of the winding."""
+    from damageest.evaluate.parts import PARTS
+
+    part = PARTS["tube"]()
+    vertices, faces = np.array(part.vertices), np.array(part.faces)
+    points = np.random.default_rng(0).uniform([18, -6, 5], [24, 6, 12], (30_000, 3))
+    inside = np.asarray(igl.fast_winding_number(vertices, faces, points)) > 0.5
+    plain = igl.signed_distance(points, vertices, faces, sign_type=KIND)[0]
+    assert not np.array_equal(plain < 0, inside)  # what libigl says of some of them, which is why this is tested
+    assert np.array_equal(signed_distance(points, part)[0] < 0, inside)

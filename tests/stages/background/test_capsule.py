@@ -1,0 +1,35 @@
+"""The capsule's domes begin where the part lets them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from damageest.artefacts import Part
+from damageest.stages.background.capsule import Capsule
+from tests.stages._open import bowl
+from tests.stages.background.holding import box, dent, gap, longest_edge
+
+
+def test_a_ball_needs_no_more_than_a_ball() -> None:
+    ball = trimesh.creation.icosphere(4, 10)
+    part = Part(ball.vertices, ball.faces)
+    found = Capsule().run(part, bowl(3, 8, 0.5), 0.5, 0.1, False)
+    assert found.volume == pytest.approx(4 / 3 * np.pi * 11**3, rel=0.02)
+
+
+def test_holds_a_block_of_any_shape() -> None:
+    for size in [(40, 30, 20), (5, 80, 5), (60, 60, 4)]:
+        part, surface = box(size), dent(size[2] / 2)  # type: ignore[arg-type]
+        nearest, holds = gap(Capsule().run(part, surface, 0.5, 0.1, False), part, surface)
+        assert holds
+        assert nearest > 0.9
+
+
+@pytest.mark.parametrize("how", ["linear", "loop", "butterfly", "adaptive"])
+def test_every_subdivision_holds_the_part(how: str) -> None:
+    """A capsule has no sharp corners, so the smoothing kinds do it no harm."""
+    found = Capsule.model_validate({"use": "capsule", "subdivide": how}).run(box(), dent(), 0.5, 0.1, True)
+    assert longest_edge(found) <= 1.5 * 1.001
+    assert gap(found, box(), dent())[1]
