@@ -1,0 +1,146 @@
+"""The nearest point of a background refined along the rim alone: as right as the fine one, and much smaller."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from damageest.artefacts import Mesh, Part, Surface, open_edges
+from damageest.errors import StageError
+from damageest.solids import to_manifold
+from damageest.stages.background.bbox import BoundingBox
+from damageest.stages.background.capsule import Capsule
+from damageest.stages.background.minkowski import Minkowski
+from damageest.stages.boundary.all_loops import AllLoops
+from damageest.stages.enclose import NotSeparatedError
+from damageest.stages.enclose._refine import halved, inserted, nearest, refined_at
+from damageest.stages.enclose.adaptive import Adaptive
+from tests.stages._open import bowl, pipe
+from tests.stages.enclose.test_shortest_path import NO_POINTS, SIZE, TOLERANCE, sound, volume
+
+BACKGROUNDS = {"bbox": BoundingBox(), "minkowski": Minkowski(), "capsule": Capsule()}
+
+
+@pytest.fixture(scope="module")
+def part() -> Part:
+    box = trimesh.creation.box(SIZE)
+    return Part(box.vertices, box.faces)
+
+
+def enclosed(part: Part, surface: Surface, intact: np.ndarray, background: str = "minkowski") -> Mesh:
+    rims = AllLoops().run(surface, part, TOLERANCE)
+    behind = BACKGROUNDS[background].run(part, surface, TOLERANCE, TOLERANCE / 2, False)
+    return Adaptive().run(surface, rims, behind, part, intact, TOLERANCE)
+
+
+@pytest.mark.parametrize("background", BACKGROUNDS)
+@pytest.mark.parametrize("turned", [False, True])
+def test_pit(part: Part, background: str, turned: bool) -> None:
+    surface = bowl(6, 10, TOLERANCE)
+    if turned:  # which way the surface was wound must not decide the side
+        surface = Surface(surface.vertices, surface.faces[:, ::-1])
+    mesh = enclosed(part, surface, sound(part, 6), background)
+    assert open_edges(mesh.faces) == 0
+    assert volume(mesh, part) == pytest.approx(2 / 3 * np.pi * 6**3, rel=0.01)
+
+
+def test_a_rim_that_runs_over_the_boxs_edge(part: Part) -> None:
+    """A ball out of the block's edge: images on two sides of the box, joined round its edge."""
+    ball = trimesh.creation.icosphere(5, 6)
+    ball.apply_translation([0, 15, 10])
+    inside = (np.abs(ball.triangles) < SIZE / 2 - TOLERANCE).all(axis=(1, 2))
+    surface = ball.submesh([np.flatnonzero(inside)], append=True)
+    points, _ = trimesh.sample.sample_surface(trimesh.Trimesh(part.vertices, part.faces), 8000, seed=1)
+    intact = np.asarray(points[np.linalg.norm(points - [0, 15, 10], axis=1) > 6])
+    for name in BACKGROUNDS:
+        mesh = enclosed(part, Surface(surface.vertices, surface.faces[:, ::-1]), intact, name)
+        assert open_edges(mesh.faces) == 0
+        assert volume(mesh, part) == pytest.approx(np.pi * 6**3 / 3, rel=0.015)
+
+
+def test_worn_through_has_to_be_close_to_the_part(part: Part) -> None:
+    surface = pipe(5, -10 + TOLERANCE, 10 - TOLERANCE)
+    mesh = enclosed(part, surface, sound(part, 5))
+    assert open_edges(mesh.faces) == 0
+    assert volume(mesh, part) == pytest.approx(np.pi * 25 * 20, rel=0.01)
+
+
+def test_a_background_on_the_far_side_of_metal_is_refused() -> None:
+    """A pit in the wall of a bore: from there the way to the bounding box leads through the wall."""
+    tube = trimesh.creation.annulus(10, 14, 40, sections=128)
+    part = Part(tube.vertices, tube.faces)
+    pit = bowl(4, 0, TOLERANCE)
+    inward = Surface(np.column_stack([10 - pit.vertices[:, 2], pit.vertices[:, 1], pit.vertices[:, 0]]), pit.faces)
+    # The bowl's rim lies on a plane, the bore is round: what of it sticks out of the metal is cut off.
+    keep = np.hypot(*inward.vertices[:, :2].T) > 10 + TOLERANCE
+    cut = trimesh.Trimesh(inward.vertices, inward.faces, process=False)
+    cut = cut.submesh([np.flatnonzero(keep[inward.faces].all(axis=1))], append=True)
+    surface = Surface(cut.vertices, cut.faces)
+    points, _ = trimesh.sample.sample_surface(tube, 20_000, seed=1)
+    lost = (np.hypot(points[:, 0], points[:, 1]) < 11) & (np.hypot(points[:, 1], points[:, 2]) < 4) & (points[:, 0] > 0)
+    with pytest.raises(StageError, match="leads through the part") as caught:
+        enclosed(part, surface, np.asarray(points[~lost]), "bbox")
+    assert "minkowski" in caught.value.remedy
+    mesh = enclosed(part, surface, np.asarray(points[~lost]))
+    assert open_edges(mesh.faces) == 0
+    ball = trimesh.creation.icosphere(5, 4)
+    true = (to_manifold(Mesh(np.add(ball.vertices, (10, 0, 0)), ball.faces)) ^ to_manifold(part)).volume()
+    assert volume(mesh, part) == pytest.approx(true, rel=0.015)
+
+
+def test_one_face_of_a_cut_ring_separates_nothing() -> None:
+    ring = trimesh.creation.torus(15, 4, major_sections=96, minor_sections=48)
+    part = Part(ring.vertices, ring.faces)
+    disc = bowl(4 - TOLERANCE, 0, 0.3)
+    flat = disc.vertices * [1, 1, 0]
+    intact, _ = trimesh.sample.sample_surface(ring, 4000, seed=1)
+    with pytest.raises(NotSeparatedError):
+        enclosed(part, Surface(np.column_stack([flat[:, 0] + 15, flat[:, 2], flat[:, 1]]), disc.faces), intact)
+
+
+def test_nothing_to_tell_the_sides_by_is_refused(part: Part) -> None:
+    with pytest.raises(StageError, match="side"):
+        enclosed(part, bowl(6, 10, TOLERANCE), NO_POINTS)
+
+
+def test_cost_follows_the_rim_and_not_the_part() -> None:
+    """The same dent in a part ten times as long needs hardly more triangles."""
+    counts = []
+    for length in (40.0, 400.0):
+        box = trimesh.creation.box((length, 30, 20))
+        part = Part(box.vertices, box.faces)
+        mesh = enclosed(part, bowl(6, 10, TOLERANCE), sound(part, 6, 20_000), "bbox")
+        counts.append(len(mesh.faces))
+    assert counts[1] < 1.2 * counts[0]
+    assert counts[0] < 20_000
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.05, 20))
+def test_refining_and_putting_points_in_keeps_the_shape(seed: int, edge: float) -> None:
+    rng = np.random.default_rng(seed)
+    box = trimesh.creation.box((40, 30, 20)) if seed % 2 else trimesh.creation.cylinder(10, 50, sections=40)
+    mesh = Mesh(box.vertices, box.faces)
+    face, foot = nearest(mesh, rng.normal(0, 15, (20, 3)))
+    fine, held = refined_at(mesh, face, foot, edge)
+    full, image = inserted(fine, held, foot)
+    for made in (fine, full):
+        assert open_edges(made.faces) == 0
+        assert trimesh.Trimesh(made.vertices, made.faces).volume == pytest.approx(box.volume)
+    corners = fine.triangles[np.unique(held)]
+    assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() <= edge
+    # a point near a vertex is that vertex
+    assert np.linalg.norm(full.vertices[image] - foot, axis=1).max() <= 0.5 * edge + 1e-9
+    assert np.abs(nearest(mesh, full.vertices)[1] - full.vertices).max() < 1e-9
+
+
+def test_halved_everywhere() -> None:
+    rod = trimesh.creation.cylinder(10, 50, sections=40)
+    fine = halved(Mesh(rod.vertices, rod.faces), 1.0)
+    assert open_edges(fine.faces) == 0
+    corners = fine.triangles
+    assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() <= 1.0
+    assert trimesh.Trimesh(fine.vertices, fine.faces).volume == pytest.approx(rod.volume)
