@@ -1,0 +1,17 @@
+"""Damage surfaces by ball pivoting, by Open3D."""
+
+from __future__ import annotations
+
+from damageest.hookspecs import hookimpl
+from damageest.stages import Stage
+
+
+@hookimpl
+def damageest_stages() -> list[type[Stage]]:
+    """What this plugin provides. Raises PluginError where a system library that Open3D loads is not there."""
+    from damageest_open3d._system import check
+
+    check()
+    from damageest_open3d.ball_pivot import BallPivot
+
+    return [BallPivot]

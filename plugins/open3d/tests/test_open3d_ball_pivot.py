@@ -1,0 +1,156 @@
+"""Ball pivoting: a bowl from noisy points, a whole job against known truth, and what happens without the libraries."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import damageest_open3d
+import numpy as np
+import pytest
+import trimesh
+from damageest_open3d import _system
+from damageest_open3d.ball_pivot import BallPivot
+
+import damageest
+from damageest.artefacts import Part, Surface
+from damageest.errors import PluginError, StageError
+from damageest.registry import Registry
+from damageest.stages.scan.simulate import Simulate
+
+RADIUS, TOP, NOISE, TOLERANCE = 6.0, 10.0, 0.05, 0.2
+
+
+def needed() -> None:
+    try:
+        _system.check()
+    except PluginError as error:
+        pytest.skip(f"{error}; {error.remedy}")
+
+
+def box() -> Part:
+    mesh = trimesh.creation.box((40, 30, 20))
+    return Part(mesh.vertices, mesh.faces)
+
+
+def bowl(n: int = 6000) -> np.ndarray:
+    """Points of a bowl let into the top of a box, at height 10."""
+    rng = np.random.default_rng(0)
+    out = rng.normal(size=(n, 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    out[:, 2] = -np.abs(out[:, 2])
+    points = out * RADIUS + [0, 0, TOP] + rng.normal(0, NOISE, (n, 3))
+    return np.asarray(points[points[:, 2] < TOP - TOLERANCE])
+
+
+@pytest.fixture(scope="module")
+def surface() -> Surface:
+    needed()
+    return BallPivot().run(bowl(), box(), TOLERANCE, 0.15, NOISE)
+
+
+def test_averages_the_noise(surface: Surface) -> None:
+    off = np.linalg.norm(surface.vertices - [0, 0, TOP], axis=1) - RADIUS
+    assert np.sqrt((off**2).mean()) < 0.6 * NOISE
+    assert np.abs(off).max() < TOLERANCE
+
+
+def test_one_rim_that_ends_where_the_points_do(surface: Surface) -> None:
+    from damageest.stages.boundary.all_loops import AllLoops
+
+    (rim,) = AllLoops().run(surface, box(), TOLERANCE).loops
+    assert surface.vertices[:, 2].max() < TOP - TOLERANCE / 2
+    assert surface.vertices[rim, 2].min() > TOP - 6 * TOLERANCE
+    assert surface.area == pytest.approx(2 * np.pi * RADIUS**2, rel=0.09)
+
+
+def test_normals_toward_the_lost_material(surface: Surface) -> None:
+    inward = np.array([0, 0, TOP]) - surface.triangles.mean(axis=1)
+    assert (np.einsum("ij,ij->i", surface.cross, inward) > 0).mean() > 0.99
+
+
+def test_same_points_same_bytes(surface: Surface) -> None:
+    again = BallPivot().run(bowl(), box(), TOLERANCE, 0.15, NOISE)
+    assert again.vertices.tobytes() == surface.vertices.tobytes()
+    assert again.faces.tobytes() == surface.faces.tobytes()
+
+
+def test_far_from_the_origin() -> None:
+    needed()
+    away, part = np.array([1e5, -2e5, 3e5]), box()
+    moved = BallPivot().run(bowl() + away, Part(part.vertices + away, part.faces), TOLERANCE, 0.15, NOISE)
+    off = np.linalg.norm(moved.vertices - away - [0, 0, TOP], axis=1) - RADIUS
+    assert np.sqrt((off**2).mean()) < 0.6 * NOISE
+
+
+def test_a_ball_that_falls_through_everywhere_gives_no_surface() -> None:
+    needed()
+    with pytest.raises(StageError, match="no surface") as caught:
+        BallPivot(radii=(0.01,)).run(bowl(), box(), TOLERANCE, 0.15, NOISE)
+    assert "spacing" in caught.value.remedy
+
+
+def test_too_few_points_are_refused() -> None:
+    with pytest.raises(StageError, match="too few") as caught:
+        BallPivot().run(bowl()[:12], box(), TOLERANCE, 0.15, NOISE)
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize("density", [0.0, 1.0])
+def test_a_whole_job_comes_near_the_truth(density: float, capfd: pytest.CaptureFixture[str]) -> None:
+    needed()
+    part = box()
+    tool = {"tool": "sphere", "centre": [0, 0, TOP], "radius": RADIUS}
+    scanner = Simulate.model_validate({"damage": [tool], "points": 20_000, "noise": 0.04, "density": density})
+    job = {"version": 1, "method": "surface", "tolerance": TOLERANCE, "align": "none", "reconstruct": "ball_pivot"}
+    result = damageest.run(job, part=part, scan=scanner.run("mm", part))
+    assert result.truth is not None
+    assert result.truth[1] > 0.95
+    assert capfd.readouterr().out == ""
+
+
+def test_a_missing_system_library_leaves_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    load = _system.load
+
+    def without(library: str) -> None:
+        if library in ("libEGL.so.1", "libGL.so.1"):
+            raise OSError(f"{library}: cannot open shared object file")
+        load(library)
+
+    monkeypatch.setattr(_system, "load", without)
+    with pytest.raises(PluginError, match=r"libEGL\.so\.1, libGL\.so\.1") as caught:
+        damageest_open3d.damageest_stages()
+    assert "apt-get install libegl1 libgl1" in caught.value.remedy
+    registry = Registry.discover()
+    assert [b.remedy for b in registry.broken if b.provider.name == "damageest-open3d"] == [caught.value.remedy]
+    assert any(item.name == "pyvista" for item in registry.of("reconstruct"))
+    with pytest.raises(KeyError, match="apt-get install libegl1"):
+        registry.get("reconstruct", "ball_pivot")
+
+
+def test_libusb_comes_from_its_package_where_the_system_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def bare(library: str) -> None:
+        asked.append(library)
+        if library == "libusb-1.0.so.0":
+            raise OSError
+
+    monkeypatch.setattr(_system, "load", bare)
+    _system.check()
+    assert asked[-1].endswith("libusb-1.0.so")
+    monkeypatch.setattr(_system, "_bundled_usb", lambda: "libusb-1.0.so.0")
+    with pytest.raises(PluginError, match="libusb") as caught:
+        _system.check()
+    assert "libusb-package" in caught.value.remedy
+
+
+def test_the_stages_are_listed_without_importing_open3d() -> None:
+    code: Any = (
+        "import sys, damageest_open3d as d\n"
+        "try: d.damageest_stages()\n"
+        "except d._system.PluginError: pass\n"
+        "sys.exit('open3d' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

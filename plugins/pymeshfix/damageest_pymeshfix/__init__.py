@@ -1,0 +1,14 @@
+"""Enclosures made watertight by MeshFix."""
+
+from __future__ import annotations
+
+from damageest.hookspecs import hookimpl
+from damageest.stages import Stage
+
+
+@hookimpl
+def damageest_stages() -> list[type[Stage]]:
+    """What this plugin provides."""
+    from damageest_pymeshfix.repair import PyMeshFix
+
+    return [PyMeshFix]

@@ -1,0 +1,47 @@
+"""Booleans by PyMeshLab."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from damageest.artefacts import Part, Solid
+from damageest.errors import StageError
+from damageest.stages.boolean import Boolean
+
+
+class PyMeshLabBoolean(Boolean):
+    """Intersection with exact predicates (libigl's, after Zhou et al. 2016), by PyMeshLab, in double precision. Slower
+    than manifold, and an independent check of it."""
+
+    use: Literal["pymeshlab"] = "pymeshlab"
+
+    def run(self, solid: Solid, part: Part) -> Solid | None:
+        """The part of ``solid`` inside ``part``. Raises StageError where PyMeshLab refuses the meshes, or what it gives
+        is not watertight."""
+        from damageest_pymeshlab._system import check
+
+        check()
+        import pymeshlab
+
+        origin = part.bounds.mean(axis=0)
+        meshes = pymeshlab.MeshSet(verbose=False)
+        for body in (part, solid):
+            meshes.add_mesh(pymeshlab.Mesh(np.array(body.vertices - origin), np.array(body.faces, dtype=np.int32)))
+        try:
+            meshes.generate_boolean_intersection(first_mesh=0, second_mesh=1)
+        except pymeshlab.PyMeshLabException as error:
+            if "Vertex matrix is empty" in str(error):  # its way of saying that nothing is in common
+                return None
+            raise StageError(
+                f"PyMeshLab could not intersect: {str(error).strip()}", "boolean: manifold, or repair: pymeshfix"
+            ) from None
+        made = meshes.current_mesh()
+        if not made.face_number():
+            return None
+        vertices, faces = np.asarray(made.vertex_matrix(), np.float64), made.face_matrix().astype(np.int64)
+        try:
+            return Solid(vertices + origin, faces)
+        except ValueError as error:
+            raise StageError(f"PyMeshLab's intersection is {error}", "boolean: manifold") from None
