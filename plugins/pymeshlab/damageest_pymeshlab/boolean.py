@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from damageest.artefacts import Part, Solid
+from damageest.artefacts import Floats, Ints, Part, Solid
 from damageest.errors import StageError
 from damageest.stages.boolean import Boolean
 
@@ -40,8 +40,18 @@ class PyMeshLabBoolean(Boolean):
         made = meshes.current_mesh()
         if not made.face_number():
             return None
-        vertices, faces = np.asarray(made.vertex_matrix(), np.float64), made.face_matrix().astype(np.int64)
+        vertices, faces = _ordered(np.asarray(made.vertex_matrix(), np.float64), made.face_matrix().astype(np.int64))
         try:
             return Solid(vertices + origin, faces)
         except ValueError as error:
             raise StageError(f"PyMeshLab's intersection is {error}", "boolean: manifold") from None
+
+
+def _ordered(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    """The same mesh, vertices and faces in an order that does not depend on the filter's threads."""
+    order = np.lexsort(vertices.T[::-1])
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    faces = place[faces]
+    faces = np.take_along_axis(faces, (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    return vertices[order], faces[np.lexsort(faces.T[::-1])]

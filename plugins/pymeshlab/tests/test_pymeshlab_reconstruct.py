@@ -1,0 +1,149 @@
+"""PyMeshLab's reconstructions: a bowl from noisy points by each filter, and whole jobs against known truth."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import damageest_pymeshlab
+import numpy as np
+import pytest
+import trimesh
+from damageest_pymeshlab import _system
+from damageest_pymeshlab.reconstruct import PyMeshLabReconstruct
+
+import damageest
+from damageest.artefacts import Part, Surface
+from damageest.errors import PluginError, StageError
+from damageest.registry import Registry
+from damageest.stages.scan.simulate import Simulate
+
+RADIUS, TOP, NOISE, TOLERANCE = 6.0, 10.0, 0.05, 0.2
+FILTERS = ["screened_poisson", "apss", "rimls", "ball_pivoting"]
+
+
+def needed() -> None:
+    try:
+        _system.check()
+    except PluginError as error:
+        pytest.skip(f"{error}; {error.remedy}")
+
+
+def box() -> Part:
+    mesh = trimesh.creation.box((40, 30, 20))
+    return Part(mesh.vertices, mesh.faces)
+
+
+def bowl(n: int = 6000) -> np.ndarray:
+    """Points of a bowl let into the top of a box, at height 10."""
+    rng = np.random.default_rng(0)
+    out = rng.normal(size=(n, 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    out[:, 2] = -np.abs(out[:, 2])
+    points = out * RADIUS + [0, 0, TOP] + rng.normal(0, NOISE, (n, 3))
+    return np.asarray(points[points[:, 2] < TOP - TOLERANCE])
+
+
+def reconstructed(name: str, away: Any = (0.0, 0.0, 0.0)) -> Surface:
+    part = box()
+    stage = PyMeshLabReconstruct.model_validate({"filter": name})
+    return stage.run(bowl() + away, Part(part.vertices + away, part.faces), TOLERANCE, 0.15, NOISE)
+
+
+@pytest.fixture(scope="module", params=FILTERS)
+def made(request: pytest.FixtureRequest) -> tuple[str, Surface]:
+    needed()
+    return request.param, reconstructed(request.param)
+
+
+def test_averages_the_noise(made: tuple[str, Surface]) -> None:
+    off = np.linalg.norm(made[1].vertices - [0, 0, TOP], axis=1) - RADIUS
+    assert np.sqrt((off**2).mean()) < 0.6 * NOISE
+    assert np.abs(off).max() < TOLERANCE
+
+
+def test_one_rim_that_ends_where_the_points_do(made: tuple[str, Surface]) -> None:
+    from damageest.stages.boundary.all_loops import AllLoops
+
+    name, surface = made
+    rim, *holes = AllLoops().run(surface, box(), TOLERANCE).loops
+    assert not holes or name == "ball_pivoting"
+    assert surface.vertices[:, 2].max() < TOP + 0.5 * TOLERANCE
+    assert surface.vertices[rim, 2].min() > TOP - 6 * TOLERANCE
+    assert surface.area == pytest.approx(2 * np.pi * RADIUS**2, rel=0.1)
+
+
+def test_normals_toward_the_lost_material(made: tuple[str, Surface]) -> None:
+    inward = np.array([0, 0, TOP]) - made[1].triangles.mean(axis=1)
+    assert (np.einsum("ij,ij->i", made[1].cross, inward) > 0).mean() > 0.99
+
+
+def test_same_points_same_bytes_and_not_a_word(made: tuple[str, Surface], capfd: pytest.CaptureFixture[str]) -> None:
+    again = reconstructed(made[0])
+    assert again.vertices.tobytes() == made[1].vertices.tobytes()
+    assert again.faces.tobytes() == made[1].faces.tobytes()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_far_from_the_origin() -> None:
+    needed()
+    away = np.array([1e5, -2e5, 3e5])
+    off = np.linalg.norm(reconstructed("screened_poisson", away).vertices - away - [0, 0, TOP], axis=1) - RADIUS
+    assert np.sqrt((off**2).mean()) < 0.6 * NOISE
+
+
+def test_too_few_points_are_refused() -> None:
+    with pytest.raises(StageError, match="too few") as caught:
+        PyMeshLabReconstruct().run(bowl()[:12], box(), TOLERANCE, 0.15, NOISE)
+    assert caught.value.remedy
+
+
+def test_a_ball_that_falls_through_everywhere_gives_no_surface() -> None:
+    needed()
+    with pytest.raises(StageError, match="no surface"):
+        PyMeshLabReconstruct(filter="ball_pivoting", radius=0.501, spacing=0.02).run(
+            bowl(400), box(), TOLERANCE, 0.15, NOISE
+        )
+
+
+@pytest.mark.parametrize("density", [0.0, 1.0])
+def test_a_whole_job_comes_near_the_truth(density: float, capfd: pytest.CaptureFixture[str]) -> None:
+    needed()
+    part = box()
+    tool = {"tool": "sphere", "centre": [0, 0, TOP], "radius": RADIUS}
+    scanner = Simulate.model_validate({"damage": [tool], "points": 20_000, "noise": 0.04, "density": density})
+    job = {"version": 1, "method": "surface", "tolerance": TOLERANCE, "align": "none", "boolean": "pymeshlab"}
+    result = damageest.run(job | {"reconstruct": "pymeshlab"}, part=part, scan=scanner.run("mm", part))
+    assert result.truth is not None
+    assert result.truth[1] > 0.95
+    assert capfd.readouterr().out == ""
+
+
+def test_a_missing_system_library_leaves_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    load = _system.load
+
+    def without(library: str) -> None:
+        if library == "libGL.so.1":
+            raise OSError(f"{library}: cannot open shared object file")
+        load(library)
+
+    monkeypatch.setattr(_system, "load", without)
+    with pytest.raises(PluginError, match=r"libGL\.so\.1") as caught:
+        damageest_pymeshlab.damageest_stages()
+    assert "apt-get install libgl1" in caught.value.remedy
+    registry = Registry.discover()
+    assert [b.remedy for b in registry.broken if b.provider.name == "damageest-pymeshlab"] == [caught.value.remedy]
+    with pytest.raises(KeyError, match="apt-get install libgl1"):
+        registry.get("boolean", "pymeshlab")
+    assert registry.get("boolean", "manifold")
+
+
+def test_the_stages_are_listed_without_importing_pymeshlab() -> None:
+    code = (
+        "import sys, damageest_pymeshlab as d\n"
+        "try: d.damageest_stages()\n"
+        "except d._system.PluginError: pass\n"
+        "sys.exit('pymeshlab' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
