@@ -35,10 +35,11 @@ def _options(
 
 
 def _commands() -> None:
-    from damageest.cli import init, plugins, run, schema, stages, validate
+    from damageest.cli import evaluate, init, plugins, run, schema, stages, validate
 
     for module in (run, validate, init, stages, plugins, schema):
         app.command(module.__name__.rsplit(".", 1)[1])(module.command)
+    app.add_typer(evaluate.app, name="evaluate")
 
 
 _commands()
@@ -46,7 +47,7 @@ _commands()
 
 def main() -> None:
     """Runs the command line; exit status 0 done, 1 a stage failed or refused, 2 the job or an input is at fault."""
-    own = {command.name for command in app.registered_commands}
+    own = {command.name for command in app.registered_commands} | {group.name for group in app.registered_groups}
     word = next((argument for argument in sys.argv[1:] if not argument.startswith("-")), "")
     try:
         if word not in own:

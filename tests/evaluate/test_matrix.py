@@ -1,0 +1,90 @@
+"""The matrix: every implementation on a job, with the truth, or why not; in a README where it asks for it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from damageest.contracts import STAGES
+from damageest.errors import InputError, JobError
+from damageest.evaluate._table import BEGIN, END, placed, table
+from damageest.evaluate.matrix import Cell, matrix
+from damageest.registry import Registry
+from tests import damaged_box
+
+README = Path(__file__).parents[2] / "README.md"
+JOB = """\
+version: 1
+tolerance: 0.2
+part: box.stl
+scan:
+  use: simulate
+  points: 20000
+  noise: 0.04
+  pose: random
+  damage:
+    - {tool: sphere, centre: [0, 0, 10], radius: 6}
+"""
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> Path:
+    trimesh.creation.box(damaged_box.SIZE).export(tmp_path / "box.stl")
+    (tmp_path / "box.yaml").write_text(JOB)
+    return tmp_path / "box.yaml"
+
+
+def test_every_implementation_of_a_stage_is_run(job: Path, registry: Registry) -> None:
+    told: list[Cell] = []
+    cells = matrix([job], registry, ["boundary", "align", "export"], workers=2, tell=told.append)
+    assert [(cell.stage, cell.use) for cell in cells] == [
+        (stage, item.name) for stage in ("align", "boundary", "export") for item in registry.of(stage)
+    ]
+    assert told == cells
+    for cell in cells:
+        assert not cell.refused
+        assert cell.iou > 0.97
+        assert 0 < cell.stage_seconds < cell.seconds
+        assert 50 < cell.megabytes < 5000
+
+
+def test_a_refusal_is_shown_with_its_reason(job: Path, registry: Registry) -> None:
+    job.write_text(JOB.replace("radius: 6}", "radius: 6}\n    - {tool: sphere, centre: [-20, 0, 0], radius: 0.9}"))
+    text = table(matrix([job], registry, ["repair"]))
+    assert re.search(r"\| repair \| none \| 0\.9\d\d, partly refused \[1\] \|", text)
+    assert re.search(r"^1\. .*points.* too few", text, re.MULTILINE)
+
+
+def test_a_job_without_a_truth_is_refused(tmp_path: Path, registry: Registry) -> None:
+    with pytest.raises(JobError, match="truth is not known"):
+        matrix([damaged_box.write(tmp_path)], registry)
+
+
+def test_the_table_goes_between_the_marks_and_nowhere_else(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
+    assert placed(page, "new") == f"before\n{BEGIN}\n\nnew\n\n{END}\nafter\n"
+    page.write_text("no marks\n")
+    with pytest.raises(InputError, match="matrix: begin"):
+        placed(page, "new")
+
+
+def test_the_readmes_matrix_has_every_implementation(registry: Registry) -> None:
+    text = README.read_text().partition(BEGIN)[2].partition(END)[0]
+    rows = [[word.strip() for word in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
+    head, rule, *body = rows
+    assert head[:2] == ["stage", "implementation"]
+    assert set(rule[2:]) == {"---:"}
+    stage, listed = "", set()
+    for row in body:
+        assert len(row) == len(head)
+        stage = row[0] or stage
+        listed.add((stage, row[1]))
+        for value in row[2:-3]:
+            assert re.fullmatch(r"[01]\.\d{3}(, partly refused \[\d+\]| \(doubted\))?|refused \[\d+\]", value)
+    shipped = ("damageest", "damageest-")
+    there = {(s, i.name) for s in STAGES for i in registry.of(s) if i.provider.name.startswith(shipped)}
+    assert there <= listed
