@@ -67,8 +67,8 @@ def _about() -> str:
     day = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
     return (
         "Intersection over union with the truth; medians of the stage's and of the whole run's seconds, the largest "
-        f"peak memory of a process. Measured {day}: damageest {version('damageest')}, Python {platform.python_version()}, "
-        f"{libraries}; {platform.machine()}, {os.cpu_count()} cores."
+        f"peak memory of a process. Measured {day}: damageest {version('damageest')}, "
+        f"Python {platform.python_version()}, {libraries}; {platform.machine()}, {os.cpu_count()} cores."
     )
 
 
