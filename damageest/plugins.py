@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import Distribution, EntryPoint, entry_points
@@ -62,7 +64,8 @@ def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[t
     own = EntryPoint("builtins", "damageest.builtins", GROUP)
     for point, provider in [(own, _own_provider()), *_installed()]:
         try:
-            plugin = point.load()
+            with unwarned():
+                plugin = point.load()
             manager.register(plugin, f"{provider.name}:{point.name}")
         except (Exception, SystemExit) as error:
             broken.append(fault_of(error, provider))
@@ -71,6 +74,14 @@ def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[t
     for observer in observers:
         manager.register(observer)
     return manager, loaded, broken
+
+
+@contextmanager
+def unwarned() -> Iterator[None]:
+    """Without pydantic's warning on options that shadow an attribute: the registry refuses those with its own words."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Field name .* shadows an attribute", category=UserWarning)
+        yield
 
 
 def _own_provider() -> Provider:

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pluggy
+from pydantic import ValidationError
 
 from damageest.contracts import DEFAULTS, STAGES, Contract, contract_of
 from damageest.errors import PluginError
-from damageest.plugins import Broken, Provider, fault_of, load
+from damageest.plugins import Broken, Provider, fault_of, load, unwarned
 from damageest.stages import Stage
 
 
@@ -46,7 +47,8 @@ class Registry:
         found: list[Implementation] = []
         for plugin, provider in loaded:
             try:
-                classes = plugin.damageest_stages() if hasattr(plugin, "damageest_stages") else []
+                with unwarned():
+                    classes = _offered(plugin)
             except (Exception, SystemExit) as error:
                 broken.append(fault_of(error, provider))
                 continue
@@ -55,6 +57,8 @@ class Registry:
                     found.append(_implementation(stage, provider))
                 except PluginError as error:
                     broken.append(Broken(provider, str(error), f"update or uninstall {provider.name}"))
+                except Exception as error:
+                    broken.append(fault_of(error, provider))
         names = [(item.contract.stage, item.name) for item in found]
         groups = {key: tuple(i for i, n in zip(found, names, strict=True) if n == key) for key in dict.fromkeys(names)}
         single = tuple(group[0] for group in groups.values() if len(group) == 1)
@@ -71,6 +75,11 @@ class Registry:
         """Raises PluginError for a name that clashes, KeyError with a message for one that is not there."""
         for group in self.clashes:
             if (group[0].contract.stage, group[0].name) == (stage, name):
+                if len({item.provider for item in group}) == 1:
+                    who = group[0].provider
+                    raise PluginError(
+                        f"{who} provides '{name}' of stage '{stage}' more than once; update or uninstall it"
+                    )
                 who = " and ".join(str(item.provider) for item in group)
                 raise PluginError(f"'{name}' of stage '{stage}' is provided by {who}; uninstall all but one of them")
         for item in self.of(stage):
@@ -98,12 +107,37 @@ def _implementation(cls: Any, provider: Provider) -> Implementation:
     contract = contract_of(cls) if isinstance(cls, type) else None
     if contract is None:
         raise PluginError(f"{cls!r} derives from no contract; the stages are: {', '.join(STAGES)}")
-    cls.needs()
-    name = _name(cls)
-    reserved = [n for n in cls.model_fields if n != "use" and hasattr(Stage, n)]
+    reserved = [n for n in cls.model_fields if n != "use" and hasattr(contract, n)]
     if reserved:
         raise PluginError(f"{cls.__qualname__}: option {', '.join(map(repr, reserved))} shadows a reserved name")
+    changed = [n for n in ("stage", "takes", "gives") if getattr(cls, n) != getattr(contract, n)]
+    if changed:
+        raise PluginError(f"{cls.__qualname__} changes {', '.join(map(repr, changed))}, which its contract fixes")
+    cls.needs()
+    name = _name(cls)
+    _check_defaults(cls)
     return Implementation(name, cls, contract, provider)
+
+
+def _offered(plugin: Any) -> list[Any]:
+    """What a plugin's hook gives. A module without that hook may have others, and then gives no stages."""
+    classes = plugin.damageest_stages() if hasattr(plugin, "damageest_stages") else []
+    if not isinstance(classes, list | tuple):
+        raise PluginError(f"its hook damageest_stages gave a {type(classes).__name__} instead of a list of classes")
+    return list(classes)
+
+
+def _check_defaults(cls: type[Stage]) -> None:
+    """Refuses a default that its own option would refuse; options without a default are the job's to give."""
+    fields = {name: field for name, field in cls.model_fields.items() if not field.is_required()}
+    try:
+        cls.model_validate({name: field.get_default(call_default_factory=True) for name, field in fields.items()})
+    except ValidationError as error:
+        # No place: the options contradict each other as a whole, which a job may mend by setting some.
+        wrong = [e for e in error.errors() if e["loc"] and e["loc"][0] in fields]
+        if wrong:
+            text = "; ".join(f"{e['loc'][0]}: {e['msg']}" for e in wrong)
+            raise PluginError(f"{cls.__qualname__}: the default of an option is not valid: {text}") from error
 
 
 def _name(cls: type[Stage]) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -44,7 +46,7 @@ def command(
         from damageest.api import run
 
         try:
-            with progress.job(job.name):
+            with progress.job(job.name), redirect_stdout(sys.stderr if as_json else sys.stdout):
                 result = run(job, output=output or True, cache=not no_cache, registry=registry)
         except DamageestError as error:
             status = max(status, _failed(error, job.source, as_json, debug))

@@ -48,7 +48,13 @@ class Stage(BaseModel):
         run: Any = getattr(cls, "run", None)
         if run is None or getattr(run, "__isabstractmethod__", False):
             raise PluginError(f"{cls.__module__}.{cls.__qualname__} has no run method")
-        names = tuple(inspect.signature(run).parameters)[1:]
+        parameters = list(inspect.signature(run).parameters.values())[1:]
+        if any(p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD, p.POSITIONAL_ONLY) for p in parameters):
+            raise PluginError(
+                f"{cls.__module__}.{cls.__qualname__}.run has to name what it needs, without *args, **kwargs or '/'; "
+                f"it may ask for: {', '.join(sorted(cls.takes))}"
+            )
+        names = tuple(p.name for p in parameters)
         unknown = [name for name in names if name not in cls.takes]
         if unknown:
             raise PluginError(
