@@ -33,14 +33,17 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.export.files import Files
     from damageest.stages.part.file import PartFile
     from damageest.stages.reconstruct.pyvista import PyVista
+    from damageest.stages.reconstruct.signed_distance import SignedDistance
     from damageest.stages.repair.none import Nothing as NoRepair
     from damageest.stages.sample.edge_aware import EdgeAware
+    from damageest.stages.sample.uniform import Uniform
     from damageest.stages.scan.file import ScanFile
     from damageest.stages.scan.simulate import Simulate
+    from damageest.stages.segment.cloud_distance import CloudDistance
     from damageest.stages.segment.mesh_distance import MeshDistance
 
     return [
         PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Unaligned, MeshDistance, Dbscan, PyVista, LargestLoop,
         AllLoops, Offset, BoundingBox, Capsule, Cylinder, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
-        NoRepair, Manifold, NoAllowance, Files,
+        NoRepair, Manifold, NoAllowance, Files, Uniform, CloudDistance, SignedDistance,
     ]  # fmt: skip

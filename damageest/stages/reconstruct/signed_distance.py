@@ -1,0 +1,77 @@
+"""Surface reconstruction by VTK's signed distance to oriented points."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from damageest.artefacts import Floats, Ints, Part, Surface
+from damageest.stages.reconstruct import Reconstruct
+from damageest.stages.reconstruct._oriented import opened, oriented
+
+MOST_CELLS = 3e6
+"""Cells in the box of a damage."""
+
+
+class SignedDistance(Reconstruct):
+    """The zero level of a signed distance, the weighted mean of the heights over the tangent planes nearby
+    (vtkSignedDistance and vtkExtractSurface, after Curless and Levoy 1996; paper 3.1 step 5)."""
+
+    use: Literal["signed_distance"] = "signed_distance"
+    spacing: float | None = Field(
+        None,
+        gt=0,
+        description="edge of the cells, in the job's unit; default: the larger of tolerance and point spacing, more "
+        "where the damage's box would hold more than three million cells",
+    )
+    radius: float = Field(
+        3.0, ge=1.5, le=8, description="how far from a point the distance is taken, in cells; larger bridges more"
+    )
+
+    def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
+        """Raises StageError where the points are too few, or no surface comes about."""
+        origin = points.mean(axis=0)
+        # Along its own axes a damage's box is a fraction of that along the part's.
+        axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
+        local = (points - origin) @ axes
+        least = float(np.prod(np.ptp(local, axis=0)) / MOST_CELLS) ** (1 / 3)
+        cell = self.spacing or max(tolerance, spacing, least)
+        cloud, normals = oriented(points, part, cell, noise)
+        vertices, faces = _zero_level((cloud - origin) @ axes, normals @ axes, cell, self.radius * cell)
+        if np.linalg.det(axes) < 0:
+            faces = faces[:, ::-1]
+        return opened(vertices @ axes.T + origin, faces, cloud, 1.4 * cell, part, tolerance)
+
+
+def _zero_level(points: Floats, normals: Floats, cell: float, radius: float) -> tuple[Floats, Ints]:
+    """Vertices (V,3) and triangles (F,3) of where the signed distance to oriented points (N,3) is 0; none where no
+    point is within ``radius``."""
+    import pyvista
+    from vtkmodules.vtkFiltersPoints import vtkExtractSurface, vtkSignedDistance
+
+    cloud = pyvista.PolyData(points)
+    # The filter refuses normals of double precision.
+    cloud.point_data.SetNormals(pyvista.convert_array(np.ascontiguousarray(normals, np.float32), name="Normals"))
+    low, high = points.min(axis=0) - 2 * cell, points.max(axis=0) + 2 * cell
+    counts = np.ceil((high - low) / cell).astype(int) + 1
+    high = low + (counts - 1) * cell
+    distance = vtkSignedDistance()
+    distance.SetInputData(cloud)
+    distance.SetDimensions(*(int(n) for n in counts))
+    distance.SetBounds(*np.column_stack([low, high]).ravel())
+    distance.SetRadius(radius)
+    extract = vtkExtractSurface()
+    extract.SetInputConnection(distance.GetOutputPort())
+    extract.SetRadius(radius)
+    extract.HoleFillingOff()
+    extract.ComputeNormalsOff()
+    extract.ComputeGradientsOff()
+    extract.Update()
+    mesh = pyvista.wrap(extract.GetOutput())
+    if not mesh.n_cells:
+        return np.empty((0, 3)), np.empty((0, 3), np.int64)
+    # The filter makes some corners twice.
+    mesh = mesh.triangulate().clean()
+    return np.asarray(mesh.points, np.float64), np.asarray(mesh.regular_faces, np.int64)
