@@ -76,7 +76,7 @@ class Registry:
         for group in self.clashes:
             if (group[0].contract.stage, group[0].name) == (stage, name):
                 if len({item.provider for item in group}) == 1:
-                    who = group[0].provider
+                    who = str(group[0].provider)
                     raise PluginError(
                         f"{who} provides '{name}' of stage '{stage}' more than once; update or uninstall it"
                     )
