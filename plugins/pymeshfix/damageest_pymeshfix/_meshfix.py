@@ -25,7 +25,7 @@ def shells(mesh: Mesh) -> list[Mesh]:
         return []
     pairs = trimesh.graph.face_adjacency(faces)
     label = trimesh.graph.connected_component_labels(pairs, node_count=len(faces))
-    pieces = [_trimmed(mesh.vertices, faces[label == k]) for k in range(int(label.max()) + 1)]
+    pieces = [trimmed(mesh.vertices, faces[label == k]) for k in range(int(label.max()) + 1)]
     return sorted(pieces, key=lambda piece: -piece.area)
 
 
@@ -80,6 +80,7 @@ def _inside(points: Floats, solid: Solid) -> bool:
     return bool((signed < 0).all())
 
 
-def _trimmed(vertices: Floats, faces: Ints) -> Mesh:
+def trimmed(vertices: Floats, faces: Ints) -> Mesh:
+    """A mesh of these faces, with the vertices that they use."""
     used, faces = np.unique(faces, return_inverse=True)
     return Mesh(vertices[used], faces.reshape(-1, 3))

@@ -27,15 +27,16 @@ class PyMeshFix(Repair):
 
     def run(self, enclosure: Mesh, tolerance: float) -> Solid:
         """Raises StageError where nothing closed comes about, or the repaired mesh strays from the given one."""
-        from damageest_pymeshfix._meshfix import closed, shells
+        from damageest_pymeshfix._meshfix import closed, shells, trimmed
 
         try:
             return Solid(enclosure.vertices, enclosure.faces)
         except ValueError as error:
             if not len(enclosure.faces):
                 raise StageError(f"the enclosure is not to be repaired: {error}", REMEDY) from None
-        origin = enclosure.bounds.mean(axis=0)
-        mesh = Mesh(enclosure.vertices - origin, enclosure.faces)
+        mesh = trimmed(enclosure.vertices, enclosure.faces)
+        origin = mesh.bounds.mean(axis=0)
+        mesh = Mesh(mesh.vertices - origin, mesh.faces)
         sound: list[Solid] = []
         doubtful: list[Mesh] = []
         for shell in shells(mesh):
