@@ -18,7 +18,7 @@ PACKAGES = {
 
 def load(library: str) -> None:
     """Loads a shared library into the process, for others to find. Raises OSError where it is not there."""
-    ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
+    ctypes.CDLL(library)
 
 
 def check() -> None:
