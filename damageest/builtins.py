@@ -32,6 +32,7 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.enclose.shortest_path import ShortestPath
     from damageest.stages.export.files import Files
     from damageest.stages.part.file import PartFile
+    from damageest.stages.part.reconstruct import Reconstructed
     from damageest.stages.reconstruct.pyvista import PyVista
     from damageest.stages.reconstruct.signed_distance import SignedDistance
     from damageest.stages.repair.none import Nothing as NoRepair
@@ -45,5 +46,5 @@ def damageest_stages() -> list[type[Stage]]:
     return [
         PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Unaligned, MeshDistance, Dbscan, PyVista, LargestLoop,
         AllLoops, Offset, BoundingBox, Capsule, Cylinder, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
-        NoRepair, Manifold, NoAllowance, Files, Uniform, CloudDistance, SignedDistance,
+        NoRepair, Manifold, NoAllowance, Files, Uniform, CloudDistance, SignedDistance, Reconstructed,
     ]  # fmt: skip

@@ -27,7 +27,11 @@ class SignedDistance(Reconstruct):
         "where the damage's box would hold more than three million cells",
     )
     radius: float = Field(
-        3.0, ge=1.5, le=8, description="how far from a point the distance is taken, in cells; larger bridges more"
+        2.0,
+        ge=1.5,
+        le=8,
+        description="how far from a point the distance is taken, in cells; larger bridges more, and shifts a surface of "
+        "curvature radius R by up to radius^2 / 4R",
     )
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:

@@ -38,7 +38,8 @@ class CloudDistance(Segment):
         With s the spacing of the CAD points and d the true distance: 'plain' gives up to sqrt(d^2 + s^2), too much;
         'tangent' is right on flat faces, off by up to s^2 / 2R where the radius of curvature is R, and too small
         beside an edge, on its outer side if convex and its inner side if concave, but never below
-        sqrt(p^2 - s^2) for a plain distance of p. Raises StageError where the CAD points lie too far apart for the threshold.
+        sqrt(p^2 - s^2) for a plain distance of p.
+        Raises StageError where the CAD points lie too far apart for the threshold.
         """
         limit = self.threshold * tolerance
         widest = (TANGENT_SPACING if self.measure == "tangent" else PLAIN_SPACING) * limit

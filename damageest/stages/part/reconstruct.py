@@ -1,0 +1,115 @@
+"""The part from the scan of an undamaged specimen, where there is no CAD (paper 3.2)."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from damageest.artefacts import Floats, Part
+from damageest.errors import InputError
+from damageest.meshio import sha256
+from damageest.stages import JobPath
+from damageest.stages.part import ReadPart
+from damageest.units import Unit
+
+FEWEST = 1000
+HELD = 20
+
+
+class Reconstructed(ReadPart):
+    """A closed part through the points of a scan of an undamaged specimen, in that scan's frame: a screened Poisson
+    surface. For want of CAD only: it has the scan's noise, and rounds sharp edges."""
+
+    use: Literal["reconstruct"] = "reconstruct"
+    path: JobPath | tuple[JobPath, ...] = Field(
+        description="the specimen's scan, a file or several in one frame, relative to the job's folder"
+    )
+    unit: Unit | None = Field(
+        None, description="unit of the files' lengths; default: the file's own (E57: m), else the job's `units`"
+    )
+    cell: float | None = Field(
+        None, gt=0, description="resolution, in the job's unit; default: from the scan's spacing and noise"
+    )
+    screening: float = Field(4.0, gt=0, le=100, description="how strongly points pull the surface onto themselves")
+    most_cells: int = Field(
+        16_000_000, ge=100_000, le=100_000_000, description="grid cells at most; a default resolution gets coarser"
+    )
+
+    def run(self, unit: str) -> Part:
+        """The part in ``unit``. ``tessellation_error`` is the 95th percentile of the distance of every 20th point,
+        not used for the surface, from it: noise included. Raises InputError for a scan that does not close."""
+        from damageest.measure import measure
+        from damageest.stages.scan.file import ScanFile
+
+        scan = ScanFile(path=self.path, unit=self.unit).run(unit)
+        paths = (self.path,) if isinstance(self.path, Path) else self.path
+        if len(scan.points) < FEWEST:
+            raise InputError(f"part: {len(scan.points)} points are too few for a part; {FEWEST} at least")
+        noise, spacing = measure(scan.points)
+        try:
+            vertices, faces, cell, error = self._surface(scan.points, noise, spacing)
+        except InputError as fault:
+            raise InputError(f"{', '.join(map(str, paths))}: {fault}") from None
+        digest = hashlib.sha256("".join(map(sha256, paths)).encode()).hexdigest()
+        note = (
+            f"reconstructed from {len(scan.points)} points of a scan, not from CAD: its surface is off by up to "
+            f"{error:.3g} (95 % of points held back, their noise of {noise:.3g} included), sharp edges are rounded by "
+            f"about {cell:.3g}, and the scan's frame is the part's"
+        )
+        return Part(
+            vertices, faces, unit, ", ".join(map(str, paths)), digest, tessellation_error=error,
+            notes=(*scan.notes, note),
+        )  # fmt: skip
+
+    def _surface(self, points: Floats, noise: float, spacing: float) -> tuple[Floats, Floats, float, float]:
+        """Vertices, faces, resolution and error of the closed surface through ``points`` (N,3)."""
+        from damageest.stages.enclose._evidence import local_areas
+        from damageest.stages.enclose._fit import smoothed, thinned
+        from damageest.stages.enclose._level import closed_region
+        from damageest.stages.enclose._poisson import box, solve_by_halves
+        from damageest.stages.part._sides import outward
+
+        held = np.arange(len(points)) % HELD == 0
+        span = np.ptp(points, axis=0)
+        least = float(np.prod(span * 1.1) / self.most_cells) ** (1 / 3)
+        cell = self.cell or max(spacing, 2 * noise, least)
+        if float(np.prod(span / cell + 16)) > 1.5 * self.most_cells:
+            raise InputError(
+                f"a resolution of {cell:.3g} needs more than most_cells ({self.most_cells}); set part.cell larger"
+            )
+        cloud, count = thinned(points[~held], 0.8 * cell)
+        cloud, normals, _ = smoothed(cloud, noise, 24)
+        normals = outward(cloud, normals, 1.5 * max(cell, spacing))
+        grid = box(points.min(axis=0) - 8 * cell, points.max(axis=0) + 8 * cell, cell)
+        # The level is positive inside, hence normals inward.
+        field = solve_by_halves(grid, cloud, -normals, local_areas(cloud), self.screening)
+        region = closed_region(grid, field)
+        if region is None:
+            raise InputError("no closed surface came about; scan the specimen all round")
+        error = _checked(region.vertices, region.faces, points[held], cell, noise)
+        return region.vertices, region.faces, cell, error
+
+
+def _checked(vertices: Floats, faces: Floats, held: Floats, cell: float, noise: float) -> float:
+    """The 95th percentile of the held points' (H,3) distance to the surface; refuses what no point vouches for."""
+    import igl
+    from scipy.spatial import cKDTree
+
+    squared = igl.point_mesh_squared_distance(held, vertices, faces)[0]
+    error = float(np.percentile(np.sqrt(squared), 95))
+    middle = vertices[faces].mean(axis=1)
+    far = np.asarray(cKDTree(held).query(middle, workers=2)[0])
+    usual = float(np.median(far))
+    if (bare := far > 8 * usual + 4 * cell).any():
+        place, size = middle[far.argmax()], 2 * float(far.max())
+        raise InputError(
+            f"the specimen's scan has an opening of about {size:.3g} across at ({place[0]:.4g}, {place[1]:.4g}, "
+            f"{place[2]:.4g}) ({100 * bare.mean():.1f} % of the surface would be invented); scan it there too"
+        )
+    if error > 3 * noise + cell:
+        raise InputError(f"the surface misses its points by {error:.3g}; set part.cell smaller than {cell:.3g}")
+    return error
