@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from damageest.artefacts import Floats, Part
+from damageest.artefacts import Floats, Ints, Part
 from damageest.errors import InputError
 from damageest.meshio import sha256
 from damageest.stages import JobPath
@@ -65,7 +65,7 @@ class Reconstructed(ReadPart):
             notes=(*scan.notes, note),
         )  # fmt: skip
 
-    def _surface(self, points: Floats, noise: float, spacing: float) -> tuple[Floats, Floats, float, float]:
+    def _surface(self, points: Floats, noise: float, spacing: float) -> tuple[Floats, Ints, float, float]:
         """Vertices, faces, resolution and error of the closed surface through ``points`` (N,3)."""
         from damageest.stages.enclose._evidence import local_areas
         from damageest.stages.enclose._fit import smoothed, thinned
@@ -81,9 +81,9 @@ class Reconstructed(ReadPart):
             raise InputError(
                 f"a resolution of {cell:.3g} needs more than most_cells ({self.most_cells}); set part.cell larger"
             )
-        cloud, count = thinned(points[~held], 0.8 * cell)
+        cloud, _ = thinned(points[~held], 0.8 * cell)
         cloud, normals, _ = smoothed(cloud, noise, 24)
-        normals = outward(cloud, normals, 1.5 * max(cell, spacing))
+        normals = outward(cloud, normals, 1.25 * max(cell, spacing))
         grid = box(points.min(axis=0) - 8 * cell, points.max(axis=0) + 8 * cell, cell)
         # The level is positive inside, hence normals inward.
         field = solve_by_halves(grid, cloud, -normals, local_areas(cloud), self.screening)
@@ -94,7 +94,7 @@ class Reconstructed(ReadPart):
         return region.vertices, region.faces, cell, error
 
 
-def _checked(vertices: Floats, faces: Floats, held: Floats, cell: float, noise: float) -> float:
+def _checked(vertices: Floats, faces: Ints, held: Floats, cell: float, noise: float) -> float:
     """The 95th percentile of the held points' (H,3) distance to the surface; refuses what no point vouches for."""
     import igl
     from scipy.spatial import cKDTree

@@ -30,8 +30,8 @@ class SignedDistance(Reconstruct):
         2.0,
         ge=1.5,
         le=8,
-        description="how far from a point the distance is taken, in cells; larger bridges more, and shifts a surface of "
-        "curvature radius R by up to radius^2 / 4R",
+        description="how far from a point the distance is taken, in cells; larger bridges more, and shifts a surface "
+        "of curvature radius R by up to radius^2 / 4R",
     )
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:

@@ -1,0 +1,54 @@
+"""Parts from scans of undamaged specimens of known shape."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import damageest
+from damageest.artefacts import Part
+from damageest.errors import InputError
+from damageest.evaluate.scores import iou
+from damageest.stages.part.reconstruct import Reconstructed
+from damageest.stages.scan.simulate import Simulate
+from tests.damaged_box import TRUE_VOLUME, box, scan
+
+
+def specimen(folder: Path, points: int = 25_000, **options: object) -> Path:
+    path = folder / "specimen.npy"
+    np.save(path, Simulate.model_validate({"points": points, "noise": 0.03, **options}).run("mm", box()).points)
+    return path
+
+
+def test_the_box_comes_back_closed_and_says_what_it_is(tmp_path: Path) -> None:
+    part = Reconstructed(path=specimen(tmp_path)).run("mm")
+    assert isinstance(part, Part)
+    assert iou([part], [box()]) > 0.98
+    assert 0.03 < part.tessellation_error < 0.3
+    assert "25000 points" in part.notes[-1]
+    assert "rounded" in part.notes[-1]
+    again = Reconstructed(path=tmp_path / "specimen.npy").run("mm")
+    assert again.vertices.tobytes() == part.vertices.tobytes()
+
+
+def test_an_opening_is_refused_with_its_place(tmp_path: Path) -> None:
+    path = specimen(tmp_path, unseen=[{"direction": [0, 0, -1], "angle": 40}])
+    with pytest.raises(InputError, match="opening"):
+        Reconstructed(path=path).run("mm")
+
+
+def test_too_few_points_and_too_fine_a_cell_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="too few"):
+        Reconstructed(path=specimen(tmp_path, 500)).run("mm")
+    with pytest.raises(InputError, match="most_cells"):
+        Reconstructed(path=specimen(tmp_path), cell=0.02).run("mm")
+
+
+def test_a_job_without_cad_finds_the_damage(tmp_path: Path) -> None:
+    specimen(tmp_path, 60_000)
+    np.save(tmp_path / "scan.npy", scan(60_000))
+    part = {"use": "reconstruct", "path": str(tmp_path / "specimen.npy")}
+    job = {"version": 1, "tolerance": 0.3, "align": "none", "part": part, "scan": str(tmp_path / "scan.npy")}
+    assert damageest.run(job).damage_volume == pytest.approx(TRUE_VOLUME, rel=0.05)
