@@ -105,14 +105,17 @@ class Dbscan(Cluster):
 def sharpest_bend(average: Floats) -> float:
     """Where the sorted curve of ``average`` (M,) neighbour distances has its largest second difference (paper 3.3).
 
-    Of 200 quantiles, not of single points: between neighbours in a sorted sample the differences are chance.
+    Of 200 quantiles, not of single points: between neighbours in a sorted sample the differences are chance. And of the
+    logarithm: the gaps among far strays are the longest of all, but not in proportion, and would be taken for the bend.
+    Where densities differ several times over and much is noise, the bend may be that of the denser damage alone.
     """
     average = np.sort(average[np.isfinite(average)])
     if len(average) < 3:
         return np.inf
     steps = min(len(average), 201)
     curve = average[np.linspace(0, len(average) - 1, steps).round().astype(np.int64)]
-    return float(curve[1 + np.argmax(curve[:-2] - 2 * curve[1:-1] + curve[2:])])
+    log = np.log(np.maximum(curve, np.finfo(float).tiny))
+    return float(curve[1 + np.argmax(log[:-2] - 2 * log[1:-1] + log[2:])])
 
 
 def _gaps(points: Floats, neighbours: int) -> tuple[float, float]:

@@ -120,3 +120,19 @@ def test_eps_below_the_spacing_is_said() -> None:
     scan, deviation, _ = plate(20_000, [(30, 30, 10)])
     sites = Dbscan(eps="tolerance").run(scan, deviation, TOLERANCE)
     assert any("shorter" in note for note in sites.notes)
+
+
+@pytest.mark.parametrize(
+    ("share", "uneven"), [(0.003, 1), (0.003, 4), (0.02, 1), (0.02, 4), (0.1, 1), (0.1, 4), (0.3, 1)]
+)
+def test_the_bend_parts_clusters_from_noise(share: float, uneven: int) -> None:
+    """Two squares, the second with its points ``uneven`` times farther apart, in noise all round."""
+    rng = np.random.default_rng(0)
+    squares = [rng.uniform(0, 10, (5000, 2)), rng.uniform(0, 10, (5000 // uneven**2, 2)) + [25, 0]]
+    flat = np.concatenate(squares)
+    points = np.column_stack([flat, np.zeros(len(flat))])
+    noise = rng.uniform([-10, -10, -15], [45, 20, 15], (int(share * len(points)), 3))
+    average = _density.neighbour_distances(np.concatenate([points, noise]), 10)
+    eps = sharpest_bend(average)
+    assert (average[: len(points)] <= eps).mean() > 0.95
+    assert (average[len(points) :] <= eps).mean() < 0.1
