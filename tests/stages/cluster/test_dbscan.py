@@ -128,7 +128,7 @@ def test_eps_below_the_spacing_is_said() -> None:
 def test_the_bend_parts_clusters_from_noise(share: float, uneven: int) -> None:
     """Two squares, the second with its points ``uneven`` times farther apart, in noise all round."""
     rng = np.random.default_rng(0)
-    squares = [rng.uniform(0, 10, (5000, 2)), rng.uniform(0, 10, (5000 // uneven**2, 2)) + [25, 0]]
+    squares = [rng.uniform(0, 10, (5000, 2)), rng.uniform(0, 10, (5000 // uneven**2, 2)) + np.array([25, 0])]
     flat = np.concatenate(squares)
     points = np.column_stack([flat, np.zeros(len(flat))])
     noise = rng.uniform([-10, -10, -15], [45, 20, 15], (int(share * len(points)), 3))
