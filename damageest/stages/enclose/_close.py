@@ -10,6 +10,8 @@ from damageest.errors import StageError
 from damageest.stages.enclose import NotSeparatedError
 from damageest.stages.enclose._sew import Cycle, Wide, cut_off, filled, strip
 
+BESIDE = 32
+"""Sound points about each rim node that are asked on which side of the damage surface they lie."""
 MARGIN = 0.1
 """Share of the sound points that the two sides must differ by."""
 WRONG = 0.03
@@ -17,7 +19,7 @@ WRONG = 0.03
 THROUGH = 0.1
 """Share of the damage surface's area that the strips' area inside the part may have: where the scan has a gap at the
 rim, the straight way out is as good as any."""
-INSTEAD = "background: minkowski, boundary: all_loops, or method: implicit"
+INSTEAD = "method: implicit"
 
 
 def closed(
@@ -85,17 +87,16 @@ def agreed(surface: Surface, rims: Rims, intact: Floats) -> tuple[Surface, Rims]
         np.add.at(normal, surface.faces[:, corner], surface.cross)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     nodes = np.concatenate(rims.loops)
-    count = min(4, len(intact))
-    beside = np.asarray(cKDTree(intact).query(surface.vertices[nodes], count)[1]).reshape(len(nodes), count)
-    way = intact[beside] - surface.vertices[nodes][:, None]
-    way /= np.maximum(np.linalg.norm(way, axis=2), 1e-300)[:, :, None]
-    lean = np.einsum("ijk,ik->ij", way, normal[nodes]).mean(axis=1)
+    count = min(BESIDE, len(intact))
+    beside = np.asarray(cKDTree(intact).query(surface.vertices[nodes], count, workers=2)[1]).reshape(len(nodes), count)
+    # The nearest lie above the rim, which ends a tolerance below the skin; the farther ones lie to the side.
+    way = intact[beside[:, count // 2 :]] - surface.vertices[nodes][:, None]
+    lean = np.einsum("ijk,ik->ij", way, normal[nodes]) / np.maximum(np.linalg.norm(way, axis=2), 1e-300)
     piece_of = np.zeros(len(surface.vertices), dtype=np.int64)
     piece_of[surface.faces] = label[:, None]
-    votes = np.bincount(piece_of[nodes], lean, label.max() + 1) / np.maximum(
-        np.bincount(piece_of[nodes], None, label.max() + 1), 1
-    )
-    wrong = votes > 0.3
+    size = label.max() + 1
+    votes = np.bincount(piece_of[nodes], lean.mean(axis=1), size)
+    wrong = votes > 0.1 * np.bincount(piece_of[nodes], np.abs(lean).mean(axis=1), size)
     faces = np.where(wrong[label][:, None], surface.faces[:, ::-1], surface.faces)
     loops = tuple(loop[::-1] if wrong[piece_of[loop[0]]] else loop for loop in rims.loops)
     return Surface(surface.vertices, faces), Rims(loops)
