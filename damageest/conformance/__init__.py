@@ -3,7 +3,7 @@
     class TestMine(BooleanContract):
         stage = Mine()
 
-There are classes for `sample`, `repair`, `boolean` and `allowance`.
+There is a class for every contract.
 """
 
 from __future__ import annotations
@@ -14,5 +14,13 @@ except ImportError as error:
     raise ImportError("damageest.conformance needs pytest: pip install pytest") from error
 
 from damageest.conformance._contracts import AllowanceContract, BooleanContract, RepairContract, SampleContract
+from damageest.conformance._enclose import EncloseAllContract, EncloseContract
 
-__all__ = ["AllowanceContract", "BooleanContract", "RepairContract", "SampleContract"]
+__all__ = [
+    "AllowanceContract",
+    "BooleanContract",
+    "EncloseAllContract",
+    "EncloseContract",
+    "RepairContract",
+    "SampleContract",
+]

@@ -8,25 +8,48 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Mesh, Part, Solid
-from damageest.conformance import AllowanceContract, BooleanContract, RepairContract, SampleContract
+from damageest.conformance import (
+    AllowanceContract,
+    BooleanContract,
+    EncloseAllContract,
+    EncloseContract,
+    RepairContract,
+    SampleContract,
+)
 from damageest.registry import Registry
 from damageest.stages.allowance import Allowance
+from damageest.stages.boolean import Boolean
 from damageest.stages.boolean.manifold import Manifold
+from damageest.stages.enclose import Enclose, EncloseAll
+from damageest.stages.repair import Repair
+from damageest.stages.sample import Sample
 
-CLASSES: dict[str, Any] = {
-    "sample": SampleContract,
-    "repair": RepairContract,
-    "boolean": BooleanContract,
-    "allowance": AllowanceContract,
+CLASSES: dict[Any, Any] = {
+    Sample: SampleContract,
+    Enclose: EncloseContract,
+    EncloseAll: EncloseAllContract,
+    Repair: RepairContract,
+    Boolean: BooleanContract,
+    Allowance: AllowanceContract,
+}
+
+
+WITH: dict[str, dict[str, Any]] = {
+    "enclose octree": {"error": 0.06},
 }
 
 
 def _made(item: Any) -> Any:
-    return type(f"Test_{item.contract.stage}_{item.name}", (CLASSES[item.contract.stage],), {"stage": item.cls()})
+    name = f"{item.contract.stage} {item.name}"
+    return type(
+        f"Test_{item.contract.stage}_{item.name}",
+        (CLASSES[item.contract],),
+        {"stage": item.cls(), **WITH.get(name, {})},
+    )
 
 
 for _item in Registry.discover().implementations:
-    if _item.contract.stage in CLASSES:
+    if _item.contract in CLASSES:
         globals()[f"Test_{_item.contract.stage}_{_item.name}"] = _made(_item)
 
 

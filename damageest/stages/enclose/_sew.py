@@ -21,7 +21,12 @@ class Wide:
 
 
 def carried_on(surface: Surface, rims: Rims, by: float) -> Wide:
-    """Adds a strip of width ``by`` along each rim, in the direction in which the surface leaves it."""
+    """Adds a strip of width ``by`` along each rim, in the direction in which the surface leaves it.
+
+    Raises StageError where there is no rim.
+    """
+    if not rims.loops:
+        raise StageError("the damage surface has no rim by which to join it to the background", "method: implicit")
     vertices, faces, ends = [surface.vertices], [surface.faces], []
     start = len(surface.vertices)
     normals = np.zeros_like(surface.vertices)
