@@ -22,6 +22,10 @@ INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
 tolerance (weld bead, dirt, fixture); deviating, but in no site (noise)."""
 
 
+class ArtefactError(ValueError):
+    """What was to become an artefact does not fit its type: wrong shapes, indices out of range, a solid not closed."""
+
+
 def _frozen(value: Any, dtype: Any) -> Any:
     array = np.array(value, dtype=dtype, order="C", copy=None)
     if array.flags.writeable:
@@ -53,13 +57,13 @@ class Mesh(_Arrays):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.vertices.ndim != 2 or self.vertices.shape[1] != 3:
-            raise ValueError(f"vertices: expected (V,3), got {self.vertices.shape}")
+            raise ArtefactError(f"vertices: expected (V,3), got {self.vertices.shape}")
         if self.faces.ndim != 2 or self.faces.shape[1] != 3:
-            raise ValueError(f"faces: expected (F,3), got {self.faces.shape}")
+            raise ArtefactError(f"faces: expected (F,3), got {self.faces.shape}")
         if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= len(self.vertices)):
-            raise ValueError(f"faces: index outside the {len(self.vertices)} vertices")
+            raise ArtefactError(f"faces: index outside the {len(self.vertices)} vertices")
         if not np.isfinite(self.vertices).all():
-            raise ValueError("vertices: not all finite")
+            raise ArtefactError("vertices: not all finite")
 
     @property
     def triangles(self) -> Floats:
@@ -105,11 +109,11 @@ class Solid(Mesh):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not len(self.faces):
-            raise ValueError("a solid needs faces; this mesh is empty")
+            raise ArtefactError("a solid needs faces; this mesh is empty")
         if loose := open_edges(self.faces):
-            raise ValueError(f"not watertight: {loose} of its edges are not shared by two opposite triangles")
+            raise ArtefactError(f"not watertight: {loose} of its edges are not shared by two opposite triangles")
         if self.volume <= 0:
-            raise ValueError(f"inside out or flat: its signed volume is {self.volume:.6g}")
+            raise ArtefactError(f"inside out or flat: its signed volume is {self.volume:.6g}")
 
     @cached_property
     def volume(self) -> float:
@@ -174,9 +178,9 @@ class Scan(_Arrays):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.points.ndim != 2 or self.points.shape[1] != 3:
-            raise ValueError(f"points: expected (N,3), got {self.points.shape}")
+            raise ArtefactError(f"points: expected (N,3), got {self.points.shape}")
         if self.normals is not None and self.normals.shape != self.points.shape:
-            raise ValueError(f"normals: expected {self.points.shape}, got {self.normals.shape}")
+            raise ArtefactError(f"normals: expected {self.points.shape}, got {self.normals.shape}")
 
     def moved(self, T: Floats) -> Scan:
         """The same scan in another frame; T is 4x4, rigid."""

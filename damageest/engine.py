@@ -9,11 +9,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from damageest.artefacts import ArtefactError
 from damageest.cache import Cache, digest
 from damageest.contracts import Contract
 from damageest.errors import DamageestError, InputError, StageError
 from damageest.job import Job
-from damageest.registry import Registry
+from damageest.registry import Implementation, Registry
 from damageest.result import StageRecord
 
 
@@ -75,7 +76,7 @@ class Engine:
             )
         except Exception as error:
             _tell(hooks.damageest_stage_failed, **named, error=error)
-            raise _placed(error, *where) from error
+            raise _placed(error, item, state.site) from error
         seconds = time.perf_counter() - start
         self.records.append(StageRecord(*where[:2], str(item.provider), state.site, round(seconds, 3), cached))
         _tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
@@ -138,26 +139,39 @@ def _checked(value: Any, contract: Contract) -> Any:
     kinds = (tuple,) if typing.get_origin(expected) is tuple else kinds
     if not isinstance(value, kinds):
         names = " or ".join(getattr(kind, "__name__", str(kind)) for kind in kinds)
-        raise StageError(f"gave a {type(value).__name__} where its contract promises {names}", "update the plugin")
+        raise StageError(
+            f"gave a {type(value).__name__} where its contract promises {names}", "update the plugin that it is from"
+        )
     return value
 
 
-def _placed(error: Exception, stage: str, use: str, site: int) -> DamageestError:
-    """The error with the stage it came from; what is no error of ours becomes one that says how to see more."""
-    if isinstance(error, StageError):
-        error.stage, error.use, error.site = stage, use, site
+def _placed(error: Exception, item: Implementation, site: int) -> DamageestError:
+    """The error with the stage it came from; what is no error of ours becomes one that says whose it is."""
+    stage = item.contract.stage
+    if isinstance(error, DamageestError) and not isinstance(error, StageError):
         return error
-    if isinstance(error, DamageestError):
-        return error
-    if isinstance(error, MemoryError):
-        placed = StageError("ran out of memory", "a larger tolerance, or fewer scan points")
-    elif isinstance(error, OSError) and stage in ("part", "scan"):
-        return InputError(f"{stage}: {use}: {error}")
-    else:
-        first = str(error).splitlines()[0] if str(error) else ""
-        placed = StageError(
-            f"failed unexpectedly: {type(error).__name__}: {first}"[:400],
-            "--debug for the traceback; a report with job and inputs would help to mend it",
-        )
-    placed.stage, placed.use, placed.site = stage, use, site
+    if isinstance(error, OSError) and stage in ("part", "scan"):
+        return InputError(f"{stage}: {item.name}: {error}")
+    placed = error if isinstance(error, StageError) else _explained(error, f"{item.provider}")
+    placed.stage, placed.use, placed.site = stage, item.name, site
     return placed
+
+
+def _explained(error: Exception, provider: str) -> StageError:
+    """An error that a stage did not raise on purpose, in words for whoever uses or mends it."""
+    first = str(error).splitlines()[0][:400] if str(error) else ""
+    if isinstance(error, MemoryError):
+        return StageError("ran out of memory", "a larger tolerance, or fewer scan points")
+    if isinstance(error, ArtefactError):
+        return StageError(
+            f"gave an artefact that is none: {first}", f"another implementation; tell those of {provider}"
+        )
+    if isinstance(error, ValueError) and "read-only" in first:
+        return StageError(
+            f"tried to edit what it was given, which later stages use as well ({first})",
+            f"another implementation; those of {provider} should edit a copy",
+        )
+    return StageError(
+        f"failed unexpectedly: {type(error).__name__}: {first}",
+        f"--debug for the traceback; a report to those of {provider}, with job and inputs, would help to mend it",
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import traceback
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -103,7 +104,14 @@ def _provider(point: EntryPoint, dist: Distribution | None) -> Provider:
 
 def fault_of(error: BaseException, provider: Provider) -> Broken:
     """The plugin as broken by an error, with what to do about it."""
-    return Broken(provider, f"{type(error).__name__}: {error}", _remedy(error, provider))
+    return Broken(provider, f"{type(error).__name__}: {error}{_place(error, provider)}", _remedy(error, provider))
+
+
+def _place(error: BaseException, provider: Provider) -> str:
+    """Where in the plugin's own files an error arose; nothing for one that its author wrote for the user."""
+    root = provider.module.split(".")[0]
+    own = [f for f in traceback.extract_tb(error.__traceback__) if root in Path(f.filename).with_suffix("").parts]
+    return f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own and type(error) is not PluginError else ""
 
 
 def _remedy(error: BaseException, provider: Provider) -> str:
