@@ -1,0 +1,106 @@
+"""Shallow damage of known truth is right; what a sweep cannot represent is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from damageest_sweep.sweep import Sweep
+
+import damageest
+from damageest.artefacts import Mesh, Part, Rims, Scan, Truth
+from damageest.conformance import EncloseContract
+from damageest.errors import StageError
+from damageest.evaluate.scores import iou
+from damageest.result import Result
+from damageest.stages.scan.simulate import Simulate
+
+SIGMA = 0.03
+BOX = trimesh.creation.box((40, 30, 20))
+
+
+def scanned(*tools: dict[str, Any]) -> tuple[Part, Scan]:
+    part = Part(BOX.vertices, BOX.faces)
+    scan = Simulate.model_validate({"damage": tools, "points": 60_000, "noise": SIGMA, "seed": 3}).run("mm", part)
+    return part, scan
+
+
+def run(part: Part, scan: Scan, **options: Any) -> Result:
+    job = {"version": 1, "align": "none", "tolerance": 4 * SIGMA, "enclose": {"use": "sweep", **options}}
+    return damageest.run(job, part=part, scan=Scan(scan.points))
+
+
+def ball(*centre: float, radius: float) -> dict[str, Any]:
+    return {"tool": "sphere", "centre": list(centre), "radius": radius}
+
+
+def rod(*point: float, axis: list[float], length: float, radius: float) -> dict[str, Any]:
+    return {"tool": "cylinder", "point": list(point), "axis": axis, "length": length, "radius": radius}
+
+
+@pytest.mark.parametrize(
+    ("tools", "least"),
+    [
+        ([ball(3, 2, 28, radius=20)], 0.985),
+        ([rod(0, 0, 70, axis=[0, 1, 0], length=100, radius=61)], 0.97),
+        ([ball(20, 0, 10, radius=8)], 0.99),
+        ([ball(20, 15, 10, radius=8)], 0.99),
+        ([ball(-10, 0, 28, radius=20), ball(10, 5, 28, radius=20)], 0.985),
+    ],
+    ids=["dent", "wear from edge to edge", "edge", "corner", "two dents"],
+)
+def test_shallow_damage_is_right(tools: list[dict[str, Any]], least: float) -> None:
+    part, scan = scanned(*tools)
+    result = run(part, scan)
+    assert isinstance(scan.truth, Truth)
+    assert scan.truth.damage is not None
+    assert result.status == "ok"
+    assert all(site.evidence.consistent and site.method == "surface" for site in result.sites)
+    assert iou([site.damage for site in result.sites], [scan.truth.damage]) > least
+
+
+@pytest.mark.parametrize(
+    "tool",
+    [
+        ball(0, 0, 10, radius=6),
+        ball(0, 0, 7, radius=5),
+        rod(0, 0, 6, axis=[0, 0, 1], length=10, radius=3),
+        rod(0, 0, 0, axis=[0, 0, 1], length=40, radius=4),
+    ],
+    ids=["steep sides", "undercut", "deep pit", "worn through"],
+)
+def test_what_a_sweep_cannot_represent_is_refused(tool: dict[str, Any]) -> None:
+    with pytest.raises(StageError, match="enclose: sweep") as caught:
+        run(*scanned(tool))
+    assert "adaptive" in caught.value.remedy
+
+
+def test_an_option_of_it_decides_what_is_too_steep() -> None:
+    part, scan = scanned(ball(3, 2, 28, radius=20))
+    with pytest.raises(StageError, match="steeper than 10 degrees"):
+        run(part, scan, steepest=10)
+
+
+class TestSweep(EncloseContract):
+    stage = Sweep(steepest=89)
+
+
+def test_several_rims_are_refused() -> None:
+    scene = TestSweep().inputs()
+    loop = scene["rims"].loops[0]
+    wanted = {name: scene[name] for name in Sweep.needs()}
+    with pytest.raises(StageError, match="2 rims"):
+        Sweep().run(**{**wanted, "rims": Rims((loop, loop))})
+
+
+def test_sound_points_inside_are_refused() -> None:
+    scene = TestSweep().inputs()
+    wanted = {name: scene[name] for name in Sweep.needs()}
+    enclosure = Sweep(steepest=89).run(**wanted)
+    assert isinstance(enclosure, Mesh)
+    centre = scene["surface"].vertices.mean(axis=0) + np.array([0, 0, 1.5])
+    cloud = centre + 0.2 * np.random.default_rng(1).normal(size=(500, 3))
+    with pytest.raises(StageError, match="sound points of the scan"):
+        Sweep(steepest=89).run(**{**wanted, "intact": np.concatenate([scene["intact"], cloud])})
