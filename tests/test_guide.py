@@ -34,13 +34,10 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str,
         (folder / name).write_text(text)
     site = tmp_path_factory.mktemp("site")
     uv = os.environ.get("UV") or shutil.which("uv")
-    tool = (
-        [uv, "pip", "install", "--offline", "--python", sys.executable]
-        if uv
-        else [sys.executable, "-m", "pip", "install"]
-    )
+    pip = [uv, "pip"] if uv else [sys.executable, "-m", "pip"]
+    at = ["--offline", "--python", sys.executable] if uv else []
     done = subprocess.run(
-        [*pip, "install", "--quiet", "--no-deps", "--no-build-isolation", "--target", str(site), str(folder)],
+        [*pip, "install", "--quiet", *at, "--no-deps", "--no-build-isolation", "--target", str(site), str(folder)],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
