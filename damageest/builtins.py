@@ -29,6 +29,7 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.cluster.dbscan import Dbscan
     from damageest.stages.enclose.adaptive import Adaptive
     from damageest.stages.enclose.implicit import Implicit
+    from damageest.stages.enclose.octree import Octree
     from damageest.stages.enclose.shortest_path import ShortestPath
     from damageest.stages.export.files import Files
     from damageest.stages.part.file import PartFile
@@ -46,5 +47,5 @@ def damageest_stages() -> list[type[Stage]]:
     return [
         PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Unaligned, MeshDistance, Dbscan, PyVista, LargestLoop,
         AllLoops, Offset, BoundingBox, Capsule, Cylinder, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
-        NoRepair, Manifold, NoAllowance, Files, Uniform, CloudDistance, SignedDistance, Reconstructed,
+        NoRepair, Manifold, NoAllowance, Files, Uniform, CloudDistance, SignedDistance, Reconstructed, Octree,
     ]  # fmt: skip
