@@ -231,18 +231,15 @@ class _Check:
         """The contracts that the job's route needs. `auto` is `surface` where the job names one of its stages."""
         whole_job = EncloseAll in chosen
         surface = chosen & set(SURFACE_ONLY)
-        octree = self.enclosing() == "octree"
+        own = "octree" if self.enclosing() == "octree" else "implicit"
         if method == "auto" and surface and not whole_job:
             method = "surface"
         if method == "auto" and whole_job and self.enclosing() not in ("", DEFAULTS[EncloseAll]):
-            method = "octree" if octree else "implicit"
-        if method == "surface" and whole_job:
+            method = own
+        if whole_job and method not in ("auto", own):
             self.fault(
-                "this implementation goes over all sites at once; it belongs to  method: implicit", "enclose", "use"
+                f"this implementation goes over all sites at once; it belongs to  method: {own}", "enclose", "use"
             )
-        if whole_job and method != "surface" and octree != (method == "octree"):
-            which = "octree" if octree else "implicit"
-            self.fault(f"this implementation belongs to  method: {which}", "enclose", "use")
         if method in ("implicit", "octree"):
             for contract in sorted(surface, key=list(DEFAULTS).index):
                 self.fault(f"not a stage of  method: {method}; remove it, or use  method: surface", contract.stage)
@@ -250,9 +247,9 @@ class _Check:
         return [contract for contract in DEFAULTS if contract not in drop.get(method, SURFACE_ONLY)], method
 
     def enclosing(self) -> str:
-        """The name that the job gives for stage `enclose`; empty where it gives none."""
+        """The name that the job gives for stage `enclose`, or means by giving options alone; empty without either."""
         value = self.tree.get("enclose", "")
-        return str(value.get("use", "") if isinstance(value, dict) else value)
+        return str(value.get("use", self.usual("enclose")) if isinstance(value, dict) else value)
 
     def default(self, contract: Contract, method: str) -> tuple[Implementation, dict[str, Any]] | None:
         if contract.stage in ("part", "scan"):

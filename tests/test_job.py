@@ -57,6 +57,8 @@ def test_options_without_a_name_are_the_routes_own(job_file: JobFile, registry: 
     surface = load(job_file("method: surface\nenclose: {overhang: 2}\n"), registry)
     assert surface.stages[Enclose].use == "adaptive"
     assert load(job_file("boundary: all_loops\nenclose: {overhang: 2}\n"), registry).method == "surface"
+    octree = load(job_file("method: octree\nenclose: {depth: 7}\n"), registry)
+    assert octree.stages[EncloseAll].model_dump()["depth"] == 7
 
 
 def test_naming_a_surface_stage_chooses_that_route(job_file: JobFile, registry: Registry) -> None:
@@ -64,6 +66,16 @@ def test_naming_a_surface_stage_chooses_that_route(job_file: JobFile, registry: 
     implicit = load(job_file("method: implicit\n"), registry)
     assert Reconstruct not in implicit.stages
     assert EncloseAll in implicit.stages
+
+
+def test_octree_is_a_route_of_its_own(job_file: JobFile, registry: Registry) -> None:
+    by_route = load(job_file("method: octree\n"), registry)
+    by_stage = load(job_file("enclose: octree\n"), registry)
+    set_from_outside = load(job_file(""), registry, ["method=octree", "enclose.cell=0.4"])
+    for job in (by_route, by_stage, set_from_outside):
+        assert (job.method, job.stages[EncloseAll].use) == ("octree", "octree")
+        assert Reconstruct not in job.stages
+    assert set_from_outside.stages[EncloseAll].model_dump()["cell"] == 0.4
 
 
 CASES = {
@@ -80,6 +92,12 @@ CASES = {
     "method: implcit": (":4:1", "did you mean 'implicit'?"),
     "method: implicit\nreconstruct: pyvista": (":5:1", "not a stage of"),
     "method: surface\nenclose: implicit": (":5:1", "method: implicit"),
+    "method: surface\nenclose: octree": (":5:1", "method: octree"),
+    "method: implicit\nenclose: octree": (":5:1", "method: octree"),
+    "method: octree\nenclose: implicit": (":5:1", "method: implicit"),
+    "method: octree\nboundary: all_loops": (":5:1", "not a stage of"),
+    "method: octree\nenclose: {deph: 7}": (":5:11", "did you mean 'depth'?"),
+    "method: octree\nenclose: {depth: 7, cell: 1}": (":5:", "give one of them"),
     "name: a/b": (":4:1", "name"),
     "version: 1": (":4:1", "duplicate key"),
     "cluster: [": (":5:1", "not valid YAML"),
