@@ -18,6 +18,10 @@ from damageest.units import Unit
 
 FEWEST = 1000
 HELD = 20
+VOXELS = (1.0, 1.6, 2.5)
+"""Factors by which the voxels that tell inside from outside grow where the points leave gaps between finer ones."""
+BRIDGED, REFUSED = 2.0, 3.5
+"""Gaps, in circles of seven neighbours, that are mentioned, and that are too wide."""
 
 
 class Reconstructed(ReadPart):
@@ -52,6 +56,7 @@ class Reconstructed(ReadPart):
         noise, spacing = measure(scan.points)
         try:
             vertices, faces, cell, error = self._surface(scan.points, noise, spacing)
+            openings = _openings(vertices, faces, scan.points)
         except InputError as fault:
             raise InputError(f"{', '.join(map(str, paths))}: {fault}") from None
         digest = hashlib.sha256("".join(map(sha256, paths)).encode()).hexdigest()
@@ -62,7 +67,7 @@ class Reconstructed(ReadPart):
         )
         return Part(
             vertices, faces, unit, ", ".join(map(str, paths)), digest, tessellation_error=error,
-            notes=(*scan.notes, note),
+            notes=(*scan.notes, note, *openings),
         )  # fmt: skip
 
     def _surface(self, points: Floats, noise: float, spacing: float) -> tuple[Floats, Ints, float, float]:
@@ -71,7 +76,6 @@ class Reconstructed(ReadPart):
         from damageest.stages.enclose._fit import smoothed, thinned
         from damageest.stages.enclose._level import closed_region
         from damageest.stages.enclose._poisson import box, solve_by_halves
-        from damageest.stages.part._sides import outward
 
         held = np.arange(len(points)) % HELD == 0
         span = np.ptp(points, axis=0)
@@ -83,33 +87,61 @@ class Reconstructed(ReadPart):
             )
         cloud, _ = thinned(points[~held], 0.8 * cell)
         cloud, normals, _ = smoothed(cloud, noise, 24)
-        normals = outward(cloud, normals, 1.25 * max(cell, spacing))
+        normals = _outward(cloud, normals, 1.25 * max(cell, spacing))
         grid = box(points.min(axis=0) - 8 * cell, points.max(axis=0) + 8 * cell, cell)
         # The level is positive inside, hence normals inward.
         field = solve_by_halves(grid, cloud, -normals, local_areas(cloud), self.screening)
         region = closed_region(grid, field)
         if region is None:
             raise InputError("no closed surface came about; scan the specimen all round")
-        error = _checked(region.vertices, region.faces, points[held], cell, noise)
+        error = _error(region.vertices, region.faces, points[held], cell, noise)
         return region.vertices, region.faces, cell, error
 
 
-def _checked(vertices: Floats, faces: Ints, held: Floats, cell: float, noise: float) -> float:
-    """The 95th percentile of the held points' (H,3) distance to the surface; refuses what no point vouches for."""
+def _outward(cloud: Floats, normals: Floats, voxel: float) -> Floats:
+    """Normals turned out, by the finest voxels that close the points' shell."""
+    from damageest.stages.part._sides import outward
+
+    first: InputError | None = None
+    for factor in VOXELS:
+        try:
+            return outward(cloud, normals, factor * voxel)
+        except InputError as fault:
+            first = first or fault
+    assert first is not None
+    raise first
+
+
+def _error(vertices: Floats, faces: Ints, held: Floats, cell: float, noise: float) -> float:
+    """The 95th percentile of the held points' (H,3) distance to the surface; refuses one that misses its points."""
     import igl
-    from scipy.spatial import cKDTree
 
     squared = igl.point_mesh_squared_distance(held, vertices, faces)[0]
     error = float(np.percentile(np.sqrt(squared), 95))
-    middle = vertices[faces].mean(axis=1)
-    far = np.asarray(cKDTree(held).query(middle, workers=2)[0])
-    usual = float(np.median(far))
-    if (bare := far > 8 * usual + 4 * cell).any():
-        place, size = middle[far.argmax()], 2 * float(far.max())
-        raise InputError(
-            f"the specimen's scan has an opening of about {size:.3g} across at ({place[0]:.4g}, {place[1]:.4g}, "
-            f"{place[2]:.4g}) ({100 * bare.mean():.1f} % of the surface would be invented); scan it there too"
-        )
     if error > 3 * noise + cell:
         raise InputError(f"the surface misses its points by {error:.3g}; set part.cell smaller than {cell:.3g}")
     return error
+
+
+def _openings(vertices: Floats, faces: Ints, points: Floats) -> tuple[str, ...]:
+    """What is to be said of gaps between the points (N,3) that the surface closes over; refuses wide ones.
+
+    A gap is measured by the circle that holds the nearest point's seven neighbours, so that uneven density is none:
+    between random points one place in a million is as far as twice that from all of them.
+    """
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(points)
+    middle = vertices[faces].mean(axis=1)
+    far, nearest = (np.asarray(found) for found in tree.query(middle, workers=2))
+    near, at = np.unique(nearest, return_inverse=True)
+    gap = far / np.asarray(tree.query(points[near], 8, workers=2)[0])[at, -1]
+    place, size = middle[gap.argmax()], 2 * float(far[gap.argmax()])
+    text = f"of about {size:.2g} across at ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g})"
+    if gap.max() > REFUSED:
+        share = 100 * float((gap > BRIDGED).mean())
+        raise InputError(
+            f"the specimen's scan has an opening {text}, {share:.1f} % of the surface would be invented; "
+            "scan it there too"
+        )
+    return (f"closed over openings of the specimen's scan, the widest {text}",) if gap.max() > BRIDGED else ()

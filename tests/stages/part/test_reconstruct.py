@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 import damageest
 from damageest.artefacts import Part
@@ -37,6 +38,32 @@ def test_an_opening_is_refused_with_its_place(tmp_path: Path) -> None:
     path = specimen(tmp_path, unseen=[{"direction": [0, 0, -1], "angle": 40}])
     with pytest.raises(InputError, match="opening"):
         Reconstructed(path=path).run("mm")
+
+
+def test_a_small_opening_is_closed_over_and_said(tmp_path: Path) -> None:
+    path = specimen(tmp_path)
+    points = np.load(path)
+    np.save(path, points[np.linalg.norm(points - [5, 3, 10], axis=1) > 1.8])
+    part = Reconstructed(path=path).run("mm")
+    assert iou([part], [box()]) > 0.98
+    assert "closed over openings" in part.notes[-1]
+    np.save(path, points[np.linalg.norm(points - [5, 3, 10], axis=1) > 4])
+    with pytest.raises(InputError, match="opening"):
+        Reconstructed(path=path).run("mm")
+
+
+def test_uneven_density_is_no_opening(tmp_path: Path) -> None:
+    part = Reconstructed(path=specimen(tmp_path, 60_000, density=0.7)).run("mm")
+    assert iou([part], [box()]) > 0.98
+    assert not [note for note in part.notes if "openings" in note]
+
+
+def test_walls_thinner_than_the_scan_resolves_are_refused(tmp_path: Path) -> None:
+    sheet = trimesh.creation.box((40, 30, 0.6))
+    scanner = Simulate.model_validate({"points": 8000, "noise": 0.03})
+    np.save(tmp_path / "sheet.npy", scanner.run("mm", Part(sheet.vertices, sheet.faces)).points)
+    with pytest.raises(InputError, match="thinner than"):
+        Reconstructed(path=tmp_path / "sheet.npy").run("mm")
 
 
 def test_too_few_points_and_too_fine_a_cell_are_refused(tmp_path: Path) -> None:
