@@ -3,7 +3,8 @@
     class TestMine(BooleanContract):
         stage = Mine()
 
-There is a class for every contract.
+There is a class for every contract. Where an implementation does not promise what a check asks for, name the check in
+``exceptions``, with the reason; the other attributes that a class knows are said in its docstring and in `Contract`.
 """
 
 from __future__ import annotations
@@ -13,14 +14,29 @@ try:
 except ImportError as error:
     raise ImportError("damageest.conformance needs pytest: pip install pytest") from error
 
+from damageest.conformance._base import Contract
 from damageest.conformance._contracts import AllowanceContract, BooleanContract, RepairContract, SampleContract
 from damageest.conformance._enclose import EncloseAllContract, EncloseContract
+from damageest.conformance._files import ExportContract, PartContract, ScanContract
+from damageest.conformance._points import NEAR, AlignContract, ClusterContract, SegmentContract
+from damageest.conformance._surface import BackgroundContract, BoundaryContract, ReconstructContract
 
 __all__ = [
+    "NEAR",
+    "AlignContract",
     "AllowanceContract",
+    "BackgroundContract",
     "BooleanContract",
+    "BoundaryContract",
+    "ClusterContract",
+    "Contract",
     "EncloseAllContract",
     "EncloseContract",
+    "ExportContract",
+    "PartContract",
+    "ReconstructContract",
     "RepairContract",
     "SampleContract",
+    "ScanContract",
+    "SegmentContract",
 ]

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Floats, Mesh, Part, Samples, Solid
-from damageest.conformance._base import REFUSED, Contract, back
+from damageest.conformance import _scene
+from damageest.conformance._base import REFUSED, Placed, back, right_or_refused
 
 SIZE = (4.0, 3.0, 2.0)
 
@@ -21,7 +22,7 @@ def block(low: tuple[float, ...], high: tuple[float, ...]) -> tuple[Floats, Any]
     return np.array(low) + corner * (np.array(high) - np.array(low)), np.array(faces)
 
 
-class BlockContract(Contract):
+class BlockContract(Placed):
     """What the four have in common."""
 
     tolerance: ClassVar[float] = 0.1
@@ -51,8 +52,18 @@ class SampleContract(BlockContract):
     """Checks for `sample`."""
 
     def test_lies_on_the_part(self) -> None:
-        points = self.run().points
+        points = self.plain().points
         assert np.abs(np.minimum(points, np.array(SIZE) - points).min(axis=1)).max() < 1e-9
+
+    def test_leaves_no_gap_larger_than_it_says(self) -> None:
+        from scipy.spatial import cKDTree
+
+        samples = self.plain()
+        everywhere, _ = _scene.spread(self.inputs()["part"], 20_000, np.random.default_rng(5))
+        assert np.max(cKDTree(samples.points).query(everywhere)[0]) <= samples.spacing
+
+    def test_half_the_tolerance_half_the_spacing(self) -> None:
+        assert self.run(tolerance=self.tolerance / 2).spacing == pytest.approx(self.plain().spacing / 2, rel=0.05)
 
 
 class RepairContract(BlockContract):
@@ -62,15 +73,26 @@ class RepairContract(BlockContract):
         with pytest.raises(REFUSED):
             self.run(enclosure=Mesh(np.zeros((0, 3)), np.zeros((0, 3), int)))
 
+    def test_an_open_mesh(self) -> None:
+        box = self.inputs()["enclosure"]
+
+        def right(solid: Solid) -> None:
+            assert solid.volume == pytest.approx(4)
+
+        right_or_refused(lambda: self.run(enclosure=Mesh(box.vertices, box.faces[1:])), right)
+
     def test_what_is_closed_keeps_its_volume(self) -> None:
-        assert self.run().volume == pytest.approx(4)
+        assert self.plain().volume == pytest.approx(4)
 
 
 class BooleanContract(BlockContract):
     """Checks for `boolean`."""
 
     def test_gives_what_lies_in_the_part(self) -> None:
-        assert self.run().volume == pytest.approx(1)
+        assert self.plain().volume == pytest.approx(1)
+
+    def test_the_part_and_itself(self) -> None:
+        assert self.run(solid=self.inputs()["part"]).volume == pytest.approx(np.prod(SIZE))
 
     def test_apart_gives_none(self) -> None:
         assert self.run(solid=Solid(*block((9, 9, 9), (10, 10, 10)))) is None
@@ -80,7 +102,7 @@ class AllowanceContract(BlockContract):
     """Checks for `allowance`."""
 
     def test_deposit_holds_the_damage(self) -> None:
-        deposit = self.run()
+        deposit = self.plain()
         assert deposit is None or deposit.volume >= self.inputs()["damage"].volume
 
 

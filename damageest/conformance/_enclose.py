@@ -9,11 +9,11 @@ import pytest
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Enclosures, Floats, Mesh, Rims, Sites, Solid, Surface
 from damageest.conformance import _scene
-from damageest.conformance._base import Contract, back, right_or_refused
+from damageest.conformance._base import Placed, back, right_or_refused
 from damageest.solids import iou, to_manifold, to_solid, united
 
 
-class EncloseContract(Contract):
+class EncloseContract(Placed):
     """Checks for `enclose`, site by site, on a round dent in a flat face and on a bore worn through.
 
     ``repair``: the implementation of `repair` that it relies on, where it does not give a closed mesh by itself.
@@ -47,7 +47,7 @@ class EncloseContract(Contract):
         assert not _deep(_scene.scene().intact, enclosure), "it holds sound points"
 
     def test_holds_the_damage_and_no_sound_points(self) -> None:
-        self.right(self.run())
+        self.right(self.plain())
 
     def test_which_way_the_surface_is_wound_does_not_matter(self) -> None:
         surface, rims = _scene.bowl(), _scene.scene().rims
@@ -75,6 +75,10 @@ class EncloseContract(Contract):
     def test_no_rim(self) -> None:
         right_or_refused(lambda: self.run(rims=Rims(())), self.right)
 
+    def test_an_empty_surface(self) -> None:
+        empty = Surface(np.empty((0, 3)), np.empty((0, 3), int))
+        right_or_refused(lambda: self.run(surface=empty, rims=Rims(())), self.right)
+
     def test_a_background_elsewhere(self) -> None:
         elsewhere = _scene.box_round(np.array([40.0, 40, 40]), np.array([50.0, 50, 50]), 3 * _scene.TOLERANCE)
         right_or_refused(lambda: self.run(background=elsewhere), self.right)
@@ -84,7 +88,7 @@ class EncloseContract(Contract):
         self.right(Mesh(back(placed.vertices, scale, turn, shift), placed.faces))
 
 
-class EncloseAllContract(Contract):
+class EncloseAllContract(Placed):
     """Checks for `enclose`, all sites at once, on two round dents on two faces.
 
     ``error``: share of the true volume by which what it finds may be off.
@@ -105,11 +109,11 @@ class EncloseAllContract(Contract):
             assert not _deep(_scene.scene().intact, item.solid), "it holds sound points"
 
     def test_holds_the_damage_and_no_sound_points(self) -> None:
-        self.right(self.run())
+        self.right(self.plain())
 
     def test_each_site_is_in_the_enclosure_that_says_so(self) -> None:
         scene = _scene.scene()
-        for item in self.run().items:
+        for item in self.plain().items:
             near = scene.aligned.points[np.isin(scene.sites.label, item.sites)]
             low, high = item.solid.bounds
             assert ((near > low - _scene.TOLERANCE) & (near < high + _scene.TOLERANCE)).all()

@@ -1,102 +1,73 @@
-"""Every implementation found here keeps its contract, and the checks catch those that do not."""
+"""Every implementation found here keeps its contract."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import tempfile
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from damageest.artefacts import Mesh, Part, Solid
-from damageest.conformance import (
-    AllowanceContract,
-    BooleanContract,
-    EncloseAllContract,
-    EncloseContract,
-    RepairContract,
-    SampleContract,
-)
+from damageest import conformance
+from damageest.conformance import NEAR, _scene
+from damageest.contracts import DEFAULTS
+from damageest.meshio import write_points, write_stl
 from damageest.registry import Registry
-from damageest.stages.allowance import Allowance
-from damageest.stages.boolean import Boolean
-from damageest.stages.boolean.manifold import Manifold
-from damageest.stages.enclose import Enclose, EncloseAll
-from damageest.stages.repair import Repair
-from damageest.stages.sample import Sample
 
-CLASSES: dict[Any, Any] = {
-    Sample: SampleContract,
-    Enclose: EncloseContract,
-    EncloseAll: EncloseAllContract,
-    Repair: RepairContract,
-    Boolean: BooleanContract,
-    Allowance: AllowanceContract,
-}
-
+HERE = tempfile.TemporaryDirectory(prefix="damageest-conformance-")
+FOLDER = Path(HERE.name)
+SPECIMEN = _scene.spread(_scene.prism(), 20_000, np.random.default_rng(1))[0]
+write_stl(FOLDER / "prism.stl", _scene.prism())
+write_points(FOLDER / "prism.ply", dict(zip("xyz", SPECIMEN.T, strict=True)))
+VOLUME = _scene.prism().volume
 
 WITH: dict[str, dict[str, Any]] = {
+    "part file": {"options": {"path": FOLDER / "prism.stl"}, "volume": VOLUME},
+    "part reconstruct": {"options": {"path": FOLDER / "prism.ply"}, "volume": VOLUME, "error": 0.02},
+    "part brep": {
+        "options": {"path": Path(__file__).parents[2] / "jobs/parts/half_torus.step"},
+        "volume": np.pi**2 * 28 * 10**2,
+        "error": 0.003,
+    },
+    "scan file": {"options": {"path": FOLDER / "prism.ply"}},
+    "scan simulate": {"options": {"points": 20_000}},
+    "align icp": {"pose": NEAR},
+    "align none": {"pose": np.eye(4)},
+    "background build_volume": {
+        "options": {"size": (60.0, 60.0, 60.0)},
+        "lengths": ("size",),
+        "exceptions": {"test_moves_along": "the printer's volume stays where it is, and the part is out of it then"},
+    },
     "enclose octree": {"error": 0.06},
 }
+"""By implementation: the ``options`` to check it with, and what else its class is told."""
 
 
-def _made(item: Any) -> Any:
-    name = f"{item.contract.stage} {item.name}"
-    return type(
-        f"Test_{item.contract.stage}_{item.name}",
-        (CLASSES[item.contract],),
-        {"stage": item.cls(), **WITH.get(name, {})},
-    )
+def base(contract: type) -> Any:
+    """The class of a contract: that of its name, which for the readers is shorter by 'Read'."""
+    return getattr(conformance, f"{contract.__name__.removeprefix('Read')}Contract")
 
 
-for _item in Registry.discover().implementations:
-    if _item.contract in CLASSES:
-        globals()[f"Test_{_item.contract.stage}_{_item.name}"] = _made(_item)
+def case(item: Any) -> Any:
+    """The class that checks an implementation; on one worker, so that it computes its plain result once."""
+    told = dict(WITH.get(f"{item.contract.stage} {item.name}", {}))
+    told["stage"] = item.cls(**told.pop("options", {}))
+    name = f"Test_{item.contract.stage}_{item.name}"
+    return pytest.mark.xdist_group(name)(type(name, (base(item.contract),), told))
 
 
-class Bad(Allowance):
-    """Wrong in the way that ``fault`` says."""
-
-    use: Literal["bad"] = "bad"
-    fault: str = ""
-
-    def run(self, damage: Solid) -> Solid | None:
-        if self.fault == "type":
-            return 7  # type: ignore[return-value]
-        if self.fault == "edits":
-            damage.vertices.flags.writeable or damage.vertices.__setitem__(0, 0.0)
-        grown = {"random": np.random.random(), "length": 0.1}.get(self.fault, 0.0)  # noqa: NPY002
-        centre = damage.bounds.mean(axis=0)
-        return Solid(damage.vertices + grown * np.sign(damage.vertices - centre), damage.faces)
+FOUND = Registry.discover().implementations
+for _item in FOUND:
+    globals()[f"Test_{_item.contract.stage}_{_item.name}"] = case(_item)
 
 
-@pytest.mark.parametrize(
-    ("fault", "check"),
-    [
-        ("type", "test_gives_its_type"),
-        ("edits", "test_leaves_its_inputs"),
-        ("random", "test_same_bytes_twice"),
-        ("", "test_declares_itself"),
-    ],
-)
-def test_a_bad_one_is_caught(fault: str, check: str) -> None:
-    case = type("Case", (AllowanceContract,), {"stage": Bad(fault=fault)})()
-    with pytest.raises((AssertionError, ValueError)):
-        getattr(case, check)()
+@pytest.mark.parametrize("contract", DEFAULTS)
+def test_a_class_for_every_contract(contract: type) -> None:
+    assert issubclass(base(contract), conformance.Contract)
+    assert base(contract).__name__ in conformance.__all__
+    assert [item for item in FOUND if item.contract is contract]
 
 
-def test_an_absolute_length_is_caught() -> None:
-    case = type("Case", (AllowanceContract,), {"stage": Bad(fault="length")})()
-    with pytest.raises(AssertionError):
-        case.test_no_length_of_its_own(1e3)
-
-
-def test_a_boolean_that_gives_all_is_caught() -> None:
-    class Whole(Manifold):
-        """Gives the solid itself."""
-
-        def run(self, solid: Mesh, part: Part) -> Any:  # type: ignore[override]
-            return solid
-
-    case = type("Case", (BooleanContract,), {"stage": Whole()})()
-    with pytest.raises(AssertionError):
-        case.test_apart_gives_none()
+def test_nothing_is_told_of_what_is_not_there() -> None:
+    assert not WITH.keys() - {f"{item.contract.stage} {item.name}" for item in FOUND}

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field as Option
 
 from damageest.artefacts import Part, Pose, Scan
+from damageest.errors import StageError
 from damageest.stages.align import Align
 from damageest.stages.align._frame import Rigid
 
@@ -27,6 +28,8 @@ class Unaligned(Align):
         T = np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan)
         if not len(scan.points):
             return Pose(T, inliers=0.0, notes=("the scan has no points",))
+        if not np.isfinite(scan.points).all():
+            raise StageError("the scan has points that are not finite", "remove them from the file")
         points = scan.points[:: max(1, len(scan.points) // 100_000)]
         distance = Target(part).closest(points @ T[:3, :3].T + T[:3, 3])[0]
         hit = np.abs(distance) <= tolerance

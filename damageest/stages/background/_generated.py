@@ -36,6 +36,7 @@ class Generated(Background, ABC):
 
     def run(self, part: Part, surface: Surface, tolerance: float, spacing: float, fine: bool) -> Solid:
         """Raises StageError where the mesh does not hold part and damage surface."""
+        check_surface(surface)
         by = max(self.clearance * tolerance, 1.5 * spacing)
         origin = (part.bounds[0] + part.bounds[1]) / 2
         body = self.shape(part, surface, by, origin)
@@ -89,6 +90,12 @@ def _divided(body: Any, edge: float) -> Any:
 
 def _longest(corners: Floats) -> float:
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
+
+
+def check_surface(surface: Surface) -> None:
+    """Raises StageError for a damage surface without vertices, round which there is nothing to make."""
+    if not len(surface.vertices):
+        raise StageError("the damage surface is empty", "another `reconstruct`, or method: implicit")
 
 
 def check_holds(background: Solid, skin: Floats, surface: Surface) -> Solid:

@@ -45,9 +45,10 @@ class BuildVolume(Background):
     ) -> Solid:
         """Raises StageError where the part does not fit in, or the cells round the site would not fit in memory."""
         from damageest.stages.background._contour import contour
-        from damageest.stages.background._generated import check_holds
+        from damageest.stages.background._generated import check_holds, check_surface
         from damageest.stages.segment.mesh_distance import signed_distance
 
+        check_surface(surface)
         by = max(self.clearance * tolerance, 1.5 * spacing)
         cell = self.cell or by
         size = np.array(self.size)

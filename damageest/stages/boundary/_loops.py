@@ -16,6 +16,8 @@ def loops(faces: Ints) -> list[Ints]:
 
     Raises StageError where two loops meet in a vertex, so that they cannot be told apart.
     """
+    if not len(faces):
+        return []
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = int(faces.max()) + 1
     lonely = ~np.isin(edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0])

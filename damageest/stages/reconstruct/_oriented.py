@@ -12,6 +12,13 @@ SMOOTHED = 32
 """Points of each local fit."""
 
 
+def middle(points: Floats) -> Floats:
+    """The mean (3,) of points (M,3). Raises StageError where they are too few for a surface."""
+    if len(points) < FEWEST:
+        raise StageError(f"{len(points)} points are too few for a surface; it takes {FEWEST}", "method: implicit")
+    return np.asarray(points.mean(axis=0))
+
+
 def oriented(points: Floats, part: Part, cell: float, noise: float) -> tuple[Floats, Floats]:
     """Points (M,3), thinned to one in each cube of 0.7 ``cell`` and moved onto local fits, and their unit normals,
     which agree with one another and face the nominal skin rather than not.

@@ -37,9 +37,10 @@ class PyVista(Reconstruct):
         from scipy.spatial import cKDTree
 
         from damageest.stages.enclose._fit import smoothed, thinned
+        from damageest.stages.reconstruct._oriented import middle
         from damageest.stages.segment.mesh_distance import signed_distance
 
-        origin = points.mean(axis=0)
+        origin = middle(points)
         # VTK fills the bounding box with cells; along its own axes a damage's box is a fraction of the part's.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         local = (points - origin) @ axes

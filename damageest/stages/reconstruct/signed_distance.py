@@ -9,7 +9,7 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Ints, Part, Surface
 from damageest.stages.reconstruct import Reconstruct
-from damageest.stages.reconstruct._oriented import opened, oriented
+from damageest.stages.reconstruct._oriented import middle, opened, oriented
 
 MOST_CELLS = 3e6
 """Cells in the box of a damage."""
@@ -36,7 +36,7 @@ class SignedDistance(Reconstruct):
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
         """Raises StageError where the points are too few, or no surface comes about."""
-        origin = points.mean(axis=0)
+        origin = middle(points)
         # Along its own axes a damage's box is a fraction of that along the part's.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         local = (points - origin) @ axes

@@ -30,10 +30,10 @@ class BallPivot(Reconstruct):
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
         """Raises StageError where the points are too few, or no surface comes about."""
-        from damageest.stages.reconstruct._oriented import opened, oriented
+        from damageest.stages.reconstruct._oriented import middle, opened, oriented
 
         cell = self.spacing or max(tolerance, spacing)
-        origin = points.mean(axis=0)
+        origin = middle(points)
         cloud, normals = oriented(points, part, cell, noise)
         faces = _pivoted(cloud - origin, normals, [radius * cell for radius in sorted(self.radii)])
         return opened(cloud, faces, cloud, np.inf, part, tolerance)

@@ -40,9 +40,9 @@ class PyMeshLabReconstruct(Reconstruct):
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
         """Raises StageError where the points are too few, or no surface comes about."""
-        from damageest.stages.reconstruct._oriented import opened, oriented
+        from damageest.stages.reconstruct._oriented import middle, opened, oriented
 
-        origin = points.mean(axis=0)
+        origin = middle(points)
         # Marching cubes fills the bounding box; along its own axes a damage's box is a fraction of the part's.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # a rotation: faces keep their winding
