@@ -110,7 +110,8 @@ def touched(triangles: Floats, depth: int) -> Ints:
         for begin in range(0, len(which), CHUNK):
             mine = np.repeat(which[begin : begin + CHUNK], 8)
             cells = (2 * low[begin : begin + CHUNK, None] + CORNERS).reshape(-1, 3)
-            meets = _meets(triangles[mine], (cells + 0.5) * 2 * half, half * (1 + 1e-9))
+            centres = np.asarray((cells + 0.5) * (2 * half), np.float64)
+            meets = _meets(triangles[mine], centres, half * (1 + 1e-9))
             pieces.append((mine[meets], cells[meets]))
         which = np.concatenate([piece[0] for piece in pieces])
         low = np.concatenate([piece[1] for piece in pieces])

@@ -146,7 +146,7 @@ def _sound(cube: Cube, skin: Ints, intact: Floats, damaged: Floats, patience: fl
     centres = cube.centres(skin)
     tree = cKDTree(intact)
     away, nearest = tree.query(centres, workers=2)
-    circle = tree.query(intact, 7, workers=2)[0][:, -1]
+    circle = np.asarray(tree.query(intact, 7, workers=2)[0])[:, -1]
     reach = np.maximum(circle[nearest], cube.cell) * patience
     bare = np.flatnonzero(away > reach)
     if not len(bare):

@@ -20,6 +20,9 @@ GIB = 2**30
 BYTES_PER_LEAF, BYTES_PER_CELL = 600, 80
 """At the peak; 440 to 590 measured for a leaf of the octree, 73 for a cell of the grid round a loss."""
 REACHES = (0, 1, 2, 3)
+FINEST = 1 / 3
+"""Of the points' spacing: seven cells, the widest closing, then bridge little more than twice the spacing, and gaps
+between random points are wider."""
 UNSEEN = 1e-3
 """Share of the skin without points that is worth a note."""
 
@@ -33,11 +36,11 @@ class Octree(EncloseAll):
         None, ge=5, le=16, description="levels over the cube round the part; default: from the cell"
     )
     cell: float | None = Field(
-        None, gt=0, description="edge of a finest cell, in the job's unit; default: the tolerance, or the spacing of the "
-        "scan's points where that is larger, or what fits into the memory"
+        None, gt=0, description="edge of a finest cell, in the job's unit; default: the tolerance, or the spacing of "
+        "the scan's points where that is larger, or what fits into the memory"
     )  # fmt: skip
     memory: float = Field(
-        2.0, ge=0.05, le=64, description="GiB that the octree, and after it the grid round each loss, may take"
+        2.0, ge=0.01, le=64, description="GiB that the octree, and after it the grid round each loss, may take"
     )
 
     @model_validator(mode="after")
@@ -63,7 +66,7 @@ class Octree(EncloseAll):
         found = losses(cube, sides, aligned, sites)
         largest = max((box_cells(sides, nodes) for nodes, _ in found), default=0)
         if largest * BYTES_PER_CELL > self.memory * GIB:
-            fits = 1.05 * cube.cell * (largest * BYTES_PER_CELL / GIB / self.memory) ** (1 / 3)
+            fits = 1.1 * cube.cell * (largest * BYTES_PER_CELL / GIB / self.memory) ** (1 / 3)
             raise StageError(
                 f"the box round a loss takes {largest:,} cells of {cube.cell:.3g}, "
                 f"{largest * BYTES_PER_CELL / GIB:.1f} GiB; memory is {self.memory:g}",
@@ -87,15 +90,19 @@ class Octree(EncloseAll):
             wanted = span / (2**self.depth - 2 * MARGIN)
         else:
             wanted = self.cell or max(tolerance, aligned.spacing)
+        if wanted < FINEST * aligned.spacing:
+            raise StageError(
+                f"cells of {wanted:.3g} are too fine for points {aligned.spacing:.3g} apart: holes would be left",
+                f"{_options(span, aligned.spacing)}, or a denser scan",
+            )
         per_leaf = LEAVES_PER_CELL_AREA * part.area * BYTES_PER_LEAF / GIB
         fits = max(float(np.sqrt(per_leaf / self.memory)), span / (2**20 - 2 * MARGIN))
         if wanted >= fits:
             return _around(part, wanted), ()
         if self.cell or self.depth:
-            levels = int(np.floor(np.log2(span / fits + 2 * MARGIN)))
             raise StageError(
-                f"cells of {wanted:.3g} take {per_leaf / wanted**2:,.1f} GiB; memory is {self.memory:g}",
-                f"enclose.cell: {np.ceil(fits * 1000) / 1000:g}, enclose.depth: {levels}, or more enclose.memory",
+                f"cells of {wanted:.3g} take {per_leaf / wanted**2:.2g} GiB; memory is {self.memory:g}",
+                f"{_options(span, max(fits, aligned.spacing))}, or more enclose.memory",
             )
         return _around(part, fits), (f"cells of {fits:.3g} instead of {wanted:.3g}, so as to fit into memory",)
 
@@ -114,8 +121,14 @@ def _divided(cube: Cube, part: Part, aligned: Scan, deviation: Deviation, sites:
     raise StageError(
         f"cells of {cube.cell:.3g} leave holes between points {aligned.spacing:.3g} apart: outside leaks into "
         f"{leak:.0%} of the sound part, even closed over {2 * REACHES[-1]} cells",
-        f"enclose.cell: {max(1.5 * cube.cell, aligned.spacing):.3g}, or a denser scan",
+        f"enclose.cell: {max(1.5 * cube.cell, 1.01 * aligned.spacing):.3g}, or a denser scan",
     )
+
+
+def _options(span: float, cell: float) -> str:
+    """Values of both options that make cells of at least this size."""
+    levels = int(np.log2(span / cell + 2 * MARGIN))
+    return f"enclose.cell: {1.01 * cell:.3g}" + (f", enclose.depth: {levels}" if levels > 4 else "")
 
 
 def _around(part: Part, cell: float) -> Cube:
