@@ -50,11 +50,10 @@ def base(contract: type) -> Any:
 
 
 def case(item: Any) -> Any:
-    """The class that checks an implementation; on one worker, so that it computes its plain result once."""
+    """The class that checks an implementation."""
     told = dict(WITH.get(f"{item.contract.stage} {item.name}", {}))
     told["stage"] = item.cls(**told.pop("options", {}))
-    name = f"Test_{item.contract.stage}_{item.name}"
-    return pytest.mark.xdist_group(name)(type(name, (base(item.contract),), told))
+    return type(f"Test_{item.contract.stage}_{item.name}", (base(item.contract),), told)
 
 
 FOUND = Registry.discover().implementations

@@ -1,0 +1,225 @@
+"""The checks catch implementations that do not keep their contract."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from damageest import conformance
+from damageest.artefacts import Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
+from damageest.conformance import _scene
+from damageest.conformance._base import Contract, Placed
+from damageest.meshio import write_stl
+from damageest.stages.align.none import Unaligned
+from damageest.stages.allowance.none import Nothing as NoAllowance
+from damageest.stages.background.bbox import BoundingBox
+from damageest.stages.boolean.manifold import Manifold
+from damageest.stages.boundary.all_loops import AllLoops
+from damageest.stages.cluster.dbscan import Dbscan
+from damageest.stages.enclose.adaptive import Adaptive
+from damageest.stages.enclose.implicit import Implicit
+from damageest.stages.export.files import Files
+from damageest.stages.part.file import PartFile
+from damageest.stages.reconstruct.signed_distance import SignedDistance
+from damageest.stages.repair.none import Nothing as NoRepair
+from damageest.stages.sample.uniform import Uniform
+from damageest.stages.scan.simulate import Simulate
+from damageest.stages.segment.mesh_distance import MeshDistance
+
+GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
+    "Part": (PartFile(path=Path("prism.stl")), {"volume": _scene.prism().volume}),
+    "Scan": (Simulate(points=5000), {}),
+    "Sample": (Uniform(), {}),
+    "Align": (Unaligned(), {"pose": np.eye(4)}),
+    "Segment": (MeshDistance(), {}),
+    "Cluster": (Dbscan(), {}),
+    "Reconstruct": (SignedDistance(), {}),
+    "Boundary": (AllLoops(), {}),
+    "Background": (BoundingBox(), {}),
+    "Enclose": (Adaptive(), {}),
+    "EncloseAll": (Implicit(), {}),
+    "Repair": (NoRepair(), {}),
+    "Boolean": (Manifold(), {}),
+    "Allowance": (NoAllowance(), {}),
+    "Export": (Files(), {}),
+}
+MEANING = {
+    "Part": "test_has_the_volume_of_its_file",
+    "Scan": "test_lies_on_what_was_scanned",
+    "Sample": "test_lies_on_the_part",
+    "Align": "test_finds_the_pose",
+    "Segment": "test_labels_the_dents",
+    "Cluster": "test_one_site_for_each_dent",
+    "Reconstruct": "test_follows_the_dent",
+    "Boundary": "test_the_open_edges_of_a_dent",
+    "Background": "test_holds_the_damage",
+    "Enclose": "test_holds_the_damage_and_no_sound_points",
+    "EncloseAll": "test_holds_the_damage_and_no_sound_points",
+    "Repair": "test_what_is_closed_keeps_its_volume",
+    "Boolean": "test_gives_what_lies_in_the_part",
+    "Allowance": "test_deposit_holds_the_damage",
+    "Export": "test_writes_the_files_it_names",
+}
+"""By contract: the check of what a result means."""
+BAD_INPUT: dict[str, tuple[str, tuple[Any, ...]]] = {
+    "Align": ("test_few_points", (3,)),
+    "Segment": ("test_few_points", (0,)),
+    "Cluster": ("test_few_points", (4,)),
+    "Reconstruct": ("test_few_points", (0,)),
+    "Boundary": ("test_an_empty_surface", ()),
+    "Background": ("test_an_empty_surface", ()),
+    "Enclose": ("test_no_rim", ()),
+    "EncloseAll": ("test_no_sites_no_enclosures", ()),
+    "Repair": ("test_an_empty_mesh_is_refused", ()),
+    "Boolean": ("test_apart_gives_none", ()),
+}
+Fault = Callable[[Any, dict[str, Any]], Any]
+
+
+def spoilt(value: Any, by: float) -> Any:
+    """A result that is off by ``by``, in the job's unit or as near to that as its kind comes."""
+    match value:
+        case Mesh() | Samples() | Scan():
+            points = value.vertices if isinstance(value, Mesh) else value.points
+            name = "vertices" if isinstance(value, Mesh) else "points"
+            low = points.min(axis=0)
+            return replace(value, **{name: low + (points - low) * (1 + by / np.ptp(points, axis=0).max())})
+        case Pose():
+            return replace(value, T_part_scan=value.T_part_scan + by * np.eye(4, k=3))
+        case Sites():
+            return replace(value, label=np.roll(value.label, int(np.ceil(by * 1e6))))
+        case Rims():
+            return Rims(
+                tuple(np.roll(loop, int(np.ceil(by * 1e6)))[: -1 if by > 0.1 else None] for loop in value.loops)
+            )
+        case Enclosures():
+            return Enclosures(tuple(replace(item, solid=spoilt(item.solid, by)) for item in value.items))
+        case tuple():
+            return (*value, f"{by}.txt")
+        case None:
+            return Solid(*(getattr(_scene.box_round(np.zeros(3), np.full(3, by), 9), n) for n in ("vertices", "faces")))
+        case _:
+            return replace(value, distance=value.distance + by, label=value.label + np.uint8(by > 0.1))
+
+
+def edited(result: Any, given: dict[str, Any]) -> Any:
+    """Writes into an input, past the lock of its arrays."""
+    value = next(v for v in given.values() if not isinstance(v, float | str | bool | Path))
+    held = value if isinstance(value, np.ndarray) else next(iter(vars(value).values()))
+    if isinstance(held, np.ndarray):
+        array = held if held.flags.writeable else held.base
+        array.setflags(write=True)
+        array.flat[0] += 1
+    else:
+        object.__setattr__(value, next(iter(vars(value))), "edited")
+    return result
+
+
+def case(name: str, tmp_path: Path, fault: Fault) -> Any:
+    """The checks of a contract on an implementation that has a fault."""
+    stage, told = GOOD[name]
+    base = getattr(conformance, f"{name}Contract")
+    if name == "Part":
+        write_stl(tmp_path / "prism.stl", _scene.prism())
+        stage = PartFile(path=tmp_path / "prism.stl")
+
+    def call(self: Any, stage: Any, given: dict[str, Any]) -> Any:
+        return fault(base.call(self, stage, given), given)
+
+    made = type("Case", (base,), {"stage": stage, "call": call, **told})()
+    if name == "Export":
+        (tmp_path / "home").mkdir()
+        made.home, made.count = tmp_path / "home", 0
+    return made
+
+
+def test_there_is_one_good_for_every_class() -> None:
+    every = {n.removesuffix("Contract") for n in conformance.__all__ if n.endswith("Contract")} - {""}
+    assert GOOD.keys() == MEANING.keys() == every
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_a_wrong_type(name: str, tmp_path: Path) -> None:
+    with pytest.raises(AssertionError):
+        case(name, tmp_path, lambda result, given: SimpleNamespace()).test_gives_its_type()
+
+
+@pytest.mark.parametrize("name", sorted(GOOD.keys() - {"Part"}))
+def test_an_edited_input(name: str, tmp_path: Path) -> None:
+    with pytest.raises(AssertionError):
+        case(name, tmp_path, edited).test_leaves_its_inputs()
+
+
+def test_an_edited_file(tmp_path: Path) -> None:
+    def appended(result: Any, given: dict[str, Any]) -> Any:
+        (tmp_path / "prism.stl").write_bytes(b"solid")
+        return result
+
+    with pytest.raises(AssertionError):
+        case("Part", tmp_path, appended).test_leaves_its_inputs()
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_chance(name: str, tmp_path: Path) -> None:
+    np.random.seed(1)  # noqa: NPY002
+    made = case(name, tmp_path, lambda result, given: spoilt(result, 1e-5 * np.random.random()))  # noqa: NPY002
+    with pytest.raises(AssertionError):
+        made.test_same_bytes_twice()
+
+
+@pytest.mark.parametrize("name", [n for n in GOOD if issubclass(getattr(conformance, f"{n}Contract"), Placed)])
+def test_a_length_of_its_own(name: str, tmp_path: Path) -> None:
+    if name == "Boundary":
+        pytest.skip("rims have no length")
+    made: Any = case(name, tmp_path, lambda result, given: spoilt(result, 1.0))
+    if name == "Cluster":
+        made = type("Case", (conformance.ClusterContract,), {"stage": Dbscan(eps=0.5)})()
+    for check in (lambda: made.test_no_length_of_its_own(1e-3), lambda: made.test_no_length_of_its_own(1e3)):
+        try:
+            check()
+        except AssertionError:
+            return
+    pytest.fail("a length of 1 went unnoticed")
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_a_wrong_result(name: str, tmp_path: Path) -> None:
+    by = -3.0 if name in ("Background", "Sample") else 3.0
+    made = case(name, tmp_path, lambda result, given: spoilt(result, by))
+    if name == "Allowance":
+        made = case(name, tmp_path, lambda result, given: spoilt(given["damage"], -0.5))
+    with pytest.raises(AssertionError):
+        getattr(made, MEANING[name])()
+
+
+@pytest.mark.parametrize("name", BAD_INPUT)
+@pytest.mark.parametrize("kind", [ValueError, IndexError])
+def test_a_crash_on_bad_input(name: str, kind: type[Exception], tmp_path: Path) -> None:
+    def call(stage: Any, given: dict[str, Any]) -> Any:
+        raise kind("zero-size array")
+
+    made = case(name, tmp_path, lambda result, given: result)
+    made.call = call
+    check, arguments = BAD_INPUT[name]
+    with pytest.raises(kind, match="zero-size"):
+        getattr(made, check)(*arguments)
+
+
+def test_a_crash_on_a_broken_file(tmp_path: Path) -> None:
+    made = case("Part", tmp_path, lambda result, given: result)
+    made.call = lambda stage, given: stage.path.read_bytes()[99]
+    with pytest.raises(IndexError):
+        made.test_refuses_a_broken_file("empty", tmp_path)
+
+
+def test_a_check_that_is_no_check_cannot_be_excepted(tmp_path: Path) -> None:
+    made = case("Boolean", tmp_path, lambda result, given: result)
+    made.exceptions = {"test_of_nothing": "because"}
+    with pytest.raises(AssertionError, match="exceptions name checks"):
+        Contract.test_declares_itself(made)
