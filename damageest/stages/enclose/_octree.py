@@ -80,7 +80,7 @@ def plant(leaves: Codes, depth: int) -> Tree:
     starts, sizes = [here], [np.ones(len(here), np.int64)]
     for level in range(depth):
         above = np.unique(here >> np.uint64(3))
-        children = ((above << np.uint64(3))[:, None] + np.arange(8, dtype=np.uint64)).ravel()
+        children = ((above << np.uint64(3))[:, None] | np.arange(8, dtype=np.uint64)).ravel()
         empty = children[~np.isin(children, here, assume_unique=True)]
         starts.append(empty << np.uint64(3 * level))
         sizes.append(np.full(len(empty), 1 << level))
