@@ -91,7 +91,8 @@ class Mesh(_Arrays):
 
 
 def open_edges(faces: Ints) -> int:
-    """How many directed edges lack their opposite exactly once; 0 for a closed, consistently oriented 2-manifold."""
+    """How many directed edges lack their opposite exactly once, or go from a vertex to itself; 0 for a closed,
+    consistently oriented 2-manifold."""
     if not len(faces):
         return 0
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -99,7 +100,8 @@ def open_edges(faces: Ints) -> int:
     forward = edges[:, 0] * size + edges[:, 1]
     backward = edges[:, 1] * size + edges[:, 0]
     codes, counts = np.unique(forward, return_counts=True)
-    return int((counts > 1).sum() + (~np.isin(codes, backward)).sum())
+    lone = (counts > 1) | ~np.isin(codes, backward) | (codes % (size + 1) == 0)  # the last: from a vertex to itself
+    return int(lone.sum())
 
 
 @dataclass(frozen=True, eq=False)
