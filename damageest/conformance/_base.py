@@ -41,7 +41,7 @@ class Contract:
     def __init_subclass__(cls) -> None:
         cls._kept = {}
 
-    _kept: ClassVar[dict[Any, Any]] = {}
+    _kept: ClassVar[dict[str, Any]] = {}
 
     @pytest.fixture(autouse=True)
     def _excepted(self, request: pytest.FixtureRequest) -> None:
@@ -76,12 +76,13 @@ class Contract:
 
     def _watched(self) -> tuple[Any, list[str]]:
         """The plain result, and what of the inputs the run has changed."""
-        if self.stage not in self._kept:
+        key = repr(self.stage)
+        if key not in self._kept:
             given = self.inputs()
             before = self.state(given)
             result, after = self.call(self.stage, given), self.state(given)
-            self._kept[self.stage] = result, [name for name in before if before[name] != after[name]]
-        kept: tuple[Any, list[str]] = self._kept[self.stage]
+            self._kept[key] = result, [name for name in before if before[name] != after[name]]
+        kept: tuple[Any, list[str]] = self._kept[key]
         return kept
 
     def state(self, given: dict[str, Any]) -> dict[str, bytes]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -117,6 +118,22 @@ class EncloseAllContract(Placed):
             near = scene.aligned.points[np.isin(scene.sites.label, item.sites)]
             low, high = item.solid.bounds
             assert ((near > low - _scene.TOLERANCE) & (near < high + _scene.TOLERANCE)).all()
+
+    @pytest.mark.parametrize("kept", ["no sound points", "few points"])
+    def test_a_scan_that_says_little(self, kept: str) -> None:
+        scene = _scene.scene()
+        chosen = np.flatnonzero(scene.sites.label) if kept == "no sound points" else np.arange(30)
+        of = scene.deviation
+        few = {
+            "aligned": replace(scene.aligned, points=scene.aligned.points[chosen], normals=None),
+            "deviation": Deviation(of.distance[chosen], of.face[chosen], of.label[chosen]),
+            "sites": Sites(scene.sites.label[chosen], 2),
+        }
+
+        def right(enclosures: Enclosures) -> None:
+            assert {k for item in enclosures.items for k in item.sites} <= {1, 2}
+
+        right_or_refused(lambda: self.run(**few), right)
 
     def test_no_sites_no_enclosures(self) -> None:
         scene = _scene.scene()
