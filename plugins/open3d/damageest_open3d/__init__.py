@@ -1,4 +1,4 @@
-"""Damage surfaces by ball pivoting, by Open3D."""
+"""By Open3D: damage surfaces by ball pivoting, and the part minus a Poisson body of the scan."""
 
 from __future__ import annotations
 
@@ -13,5 +13,6 @@ def damageest_stages() -> list[type[Stage]]:
 
     check()
     from damageest_open3d.ball_pivot import BallPivot
+    from damageest_open3d.poisson_subtract import PoissonSubtract
 
-    return [BallPivot]
+    return [BallPivot, PoissonSubtract]
