@@ -1,118 +1,157 @@
-"""One case of the suite, from the random damage to its score, as a row that JSON can hold."""
+"""One case, from the random damage to its score, as a row that JSON can hold; ``python -m`` runs one in its process."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
+import resource
+import sys
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from damageest.artefacts import Part, Scan, Solid
 from damageest.errors import DamageestError, StageError
-from damageest.evaluate.damages import KINDS, random_damage
+from damageest.evaluate._run import MARK
+from damageest.evaluate.damages import random_damage
 from damageest.evaluate.parts import PARTS
-from damageest.evaluate.scores import score
+from damageest.evaluate.scores import depth, score
+from damageest.evaluate.sized import sized_damage
+from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate
 
-SIGMA = 0.0005
-"""Noise of the scan as a share of the part's diagonal."""
+TIMES = ("seconds", "stage_seconds", "megabytes")
+"""What of a row differs from run to run; all else follows from the case."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What makes a case; equal cases give equal scans. ``tolerance`` is ``auto`` or the noise's multiple; ``settings``
-    are ``stage.option=value`` for the job."""
+    """What makes a case; equal cases give equal scans.
 
-    number: int
+    ``part`` is the name of a built-in one, or what the one in ``file`` (.npz) is called. ``first``: kind of the first
+    loss. ``size``: depth of the damage; 0: none; None: any. ``scanner``: options of `simulate` beside damage and seed.
+    ``job``: a job file, else the defaults, to which ``settings`` apply; ``source`` stands for the contents of both
+    files. ``tolerance``: the one to expect. ``varied``: what this case stands for in the tables.
+    """
+
     part: str
     seed: int
-    pose: str = "random"
-    method: str = "auto"
-    points: int = 150_000
-    density: float = 0.4
-    undamaged: bool = False
-    tolerance: str = "4"
-    settings: tuple[str, ...] = ()
+    first: str
+    tolerance: float
+    size: float | None = None
+    scanner: Mapping[str, Any] = field(default_factory=dict)
+    settings: Sequence[str] = ()
+    varied: Mapping[str, float | str] = field(default_factory=dict)
+    source: str = ""
+    job: str = ""
+    file: str = ""
 
     def key(self) -> str:
-        """Names the case among the rows of a file."""
-        return "|".join(str(value) for value in {**vars(self), "settings": " ".join(self.settings)}.values())
+        """Names the case among the rows of a file, wherever its part and job lie."""
+        values = {name: value for name, value in vars(self).items() if name not in ("job", "file")}
+        return hashlib.sha256(json.dumps([version("damageest"), values]).encode()).hexdigest()[:16]
 
 
-def cases(
-    count: int,
-    seed: int,
-    parts: list[str],
-    pose: str,
-    method: str,
-    undamaged: bool,
-    points: int,
-    tolerance: str,
-    settings: tuple[str, ...] = (),
-) -> list[Case]:
-    """``count`` cases that go through the parts in turn."""
-    return [
-        Case(k, parts[k % len(parts)], 1000 * seed + k, pose, method, points, 0.4, undamaged, tolerance, settings)
-        for k in range(count)
-    ]
+def blank(case: Case) -> dict[str, Any]:
+    """The row of a case that has no result."""
+    row: dict[str, Any] = {"key": case.key(), "part": case.part, "seed": case.seed, "size": case.size}
+    row |= {"varied": dict(case.varied), "noise": case.scanner["noise"], "points": case.scanner["points"]}
+    row |= {"tolerance": case.tolerance, "kinds": [], "share": 0.0, "depth": 0.0, "error": "", "skipped": False}
+    row |= {"iou": 0.0, "found": 0, "missed": int(case.size != 0), "invented": 0, "sites": 0, "flagged": False}
+    return row | {"methods": [], "failures": [], "reasons": [], "seconds": 0.0}
 
 
-def scanned(case: Case) -> tuple[Part, Scan, tuple[str, ...]]:
-    """The part, its scan with the truth, and the kinds of the damage."""
-    part = PARTS[case.part]()
+def save_part(part: Part, path: Path) -> None:
+    """Writes what the stages use of a part."""
+    brep: dict[str, Any] = {} if part.faces_brep is None else {"faces_brep": part.faces_brep}
+    np.savez(path, vertices=part.vertices, faces=part.faces, unit=part.unit, error=part.tessellation_error, **brep)
+
+
+def part_of(case: Case) -> Part:
+    if not case.file:
+        return PARTS[case.part]()
+    data = np.load(case.file)
+    return Part(
+        data["vertices"],
+        data["faces"],
+        unit=str(data["unit"]),
+        faces_brep=data.get("faces_brep"),
+        tessellation_error=float(data["error"]),
+    )
+
+
+def scanned(case: Case, part: Part) -> tuple[Scan, tuple[str, ...]]:
+    """The scan with the truth, and the kinds of the damage. Raises LookupError where no damage fits the part."""
     tools: tuple[Any, ...] = ()
     kinds: tuple[str, ...] = ()
-    if not case.undamaged:
-        # the first loss goes through the kinds in turn, shifted for each round of the parts
-        first = list(KINDS)[(case.number + case.number // len(PARTS)) % len(KINDS)]
-        made = random_damage(part, case.seed, (first,))
+    if case.size != 0:
+        made = random_damage(part, case.seed, (case.first,)) if case.size is None else None
+        made = made or sized_damage(part, case.seed, float(case.size or 0), case.first)
         tools, kinds = made.tools, made.kinds
-    options: dict[str, Any] = {"points": case.points, "density": case.density, "pose": case.pose, "seed": case.seed}
-    scan = Simulate(damage=tools, noise=SIGMA * part.diagonal, **options).run("mm", part)
-    return part, scan, kinds
+    scanner = Simulate.model_validate({**case.scanner, "damage": tools, "seed": case.seed})
+    return scanner.run(part.unit, part), kinds
 
 
 def run_case(case: Case) -> dict[str, Any]:
-    """The row of a case: its score and what the result said of itself; ``error`` where there is no result."""
-    part, scan, kinds = scanned(case)
+    """The row of a case: its score and what the result said of itself; ``error`` where there is no result, and
+    ``skipped`` where there is no case."""
+    import damageest
+
+    part, row = part_of(case), blank(case)
+    try:
+        scan, kinds = scanned(case, part)
+    except (LookupError, DamageestError) as error:
+        return row | {"error": _one_line(error), "skipped": True, "missed": 0}
     truth = scan.truth
     assert truth is not None
-    sigma = SIGMA * part.diagonal
-    share = truth.damage.volume / part.volume if truth.damage else 0.0
-    row: dict[str, Any] = {"key": case.key(), "part": case.part, "seed": case.seed, "kinds": list(kinds)}
-    row |= {"share": share, "error": "", "iou": 0.0, "flagged": False, "sites": 0}
+    lost = truth.damage
+    row |= {"kinds": list(kinds), "points": len(scan.points)}
+    row |= {"share": lost.volume / part.volume, "depth": depth(lost, part)} if lost else {}
     start = time.perf_counter()
     try:
-        found = _run(part, scan, case, 4 * sigma)
+        alone = Scan(scan.points, unit=scan.unit)  # without the truth
+        found = damageest.run(case.job or {"version": 1}, part=part, scan=alone, settings=case.settings)
     except DamageestError as error:
-        # a stage that refuses owns up to it; a job or an input at fault would be the suite's own mistake
-        text, refused = str(error).replace("\n", " "), isinstance(error, StageError)
-        return row | {"error": text, "flagged": refused, "seconds": time.perf_counter() - start}
-    row["seconds"] = time.perf_counter() - start
-    solids: list[Solid] = [site.damage for site in found.sites]
-    marks = score(part, solids, truth.damage, found.tolerance, found.pose.T_part_scan, truth.T_part_scan)
-    row |= {
-        "iou": marks.iou,
-        "volume_error": marks.volume_error,
-        "surface_error": marks.surface_error,
-        "pose_error": marks.pose_error / sigma,
-        "sites": len(found.sites),
-        "methods": sorted({site.method for site in found.sites}),
-        "consistent": all(site.evidence.consistent for site in found.sites),
-        "failures": list(found.failures),
-        "reasons": [reason for site in found.sites for reason in site.evidence.reasons],
-        "watertight": all(isinstance(solid, Solid) for solid in solids),
-    }
-    row["flagged"] = not row["consistent"] or found.status != "ok"
+        row["seconds"] = time.perf_counter() - start
+        marks = score(part, [], lost, case.tolerance)
+        # a stage that refuses owns up to it; a job or an input at fault would be the evaluation's own mistake
+        row |= {"error": _one_line(error), "flagged": isinstance(error, StageError), "missed": marks.missed}
+    else:
+        row["seconds"] = time.perf_counter() - start
+        row |= _scored(found, part, scan)
+    row["megabytes"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in row.items()}
 
 
-def _run(part: Part, scan: Scan, case: Case, tolerance: float) -> Any:
-    """The public way in; scan made before, so that its time does not count."""
-    import damageest
+def _scored(found: Result, part: Part, scan: Scan) -> dict[str, Any]:
+    truth = scan.truth
+    assert truth is not None
+    solids: list[Solid] = [site.damage for site in found.sites]
+    marks = score(part, solids, truth.damage, found.tolerance, found.pose.T_part_scan, truth.T_part_scan)
+    stages: dict[str, float] = {}
+    for record in found.stages:
+        stages[record.stage] = round(stages.get(record.stage, 0.0) + record.seconds, 3)
+    consistent = all(site.evidence.consistent for site in found.sites)
+    return vars(marks) | {
+        "tolerance": found.tolerance,
+        "sites": len(found.sites),
+        "methods": sorted({site.method for site in found.sites}),
+        "flagged": not consistent or found.status != "ok",
+        "failures": [text.replace("\n", " ") for text in found.failures],
+        "reasons": [reason for site in found.sites for reason in site.evidence.reasons],
+        "stage_seconds": stages,
+    }
 
-    wanted: Any = "auto" if case.tolerance == "auto" else tolerance * float(case.tolerance) / 4
-    job: dict[str, Any] = {"version": 1, "method": case.method, "tolerance": wanted}
-    if case.pose == "identity":
-        job["align"] = "none"
-    return damageest.run(job, part=part, scan=Scan(scan.points, unit=scan.unit), settings=case.settings)
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+if __name__ == "__main__":
+    print(MARK + json.dumps(run_case(Case(**json.loads(sys.argv[1])))), flush=True)

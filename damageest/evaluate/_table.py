@@ -1,4 +1,4 @@
-"""The matrix as a table for a README, and its place there."""
+"""Measurements as tables for a README, and their place there."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import platform
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,16 @@ from damageest.errors import InputError
 if TYPE_CHECKING:
     from damageest.evaluate.matrix import Cell
 
-BEGIN, END = "<!-- matrix: begin -->", "<!-- matrix: end -->"
+
+def marks(kind: str) -> tuple[str, str]:
+    """The lines between which a table goes: of kind matrix or suite."""
+    return f"<!-- {kind}: begin -->", f"<!-- {kind}: end -->"
+
+
+MATRIX = (
+    "Intersection over union with the truth; medians of the stage's and of the whole run's seconds, the largest peak "
+    "memory of a process"
+)
 
 
 def table(cells: Sequence[Cell]) -> str:
@@ -28,7 +37,7 @@ def table(cells: Sequence[Cell]) -> str:
     found = {(cell.stage, cell.use, cell.job): cell for cell in cells}
     reasons: list[str] = []
     head = ["stage", "implementation", *jobs, "stage, s", "run, s", "peak, MB"]
-    lines = [_line(head), _line(["---", "---", *(["---:"] * (len(head) - 2))])]
+    lines = [head]
     before = ""
     for stage, use in rows:
         mine = [found[stage, use, job] for job in jobs]
@@ -38,14 +47,16 @@ def table(cells: Sequence[Cell]) -> str:
             _number([cell.seconds for cell in mine if not math.isnan(cell.iou)], "{:.1f}"),
             _number([cell.megabytes for cell in mine], "{:.0f}", np.max),
         ]
-        lines.append(_line([stage if stage != before else "", use, *shown, *figures]))
+        lines.append([stage if stage != before else "", use, *shown, *figures])
         before = stage
     notes = [f"{number}. {reason}" for number, reason in enumerate(reasons, 1)]
-    return "\n".join([*lines, "", _about(), *(["", *notes] if notes else [])])
+    return "\n".join([markdown(lines, 2), "", about(MATRIX), *(["", *notes] if notes else [])])
 
 
-def _line(words: Sequence[str]) -> str:
-    return "| " + " | ".join(words) + " |"
+def markdown(lines: Sequence[Sequence[str]], names: int = 1) -> str:
+    """A Markdown table, its head first; all columns but the first ``names`` to the right."""
+    rule = ["---"] * names + ["---:"] * (len(lines[0]) - names)
+    return "\n".join("| " + " | ".join(words) + " |" for words in (lines[0], rule, *lines[1:]))
 
 
 def _shown(cell: Cell, reasons: list[str]) -> str:
@@ -62,21 +73,32 @@ def _number(values: Sequence[float], form: str, of: object = np.median) -> str:
     return form.format(of(known)) if known and callable(of) else "–"
 
 
-def _about() -> str:
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "pyvista", "manifold3d", "libigl"))
-    day = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
-    return (
-        "Intersection over union with the truth; medians of the stage's and of the whole run's seconds, the largest "
-        f"peak memory of a process. Measured {day}: damageest {version('damageest')}, "
-        f"Python {platform.python_version()}, {libraries}; {platform.machine()}, {os.cpu_count()} cores."
-    )
+def about(what: str) -> str:
+    """``what`` was measured, when, with which versions and on what machine."""
+    found = versions()
+    libraries = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
+    return f"{what}. Measured {found['date']}: {libraries}; {found['machine']}."
 
 
-def placed(path: Path, text: str | None) -> str:
+def versions() -> dict[str, Any]:
+    """Today's date, the versions of what computes, and the machine."""
+    names = ("damageest", "numpy", "pyvista", "manifold3d", "libigl")
+    return {
+        "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
+        "versions": {"Python": platform.python_version(), **{name: version(name) for name in names}},
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
+    }
+
+
+def placed(path: Path, text: str | None, kind: str) -> str:
     """The file's text with the lines between the marks replaced. Raises InputError where it has no such marks."""
-    old = path.read_text()
-    before, begin, rest = old.partition(BEGIN)
-    _, end, after = rest.partition(END)
+    first, last = marks(kind)
+    try:
+        old = path.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a text file: {error}") from None
+    before, begin, rest = old.partition(first)
+    _, end, after = rest.partition(last)
     if not begin or not end:
-        raise InputError(f"{path}: the table goes between the lines  {BEGIN}  and  {END}, which are not there")
-    return old if text is None else f"{before}{BEGIN}\n\n{text}\n\n{END}{after}"
+        raise InputError(f"{path}: the table goes between the lines  {first}  and  {last}, which are not there")
+    return old if text is None else f"{before}{first}\n\n{text}\n\n{last}{after}"

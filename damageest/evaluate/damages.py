@@ -11,7 +11,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
-from damageest.evaluate.scores import off_part, surface_points
+from damageest.evaluate.scores import depth, surface_points
 from damageest.solids import to_manifold
 from damageest.stages.scan._scanner import wear
 from damageest.stages.scan._tools import Blob, Box, Cylinder, Plane, Sphere, Tool
@@ -206,12 +206,6 @@ class Damaged:
     damage: Solid
 
 
-def depth(damage: Solid, part: Part) -> float:
-    """How far the damage reaches below the part's surface."""
-    points = np.concatenate([damage.vertices, surface_points(damage, 2000)[0]])
-    return float(off_part(points, part).max())
-
-
 def random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), losses: int | None = None) -> Damaged:
     """One to three losses on a part, each at least 0.008 of the diagonal deep and together within ``SHARE``.
 
@@ -234,7 +228,7 @@ def random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), losses: in
                 made.append(name)
                 break
     if damage is None:
-        raise RuntimeError(f"no damage fits the part {part.path!r} with seed {seed}")
+        raise LookupError(f"no damage fits the part with seed {seed}")
     return Damaged(tuple(tools), tuple(made), damage)
 
 

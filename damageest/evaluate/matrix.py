@@ -6,7 +6,6 @@ The jobs' scans are simulated, so that the truth is known; each run has a proces
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import tempfile
 import time
@@ -21,11 +20,10 @@ import numpy as np
 from damageest.artefacts import Part, Scan, Solid, Truth
 from damageest.contracts import STAGES
 from damageest.errors import DamageestError, Fault, JobError
+from damageest.evaluate._run import MARK, apart
 from damageest.evaluate._scene import Scene, prepared, settings_for
 from damageest.evaluate.scores import score
 from damageest.registry import Implementation, Registry
-
-MARK = "@row "
 
 
 @dataclass(frozen=True)
@@ -76,16 +74,8 @@ def _cell(item: Implementation, scene: Scene, timeout: float) -> Cell:
     if isinstance(settings, str):
         return Cell(*name, float("nan"), refused=settings)
     case = {"folder": str(scene.folder), "stage": item.contract.stage, "use": item.name, **settings}
-    command = [sys.executable, "-m", "damageest.evaluate.matrix", json.dumps(case)]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
-    except subprocess.TimeoutExpired:
-        return Cell(*name, float("nan"), refused=f"not done after {timeout:g} s")
-    for text in done.stdout.splitlines():
-        if text.startswith(MARK):
-            return Cell(*name, **json.loads(text.removeprefix(MARK)))
-    said = done.stderr.strip().splitlines()
-    return Cell(*name, float("nan"), refused=f"crashed ({done.returncode}): {said[-1] if said else ''}")
+    row = apart("damageest.evaluate.matrix", case, timeout)
+    return Cell(*name, **row) if isinstance(row, dict) else Cell(*name, float("nan"), refused=row)
 
 
 def run_one(case: dict[str, Any]) -> dict[str, Any]:

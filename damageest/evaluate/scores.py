@@ -8,20 +8,35 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh, Solid
-from damageest.solids import to_manifold
+from damageest.artefacts import Floats, Mesh, Part, Solid
+from damageest.settle import ids_surface
+from damageest.solids import to_manifold, to_solid
+
+MATCH = 0.1
+"""Share of a loss that has to lie in found sites for it to count as found, and of a site in the losses for it not to
+count as invented. How well it was found is for the distances to say."""
+SAMPLES = 10_000
+"""Points on each inner damage surface whose distance to the other is measured."""
 
 
 @dataclass(frozen=True)
 class Score:
     """``iou`` of found and true damage; ``volume_error`` found over true, less 1; ``surface_error``: volume of the
     symmetric difference per area of the true inner damage surface, in units of the tolerance; ``pose_error``: rms
-    distance of the part's surface, moved by the pose's error, to the part. NaN where there is nothing to compare."""
+    distance of the part's surface, moved by the pose's error, to the part. ``distance_median``, ``_95`` and ``_max``:
+    of points on the found inner damage surface to the true one, and the other way round, together. NaN where there is
+    nothing to compare. ``found`` and ``missed`` of the true losses, ``invented`` sites."""
 
     iou: float
     volume_error: float
     surface_error: float
     pose_error: float
+    distance_median: float = float("nan")
+    distance_95: float = float("nan")
+    distance_max: float = float("nan")
+    found: int = 0
+    missed: int = 0
+    invented: int = 0
 
 
 def union(solids: Sequence[Solid], origin: Floats) -> Any:
@@ -39,12 +54,6 @@ def iou(found: Sequence[Solid], true: Sequence[Solid]) -> float:
     a, b = union(found, origin), union(true, origin)
     common = (a ^ b).volume()
     return float(common / (a.volume() + b.volume() - common))
-
-
-def inner_area(damage: Solid, part: Mesh) -> float:
-    """Area of the damage's surface that is not the part's: that of the true inner damage surface."""
-    inner = off_part(damage.triangles.mean(1), part) > 1e-6 * part.diagonal
-    return float(np.linalg.norm(damage.cross[inner], axis=1).sum() / 2)
 
 
 def off_part(points: Floats, part: Mesh) -> Floats:
@@ -76,8 +85,37 @@ def pose_error(part: Mesh, found: Floats, true: Floats) -> tuple[float, float]:
     return float(np.sqrt((off_part(moved, part) ** 2).mean())), float(np.sqrt((way**2).mean()))
 
 
+def depth(damage: Mesh, part: Mesh) -> float:
+    """How far the damage reaches below the part's surface."""
+    points = np.concatenate([damage.vertices, surface_points(damage, 2000)[0]])
+    return float(off_part(points, part).max())
+
+
+def distances(found: Mesh, true: Mesh) -> Floats:
+    """(2 * SAMPLES,) distances of points, uniform by area, on each of two surfaces to the other."""
+    there = off_part(surface_points(found, SAMPLES, 1)[0], true)
+    return np.concatenate([there, off_part(surface_points(true, SAMPLES, 2)[0], found)])
+
+
+def matched(found: Sequence[Any], true: Any, part: Mesh, tolerance: float, origin: Floats) -> tuple[int, int, int]:
+    """How many connected losses of the ``true`` damage were found and missed, and how many sites were invented.
+
+    Args are Manifolds relative to ``origin`` (3,). A loss no deeper than the tolerance is none by definition.
+    """
+    from manifold3d import Manifold, OpType
+
+    everything = Manifold.batch_boolean([Manifold(), *found], OpType.Add)
+    hits = []
+    for piece in true.decompose():
+        solid = to_solid(piece, origin)
+        if solid is not None and depth(solid, part) > tolerance:
+            hits.append((piece ^ everything).volume() >= MATCH * piece.volume())
+    invented = sum((site ^ true).volume() < MATCH * site.volume() for site in found)
+    return sum(hits), len(hits) - sum(hits), invented
+
+
 def score(
-    part: Solid,
+    part: Part,
     found: Sequence[Solid],
     true: Solid | None,
     tolerance: float,
@@ -90,20 +128,30 @@ def score(
     along; the poses' small errors count against the damage otherwise.
     """
     nan = float("nan")
-    after, way = nan, nan
+    after, way, D = nan, nan, np.eye(4)
     if found_pose is not None and true_pose is not None:
         after, way = pose_error(part, found_pose, true_pose)
-    if true is None or not found:
-        empty = true is None and not found
-        return Score(float(empty), nan if true is None else -1.0, nan, after)
+        if after < tolerance and way > max(4 * after, tolerance / 4):
+            D = found_pose @ np.linalg.inv(true_pose)
     origin = part.bounds.mean(0)
-    expected, actual = to_manifold(true, origin), union(found, origin)
-    if found_pose is not None and true_pose is not None and after < tolerance and way > max(4 * after, tolerance / 4):
-        D = found_pose @ np.linalg.inv(true_pose)
-        D[:3, 3] += D[:3, :3] @ origin - origin
-        expected = expected.transform(np.ascontiguousarray(D[:3]))
+    if true is None:
+        return Score(float(not found), nan, nan, after, invented=len(found))
+    moved = Solid(true.vertices @ D[:3, :3].T + D[:3, 3], true.faces)
+    expected, sites = to_manifold(moved, origin), [to_manifold(solid, origin) for solid in found]
+    counts = matched(sites, expected, part, tolerance, origin)
+    if not found:
+        return Score(0.0, -1.0, nan, after, nan, nan, nan, *counts)
+    actual = union(found, origin)
     common = (expected ^ actual).volume()
     a, b = expected.volume(), actual.volume()
     differs = max(a + b - 2 * common, 0.0)
-    area = inner_area(true, part)
-    return Score(common / (a + b - common), b / a - 1, differs / area / tolerance if area else nan, after)
+    # which faces are the part's skin is told in the frame where they lie on it
+    inner = ids_surface(true, part)
+    left = ids_surface(whole, part) if (whole := to_solid(actual, origin)) else None
+    far = (nan, nan, nan)
+    if left is not None and len(left.faces) and len(inner.faces):
+        other = Mesh(inner.vertices @ D[:3, :3].T + D[:3, 3], inner.faces)
+        apart = distances(left, other)
+        far = (float(np.median(apart)), float(np.quantile(apart, 0.95)), float(apart.max()))
+    surface = differs / inner.area / tolerance if inner.area else nan
+    return Score(common / (a + b - common), b / a - 1, surface, after, *far, *counts)

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from damageest.evaluate.damages import KINDS, SHARE, depth, random_damage
+from damageest.evaluate.damages import KINDS, SHARE, random_damage
 from damageest.evaluate.parts import PARTS
-from damageest.evaluate.scores import iou
+from damageest.evaluate.scores import depth, iou
 from damageest.solids import to_manifold
 from damageest.stages.scan.simulate import Simulate
 

@@ -10,11 +10,12 @@ import trimesh
 
 from damageest.contracts import STAGES
 from damageest.errors import InputError, JobError
-from damageest.evaluate._table import BEGIN, END, placed, table
+from damageest.evaluate._table import marks, placed, table
 from damageest.evaluate.matrix import Cell, matrix
 from damageest.registry import Registry
 from tests import damaged_box
 
+BEGIN, END = marks("matrix")
 README = Path(__file__).parents[2] / "README.md"
 JOB = """\
 version: 1
@@ -66,10 +67,10 @@ def test_a_job_without_a_truth_is_refused(tmp_path: Path, registry: Registry) ->
 def test_the_table_goes_between_the_marks_and_nowhere_else(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
-    assert placed(page, "new") == f"before\n{BEGIN}\n\nnew\n\n{END}\nafter\n"
+    assert placed(page, "new", "matrix") == f"before\n{BEGIN}\n\nnew\n\n{END}\nafter\n"
     page.write_text("no marks\n")
     with pytest.raises(InputError, match="matrix: begin"):
-        placed(page, "new")
+        placed(page, "new", "matrix")
 
 
 def test_the_readmes_matrix_has_every_implementation(registry: Registry) -> None:
@@ -88,3 +89,4 @@ def test_the_readmes_matrix_has_every_implementation(registry: Registry) -> None
     shipped = ("damageest", "damageest-")
     there = {(s, i.name) for s in STAGES for i in registry.of(s) if i.provider.name.startswith(shipped)}
     assert there <= listed
+    assert listed <= {(s, i.name) for s in STAGES for i in registry.of(s)}, "names what is not there"

@@ -8,7 +8,8 @@ import trimesh
 
 from damageest.artefacts import Floats, Solid
 from damageest.evaluate.parts import PARTS
-from damageest.evaluate.scores import inner_area, iou, score
+from damageest.evaluate.scores import iou, score
+from damageest.settle import ids_surface
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Solid:
@@ -40,7 +41,7 @@ def test_score_of_a_cut_that_is_too_shallow() -> None:
     result = score(part, [found], true, 0.5)
     assert result.iou == pytest.approx(0.9)
     assert result.volume_error == pytest.approx(-0.1)
-    assert inner_area(true, part) == pytest.approx(50 * 30)
+    assert ids_surface(true, part).area == pytest.approx(50 * 30)
     assert result.surface_error == pytest.approx(1 / 0.5)
     assert math.isnan(result.pose_error)
 
@@ -74,3 +75,32 @@ def test_a_wrong_pose_is_wrong() -> None:
     assert score(part, [true], true, 0.2, shifted, np.eye(4)).pose_error == pytest.approx(
         0.1 * math.sqrt(2 * 50 * 30 / part.area), rel=0.1
     )
+
+
+def test_distances_between_the_inner_surfaces_leave_the_skin_out() -> None:
+    part = PARTS["cuboid"]()  # 70 x 50 x 30
+    true, found = box((25, -25, -15), (35, 25, 15)), box((26, -25, -15), (35, 25, 15))
+    result = score(part, [found], true, 0.5)
+    # two parallel faces one apart; the skin, which both share, would bring the median to 0
+    assert (result.distance_median, result.distance_95, result.distance_max) == pytest.approx((1, 1, 1))
+    corner = box((25, 0, 0), (35, 25, 15))
+    result = score(part, [corner], true, 0.5)
+    assert result.distance_median < result.distance_95 < result.distance_max
+    # the true corner at (25, -25, -15) is 25 off the found one's near edge, at y = 0, and 15 off its z = 0
+    assert result.distance_max == pytest.approx(math.hypot(25, 15), rel=0.03)
+
+
+def test_losses_found_and_missed_and_sites_invented() -> None:
+    part = PARTS["cuboid"]()
+    west, east = box((-35, -25, -15), (-30, 25, 15)), box((30, -25, -15), (35, 25, 15))
+    both = Solid(np.concatenate([west.vertices, east.vertices]), np.concatenate([west.faces, east.faces + 8]))
+    half, elsewhere = box((30, -25, -15), (35, 0, 15)), box((-5, 20, -15), (5, 25, 15))
+    result = score(part, [half, elsewhere], both, 0.5)
+    assert (result.found, result.missed, result.invented) == (1, 1, 1)
+    # one site over both losses finds both; a loss within the tolerance is none
+    assert score(part, [box((-35, -25, -15), (35, 25, 15))], both, 0.5).found == 2
+    thin = box((34.8, -25, -15), (35, 25, 15))
+    assert score(part, [], thin, 0.5).missed == 0
+    assert score(part, [], thin, 0.1).missed == 1
+    nothing = score(part, [half], None, 0.5)
+    assert (nothing.found, nothing.missed, nothing.invented) == (0, 0, 1)

@@ -1,70 +1,122 @@
+"""`damageest evaluate suite`, and its table in the README."""
+
 from __future__ import annotations
 
-import json
+import re
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 
+from damageest.errors import InputError
 from damageest.evaluate import suite
-from damageest.evaluate._case import Case, cases, scanned
+from damageest.evaluate._report import COLUMNS
+from damageest.evaluate._table import marks
+from damageest.evaluate._vary import Wanted
+from damageest.evaluate.damages import KINDS
+from damageest.evaluate.parts import PARTS
+from damageest.registry import Registry
+from tests.evaluate.call import evaluate, rows_of, timeless
+
+README = Path(__file__).parents[2] / "README.md"
+BEGIN, END = marks("suite")
 
 
-def a_row(case: Case, **figures: Any) -> dict[str, Any]:
-    row = {"key": case.key(), "part": case.part, "seed": case.seed, "kinds": ["pit"], "share": 0.1, "error": ""}
-    return row | {"iou": 0.99, "flagged": False, "sites": 1, "seconds": 2.0} | figures
+def tables(text: str) -> list[list[list[str]]]:
+    """The Markdown tables between the marks, as lines of words."""
+    lines = text.partition(BEGIN)[2].partition(END)[0].splitlines()
+    found: list[list[list[str]]] = []
+    for before, line in zip(["", *lines], lines, strict=False):
+        if line.startswith("|"):
+            found += [] if before.startswith("|") else [[]]
+            found[-1].append([word.strip() for word in line.strip("|").split("|")])
+    return found
 
 
-def test_a_case_repeats_and_its_noise_is_known() -> None:
-    case = Case(0, "cuboid", 5, points=3000)
-    (part, a, kinds), (_, b, _) = scanned(case), scanned(case)
-    assert a.points.tobytes() == b.points.tobytes()
-    assert kinds
-    assert part.volume == pytest.approx(105_000)
-    assert a.truth is not None
-    assert not np.allclose(a.truth.T_part_scan, np.eye(4))
+def check(table: list[list[str]], names: set[str]) -> None:
+    """A table of the suite: its head, and in each line a name and figures."""
+    head, rule, *body = table
+    assert head[1:] == [title for title, _ in COLUMNS.values()]
+    assert rule == ["---", *["---:"] * len(COLUMNS)]
+    assert len(body) > 0
+    for line in body:
+        assert line[0] in names
+        assert len(line) == len(head)
+        assert all(re.fullmatch(r"\d+(\.\d+)?(e[+-]\d+)?%?|–", word) for word in line[1:])
 
 
-def test_an_undamaged_case_has_no_damage() -> None:
-    truth = scanned(Case(0, "cuboid", 5, points=1000, undamaged=True))[1].truth
-    assert truth is not None
-    assert truth.damage is None
+def test_two_methods_on_a_part_twice_over_and_the_table_in_a_page(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
+    words = ["--cases", 1, "--parts", "cuboid", "--pose", "identity", "--points", 20_000, "--size", 5]
+    words += ["--vary", "method=implicit,surface", "--no-plots"]
+    done = evaluate("suite", *words, "--out", tmp_path / "a", "--write", page)
+    assert done.returncode == 0, done.stderr
+    text = page.read_text()
+    assert text.startswith(f"before\n{BEGIN}\n")
+    assert text.endswith(f"{END}\nafter\n")
+    parts, methods = tables(text)
+    check(parts, {"cuboid", "all"})
+    check(methods, {"implicit", "surface"})
+    assert parts[0][0] == "part"
+    assert methods[0][0] == "method"
+    assert re.search(r"`damageest evaluate suite --cases 1 .*`\. Measured \d{4}-\d\d-\d\d: Python .*damageest", text)
+    assert done.stdout.splitlines()[-1].startswith("Damage 5 mm deep with method implicit was found in at least 95 %")
+
+    assert evaluate("suite", *words, "--jobs", 1, "--out", tmp_path / "b").returncode == 0
+    a, b = rows_of(tmp_path / "a"), rows_of(tmp_path / "b")
+    assert {key: timeless(row) for key, row in a.items()} == {key: timeless(row) for key, row in b.items()}
+    assert sorted(row["methods"] for row in a.values()) == [["implicit"], ["surface"]]
+    assert all(row["found"] == 1 and row["iou"] > 0.9 for row in a.values())
 
 
-def test_rows_on_file_are_not_run_again_and_new_ones_are_appended(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    wanted = cases(3, 0, ["cuboid", "block"], "random", "auto", False, 1000, "4")
-    out = tmp_path / "rows.jsonl"
-    out.write_text(json.dumps(a_row(wanted[1])) + '\n{"key": "cut sh')
-    ran: list[str] = []
-
-    def apart(case: Case, timeout: float) -> dict[str, Any]:
-        ran.append(case.key())
-        return a_row(case, volume_error=0.01)
-
-    monkeypatch.setattr(suite, "_apart", apart)
-    rows = suite.run_all(wanted, out, 1, 10)
-    assert ran == [wanted[0].key(), wanted[2].key()]
-    assert [row["key"] for row in rows] == [case.key() for case in wanted]
-    suite.run_all(wanted, out, 1, 10)
-    assert len(ran) == 2
-    assert "+0.0100" in capsys.readouterr().out
+def test_cases_go_through_parts_and_kinds_in_turn_and_their_seeds_differ(registry: Registry) -> None:
+    cases = suite.cases(40, 2, list(PARTS), "random", Wanted(tolerance="4"), registry)
+    assert [case.part for case in cases] == [list(PARTS)[k % 13] for k in range(40)]
+    assert {case.first for case in cases} == set(KINDS)
+    # the second round has other damages on the parts
+    assert all(a.first != b.first for a, b in zip(cases[:13], cases[13:26], strict=True))
+    assert [case.seed for case in cases] == list(range(2000, 2040))
+    assert all(case.tolerance == pytest.approx(4 * case.scanner["noise"]) for case in cases)
+    assert len({case.key() for case in cases}) == 40
 
 
-def test_a_case_that_takes_too_long_is_a_row_with_an_error() -> None:
-    row = suite._apart(Case(0, "cuboid", 5), timeout=0.01)
-    assert "not done" in row["error"]
-    assert row["iou"] == 0
-    assert not row["flagged"]
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--parts", "cubiod"], "no part 'cubiod' (did you mean 'cuboid'?)"),
+        (["--method", "implizit"], "did you mean 'implicit'?"),
+        (["--pose", "unknown"], "--pose: random or identity"),
+        (["--cases", "0"], "--cases: give 1 or more"),
+    ],
+)
+def test_faults_are_named(words: list[str], said: str) -> None:
+    done = evaluate("suite", *words)
+    assert done.returncode == 2
+    assert said in done.stderr
 
 
-def test_the_summary_counts_right_wrong_and_flagged() -> None:
-    case = Case(0, "cuboid", 5)
-    figures: list[dict[str, Any]] = [{}, {"flagged": True}, {"iou": 0.92}, {"iou": 0.3}, {"iou": 0.2, "flagged": True}]
-    text = suite.summary([a_row(case, **f) for f in figures])
-    assert "5 cases: IoU >= 0.95: 2 (40%), median 0.9200, worst 0.200; 0 without a result" in text
-    assert "wrong (IoU < 0.9): 2, flagged 1 of them" in text
-    assert "falsely flagged: 1 of 3 with IoU >= 0.9, 1 of 2 with IoU >= 0.95" in text
-    assert suite.summary([a_row(case, sites=0), a_row(case)], undamaged=True).startswith("2 undamaged: 1 without")
+def test_a_page_without_marks_is_refused_before_anything_runs(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("no marks\n")
+    done = evaluate("suite", "--write", page)
+    assert done.returncode == 2
+    assert "suite: begin" in done.stderr
+    assert "[1/" not in done.stderr
+
+
+def test_the_readmes_table_is_of_this_suite(registry: Registry) -> None:
+    found = tables(README.read_text())
+    assert found, "the table is missing: damageest evaluate suite --write README.md"
+    assert found[0][0][0] == "part"
+    check(found[0], {*PARTS, "all"})
+    assert {line[0] for line in found[0][2:]} == {*PARTS, "all"}
+    for table in found[1:]:
+        axis = table[0][0]
+        known = {item.name for item in registry.of(axis)} or {"auto", "implicit", "surface", "octree"}
+        names = known if axis == "method" or registry.of(axis) else {line[0] for line in table[2:]}
+        check(table, names)
+
+
+def test_an_unknown_part_is_an_error_of_its_own(registry: Registry) -> None:
+    with pytest.raises(InputError, match="there are: block"):
+        suite.cases(1, 0, ["nothing"], "random", Wanted(), registry)

@@ -1,0 +1,134 @@
+"""Figures over rows: one set for all of them, one for each value of what was varied, and the sentence that says it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from damageest.evaluate._run import Row
+
+RIGHT, WRONG = 0.95, 0.9
+"""IoU from which a case is right, and below which it is wrong."""
+ENOUGH = 0.95
+"""Share of the cases in which a damage has to be found."""
+CONFIDENCE = 0.95
+
+Number = float | int | None
+
+
+def figures(rows: Sequence[Row]) -> dict[str, Number]:
+    """Of the rows that are cases. IoU, errors and distances: of those with damage. None where there is nothing to say.
+
+    ``right``: share of the cases; ``volume_error``, ``surface_error``, ``distance_95``, ``pose_error``, ``seconds``:
+    medians; ``distance_max``, ``seconds_max``, ``megabytes``: the largest; the others: how many.
+    """
+    rows = [row for row in rows if not row["skipped"]]
+    damaged = [row for row in rows if row["size"] != 0]
+    iou = np.array([row["iou"] for row in rows])
+    flagged = np.array([row["flagged"] for row in rows], dtype=bool)
+    lost = [row for row in rows if (row.get("pose_error") or 0) > row["tolerance"]]
+    return {
+        "cases": len(rows),
+        "right": _of(rows, "iou", lambda values: np.mean(values >= RIGHT)),
+        "iou": _of(damaged, "iou", np.median),
+        "worst": _of(damaged, "iou", np.min),
+        "volume_error": _of(damaged, "volume_error", lambda values: np.median(np.abs(values))),
+        "surface_error": _of(damaged, "surface_error", np.median),
+        "distance_median": _of(damaged, "distance_median", np.median),
+        "distance_95": _of(damaged, "distance_95", np.median),
+        "distance_max": _of(damaged, "distance_max", np.max),
+        "found": sum(row["found"] for row in rows),
+        "missed": sum(row["missed"] for row in rows),
+        "invented": sum(row["invented"] for row in rows),
+        "pose_error": _of(rows, "pose_error", np.median),
+        "pose_lost": len(lost),
+        "wrong": int((iou < WRONG).sum()),
+        "wrong_flagged": int(((iou < WRONG) & flagged).sum()),
+        "right_flagged": int(((iou >= RIGHT) & flagged).sum()),
+        "errors": sum(bool(row["error"]) for row in rows),
+        "seconds": _of(rows, "seconds", np.median),
+        "seconds_max": _of(rows, "seconds", np.max),
+        "megabytes": _of(rows, "megabytes", np.max),
+    }
+
+
+def _of(rows: Sequence[Row], name: str, of: Callable[[Any], Any]) -> float | None:
+    known = [row[name] for row in rows if row.get(name) is not None]
+    return float(of(np.array(known))) if known else None
+
+
+def axes_of(rows: Sequence[Row]) -> dict[str, list[Any]]:
+    """What was varied, and its values in their order."""
+    axes: dict[str, list[Any]] = {}
+    for row in rows:
+        for name, label in row["varied"].items():
+            if label not in axes.setdefault(name, []):
+                axes[name].append(label)
+    return axes
+
+
+def by(rows: Sequence[Row], axis: str) -> dict[Any, list[Row]]:
+    """The rows of each value of an axis; ``part`` is one as well."""
+    if axis == "part":
+        return {name: [row for row in rows if row["part"] == name] for name in dict.fromkeys(r["part"] for r in rows)}
+    return {label: [row for row in rows if row["varied"].get(axis) == label] for label in axes_of(rows)[axis]}
+
+
+def sentence(rows: Sequence[Row], unit: str) -> str:
+    """From which depth on damage was found in 95 % of the cases; where depth was not varied, how much was found."""
+    rows = [row for row in rows if not row["skipped"]]
+    sound = [row for row in rows if row["size"] == 0]
+    alarms = sum(row["sites"] > 0 for row in sound)
+    also = f"; on {alarms} of {_many(len(sound), 'scan')} of the sound part it saw damage" if sound else ""
+    rows = [row for row in rows if row["size"] != 0]
+    if not rows:
+        return f"Damage was looked for{also}." if sound else "There was no case."
+    if any(row["size"] is None for row in rows):
+        text = f"All damage was found in {sum(_found(row) for row in rows)} of {_many(len(rows), 'case')}"
+        return f"{text}, and nothing else in {sum(not row['invented'] for row in rows)}{also}."
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple((k, v) for k, v in row["varied"].items() if k != "size"), []).append(row)
+    texts = [_least(group, unit, " with " + ", ".join(f"{k} {v}" for k, v in key)) for key, group in groups.items()]
+    if len(groups) == 1:
+        texts = [_least(rows, unit, "")]
+    return f"{'; '.join(texts)}{also}."
+
+
+def _least(rows: Sequence[Row], unit: str, where: str) -> str:
+    """The least depth from which on all depths were found often enough."""
+    sizes = sorted({row["size"] for row in rows})
+    share = {size: float(np.mean([_found(row) for row in rows if row["size"] == size])) for size in sizes}
+    enough = [size for k, size in enumerate(sizes) if all(share[other] >= ENOUGH for other in sizes[k:])]
+    if not enough:
+        best = f"{_percent(share[sizes[-1]])} of the cases at {sizes[-1]:g} {unit}, the deepest tried"
+        return f"No depth{where} was found in {_percent(ENOUGH)} of the cases ({best})"
+    deepest = [row for row in rows if row["size"] == enough[0]]
+    hits = sum(_found(row) for row in deepest)
+    deeper = " or more" if len(enough) > 1 else ""
+    return (
+        f"Damage {enough[0]:g} {unit} deep{deeper}{where} was found in at least {_percent(ENOUGH)} of the cases "
+        f"({hits} of {len(deepest)}; with {_percent(CONFIDENCE)} confidence the true share is "
+        f"above {_percent(surely(hits, len(deepest)))})"
+    )
+
+
+def surely(hits: int, cases: int) -> float:
+    """The share that the true one exceeds with the confidence, by Clopper and Pearson."""
+    from scipy.stats import beta
+
+    return float(beta.ppf(1 - CONFIDENCE, hits, cases - hits + 1)) if hits else 0.0
+
+
+def _found(row: Row) -> bool:
+    return bool(row["found"] and not row["missed"])
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}" + ("s" if count != 1 else "")

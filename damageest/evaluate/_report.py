@@ -1,0 +1,134 @@
+"""The evaluation as text and as files: tables, a line for each case, cases.csv, summary.json."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from damageest.evaluate._figures import RIGHT, WRONG, Number, axes_of, by, figures, sentence
+from damageest.evaluate._run import Row
+from damageest.evaluate._table import about, markdown, versions
+
+COLUMNS: dict[str, tuple[str, str]] = {
+    "cases": ("cases", "d"),
+    "right": ("right", ".0%"),
+    "iou": ("IoU", ".3f"),
+    "worst": ("worst", ".3f"),
+    "volume_error": ("volume error", ".1%"),
+    "surface_error": ("surface error", ".2f"),
+    "distance_95": ("95 % within", ".3g"),
+    "distance_max": ("all within", ".3g"),
+    "found": ("found", "d"),
+    "missed": ("missed", "d"),
+    "invented": ("invented", "d"),
+    "seconds": ("s", ".1f"),
+    "megabytes": ("peak MB", ".0f"),
+}
+"""Name among the figures to the table's head and the form of the number."""
+
+
+def legend(unit: str) -> str:
+    """What the columns say."""
+    return (
+        f"right: IoU >= {RIGHT}. IoU, volume error (either sign), surface error (in tolerances) and seconds: medians. "
+        f"95 % within, all within: how far, in {unit}, the found and the true inner damage surface lie apart, median "
+        "and largest over the cases. found, missed, invented: losses and sites over all cases."
+    )
+
+
+def cells(rows: Sequence[Row], axis: str, unit: str) -> list[list[str]]:
+    """Head and body of a table with a line for each value of an axis; an empty one: a single line for all."""
+    lengths = {"size": f"depth, {unit}"}
+    groups = by(rows, axis) if axis else {"all": rows}
+    body = [[_label(label), *_numbers(figures(group))] for label, group in groups.items()]
+    return [[lengths.get(axis, axis), *(head for head, _ in COLUMNS.values())], *body]
+
+
+def _numbers(found: dict[str, Number]) -> list[str]:
+    return [_number(found[name], form) for name, (_, form) in COLUMNS.items()]
+
+
+def _number(value: Number, form: str) -> str:
+    return "–" if value is None else format(value, form)
+
+
+def _label(label: Any) -> str:
+    return f"{label:g}" if isinstance(label, float) else str(label)
+
+
+def plain(lines: Sequence[Sequence[str]]) -> str:
+    """A table in columns."""
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    return "\n".join(
+        "  ".join(word.rjust(w) if k else word.ljust(w) for k, (word, w) in enumerate(zip(line, widths, strict=True)))
+        for line in lines
+    )
+
+
+def tables(rows: Sequence[Row], axes: Sequence[str], unit: str) -> str:
+    """One for each axis, and what does not go into tables."""
+    made = [plain(cells(rows, axis, unit)) for axis in axes or ("",)]
+    return "\n\n".join([*made, legend(unit), remarks(rows)])
+
+
+def remarks(rows: Sequence[Row]) -> str:
+    """How far the results owned up to being wrong, and what went wrong."""
+    found = figures(rows)
+    skipped = [row for row in rows if row["skipped"]]
+    lines = [
+        f"wrong (IoU < {WRONG}): {found['wrong']}, flagged {found['wrong_flagged']} of them; right but flagged: "
+        f"{found['right_flagged']}; without a result: {found['errors']}; pose off by more than the tolerance: "
+        f"{found['pose_lost']}"
+    ]
+    if skipped:
+        lines.append(f"left out: {len(skipped)}, as {skipped[0]['error']}")
+    return "\n".join(lines)
+
+
+def readme_table(rows: Sequence[Row], axes: Sequence[str], unit: str, command: str) -> str:
+    """The tables for a README, with what was measured, when and on what."""
+    made = [
+        markdown([*cells(rows, axis, unit), *([["all", *_numbers(figures(rows))]] if not k else [])])
+        for k, axis in enumerate(axes)
+    ]
+    return "\n\n".join([*made, f"{legend(unit)} {remarks(rows).splitlines()[0]}.", about(f"`{command}`")])
+
+
+def line(row: Row) -> str:
+    """What is told of a case when it is done."""
+    what = " ".join([row["part"], str(row["seed"]), *(f"{k}={_label(v)}" for k, v in row["varied"].items())])
+    if row["skipped"]:
+        return f"{what}: left out: {row['error']}"
+    text = f"{what}: {'+'.join(row['kinds']) or 'sound'}: IoU {row['iou']:.3f}, {row['seconds']:.1f} s"
+    said = [row["error"], *row["failures"], *row["reasons"]]
+    return text + "".join(f"\n  {remark[:200]}" for remark in said if remark)
+
+
+def write_files(rows: Sequence[Row], unit: str, folder: Path, command: str) -> None:
+    """cases.csv and summary.json; cases.jsonl is there already."""
+    flat = [_flat(row) for row in rows]
+    names = list(dict.fromkeys(name for row in flat for name in row))
+    with (folder / "cases.csv").open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, names, restval="")
+        writer.writeheader()
+        writer.writerows(flat)
+    groups = {
+        axis: [{"value": v, **figures(g)} for v, g in by(rows, axis).items()] for axis in ("part", *axes_of(rows))
+    }
+    summary = {"command": command, "unit": unit, **versions(), "sentence": sentence(rows, unit)}
+    summary |= {"all": figures(rows), "by": groups}
+    (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+
+
+def _flat(row: Row) -> dict[str, Any]:
+    """A row without nesting: lists as text, mappings as columns of their own."""
+    flat: dict[str, Any] = {}
+    for name, value in row.items():
+        if isinstance(value, dict):
+            flat |= {f"{name}.{key}": inner for key, inner in value.items()}
+        else:
+            flat[name] = "; ".join(map(str, value)) if isinstance(value, list) else value
+    return flat

@@ -1,0 +1,18 @@
+"""Rows as cases give them, made up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from damageest.evaluate._case import Case, blank
+
+
+def row(**figures: Any) -> dict[str, Any]:
+    """The row of a case that went well, with other ``figures``."""
+    case = Case("cuboid", 5, "pit", 0.2, scanner={"noise": 0.05, "points": 1000})
+    well = {"iou": 0.99, "volume_error": -0.01, "surface_error": 0.2, "pose_error": 0.01, "found": 1, "missed": 0}
+    return blank(case) | well | {"sites": 1, "seconds": 2.0, "megabytes": 100.0} | figures
+
+
+MISSED = {"iou": 0.0, "volume_error": -1.0, "surface_error": None, "found": 0, "missed": 1, "sites": 0}
+SOUND = {"size": 0, "iou": 1.0, "volume_error": None, "surface_error": None, "found": 0, "sites": 0}

@@ -1,0 +1,77 @@
+"""What the figures count, and what the sentence says of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from damageest.evaluate._figures import axes_of, by, figures, sentence, surely
+from damageest.evaluate._report import cells, line, plain, remarks
+from tests.evaluate.rows import MISSED, SOUND, row
+
+
+def at(size: float, found: int, missed: int, **varied: float) -> list[dict[str, object]]:
+    places = {"size": size, "varied": {"size": size, **varied}}
+    return [row(**places) for _ in range(found)] + [row(**places, **MISSED) for _ in range(missed)]
+
+
+def test_figures_count_right_wrong_and_flagged() -> None:
+    rows = [row(), row(flagged=True), row(iou=0.92), row(iou=0.3, pose_error=0.3), row(flagged=True, **MISSED)]
+    found = figures([*rows, row(skipped=True, error="no room")])
+    assert (found["cases"], found["right"], found["iou"], found["worst"]) == (5, 0.4, 0.92, 0)
+    assert (found["wrong"], found["wrong_flagged"], found["right_flagged"]) == (2, 1, 1)
+    assert (found["found"], found["missed"], found["pose_lost"]) == (4, 1, 1)
+    assert found["volume_error"] == pytest.approx(0.01)
+    assert "wrong (IoU < 0.9): 2, flagged 1 of them; right but flagged: 1" in remarks(rows)
+
+
+def test_sound_parts_do_not_count_as_damage_found_well() -> None:
+    found = figures([row(iou=0.5), row(**SOUND)])
+    assert found["iou"] == 0.5
+    assert found["right"] == 0.5
+    assert figures([row(**SOUND)])["iou"] is None
+
+
+def test_a_table_has_a_line_for_each_value() -> None:
+    rows = at(0.4, 0, 2) + at(0.8, 2, 0)
+    assert axes_of(rows) == {"size": [0.4, 0.8]}
+    assert [len(group) for group in by(rows, "size").values()] == [2, 2]
+    head, first, second = plain(cells(rows, "size", "mm")).splitlines()
+    assert head.startswith("depth, mm")
+    assert first.split()[:4] == ["0.4", "2", "0%", "0.000"]
+    assert second.split()[:4] == ["0.8", "2", "100%", "0.990"]
+    assert len(head) == len(first) == len(second)
+
+
+def test_the_sentence_names_the_least_depth_from_which_all_are_found() -> None:
+    # found by chance at 0.2 does not count where 0.4 is missed
+    text = sentence(at(0.2, 3, 0) + at(0.4, 2, 1) + at(0.8, 20, 0) + at(1.6, 19, 1), "mm")
+    assert text.startswith("Damage 0.8 mm deep or more was found in at least 95 % of the cases (20 of 20; ")
+    assert text.endswith("the true share is above 86 %).")
+    assert sentence(at(0.2, 1, 1) + at(0.4, 9, 1), "in") == (
+        "No depth was found in 95 % of the cases (90 % of the cases at 0.4 in, the deepest tried)."
+    )
+
+
+def test_the_sentence_goes_through_what_else_was_varied_and_sound_parts() -> None:
+    rows = at(0.2, 1, 0, noise=0.1) + at(0.4, 1, 0, noise=0.1) + at(0.2, 0, 1, noise=0.2) + at(0.4, 1, 0, noise=0.2)
+    text = sentence([*rows, row(**SOUND), row(**SOUND | {"sites": 1, "iou": 0.0})], "mm")
+    assert "Damage 0.2 mm deep or more with noise 0.1 was" in text
+    assert "; Damage 0.4 mm deep with noise 0.2 was" in text
+    assert text.endswith("; on 1 of 2 scans of the sound part it saw damage.")
+
+
+def test_the_sentence_where_depth_was_not_varied() -> None:
+    text = sentence([row(), row(invented=1), row(**MISSED)], "mm")
+    assert text == "All damage was found in 2 of 3 cases, and nothing else in 2."
+    assert sentence([row(**SOUND)], "mm") == "Damage was looked for; on 0 of 1 scan of the sound part it saw damage."
+
+
+def test_how_sure_a_share_is() -> None:
+    assert surely(10, 10) == pytest.approx(0.05**0.1)
+    assert surely(0, 10) == 0
+
+
+def test_a_case_is_told_with_what_went_wrong() -> None:
+    assert line(row(kinds=["pit"])) == "cuboid 5: pit: IoU 0.990, 2.0 s"
+    assert line(row(error="align: lost", **MISSED)).endswith("\n  align: lost")
+    assert line(row(skipped=True, error="no room")) == "cuboid 5: left out: no room"

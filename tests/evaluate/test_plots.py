@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import sys
+import xml.etree.ElementTree as Xml
+from pathlib import Path
+
+import pytest
+
+from damageest.errors import InputError
+from damageest.evaluate._plots import draw, require
+from tests.evaluate.rows import MISSED, row
+
+
+def test_what_was_varied_is_drawn_and_the_errors(tmp_path: Path) -> None:
+    rows = [
+        row(varied={"noise": n, "points": p, "tolerance": t, "size": s}, tolerance=t, size=s, surface_error=0.1 * n)
+        for n, p, t, s in [(1, 1000, 0.1, 0.5), (2, 1000, 0.2, 1.0), (2, 4000, 0.1, 1.0)]
+    ]
+    rows.append(row(varied=rows[0]["varied"], size=0.5, **MISSED))
+    made = draw(rows, "mm", tmp_path)
+    assert {path.stem for path in made} == {
+        "error_by_noise",
+        "time_by_points",
+        "time_by_tolerance",
+        "found_by_depth",
+        "errors",
+    }
+    for path in made:
+        if path.suffix == ".png":
+            assert path.read_bytes().startswith(b"\x89PNG")
+        else:
+            assert Xml.parse(path).getroot().tag.endswith("svg")
+    before = {path: path.read_bytes() for path in made}
+    draw(rows, "mm", tmp_path)
+    assert {path: path.read_bytes() for path in made} == before
+
+
+def test_nothing_varied_and_nothing_found_draws_nothing(tmp_path: Path) -> None:
+    assert draw([row(**MISSED)], "mm", tmp_path) == []
+    assert [path.stem for path in draw([row()], "mm", tmp_path)] == ["errors", "errors"]
+
+
+def test_without_matplotlib_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    require()
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(InputError, match=r"pip install 'damageest\[evaluate\]', or --no-plots"):
+        require()
