@@ -56,8 +56,8 @@ def job_command(
 ) -> None:
     """How deep a damage has to be to be found on your part with your scanner, and how well it is found.
 
-    Random damages are taken off the job's part and scanned virtually, with the noise and density of the job's scan.
-    Without --size: no damage, and depths of 2, 4, 8 and 16 tolerances.
+    Random damages are taken off the job's part and scanned virtually, with the noise and density of the job's scan;
+    damage that the job itself simulates is left out. Without --size: none, and depths of 2, 4, 8 and 16 tolerances.
     """
     from damageest.evaluate._figures import sentence
     from damageest.evaluate._vary import Wanted
@@ -159,7 +159,14 @@ def _report(rows: list[dict[str, Any]], first: list[str], unit: str, out: Path |
 
 
 def _command() -> str:
-    return shlex.join(["damageest", *sys.argv[1:]])
+    """The command line, without where its output goes."""
+    words, places = sys.argv[1:], ("--out", "--write")
+    kept = [
+        word
+        for before, word in zip(["", *words], words, strict=False)
+        if before not in places and word.partition("=")[0] not in places
+    ]
+    return shlex.join(["damageest", *kept])
 
 
 @app.command("matrix")

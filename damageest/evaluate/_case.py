@@ -53,8 +53,8 @@ class Case:
     file: str = ""
 
     def key(self) -> str:
-        """Names the case among the rows of a file, wherever its part and job lie."""
-        values = {name: value for name, value in vars(self).items() if name not in ("job", "file")}
+        """Names the case among the rows of a file, wherever its part and job lie and whatever else is varied."""
+        values = {name: value for name, value in vars(self).items() if name not in ("job", "file", "varied")}
         return hashlib.sha256(json.dumps([version("damageest"), values]).encode()).hexdigest()[:16]
 
 
@@ -114,18 +114,16 @@ def run_case(case: Case) -> dict[str, Any]:
     row |= {"kinds": list(kinds), "points": len(scan.points)}
     row |= {"share": lost.volume / part.volume, "depth": depth(lost, part)} if lost else {}
     start = time.perf_counter()
+    found = None
     try:
         alone = Scan(scan.points, unit=scan.unit)  # without the truth
         found = damageest.run(case.job or {"version": 1}, part=part, scan=alone, settings=case.settings)
     except DamageestError as error:
-        row["seconds"] = time.perf_counter() - start
-        marks = score(part, [], lost, case.tolerance)
         # a stage that refuses owns up to it; a job or an input at fault would be the evaluation's own mistake
-        row |= {"error": _one_line(error), "flagged": isinstance(error, StageError), "missed": marks.missed}
-    else:
-        row["seconds"] = time.perf_counter() - start
-        row |= _scored(found, part, scan)
-    row["megabytes"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        row |= {"error": _one_line(error), "flagged": isinstance(error, StageError)}
+    row["seconds"] = time.perf_counter() - start
+    row["megabytes"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # before the scoring
+    row |= _scored(found, part, scan) if found else {"missed": score(part, [], lost, case.tolerance).missed}
     return {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in row.items()}
 
 

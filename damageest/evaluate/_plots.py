@@ -39,14 +39,16 @@ def draw(rows: Sequence[Row], unit: str, folder: Path) -> list[Path]:
 
     varied = axes_of(rows)
     if "noise" in varied:
+        own = all(row["varied"]["noise"] == row["noise"] for row in rows)  # not so where the parts differ in size
         pairs = [(row["varied"]["noise"], row["surface_error"] * row["tolerance"]) for row in whole]
-        plot("error_by_noise", "noise", f"surface error, {unit}", pairs)
+        plot("error_by_noise", f"noise, {unit}" if own else "noise, times the usual", f"surface error, {unit}", pairs)
     if "points" in varied:
         pairs = [(row["varied"]["points"], row["seconds"]) for row in rows]
         plot("time_by_points", "points of the scan", "seconds", pairs, scale="log")
     if "tolerance" in varied:
-        pairs = [(1 / row["tolerance"], row["seconds"]) for row in rows]
-        plot("time_by_tolerance", f"1 / tolerance, 1/{unit}", "seconds", pairs)
+        own = all(row["varied"]["tolerance"] in ("auto", row["tolerance"]) for row in rows)
+        pairs = [((1 if own else row["noise"]) / row["tolerance"], row["seconds"]) for row in rows]
+        plot("time_by_tolerance", f"1 / tolerance, 1/{unit}" if own else "noise / tolerance", "seconds", pairs)
     if "size" in varied:
         pairs = [(row["size"], float(row["found"] > 0 and not row["missed"])) for row in damaged if row["size"]]
         plot("found_by_depth", f"depth of the damage, {unit}", "share found", pairs, of=np.mean, dots=False)
@@ -71,7 +73,7 @@ def _against(
     scale: str = "linear",
 ) -> None:
     """All cases as dots, and a line through ``of`` those with the same x."""
-    x, y = np.array([(float(a), b) for a, b in points if not isinstance(a, str)]).T
+    x, y = np.array(points).T
     places = np.unique(x)
     if dots:
         axes.plot(x, y, "o", color="0.7", markersize=4, label="cases")

@@ -6,7 +6,7 @@ import contextlib
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
@@ -41,11 +41,11 @@ def run_all(
 ) -> list[Row]:
     """The rows of all cases in their order; those that the file ``out`` has are taken from there, new ones appended."""
     known = {row["key"]: row for row in read(out)}
-    waiting = [case for case in wanted if case.key() not in known]
-    for row in (known[case.key()] for case in wanted if case.key() in known):
+    waiting = {case.key(): case for case in wanted if case.key() not in known}
+    for row in _named(wanted, known):
         tell(row)
     with ThreadPoolExecutor(jobs) as pool:
-        futures = [pool.submit(_row, case, timeout) for case in waiting]
+        futures = [pool.submit(_row, case, timeout) for case in waiting.values()]
         try:
             for future in as_completed(futures):
                 row = future.result()
@@ -57,7 +57,12 @@ def run_all(
         except BaseException:  # Ctrl-C: what has not begun does not begin
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return [known[case.key()] for case in wanted]
+    return _named(wanted, known)
+
+
+def _named(wanted: Sequence[Case], known: Mapping[str, Row]) -> list[Row]:
+    """The known rows in the order of their cases; what they stand for in the tables is up to the run."""
+    return [known[case.key()] | {"varied": dict(case.varied)} for case in wanted if case.key() in known]
 
 
 def _row(case: Case, timeout: float) -> Row:

@@ -136,7 +136,7 @@ def _tolerances(text: str, base: Base) -> list[tuple[Label | None, Any]]:
 
 def _counts(text: str) -> list[int]:
     try:
-        found = [int(float(word)) for word in text.split(",") if word.strip()]
+        found = list(dict.fromkeys(int(float(word)) for word in text.split(",") if word.strip()))
     except ValueError:
         found = [0]
     if any(count < 1 for count in found):

@@ -59,7 +59,7 @@ def test_two_methods_on_a_part_twice_over_and_the_table_in_a_page(tmp_path: Path
     check(methods, {"implicit", "surface"})
     assert parts[0][0] == "part"
     assert methods[0][0] == "method"
-    assert re.search(r"`damageest evaluate suite --cases 1 .*`\. Measured \d{4}-\d\d-\d\d: Python .*damageest", text)
+    assert re.search(r"`damageest evaluate suite --cases 1 .* --no-plots`\. Measured \d{4}-\d\d-\d\d: Python", text)
     assert done.stdout.splitlines()[-1].startswith("Damage 5 mm deep with method implicit was found in at least 95 %")
 
     assert evaluate("suite", *words, "--jobs", 1, "--out", tmp_path / "b").returncode == 0
