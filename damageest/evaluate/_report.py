@@ -34,8 +34,9 @@ def legend(unit: str) -> str:
     """What the columns say."""
     return (
         f"right: IoU >= {RIGHT}. IoU, volume error (either sign), surface error (in tolerances) and seconds: medians. "
-        f"95 % within, all within: how far, in {unit}, the found and the true inner damage surface lie apart, median "
-        "and largest over the cases. found, missed, invented: losses and sites over all cases."
+        f"95 % within, all within: how far apart, in {unit}, found and true inner damage surface lie where they are "
+        "deeper than the tolerance, median and largest over the cases. found, missed, invented: losses and sites over "
+        "all cases."
     )
 
 

@@ -24,8 +24,9 @@ class Score:
     """``iou`` of found and true damage; ``volume_error`` found over true, less 1; ``surface_error``: volume of the
     symmetric difference per area of the true inner damage surface, in units of the tolerance; ``pose_error``: rms
     distance of the part's surface, moved by the pose's error, to the part. ``distance_median``, ``_95`` and ``_max``:
-    of points on the found inner damage surface to the true one, and the other way round, together. NaN where there is
-    nothing to compare. ``found`` and ``missed`` of the true losses, ``invented`` sites."""
+    of points on the found inner damage surface to the true one, and the other way round, together, where they are
+    deeper than the tolerance. NaN where there is nothing to compare. ``found`` and ``missed`` of the true losses,
+    ``invented`` sites."""
 
     iou: float
     volume_error: float
@@ -91,10 +92,17 @@ def depth(damage: Mesh, part: Mesh) -> float:
     return float(off_part(points, part).max())
 
 
-def distances(found: Mesh, true: Mesh) -> Floats:
-    """(2 * SAMPLES,) distances of points, uniform by area, on each of two surfaces to the other."""
-    there = off_part(surface_points(found, SAMPLES, 1)[0], true)
-    return np.concatenate([there, off_part(surface_points(true, SAMPLES, 2)[0], found)])
+def distances(found: Mesh, true: Mesh, part: Mesh, tolerance: float) -> Floats:
+    """(M,) distances of points, uniform by area, on each of two surfaces to the other.
+
+    Of ``SAMPLES`` points on each, those that lie deeper than the tolerance below the part's skin: what lies shallower,
+    as the damage does along its rim, is sound by definition, and where it ends is anyone's guess.
+    """
+    apart = []
+    for seed, (mesh, other) in enumerate(((found, true), (true, found)), 1):
+        points = surface_points(mesh, SAMPLES, seed)[0]
+        apart.append(off_part(points[off_part(points, part) > tolerance], other))
+    return np.concatenate(apart)
 
 
 def matched(found: Sequence[Any], true: Any, part: Mesh, tolerance: float, origin: Floats) -> tuple[int, int, int]:
@@ -151,7 +159,7 @@ def score(
     far = (nan, nan, nan)
     if left is not None and len(left.faces) and len(inner.faces):
         other = Mesh(inner.vertices @ D[:3, :3].T + D[:3, 3], inner.faces)
-        apart = distances(left, other)
-        far = (float(np.median(apart)), float(np.quantile(apart, 0.95)), float(apart.max()))
+        apart = distances(left, other, part, tolerance)
+        far = (float(np.median(apart)), float(np.quantile(apart, 0.95)), float(apart.max())) if len(apart) else far
     surface = differs / inner.area / tolerance if inner.area else nan
     return Score(common / (a + b - common), b / a - 1, surface, after, *far, *counts)

@@ -84,10 +84,19 @@ def test_distances_between_the_inner_surfaces_leave_the_skin_out() -> None:
     # two parallel faces one apart; the skin, which both share, would bring the median to 0
     assert (result.distance_median, result.distance_95, result.distance_max) == pytest.approx((1, 1, 1))
     corner = box((25, 0, 0), (35, 25, 15))
-    result = score(part, [corner], true, 0.5)
+    result = score(part, [corner], true, 0.05)
     assert result.distance_median < result.distance_95 < result.distance_max
     # the true corner at (25, -25, -15) is 25 off the found one's near edge, at y = 0, and 15 off its z = 0
     assert result.distance_max == pytest.approx(math.hypot(25, 15), rel=0.03)
+
+
+def test_what_is_shallower_than_the_tolerance_does_not_count_as_apart() -> None:
+    part = PARTS["cuboid"]()
+    true = box((25, -25, -15), (35, 25, 15))
+    # beside the same cut, a sliver of 0.2 off the top
+    sliver = box((0, -25, 14.8), (25, 25, 15))
+    assert score(part, [true, sliver], true, 0.5).distance_max == pytest.approx(0, abs=1e-9)
+    assert score(part, [true, sliver], true, 0.1).distance_max == pytest.approx(25, rel=0.03)
 
 
 def test_losses_found_and_missed_and_sites_invented() -> None:
