@@ -69,6 +69,20 @@ def axes_of(rows: Sequence[Row]) -> dict[str, list[Any]]:
     return axes
 
 
+def title(axis: str, rows: Sequence[Row], unit: str) -> str:
+    """What heads the values of an axis."""
+    if axis not in ("noise", "tolerance"):
+        return f"depth, {unit}" if axis == "size" else axis
+    # a multiple where the parts differ in size
+    own = all(row["varied"][axis] in ("auto", row[axis]) for row in rows)
+    return f"{axis}, {unit}" if own else f"{axis}, times the {'usual' if axis == 'noise' else 'noise'}"
+
+
+def label(value: Any) -> str:
+    """A value of an axis as text."""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
 def by(rows: Sequence[Row], axis: str) -> dict[Any, list[Row]]:
     """The rows of each value of an axis; ``part`` is one as well."""
     if axis == "part":
@@ -88,31 +102,41 @@ def sentence(rows: Sequence[Row], unit: str) -> str:
     if any(row["size"] is None for row in rows):
         text = f"All damage was found in {sum(_found(row) for row in rows)} of {_many(len(rows), 'case')}"
         return f"{text}, and nothing else in {sum(not row['invented'] for row in rows)}{also}."
-    groups: dict[tuple[Any, ...], list[Row]] = {}
+    groups: dict[str, list[Row]] = {}
     for row in rows:
-        groups.setdefault(tuple((k, v) for k, v in row["varied"].items() if k != "size"), []).append(row)
-    texts = [_least(group, unit, " with " + ", ".join(f"{k} {v}" for k, v in key)) for key, group in groups.items()]
-    if len(groups) == 1:
-        texts = [_least(rows, unit, "")]
-    return f"{'; '.join(texts)}{also}."
-
-
-def _least(rows: Sequence[Row], unit: str, where: str) -> str:
-    """The least depth from which on all depths were found often enough."""
-    sizes = sorted({row["size"] for row in rows})
-    share = {size: float(np.mean([_found(row) for row in rows if row["size"] == size])) for size in sizes}
-    enough = [size for k, size in enumerate(sizes) if all(share[other] >= ENOUGH for other in sizes[k:])]
-    if not enough:
-        best = f"{_percent(share[sizes[-1]])} of the cases at {sizes[-1]:g} {unit}, the deepest tried"
-        return f"No depth{where} was found in {_percent(ENOUGH)} of the cases ({best})"
-    deepest = [row for row in rows if row["size"] == enough[0]]
-    hits = sum(_found(row) for row in deepest)
-    deeper = " or more" if len(enough) > 1 else ""
+        others = [f"{axis} {label(value)}" for axis, value in row["varied"].items() if axis != "size"]
+        groups.setdefault(", ".join(others), []).append(row)
+    share = f"at least {_percent(ENOUGH)} of the cases"
+    if len(groups) > 1:
+        each = [f"{_from(group, unit)} with {others}" for others, group in groups.items()]
+        return f"Found in {share} was damage {'; '.join(each)}{also}."
+    size, hits, cases, least = _least(rows)
+    if size is None:
+        return f"No depth was found in {share} ({hits} of {cases} at {label(least)} {unit}, the deepest tried){also}."
+    deeper = " or more" if size < max(row["size"] for row in rows) else ""
     return (
-        f"Damage {enough[0]:g} {unit} deep{deeper}{where} was found in at least {_percent(ENOUGH)} of the cases "
-        f"({hits} of {len(deepest)}; with {_percent(CONFIDENCE)} confidence the true share is "
-        f"above {_percent(surely(hits, len(deepest)))})"
+        f"Damage {label(size)} {unit} deep{deeper} was found in {share} ({hits} of {cases}; with "
+        f"{_percent(CONFIDENCE)} confidence the true share is above {_percent(surely(hits, cases))}){also}."
     )
+
+
+def _from(rows: Sequence[Row], unit: str) -> str:
+    size, hits, cases, least = _least(rows)
+    if size is None:
+        return f"of no depth ({hits} of {cases} at {label(least)} {unit})"
+    return f"from {label(size)} {unit} deep ({hits} of {cases})"
+
+
+def _least(rows: Sequence[Row]) -> tuple[float | None, int, int, float]:
+    """The least depth from which on all depths were found often enough, None for none; how many cases of how many were
+    found there, else at the deepest; and that depth."""
+    hits: dict[float, list[bool]] = {}
+    for row in sorted(rows, key=lambda row: -float(row["size"])):
+        hits.setdefault(row["size"], []).append(_found(row))
+    sizes = list(hits)
+    below = next((k for k, size in enumerate(sizes) if np.mean(hits[size]) < ENOUGH), len(sizes))
+    place = sizes[max(below - 1, 0)]
+    return place if below else None, sum(hits[place]), len(hits[place]), place
 
 
 def surely(hits: int, cases: int) -> float:

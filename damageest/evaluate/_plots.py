@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from damageest.errors import InputError
-from damageest.evaluate._figures import axes_of
+from damageest.evaluate._figures import axes_of, title
 from damageest.evaluate._run import Row
 
 SIZE = (6.0, 4.0)
@@ -39,14 +39,13 @@ def draw(rows: Sequence[Row], unit: str, folder: Path) -> list[Path]:
 
     varied = axes_of(rows)
     if "noise" in varied:
-        own = all(row["varied"]["noise"] == row["noise"] for row in rows)  # not so where the parts differ in size
         pairs = [(row["varied"]["noise"], row["surface_error"] * row["tolerance"]) for row in whole]
-        plot("error_by_noise", f"noise, {unit}" if own else "noise, times the usual", f"surface error, {unit}", pairs)
+        plot("error_by_noise", title("noise", rows, unit), f"surface error, {unit}", pairs)
     if "points" in varied:
         pairs = [(row["varied"]["points"], row["seconds"]) for row in rows]
         plot("time_by_points", "points of the scan", "seconds", pairs, scale="log")
     if "tolerance" in varied:
-        own = all(row["varied"]["tolerance"] in ("auto", row["tolerance"]) for row in rows)
+        own = title("tolerance", rows, unit).endswith(unit)
         pairs = [((1 if own else row["noise"]) / row["tolerance"], row["seconds"]) for row in rows]
         plot("time_by_tolerance", f"1 / tolerance, 1/{unit}" if own else "noise / tolerance", "seconds", pairs)
     if "size" in varied:

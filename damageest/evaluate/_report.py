@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from damageest.evaluate._figures import RIGHT, WRONG, Number, axes_of, by, figures, sentence
+from damageest.evaluate._figures import RIGHT, WRONG, Number, axes_of, by, figures, label, sentence, title
 from damageest.evaluate._run import Row
 from damageest.evaluate._table import about, markdown, versions
 
@@ -42,10 +42,9 @@ def legend(unit: str) -> str:
 
 def cells(rows: Sequence[Row], axis: str, unit: str) -> list[list[str]]:
     """Head and body of a table with a line for each value of an axis; an empty one: a single line for all."""
-    lengths = {"size": f"depth, {unit}"}
     groups = by(rows, axis) if axis else {"all": rows}
-    body = [[_label(label), *_numbers(figures(group))] for label, group in groups.items()]
-    return [[lengths.get(axis, axis), *(head for head, _ in COLUMNS.values())], *body]
+    body = [[label(value), *_numbers(figures(group))] for value, group in groups.items()]
+    return [[title(axis, rows, unit), *(head for head, _ in COLUMNS.values())], *body]
 
 
 def _numbers(found: dict[str, Number]) -> list[str]:
@@ -54,10 +53,6 @@ def _numbers(found: dict[str, Number]) -> list[str]:
 
 def _number(value: Number, form: str) -> str:
     return "–" if value is None else format(value, form)
-
-
-def _label(label: Any) -> str:
-    return f"{label:g}" if isinstance(label, float) else str(label)
 
 
 def plain(lines: Sequence[Sequence[str]]) -> str:
@@ -100,7 +95,7 @@ def readme_table(rows: Sequence[Row], axes: Sequence[str], unit: str, command: s
 
 def line(row: Row) -> str:
     """What is told of a case when it is done."""
-    what = " ".join([row["part"], str(row["seed"]), *(f"{k}={_label(v)}" for k, v in row["varied"].items())])
+    what = " ".join([row["part"], str(row["seed"]), *(f"{k}={label(v)}" for k, v in row["varied"].items())])
     if row["skipped"]:
         return f"{what}: left out: {row['error']}"
     text = f"{what}: {'+'.join(row['kinds']) or 'sound'}: IoU {row['iou']:.3f}, {row['seconds']:.1f} s"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from damageest.evaluate._figures import axes_of, by, figures, sentence, surely
+from damageest.evaluate._figures import axes_of, by, figures, sentence, surely, title
 from damageest.evaluate._report import cells, line, plain, remarks
 from tests.evaluate.rows import MISSED, SOUND, row
 
@@ -48,16 +48,27 @@ def test_the_sentence_names_the_least_depth_from_which_all_are_found() -> None:
     assert text.startswith("Damage 0.8 mm deep or more was found in at least 95 % of the cases (20 of 20; ")
     assert text.endswith("the true share is above 86 %).")
     assert sentence(at(0.2, 1, 1) + at(0.4, 9, 1), "in") == (
-        "No depth was found in 95 % of the cases (90 % of the cases at 0.4 in, the deepest tried)."
+        "No depth was found in at least 95 % of the cases (9 of 10 at 0.4 in, the deepest tried)."
     )
 
 
 def test_the_sentence_goes_through_what_else_was_varied_and_sound_parts() -> None:
-    rows = at(0.2, 1, 0, noise=0.1) + at(0.4, 1, 0, noise=0.1) + at(0.2, 0, 1, noise=0.2) + at(0.4, 1, 0, noise=0.2)
-    text = sentence([*rows, row(**SOUND), row(**SOUND | {"sites": 1, "iou": 0.0})], "mm")
-    assert "Damage 0.2 mm deep or more with noise 0.1 was" in text
-    assert "; Damage 0.4 mm deep with noise 0.2 was" in text
-    assert text.endswith("; on 1 of 2 scans of the sound part it saw damage.")
+    rows = at(0.2, 1, 0, noise=0.1) + at(0.4, 1, 0, noise=0.1) + at(0.2, 0, 1, noise=0.2) + at(0.4, 2, 0, noise=0.2)
+    rows += at(0.2, 1, 0, noise=0.3) + at(0.4, 1, 2, noise=0.3)
+    assert sentence([*rows, row(**SOUND), row(**SOUND | {"sites": 1, "iou": 0.0})], "mm") == (
+        "Found in at least 95 % of the cases was damage from 0.2 mm deep (1 of 1) with noise 0.1; from 0.4 mm deep "
+        "(2 of 2) with noise 0.2; of no depth (1 of 3 at 0.4 mm) with noise 0.3; on 1 of 2 scans of the sound part it "
+        "saw damage."
+    )
+
+
+def test_heads_name_the_unit_or_that_values_are_multiples() -> None:
+    assert title("noise", [row(varied={"noise": 0.05})], "in") == "noise, in"
+    assert title("noise", [row(varied={"noise": 2.0})], "in") == "noise, times the usual"
+    assert title("tolerance", [row(varied={"tolerance": 4.0}), row(varied={"tolerance": "auto"})], "mm").endswith(
+        "noise"
+    )
+    assert title("method", [row(varied={"method": "auto"})], "mm") == "method"
 
 
 def test_the_sentence_where_depth_was_not_varied() -> None:

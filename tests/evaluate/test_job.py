@@ -44,7 +44,7 @@ def test_depths_found_and_not_found_are_told_kept_and_gone_on_from(tmp_path: Pat
     assert head[:5] == ["depth,", "mm", "cases", "right", "IoU"]
     assert [text[:2] for text in body] == [["0", "2"], ["4", "2"]]
     last = done.stdout.splitlines()[-1]
-    assert last.startswith("Damage 4 mm deep with noise 0.02 was found in at least 95 % of the cases (1 of 1;")
+    assert last.startswith("Found in at least 95 % of the cases was damage from 4 mm deep (1 of 1) with noise 0.02; ")
     assert last.endswith("; on 0 of 2 scans of the sound part it saw damage.")
 
     summary = json.loads((out / "summary.json").read_text())
@@ -89,7 +89,7 @@ def test_a_case_that_takes_too_long_is_a_row_with_an_error(tmp_path: Path) -> No
     done = evaluate("job", job, "--seeds", 1, "--size", "4", "--timeout", 0.01)
     assert done.returncode == 0, done.stderr
     assert "not done after 0.01 s" in done.stderr
-    assert "No depth was found in 95 % of the cases (0 % of the cases at 4 mm" in done.stdout
+    assert "No depth was found in at least 95 % of the cases (0 of 1 at 4 mm, the deepest tried)" in done.stdout
 
 
 @pytest.fixture
