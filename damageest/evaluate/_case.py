@@ -10,7 +10,6 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +36,8 @@ class Case:
     ``part`` is the name of a built-in one, or what the one in ``file`` (.npz) is called. ``first``: kind of the first
     loss. ``size``: depth of the damage; 0: none; None: any. ``scanner``: options of `simulate` beside damage and seed.
     ``job``: a job file, else the defaults, to which ``settings`` apply; ``source`` stands for the contents of both
-    files. ``tolerance``: the one to expect. ``varied``: what this case stands for in the tables.
+    files and for the code that computes. ``tolerance``: the one to expect. ``varied``: what this case stands for in the
+    tables.
     """
 
     part: str
@@ -55,7 +55,7 @@ class Case:
     def key(self) -> str:
         """Names the case among the rows of a file, wherever its part and job lie and whatever else is varied."""
         values = {name: value for name, value in vars(self).items() if name not in ("job", "file", "varied")}
-        return hashlib.sha256(json.dumps([version("damageest"), values]).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps(values).encode()).hexdigest()[:16]
 
 
 def blank(case: Case) -> dict[str, Any]:

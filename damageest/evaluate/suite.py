@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from functools import cache
 
 from damageest.artefacts import Part
+from damageest.cache import digest
 from damageest.errors import InputError
 from damageest.evaluate._case import Case
 from damageest.evaluate._vary import Base, Wanted, variants
 from damageest.evaluate.damages import KINDS
-from damageest.evaluate.job import checked
+from damageest.evaluate.job import checked, code
 from damageest.evaluate.parts import PARTS
 from damageest.evaluate.sized import SIZED
 from damageest.registry import Registry, near
@@ -35,7 +35,7 @@ def cases(count: int, seed: int, parts: Sequence[str], pose: str, wanted: Wanted
             raise InputError(f"--parts: no part '{name}'{near(name, list(PARTS))}; there are: {', '.join(PARTS)}")
     if count < 1:
         raise InputError(f"--cases: give 1 or more, not {count}")
-    made = []
+    made, computed = [], code(registry)
     for number in range(count):
         part = _part(parts[number % len(parts)])
         noise = float(f"{SIGMA * part.diagonal:.6g}")
@@ -58,7 +58,7 @@ def cases(count: int, seed: int, parts: Sequence[str], pose: str, wanted: Wanted
                     scanner=way.scanner,
                     settings=way.settings,
                     varied=way.varied,
-                    source=hashlib.sha256(part.vertices.tobytes()).hexdigest()[:16],
+                    source=digest(computed, part.vertices, part.faces),
                 )
             )
     return made

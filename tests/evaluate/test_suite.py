@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -120,3 +121,10 @@ def test_the_readmes_table_is_of_this_suite(registry: Registry) -> None:
 def test_an_unknown_part_is_an_error_of_its_own(registry: Registry) -> None:
     with pytest.raises(InputError, match="there are: block"):
         suite.cases(1, 0, ["nothing"], "random", Wanted(), registry)
+
+
+def test_rows_of_other_code_are_not_gone_on_from(registry: Registry) -> None:
+    other = replace(registry, providers=registry.providers[:1])
+    a, b = (suite.cases(1, 0, ["cuboid"], "random", Wanted(), code)[0] for code in (registry, other))
+    assert a.key() != b.key()
+    assert replace(a, source=b.source).key() == b.key()
