@@ -46,21 +46,22 @@ def pieces_of(damage: Solid, points: Floats, label: Ints, reach: float) -> tuple
     """
     import igl
 
-    from damageest.solids import to_manifold, to_solid
+    from damageest.solids import bodies
 
     origin = damage.bounds.mean(axis=0)
-    solids = [s for s in (to_solid(body, origin) for body in to_manifold(damage, origin).decompose()) if s]
+    solids = bodies(damage)
     vertices, faces, owner = _joined(solids)
     squared, face, _ = igl.point_mesh_squared_distance(
         np.ascontiguousarray(points - origin), np.ascontiguousarray(vertices - origin), faces
     )
     near = squared < reach**2
+    touching = np.zeros((len(solids), int(label.max(initial=0)) + 1), np.int64)
+    np.add.at(touching, (owner[face[near]], label[near]), 1)
     kept, dropped = [], 0.0
-    for index, solid in enumerate(solids):
-        touching, counts = np.unique(label[near & (owner[face] == index)], return_counts=True)
-        if len(touching) and counts.max() >= ENOUGH:
+    for solid, counts in zip(solids, touching, strict=True):
+        if counts.max() >= ENOUGH:
             enough = counts >= max(ENOUGH, 0.02 * counts.max())
-            kept.append(Piece(solid, tuple(int(c) for c in touching[enough])))
+            kept.append(Piece(solid, tuple(int(c) for c in np.flatnonzero(enough))))
         else:
             dropped += solid.volume
     return kept, dropped
