@@ -24,7 +24,7 @@ FAR = 4 * COARSE
 """Beyond that, what a point costs no longer depends on how far exactly it is off."""
 
 FEW, SOME = 2000, 10_000
-"""Points of the fits that are only compared, and of the first comparison."""
+"""Points of the fits that are only compared and of their first comparison, and of the second."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,10 @@ def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Flo
     poses, axis = _counterparts(poses, field, scan)
     fits = [fit(target, _close(field, points[:FEW], pose), pose, COARSE, noise, 12) for pose in poses]
     poses = np.array([one.pose for one in fits])
-    some = [_distance(target, field, points[:SOME], pose) for pose in poses]
-    band = fits[int(np.argmin([loss(distance, 0.75 * COARSE).sum() for distance in some]))].band
-    costs = [loss(distance, band) for distance in some]
-    first = costs[int(np.argmin([cost.sum() for cost in costs]))]
-    poses = poses[[not worse(cost, first) for cost in costs]]
+    few = [_distance(target, field, points[:FEW], pose) for pose in poses]
+    band = fits[int(np.argmin([loss(distance, 0.75 * COARSE).sum() for distance in few]))].band
+    poses = poses[_equal([loss(distance, band) for distance in few])]
+    poses = poses[_equal([loss(_distance(target, field, points[:SOME], pose), band) for pose in poses])]
     poses = poses[distinct(poses, np.zeros(len(poses)), 0.25 * COARSE, TRIED)]
 
     costs = [loss(_distance(target, field, points, pose), band) for pose in poses]
@@ -117,6 +116,12 @@ def _ranked(poses: Floats, field: Field, scan: Cloud) -> tuple[Floats, Floats]:
 def _good(scores: Floats) -> NDArray[np.bool_]:
     best = float(scores.max())
     return np.asarray(scores >= best - max(0.06, 0.2 * best))
+
+
+def _equal(costs: list[Floats]) -> NDArray[np.bool_]:
+    """Which of the poses, by what each point costs, are not decidedly worse than the best."""
+    best = costs[int(np.argmin([cost.sum() for cost in costs]))]
+    return np.array([not worse(cost, best) for cost in costs])
 
 
 def worse(cost: Floats, best: Floats) -> bool:

@@ -13,6 +13,10 @@ from damageest.stages.align._search import motion
 REACH = 3.5
 """Where the kernel ends, in standard deviations of the points off the surface."""
 
+STALE = 0.1
+"""How far the points may move, in bands, before their closest points are looked up again: until then their planes do.
+"""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -36,29 +40,33 @@ def fit(target: Target, points: Floats, pose: Floats, band: float, noise: float,
     All lengths in diagonals of the part.
     """
     narrowest = max(REACH * noise, 2e-5)
-    step = residue = np.inf
+    step = residue = drift = np.inf
     for turn in range(rounds):
         at = moved(pose, points)
-        distance, foot, face = target.closest(at)
-        if (
-            turn == 0
-        ):  # the pose will not move by more than a few bands: what is farther off need not be looked at again
-            close = np.abs(distance) < 4 * band
-            points, at, distance, foot, face = points[close], at[close], distance[close], foot[close], face[close]
+        if drift > STALE * band:
+            distance, foot, face = target.closest(at)
+            if turn == 0:  # the pose will not move by more than a few bands: what is farther off need not be seen again
+                close = np.abs(distance) < 4 * band
+                points, at, distance, foot, face = points[close], at[close], distance[close], foot[close], face[close]
+            normals, drift = target.normals[face], 0.0
+            offset = np.einsum("ij,ij->i", normals, at - foot)
+        else:
+            before, offset = offset, np.einsum("ij,ij->i", normals, at - foot)
+            distance = distance + offset - before
         within = np.abs(distance) < band
         if within.sum() < 12:
             break
         deviation = 1.4826 * float(np.median(np.abs(distance[within])))
-        normal = target.normals[face[within]]
-        offset = np.einsum("ij,ij->i", normal, (at - foot)[within])
+        normal = normals[within]
         weight = (1 - (distance[within] / band) ** 2) ** 2
         jacobian = np.column_stack([np.cross(at[within], normal), normal])
         hessian = jacobian.T @ (jacobian * weight[:, None])
         # A little damping holds the motions that the surface does not fix, such as a shaft's turning.
         hessian += np.diag(np.full(6, 1e-6 * max(float(np.trace(hessian)), 1e-12)))
-        twist = -np.linalg.solve(hessian, jacobian.T @ (weight * offset))
+        twist = -np.linalg.solve(hessian, jacobian.T @ (weight * offset[within]))
         pose = motion(twist[None])[0] @ pose
         step = float(np.hypot(np.linalg.norm(twist[:3]) / 2, np.linalg.norm(twist[3:])))
+        drift += step
         residue = float(np.sqrt(np.average((jacobian @ twist) ** 2, weights=weight + 1e-12)))
         narrower = min(band, max(REACH * deviation, 0.6 * band, narrowest))
         if step < 0.003 * narrowest and narrower > 0.97 * band:
