@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Deviation, Floats, Ints, Part, Samples, Scan, Sites
-from damageest.stages.enclose._fit import neighbours, smoothed, subset
+from damageest.stages.enclose._fit import averaged, neighbours, subset, thinned
 from damageest.stages.enclose._orient import toward_void
 from damageest.stages.enclose._poisson import Field, Grid, refined
 from damageest.stages.enclose._skin import Flags, Skin, pushed, skin_near
@@ -101,12 +101,9 @@ def _surface(points: Floats, above: Floats, lost: Floats, lost_normals: Floats, 
 
     ``above`` (M,3): the normal of the nominal skin nearest to each; ``lost`` (L,3): samples of the skin lost with them.
     """
-    if len(points) > 40_000:
-        keep = subset(points, 0.5 * cell)
-        points, above = points[keep], above[keep]
-    points, normals, _ = smoothed(points, noise)
-    keep = subset(points, 0.5 * cell)
-    points, normals, above = points[keep], normals[keep], above[keep]
+    points, counts, first = thinned(points, 0.5 * cell)
+    above = above[first]
+    points, normals = averaged(points, counts, noise)
     size, chosen = cell, np.arange(len(lost))
     while len(chosen) > 5000:
         size *= 1.3

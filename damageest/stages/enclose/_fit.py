@@ -6,15 +6,22 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 
+ROUNDS = 3
+SCALES = (32, 64, 128)
+"""Neighbours of the fits to choose from."""
+KAPPA = 2.0
+"""Standard deviations that two fits of one point may lie apart by noise."""
+CHUNK = 4000
 
-def thinned(points: Floats, cell: float) -> tuple[Floats, Ints]:
-    """Means (M,3) of the points (N,3) in each cube of edge ``cell``, and how many each stands for."""
+
+def thinned(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
+    """Means (M,3) of the points (N,3) in each cube of edge ``cell``, how many each stands for, and one of those."""
     keys = np.floor((points - points.min(0)) / cell).astype(np.int64)
     size = keys.max(0) + 1
     flat = (keys[:, 0] * size[1] + keys[:, 1]) * size[2] + keys[:, 2]
-    _, group, counts = np.unique(flat, return_inverse=True, return_counts=True)
+    _, first, group, counts = np.unique(flat, return_index=True, return_inverse=True, return_counts=True)
     sums = np.stack([np.bincount(group, points[:, axis]) for axis in range(3)], axis=1)
-    return sums / counts[:, None], counts.astype(np.int64)
+    return sums / counts[:, None], counts.astype(np.int64), first
 
 
 def subset(points: Floats, cell: float) -> Ints:
@@ -35,7 +42,7 @@ def neighbours(points: Floats, count: int, among: Floats | None = None, reach: f
     return np.reshape(distance, (len(points), count)), np.reshape(index, (len(points), count))
 
 
-def smoothed(points: Floats, noise: float, count: int = 32, rounds: int = 3) -> tuple[Floats, Floats, Floats]:
+def smoothed(points: Floats, noise: float, count: int = 32) -> tuple[Floats, Floats, Floats]:
     """Points moved onto a local fit, unit normals of either sign, and the radius of each fit.
 
     Planes are fitted to the neighbours that agree in direction (bilateral weights, after Fleishman et al. 2003), so
@@ -43,46 +50,96 @@ def smoothed(points: Floats, noise: float, count: int = 32, rounds: int = 3) -> 
     along its normal only, by three times the noise at most.
     """
     distance, index = neighbours(points, count)
-    reach = np.maximum(distance[:, -1], 1e-12)
-    near = np.exp(-2.0 * (distance / reach[:, None]) ** 2)
-    normals, _ = _planes(points, index, near)
-    weights = near
-    for _ in range(rounds):
-        agree = np.einsum("ij,ikj->ik", normals, normals[index]) ** 2
-        # How far a neighbour lies off this point's tangent plane tells faces apart where directions do not yet.
-        off = np.einsum("ij,ikj->ik", normals, points[index] - points[:, None])
-        limit = np.maximum(3 * noise, 0.25 * reach)[:, None]
-        weights = near * np.exp(-(1 - agree) / 0.12) * np.exp(-((off / limit) ** 2)) + 1e-9
-        normals, _ = _planes(points, index, weights)
-    return _onto_quadric(points, normals, index, weights, reach, noise)
+    normals, weights = _planes(points, index, distance, noise)
+    move, tilted, _ = _quadric(points, normals, points[index], weights, distance[:, -1])
+    return points + np.clip(move, -3 * noise, 3 * noise)[:, None] * normals, tilted, distance[:, -1]
 
 
-def _planes(points: Floats, index: Ints, weights: Floats) -> tuple[Floats, Floats]:
-    total = weights.sum(axis=1)
+def averaged(points: Floats, counts: Ints, noise: float) -> tuple[Floats, Floats]:
+    """As `smoothed`, but each point is fitted to as many neighbours as agree: points (N,3) and normals (N,3).
+
+    A wider fit averages more noise, and bends what is more curved than it can follow. So it is taken where it lies as
+    close to every narrower one as noise explains (Lepski's choice of scale). ``counts`` (N,): how many scan points each
+    point is the mean of, which divides the variance of the ``noise``.
+    """
+    distance, index = neighbours(points, SCALES[0])
+    normals, _ = _planes(points, index, distance, noise)
+    out, tilted = points.copy(), normals.copy()
+    for start in range(0, len(points), CHUNK):
+        own = slice(start, start + CHUNK)
+        out[own], tilted[own] = _widest(points, counts, noise, normals, own)
+    return out, tilted
+
+
+def _widest(points: Floats, counts: Ints, noise: float, normals: Floats, own: slice) -> tuple[Floats, Floats]:
+    """The fits of the points ``own``, of each the widest that noise explains."""
+    at, way = points[own], normals[own]
+    distance, index = neighbours(at, SCALES[-1], points)
+    best, turned = at.copy(), way.copy()
+    explained = np.ones(len(at), bool)
+    narrower: list[tuple[Floats, Floats]] = []
+    for scale in SCALES:
+        near = index[:, :scale]
+        reach = np.maximum(distance[:, : near.shape[1]][:, -1], 1e-12)
+        weights = counts[near] * _bilateral(at, way, points[near], normals[near], distance[:, : near.shape[1]], noise)
+        move, tilted, row = _quadric(at, way, points[near], weights, reach)
+        spread = noise**2 * (row**2 / counts[near]).sum(axis=1)
+        for other, wide in narrower:
+            explained &= (move - other) ** 2 <= KAPPA**2 * np.maximum(wide - spread, 1e-3 * wide)
+        best[explained] = (at + np.clip(move, -3 * noise, 3 * noise)[:, None] * way)[explained]
+        turned[explained] = tilted[explained]
+        narrower.append((move, spread))
+    return best, turned
+
+
+def _planes(points: Floats, index: Ints, distance: Floats, noise: float) -> tuple[Floats, Floats]:
+    """Normals (N,3) of planes through the neighbours that agree, and the neighbours' weights (N,K)."""
     around = points[index]
-    mean = np.einsum("ik,ikj->ij", weights, around) / total[:, None]
+    weights = np.exp(-2.0 * (distance / np.maximum(distance[:, -1:], 1e-12)) ** 2)
+    normals = _least_spread(around, weights)
+    for _ in range(ROUNDS):
+        weights = _bilateral(points, normals, around, normals[index], distance, noise)
+        normals = _least_spread(around, weights)
+    return normals, weights
+
+
+def _bilateral(
+    at: Floats, normals: Floats, around: Floats, their_normals: Floats, distance: Floats, noise: float
+) -> Floats:
+    """Weights (N,K) of neighbours (N,K,3): near, of the same direction, in the point's own tangent plane."""
+    reach = np.maximum(distance[:, -1:], 1e-12)
+    agree = np.einsum("ij,ikj->ik", normals, their_normals) ** 2
+    # How far a neighbour lies off this point's tangent plane tells faces apart where directions do not yet.
+    off = np.einsum("ij,ikj->ik", normals, around - at[:, None]) / np.maximum(3 * noise, 0.25 * reach)
+    return np.asarray(np.exp(-2.0 * (distance / reach) ** 2 - (1 - agree) / 0.12 - off**2) + 1e-9)
+
+
+def _least_spread(around: Floats, weights: Floats) -> Floats:
+    """The direction (N,3) in which weighted points (N,K,3) spread least."""
+    mean = np.einsum("ik,ikj->ij", weights, around) / weights.sum(axis=1)[:, None]
     off = around - mean[:, None]
-    spread = np.einsum("ik,ikj,ikl->ijl", weights, off, off, optimize=True)
-    return np.linalg.eigh(spread)[1][:, :, 0], mean
+    return np.asarray(np.linalg.eigh(np.matmul((weights[:, :, None] * off).transpose(0, 2, 1), off))[1][:, :, 0])
 
 
-def _onto_quadric(
-    points: Floats, normals: Floats, index: Ints, weights: Floats, reach: Floats, noise: float
+def _quadric(
+    at: Floats, normals: Floats, around: Floats, weights: Floats, reach: Floats
 ) -> tuple[Floats, Floats, Floats]:
+    """Height (N,) over each point of the quadric through its neighbours (N,K,3), the quadric's normal there (N,3), and
+    what each neighbour's height adds to it (N,K)."""
+    reach = np.maximum(reach, 1e-12)
     helper = np.eye(3)[np.abs(normals).argmin(axis=1)]
     u = np.cross(normals, helper)
     u /= np.linalg.norm(u, axis=1)[:, None]
     v = np.cross(normals, u)
-    off = (points[index] - points[:, None]) / reach[:, None, None]
+    off = (around - at[:, None]) / reach[:, None, None]
     a, b, h = (np.einsum("ij,ikj->ik", axis, off) for axis in (u, v, normals))
-    terms = np.stack([np.ones_like(a), a, b, a * a, a * b, b * b], axis=2)
-    heavy = weights[:, :, None] * terms
-    left = np.einsum("iks,ikt->ist", heavy, terms, optimize=True)
+    terms = np.stack([np.ones_like(a), a, b, a * a, a * b, b * b], axis=1)
+    heavy = weights[:, None] * terms
+    left = np.matmul(heavy, terms.transpose(0, 2, 1))
     # Bending is only taken where the neighbours ask for it: a light penalty keeps thin neighbourhoods flat.
     left += np.diag([1e-9, 1e-6, 1e-6, 3e-4, 3e-4, 3e-4]) * weights.sum(axis=1)[:, None, None]
-    right = np.einsum("iks,ik->is", heavy, h)
-    fit = np.linalg.solve(left, right[:, :, None])[:, :, 0]
-    move = np.clip(fit[:, 0] * reach, -3 * noise, 3 * noise)
+    rows = np.linalg.solve(left, heavy)  # (N,6,K): of each coefficient, what each height adds to it
+    fit = np.einsum("isk,ik->is", rows[:, :3], h)
     tilted = normals - fit[:, 1, None] * u - fit[:, 2, None] * v
     tilted /= np.linalg.norm(tilted, axis=1)[:, None]
-    return points + move[:, None] * normals, tilted, reach
+    return fit[:, 0] * reach, tilted, rows[:, 0]

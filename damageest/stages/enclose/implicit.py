@@ -33,6 +33,7 @@ class Implicit(EncloseAll):
         from damageest.stages.enclose._evidence import gathered, oriented, within_reach
         from damageest.stages.enclose._level import closed_region
         from damageest.stages.enclose._poisson import box, solve_by_halves
+        from damageest.stages.enclose._refit import refitted
 
         if not sites.count:
             return Enclosures(())
@@ -53,6 +54,7 @@ class Implicit(EncloseAll):
             field = within_reach(grid, field, found, number, 4 * tolerance)
             region = closed_region(grid, field)
             if region is not None:
+                region = refitted(region, points, normals, 0.5 * tolerance)
                 items.append(Enclosure(region, group.sites, notes))
         if not items:
             raise StageError("no closed surface came about", "method: surface, or a larger tolerance")

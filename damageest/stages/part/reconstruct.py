@@ -85,7 +85,7 @@ class Reconstructed(ReadPart):
             raise InputError(
                 f"a resolution of {cell:.3g} needs more than most_cells ({self.most_cells}); set part.cell larger"
             )
-        cloud, _ = thinned(points[~held], 0.8 * cell)
+        cloud, *_ = thinned(points[~held], 0.8 * cell)
         cloud, normals, _ = smoothed(cloud, noise, 24)
         normals = _outward(cloud, normals, 1.25 * max(cell, spacing))
         grid = box(points.min(axis=0) - 8 * cell, points.max(axis=0) + 8 * cell, cell)

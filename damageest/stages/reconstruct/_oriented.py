@@ -28,7 +28,7 @@ def oriented(points: Floats, part: Part, cell: float, noise: float) -> tuple[Flo
     from damageest.stages.enclose._fit import smoothed, thinned
     from damageest.stages.enclose._orient import toward_void
 
-    cloud, _ = thinned(points, 0.7 * cell)
+    cloud, *_ = thinned(points, 0.7 * cell)
     if len(cloud) < FEWEST:
         raise StageError(
             f"{len(points)} points, {len(cloud)} after thinning, are too few for a surface",

@@ -46,7 +46,7 @@ class PyVista(Reconstruct):
         local = (points - origin) @ axes
         least = float(np.prod(np.ptp(local, axis=0)) / MOST_CELLS) ** (1 / 3)
         cell = self.spacing or max(tolerance, spacing, least)
-        cloud, _ = thinned(local, 0.7 * cell)
+        cloud, *_ = thinned(local, 0.7 * cell)
         if len(cloud) < FEWEST:
             raise StageError(
                 f"{len(points)} points, {len(cloud)} after thinning, are too few for a surface",

@@ -1,0 +1,56 @@
+"""The surface of a solved field brought onto the points that it was solved from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import Floats, Mesh, Solid
+from damageest.stages.enclose._fit import neighbours
+
+NEAR = 12
+"""Points that a vertex is fitted to."""
+
+
+def refitted(region: Solid, points: Floats, normals: Floats, most: float) -> Solid:
+    """The region with its vertices moved along the points' normals onto the surface through the points (N,3).
+
+    A grid of cells resolves the field's zero to a fraction of a cell, and the screened solve trades the points against
+    smoothness; the points know better where there are some all round a vertex. The chord between two points of a
+    circular arc is normal to the mean of their normals, so curvature adds no error of second order. ``normals`` (N,3)
+    point into the region; no vertex moves by more than ``most``, and those with no points about do not move.
+    """
+    vertices = region.vertices
+    distance, index = neighbours(vertices, NEAR, points)
+    near = np.flatnonzero(distance[:, 0] < 2 * most + np.median(distance[:, 0]))
+    distance, index, at = distance[near], index[near], vertices[near]
+    own = _normals(region)[near]
+    facing = -np.einsum("ij,ikj->ik", own, normals[index])
+    reach = distance[:, -1:]
+    weights = np.exp(-3 * (distance / reach) ** 2) * np.maximum(facing, 0) ** 2
+    total = weights.sum(axis=1)
+    known = total > 1e-3
+    share = weights / np.maximum(total, 1e-12)[:, None]
+    way = np.einsum("ik,ikj->ij", share, normals[index])
+    way /= np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None]
+    chord = points[index] - at[:, None]
+    height = 0.5 * np.einsum("ikj,ikj->ik", chord, normals[index] + way[:, None])
+    move = np.einsum("ik,ik->i", share, height)
+    # Beyond the points' border the fit would be carried on where none of them speaks for it.
+    aside = np.einsum("ik,ikj->ij", share, chord)
+    aside -= np.einsum("ij,ij->i", aside, way)[:, None] * way
+    lopsided = np.linalg.norm(aside, axis=1) / reach[:, 0]
+    fade = np.clip(2 - 4 * lopsided, 0, 1) * np.clip(2 - np.abs(move) / most, 0, 1) * known
+    moved = vertices.copy()
+    moved[near] += (np.clip(move, -most, most) * fade)[:, None] * way
+    try:
+        return Solid(moved, region.faces)
+    except ValueError:
+        return region
+
+
+def _normals(mesh: Mesh) -> Floats:
+    """Unit normals (V,3) of the vertices."""
+    normal = np.zeros_like(mesh.vertices)
+    for corner in range(3):
+        np.add.at(normal, mesh.faces[:, corner], mesh.cross)
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None])
