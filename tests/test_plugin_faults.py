@@ -130,12 +130,19 @@ def test_a_stage_that_hangs_can_be_stopped(number: int, status: int, site: Site,
     site.add("acme-hang", GROWN.replace(BODY, f"import time; open({str(hung)!r}, 'w').close(); time.sleep(600)"))
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site.folder), os.environ.get("PYTHONPATH", "")])}
     stuck = [*command, "--set", "allowance=doubled"]
-    with subprocess.Popen(stuck, env=env, stderr=subprocess.PIPE, text=True) as process:
-        while not hung.exists():
-            assert process.poll() is None, process.communicate()[1]
-            time.sleep(0.05)
-        process.send_signal(number)
-        assert process.wait(timeout=30) == status
+
+    def heeding() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # shells let what runs in the background ignore it
+
+    with subprocess.Popen(stuck, env=env, stderr=subprocess.PIPE, text=True, preexec_fn=heeding) as process:
+        try:
+            while not hung.exists():
+                assert process.poll() is None, process.communicate()[1]
+                time.sleep(0.05)
+            process.send_signal(number)
+            assert process.wait(timeout=30) == status
+        finally:
+            process.kill()
     assert damaged_box.content(tmp_path / "job" / "out" / "job") == before
     subprocess.run(command, check=True)
 
