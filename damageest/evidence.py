@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import INTACT, Deviation, Evidence, Floats, Part, Scan, Solid
+from damageest.nearby import within
 from damageest.settle import inner_faces
 
 MOST = 20_000
@@ -28,7 +29,7 @@ def weigh(
     spacing = aligned.spacing
     reach = max(2.0 * tolerance, 1.5 * spacing)
     low, high = damage.bounds[0] - 4 * reach, damage.bounds[1] + 4 * reach
-    here = ((aligned.points > low) & (aligned.points < high)).all(axis=1)
+    here = within(aligned.points, low, high)
     points, label = aligned.points[here], deviation.label[here]
     origin = damage.bounds.mean(axis=0)
     vertices, faces = np.ascontiguousarray(damage.vertices - origin), np.array(damage.faces)

@@ -64,9 +64,9 @@ def _directions(count: int = 200) -> Floats:
 
 def _size(points: Floats, clip: float) -> float:
     """The largest width of the points over all directions, leaving out the share ``clip`` at either end of each."""
-    points = points[:: max(1, len(points) // 20_000)]
+    points = points[:: max(1, len(points) // 5000)]
     along = (points - points.mean(0)) @ _directions().T
-    low, high = np.quantile(along, [clip, 1 - clip], axis=0)
+    low, high = np.quantile(along, [clip, 1 - clip], axis=0) if clip else (along.min(axis=0), along.max(axis=0))
     return float((high - low).max())
 
 

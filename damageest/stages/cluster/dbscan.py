@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
 from damageest.artefacts import DAMAGE, Deviation, Floats, Ints, Scan, Sites
+from damageest.nearby import nearby
 from damageest.stages.cluster import Cluster
 from damageest.stages.cluster._density import dbscan, neighbour_distances
 
@@ -17,6 +18,9 @@ AROUND = 12
 LIKE_IT = 4
 """How many of those, itself included, must be damage too. Where noise takes one point in 700 beyond the tolerance (a
 pose off by one standard deviation at a tolerance of four), one stray in two million has three more beside it."""
+
+WHOLE = 200_000
+"""Scan points beyond which the gaps between them are looked at here and there only."""
 
 
 class Dbscan(Cluster):
@@ -119,21 +123,36 @@ def sharpest_bend(average: Floats) -> float:
 
 
 def _gaps(points: Floats, neighbours: int) -> tuple[float, float]:
-    """95th percentile and median of the distance to the k-th nearest scan point, from 5,000 points evenly picked."""
+    """95th percentile and median of the distance to the k-th nearest scan point, of points evenly picked: 5,000 or, of
+    a dense scan, 600."""
     from scipy.spatial import cKDTree
 
     if len(points) <= neighbours:
         return 0.0, 0.0
-    picked = points[np.linspace(0, len(points) - 1, min(len(points), 5000)).round().astype(np.int64)]
-    distance = np.asarray(cKDTree(points).query(picked, k=[neighbours + 1], workers=-1)[0])[:, 0]
+    dense = len(points) > WHOLE
+    picked = points[_evenly(len(points), 600 if dense else 5000)]
+    reach = np.inf
+    if dense:
+        # Among some of the points the k-th is farther than among all, so it tells how far to look.
+        some = cKDTree(points[_evenly(len(points), WHOLE)])
+        reach = float(np.percentile(np.asarray(some.query(picked, k=[neighbours + 1], workers=2)[0]), 97))
+        points = points[nearby(points, picked, reach)]
+    tree = cKDTree(points)
+    distance = np.asarray(tree.query(picked, k=[neighbours + 1], distance_upper_bound=reach, workers=2)[0])[:, 0]
     return float(np.percentile(distance, 95)), float(np.median(distance))
+
+
+def _evenly(count: int, wanted: int) -> Ints:
+    """At most ``wanted`` of ``count`` indices, evenly over all."""
+    return np.linspace(0, count - 1, min(count, wanted)).round().astype(np.int64)
 
 
 def _supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:
     """(M,) whether enough of a damage point's nearest scan points are damage as well."""
     from scipy.spatial import cKDTree
 
-    _, near = cKDTree(points).query(points[damage], k=AROUND, distance_upper_bound=reach, workers=-1)
-    padded = np.append(is_damage, False)  # the index of a missing neighbour is len(points)
+    here = nearby(points, points[damage], reach)
+    _, near = cKDTree(points[here]).query(points[damage], k=AROUND, distance_upper_bound=reach, workers=2)
+    padded = np.append(is_damage[here], False)  # the index of a missing neighbour is one past the last
     result: NDArray[np.bool_] = padded[near].sum(axis=1) >= LIKE_IT
     return result
