@@ -21,7 +21,8 @@ DEEPEST = 11
 class PyMeshLabReconstruct(Reconstruct):
     """Reconstruction by PyMeshLab, of points moved onto local fits first, trimmed to where the points are.
     `screened_poisson` (Kazhdan and Hoppe 2013) bears uneven density; `apss` (Guennebaud and Gross 2007) fits spheres,
-    `rimls` (Oztireli et al. 2009) is kinder to creases, and both are faster; `ball_pivoting` keeps the points."""
+    `rimls` (Oztireli et al. 2009) is kinder to creases; both are faster, and vary in the seventh digit from run to
+    run; `ball_pivoting` keeps the points."""
 
     use: Literal["pymeshlab"] = "pymeshlab"
     filter: Filter = Field("screened_poisson", description="which of PyMeshLab's reconstructions")
