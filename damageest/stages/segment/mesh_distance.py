@@ -10,6 +10,11 @@ from pydantic import Field
 
 from damageest.artefacts import ADDED, DAMAGE, INTACT, Deviation, Floats, Ints, Mesh, Part, Scan
 from damageest.stages.segment import Segment
+from damageest.stages.segment._averaged import worn
+from damageest.stages.segment._cells import by_cells
+
+MANY = 100_000
+"""Scan points beyond which not each of them is searched for."""
 
 
 class MeshDistance(Segment):
@@ -19,14 +24,23 @@ class MeshDistance(Segment):
     threshold: float = Field(
         1.0, gt=0, description="distance from the part beyond which a point is damage or added metal, in tolerances"
     )
+    wear: bool = Field(
+        True, description="also label as damage what is worn by less than that, where the mean over neighbours shows it"
+    )
 
     def run(self, aligned: Scan, part: Part, tolerance: float) -> Deviation:
         """Distance (N,), positive outside, in the job's unit; nearest triangle (N,); label (N,)."""
-        distance, face = signed_distance(aligned.points, part)
         limit = self.threshold * tolerance
+        if len(aligned.points) > max(MANY, 4 * len(part.faces)):
+            points, near = aligned.points, 0.5 * min(limit, tolerance)
+            distance, face = by_cells(points, part, near, lambda some: signed_distance(some, part))
+        else:
+            distance, face = signed_distance(aligned.points, part)
         label = np.full(len(distance), INTACT, np.uint8)
         label[distance < -limit] = DAMAGE
         label[distance > limit] = ADDED
+        if self.wear:
+            label[worn(aligned, part, distance, face, limit).worn] = DAMAGE
         return Deviation(distance=distance, face=face, label=label)
 
 
