@@ -13,7 +13,8 @@ from damageest.stages import Stage
 class Segment(Stage, ABC):
     """Gives each scan point's signed distance to the part, and its label (paper 3.1 step 4).
 
-    ``aligned``: the scan in the part's frame. DAMAGE: inside by more than ``tolerance``; ADDED: outside by more.
+    ``aligned``: the scan in the part's frame. DAMAGE: inside by more than ``tolerance``, or by less
+    where a whole region shows it; ADDED: outside by more.
     """
 
     stage: ClassVar[str] = "segment"

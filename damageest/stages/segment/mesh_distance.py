@@ -10,6 +10,7 @@ from pydantic import Field
 
 from damageest.artefacts import ADDED, DAMAGE, INTACT, Deviation, Floats, Ints, Mesh, Part, Scan
 from damageest.stages.segment import Segment
+from damageest.stages.segment._averaged import worn
 from damageest.stages.segment._cells import by_cells
 
 MANY = 100_000
@@ -23,6 +24,9 @@ class MeshDistance(Segment):
     threshold: float = Field(
         1.0, gt=0, description="distance from the part beyond which a point is damage or added metal, in tolerances"
     )
+    wear: bool = Field(
+        True, description="also label as damage what is worn by less than that, where the mean over neighbours shows it"
+    )
 
     def run(self, aligned: Scan, part: Part, tolerance: float) -> Deviation:
         """Distance (N,), positive outside, in the job's unit; nearest triangle (N,); label (N,)."""
@@ -35,6 +39,8 @@ class MeshDistance(Segment):
         label = np.full(len(distance), INTACT, np.uint8)
         label[distance < -limit] = DAMAGE
         label[distance > limit] = ADDED
+        if self.wear:
+            label[worn(aligned, part, distance, face, limit).worn] = DAMAGE
         return Deviation(distance=distance, face=face, label=label)
 
 

@@ -1,0 +1,141 @@
+"""Wear within the tolerance, on a plate and a box whose worn points are known."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+import trimesh
+
+import damageest
+from damageest.artefacts import DAMAGE, Floats, Part, Scan
+from damageest.evaluate.parts import PARTS
+from damageest.stages.scan.simulate import Simulate
+from damageest.stages.segment._averaged import Wear, worn
+from damageest.stages.segment.mesh_distance import MeshDistance, signed_distance
+
+SIGMA = 0.02
+SIZE = np.array([40.0, 30.0, 1.0])
+PER_AREA = 12
+TOLERANCE = 4 * SIGMA
+
+
+@lru_cache
+def plate() -> Part:
+    mesh = trimesh.creation.box(SIZE)
+    return Part(mesh.vertices, mesh.faces)
+
+
+def scanned(shift: float = 0.0, bend: float = 0.0) -> Floats:
+    """Points (N,3) on both faces of the thin plate, upper ones first, with noise; moved up, or bent in waves."""
+    rng = np.random.default_rng(3)
+    count = int(PER_AREA * SIZE[0] * SIZE[1])
+    xy = rng.uniform(-0.5, 0.5, (2 * count, 2)) * SIZE[:2]
+    z = np.repeat([0.5, -0.5], count) * SIZE[2] + shift + bend * np.sin(xy[:, 0] / 3)
+    return np.column_stack([xy, z]) + rng.normal(0, SIGMA, (2 * count, 3))
+
+
+def found(points: Floats, tolerance: float = TOLERANCE) -> Wear:
+    scan = Scan(points, noise=SIGMA, spacing=1.1 / np.sqrt(PER_AREA))
+    distance, face = signed_distance(points, plate())
+    return worn(scan, plate(), distance, face, tolerance)
+
+
+def worn_patch(depth: float) -> tuple[Floats, np.ndarray]:
+    """The plate with a patch of its upper face lowered, and which points those are."""
+    points = scanned()
+    patch = (np.abs(points[:, 0] + 8) < 6) & (np.abs(points[:, 1]) < 8) & (points[:, 2] > 0)
+    points[patch, 2] -= depth
+    return points, patch
+
+
+@pytest.mark.parametrize(("depth", "share"), [(2.0, 0.85), (3.0, 0.94), (4.0, 0.97)])
+def test_wear_within_the_tolerance_is_seen(depth: float, share: float) -> None:
+    points, patch = worn_patch(depth * SIGMA)
+    alone = signed_distance(points, plate())[0] < -TOLERANCE
+    assert alone[patch].mean() < 0.55  # what single points show of it
+    result = found(points)
+    seen = result.worn | alone
+    assert seen[patch].mean() > share
+    # What is deeper than twice the threshold shows a little beyond its rim.
+    assert result.worn[~patch].sum() < 0.05 * patch.sum()
+
+
+def test_its_rim_comes_out_where_it_is() -> None:
+    points, patch = worn_patch(3 * SIGMA)
+    seen = found(points).worn | (signed_distance(points, plate())[0] < -TOLERANCE)
+    assert seen.sum() == pytest.approx(patch.sum(), rel=0.03)
+
+
+def test_the_other_face_of_a_thin_wall_is_not_worn() -> None:
+    points, _ = worn_patch(3 * SIGMA)
+    assert not found(points).worn[len(points) // 2 :].any()
+
+
+def test_nothing_is_worn_on_a_sound_plate() -> None:
+    result = found(scanned())
+    assert not result.worn.any()
+    assert result.threshold == pytest.approx(1.5 * SIGMA)
+    assert not result.notes
+
+
+@pytest.mark.parametrize(("shift", "bend"), [(1.8, 0.0), (0.0, 2.0), (2.5, 1.0)])
+def test_what_pose_or_form_leave_is_not_wear(shift: float, bend: float) -> None:
+    result = found(scanned(shift * SIGMA, bend * SIGMA))
+    assert not result.worn.any()
+    assert "over whole areas" in result.notes[0]
+
+
+def test_a_tolerance_wider_than_the_noise_asks_for_is_kept_to() -> None:
+    points, patch = worn_patch(5 * SIGMA)
+    assert not found(points, 10 * SIGMA).worn.any()
+    assert found(points, 5 * SIGMA).worn[patch].mean() > 0.9
+
+
+def test_too_few_points_are_no_wear() -> None:
+    points, patch = worn_patch(3 * SIGMA)
+    few = patch & (np.abs(points[:, 0] + 8) < 1) & (np.abs(points[:, 1]) < 1)
+    points[patch & ~few, 2] += 3 * SIGMA
+    assert few.sum() > 30
+    assert not found(points).worn.any()
+
+
+def test_the_option_turns_it_off() -> None:
+    points, patch = worn_patch(3 * SIGMA)
+    scan = Scan(points, noise=SIGMA, spacing=1.1 / np.sqrt(PER_AREA))
+    with_wear, without = (
+        MeshDistance(wear=on).run(scan, plate(), TOLERANCE).label[patch] == DAMAGE for on in (True, False)
+    )
+    assert with_wear.mean() > 0.9
+    assert 0.05 < without.mean() < 0.3
+
+
+def test_an_unmeasured_scan_is_left_alone() -> None:
+    points, _ = worn_patch(3 * SIGMA)
+    plain = MeshDistance(wear=False).run(Scan(points), plate(), TOLERANCE).label
+    assert np.array_equal(MeshDistance().run(Scan(points), plate(), TOLERANCE).label, plain)
+
+
+def test_volume_of_wear_of_three_sigma() -> None:
+    """A tenth of a block's surface worn by three quarters of the tolerance: most of its points are within it."""
+    part = PARTS["cuboid"]()
+    sigma = 0.0005 * part.diagonal
+    tool = {"tool": "box", "centre": [-10, 5, 15], "size": [40, 35, 6 * sigma]}
+    scan = Simulate.model_validate({"damage": [tool], "points": 150_000, "noise": sigma}).run("mm", part)
+    assert scan.truth is not None
+    assert scan.truth.damage is not None
+    result = damageest.run({"version": 1, "align": "none"}, part=part, scan=scan)
+    assert result.tolerance == pytest.approx(4 * sigma, rel=0.05)
+    assert len(result.sites) == 1
+    assert result.sites[0].evidence.consistent
+    assert result.sites[0].damage.volume == pytest.approx(scan.truth.damage.volume, rel=0.1)
+    assert result.truth is not None
+    assert result.truth[1] > 0.8
+
+
+@pytest.mark.parametrize("name", ["cuboid", "coupling", "blade"])
+def test_sound_parts_have_no_site(name: str) -> None:
+    scan = Simulate.model_validate({"points": 150_000, "density": 0.4}).run("mm", PARTS[name]())
+    result = damageest.run({"version": 1, "align": "icp"}, part=PARTS[name](), scan=scan)
+    assert not result.sites
