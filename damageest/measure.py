@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from damageest.artefacts import Floats, Ints
+from damageest.artefacts import Floats
+from damageest.nearby import nearby
 
-_SAMPLES = 4000
-_WHOLE = 2_000_000
+_SAMPLES = (4000, 1500)
+_WHOLE = 200_000
 _LEVELS = (16, 32, 64, 128, 256, 512)
 _WIDE = 8.0
 _SECTORS = 6
@@ -35,11 +38,18 @@ def measure(points: Floats, seed: int = 0) -> tuple[float, float]:
         return 0.0, 0.0
     from scipy.spatial import cKDTree
 
-    near, centres = _neighbourhoods(points - (points.min(0) + points.max(0)) / 2, np.random.default_rng(seed))
-    tree = cKDTree(near, balanced_tree=False, compact_nodes=False)
+    rng = np.random.default_rng(seed)
+    dense = len(points) > _WHOLE
+    centres = points[rng.permutation(len(points))[: _SAMPLES[dense]]]
+    middle = centres.mean(axis=0)  # far from the origin, products of coordinates lose digits
+    centres = centres - middle
     noise = spacing = 0.0
-    settled = False
-    for k in sorted({min(k, len(near)) for k in _LEVELS}):
+    settled, held = False, 0
+    for k in sorted({min(k, len(points)) for k in _LEVELS}):
+        if k > held:  # 64 mostly do
+            held = max(k, 64) if dense else len(points)
+            near = (_around(points, centres + middle, held, rng) if dense else points) - middle
+            tree = cKDTree(near, balanced_tree=False, compact_nodes=False)
         some = centres[: max(500, 400_000 // k)]  # wide patches average more points each: fewer of them will do
         far, index = (np.asarray(a) for a in tree.query(some, k=k))
         local, roundness = _local(near[index])
@@ -55,38 +65,17 @@ def measure(points: Floats, seed: int = 0) -> tuple[float, float]:
     return noise, spacing
 
 
-def _neighbourhoods(points: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """The points to look for neighbours among, and sample points whose neighbours are all among them.
+def _around(points: Floats, centres: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """The points round the centres (M,3), among them the ``count`` nearest of nearly each.
 
-    Up to two million points that is everything. Of more, the points of some boxes, drawn at random, and of the 26
-    around each: density must not be thinned, but a tree over everything would cost seconds.
+    Density must not be thinned, but a tree over all of very many points would cost seconds.
     """
-    if len(points) <= _WHOLE:
-        return points, points[rng.permutation(len(points))[:_SAMPLES]]
-    low = np.array([axis.min() for axis in points.T])
-    some = points[rng.integers(0, len(points), 100_000)]
-    centres = some[:40]
-    columns = np.ascontiguousarray(some.T)
-    cell = float(np.ptp(columns, axis=1).max()) / 4
-    while True:  # until the box of a typical point holds a few thousand
-        inside = [int((np.abs(columns - centre[:, None]).max(0) < cell / 2).sum()) for centre in centres]
-        if float(np.median(inside)) * len(points) / len(some) <= 4000 or max(inside) <= 20:
-            break
-        cell /= 1.4
-    here = np.floor((points - low) / cell).astype(np.int64)
-    wide = int(here.max()) + 3
+    from scipy.spatial import cKDTree
 
-    def code(box: Ints) -> Ints:
-        number: Ints = ((box[..., 0] + 1) * wide + box[..., 1] + 1) * wide + box[..., 2] + 1
-        return number
-
-    boxes = code(here)
-    chosen = np.unique(np.floor((centres - low) / cell).astype(np.int64), axis=0)
-    around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), -1).reshape(-1, 3)
-    wanted = np.unique(code(chosen[:, None] + around))
-    near = np.isin(boxes, wanted)
-    inner = np.flatnonzero(np.isin(boxes, code(chosen)))
-    return points[near], points[rng.permutation(inner)[:_SAMPLES]]
+    some = points[rng.integers(0, len(points), _WHOLE)]
+    enough = max(3, math.ceil(1.3 * count * len(some) / len(points)))
+    reach = np.asarray(cKDTree(some).query(centres, k=[enough + 1], workers=2)[0])
+    return points[nearby(points, centres, float(np.percentile(reach, 95)))]
 
 
 def _local(patches: Floats) -> tuple[Floats, Floats]:

@@ -66,17 +66,20 @@ def scan_cloud(
     from scipy.spatial import cKDTree
 
     index = strided(len(points), DENSE, rng)
+    every = points[index]
+    tree = cKDTree(every)
+    # neighbours among all of them, but of every second only where they are many
+    index = index[:: 1 + (len(index) > DENSE // 2)]
     dense = points[index]
-    tree = cKDTree(dense)
-    reach = np.asarray(tree.query(dense, k=min(9, len(dense)), workers=-1)[0])[:, -1]
+    reach = np.asarray(tree.query(dense, k=min(9, len(every)), workers=-1)[0])[:, -1]
     typical = float(np.median(reach))
     weights = np.where(reach < 5 * typical, np.minimum(reach, 2.5 * typical) ** 2, 0.0)
 
     chosen = spread(dense, weights, wanted, rng)
     radius = float(np.clip(max(8 * noise, 2.5 * typical), 0.006, 0.03))
-    near = np.asarray(tree.query(dense[chosen], k=min(64, len(dense)), distance_upper_bound=radius, workers=-1)[1])
-    there = near < len(dense)
-    around = dense[np.minimum(near, len(dense) - 1)] - dense[chosen][:, None]
+    near = np.asarray(tree.query(dense[chosen], k=min(64, len(every)), distance_upper_bound=radius, workers=-1)[1])
+    there = near < len(every)
+    around = every[np.minimum(near, len(every) - 1)] - dense[chosen][:, None]
     count = np.maximum(there.sum(1), 1)[:, None]
     around = (around - (around * there[..., None]).sum(1, keepdims=True) / count[..., None]) * there[..., None]
     value, axes = np.linalg.eigh(np.swapaxes(around, 1, 2) @ around)
