@@ -23,7 +23,7 @@ COARSE = 0.008
 FAR = 4 * COARSE
 """Beyond that, what a point costs no longer depends on how far exactly it is off."""
 
-FEW, SOME = 2000, 10_000
+FEW, SOME = 1500, 10_000
 """Points of the fits that are only compared and of their first comparison, and of the second."""
 
 

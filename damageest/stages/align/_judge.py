@@ -16,8 +16,8 @@ LEAST, LEAST_WITH_COVER, COVER = 0.38, 0.15, 0.45
 """The share of the scanned area that must lie on the part; less will do where that much of the part's surface is
 covered, as when the part stands on a fixture that was scanned along."""
 
-COUNTED = 30_000
-"""Points that rms and share of the inliers are counted on: right to a third of a percent."""
+COUNTED = 15_000
+"""Points that each share is counted on: right to half a percent."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,8 @@ def judge(target: Target, best: Fit, even: Floats, raw: Floats, tolerance: float
     from scipy.spatial import cKDTree
 
     band = max(tolerance, min(best.band, 0.004))
+    rng = np.random.default_rng(0)
+    even, raw = (points[strided(len(points), COUNTED, rng)] for points in (even, raw))
     at = moved(best.pose, even)
     distance = target.closest(at)[0]
     on = np.abs(distance) <= band
@@ -61,7 +63,6 @@ def judge(target: Target, best: Fit, even: Floats, raw: Floats, tolerance: float
     if on.sum() > 10:
         gap = 3 * float(np.sqrt(target.mesh.area / len(even)))
         cover = float(np.isfinite(cKDTree(at[on]).query(surface, distance_upper_bound=max(gap, 0.02))[0]).mean())
-    raw = raw[strided(len(raw), COUNTED, np.random.default_rng(0))]
     loose = target.closest(moved(best.pose, raw))[0]
     hit = np.abs(loose) <= band
     rms = float(np.sqrt((loose[hit] ** 2).mean())) if hit.any() else float("inf")

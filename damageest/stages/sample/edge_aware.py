@@ -39,13 +39,14 @@ class EdgeAware(Sample):
         area = part.area
         if not area > 0:
             raise InputError("the part's surface has no area; check the file it was read from")
-        spacing = max(self.spacing * tolerance, float(np.sqrt(area / self.max_points)))
+        # a lattice on each triangle takes a quarter more points than one on all would, at least
+        spacing = max(self.spacing * tolerance, float(np.sqrt(1.25 * area / self.max_points)))
         while True:
             samples = _sample(part, spacing, self.angle)
             excess = len(samples.points) / self.max_points
             if excess <= 1:
                 return samples
-            spacing *= 1.02 * np.sqrt(excess)
+            spacing *= 1.04 * np.sqrt(excess)
 
 
 def _sample(part: Mesh, spacing: float, angle: float) -> Samples:
