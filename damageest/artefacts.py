@@ -231,11 +231,13 @@ class Pose(_Arrays):
 @dataclass(frozen=True, eq=False)
 class Deviation(_Arrays):
     """Per scan point, in the part's frame: ``distance`` (N,) signed to the part's surface, positive outside; ``face``
-    (N,) the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER."""
+    (N,) the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER. ``notes`` say what the scan could
+    not tell."""
 
     distance: Floats
     face: Ints
     label: NDArray[np.uint8]
+    notes: tuple[str, ...] = ()
     _dtypes: ClassVar[dict[str, Any]] = {"distance": np.float64, "face": np.int64, "label": np.uint8}
 
 

@@ -82,8 +82,8 @@ def placed(engine: Engine, lanes: list[State]) -> list[State]:
 def damaged(engine: Engine, lanes: list[State]) -> list[State]:
     """Goes on only where there is a site to go on with."""
     (state,) = lanes
-    engine.warnings += state["sites"].notes
     aligned, deviation = state["aligned"], state["deviation"]
+    engine.warnings += [*deviation.notes, *state["sites"].notes]
     state = state.derive("intact", aligned.points[deviation.label == INTACT], "aligned", "deviation")
     engine.whole = state
     return [state] if state["sites"].count else []

@@ -35,6 +35,7 @@ class Register(Align):
         from damageest.stages.align._pairs import candidates
         from damageest.stages.align._points import scan_cloud, spread, strided, surface_cloud
         from damageest.stages.align._search import search
+        from damageest.stages.align._settle import settled
 
         frame = Frame.of(scan, part)
         target, noise = frame.target, scan.noise / frame.size
@@ -50,7 +51,7 @@ class Register(Align):
         few = oriented.take(strided(len(oriented.points), 1500, rng))
         fine = rng.permutation(dense[spread(dense, weights, self.points, rng)])
         choice = choose(search(rough, oriented, field, rng), target, field, few, fine, noise)
-        best = fit(target, fine, choice.pose, COARSE / 2, noise, 30)
+        best = settled(target, fine, fit(target, fine, choice.pose, COARSE / 2, noise, 30))
         verdict = judge(target, best, fine, dense, tolerance / frame.size)
         if not verdict.sound:
             raise verdict.refuse(

@@ -49,7 +49,7 @@ def gathered(
 
     points, label, grown, face = _grown(aligned, deviation, sites, tolerance)
     skin = skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
-    free = cKDTree(points).query(skin.points, workers=2)[0] < np.maximum(band * tolerance, 1.2 * skin.usual)
+    free = cKDTree(points).query(skin.points, workers=2)[0] < np.maximum(band * tolerance, 1.6 * skin.usual)
     cross = part.cross[face]
     above = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
     groups, lost_by = _groups(points, above, label, skin, free, tolerance, aligned.spacing, aligned.noise)

@@ -30,7 +30,7 @@ def toward_void(
     from scipy.spatial import cKDTree
 
     eyes = points[subset(points, 2 * cell)] if len(points) > 1500 else points
-    pull = _pull(eyes, lost, lost_normals, areas, cell)
+    pull = _pull(eyes, lost, lost_normals, areas, cell) + _overhead(eyes, lost, lost_normals, areas, cell)
     nearest = cKDTree(eyes).query(points, workers=2)[1]
     vote = np.einsum("ij,ij->i", normals, pull[nearest] / np.pi + 0.01 * above)
     return _signs(points, normals, vote)[:, None] * normals
@@ -132,6 +132,30 @@ def _spanned(size: int, first: Ints, second: Ints, agree: Floats) -> tuple[Float
     return np.where(side[:size] == side[root[island]], 1.0, -1.0), island.astype(np.int64)
 
 
+def _softness(areas: Floats, cell: float) -> float:
+    """Square of the length below which skin samples stand for points and not for a surface."""
+    return float(areas.mean() + (0.5 * cell) ** 2)
+
+
+def _overhead(eyes: Floats, skin: Floats, normals: Floats, areas: Floats, cell: float) -> Floats:
+    """What `_pull` leaves out (E,3) of skin so close overhead that its samples do not resolve it.
+
+    Under a disc of skin at height h the softened sum falls short of the whole, pi, by pi soft / (h^2 + soft): a shallow
+    wear all round a shaft would otherwise be turned by the skin on the shaft's other side.
+    """
+    from scipy.spatial import cKDTree
+
+    if not len(skin):
+        return np.zeros((len(eyes), 3))
+    soft = _softness(areas, cell)
+    nearest = cKDTree(skin).query(eyes, workers=2)[1]
+    step = skin[nearest] - eyes
+    height = np.einsum("ij,ij->i", step, normals[nearest])
+    beside = np.einsum("ij,ij->i", step, step) - height**2 > areas.mean()
+    missing = np.where(beside, 0.0, np.pi * soft / (height**2 + soft))
+    return np.asarray(missing[:, None] * normals[nearest])
+
+
 def _pull(eyes: Floats, skin: Floats, normals: Floats, areas: Floats, cell: float) -> Floats:
     """Sum (E,3) over the skin of solid angle times direction."""
     out = np.zeros((len(eyes), 3), np.float32)
@@ -140,7 +164,7 @@ def _pull(eyes: Floats, skin: Floats, normals: Floats, areas: Floats, cell: floa
     middle = skin.mean(axis=0)
     skin32, normals32 = (skin - middle).astype(np.float32), normals.astype(np.float32)
     weight = areas.astype(np.float32)
-    soft = weight.mean() + np.float32((0.5 * cell) ** 2)
+    soft = np.float32(_softness(areas, cell))
     step = max(1, 4_000_000 // len(skin))
     for start in range(0, len(eyes), step):
         eye = (eyes[start : start + step] - middle).astype(np.float32)

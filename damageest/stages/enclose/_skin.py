@@ -40,7 +40,7 @@ def skin_near(
     hit = aligned.points[keep]
     if not len(hit) or not len(points):
         return Skin(points, normals, np.ones(len(points), bool), np.full(len(points), aligned.spacing))
-    thin = subset(hit, 0.7 * tolerance)
+    thin = subset(hit, 0.35 * tolerance)
     hit, face = hit[thin], deviation.face[keep][thin]
     cross = part.cross[face]
     outward = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]

@@ -18,7 +18,7 @@ class Implicit(EncloseAll):
 
     use: Literal["implicit"] = "implicit"
     cell: float = Field(1.0, gt=0.1, le=4, description="edge of a grid cell, in tolerances")
-    band: float = Field(2.5, ge=0, le=10, description="skin left free round the damaged points, in tolerances")
+    band: float = Field(1.0, ge=0, le=10, description="skin left free round the damaged points, in tolerances")
     push: float = Field(1.0, gt=0, le=4, description="how far the sound skin is pushed outward, in tolerances")
     margin: float = Field(8.0, ge=4, le=60, description="space round a loss that takes part, in tolerances")
     screening: float = Field(1.0, gt=0, le=100, description="how strongly points pull the surface onto themselves")

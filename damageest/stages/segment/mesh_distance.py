@@ -39,9 +39,12 @@ class MeshDistance(Segment):
         label = np.full(len(distance), INTACT, np.uint8)
         label[distance < -limit] = DAMAGE
         label[distance > limit] = ADDED
+        notes: tuple[str, ...] = ()
         if self.wear:
-            label[worn(aligned, part, distance, face, limit).worn] = DAMAGE
-        return Deviation(distance=distance, face=face, label=label)
+            found = worn(aligned, part, distance, face, limit)
+            label[found.worn] = DAMAGE
+            notes = found.notes
+        return Deviation(distance=distance, face=face, label=label, notes=notes)
 
 
 def signed_distance(points: Floats, part: Mesh) -> tuple[Floats, Ints]:
