@@ -76,6 +76,20 @@ class Mesh(_Arrays):
         a, b, c = np.moveaxis(self.triangles, 1, 0)
         return np.cross(b - a, c - a)
 
+    @cached_property
+    def vertex_cross(self) -> Floats:
+        """(V,3) sum of the faces' `cross` at each vertex: a normal weighted by area, of no unit length."""
+        total = np.zeros_like(self.vertices)
+        for corner in range(3):
+            np.add.at(total, self.faces[:, corner], self.cross)
+        return total
+
+    @property
+    def vertex_normals(self) -> Floats:
+        """(V,3) unit normals of the vertices; 0 where there is none."""
+        length = np.linalg.norm(self.vertex_cross, axis=1)
+        return np.asarray(self.vertex_cross / np.maximum(length, 1e-300)[:, None])
+
     @property
     def area(self) -> float:
         return float(np.linalg.norm(self.cross, axis=1).sum() / 2)

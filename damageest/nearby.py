@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-
-MOST_ALONG = 320
-"""Cubes of the lattice along an axis at most, for the memory's sake: 33 MB."""
-
-CHUNK = 1 << 18
-"""Points looked up at a time, so that what comes between stays in the processor's cache."""
+from damageest.lattice import CHUNK, MOST_ALONG, Lattice
 
 
 def nearby(points: Floats, places: Floats, reach: float) -> Ints:
@@ -26,16 +21,11 @@ def nearby(points: Floats, places: Floats, reach: float) -> Ints:
     # two empty layers all round: one that the places' neighbours may reach into, one for whatever lies beyond
     low = low - 2 * size
     shape = np.floor((high - low) / size).astype(np.int64) + 3
-    step = np.array([shape[1] * shape[2], shape[2], 1])
-    taken = np.zeros(int(np.prod(shape)), bool)
-    taken[_cubes(places, low, size, shape)] = True
-    around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) @ step
-    held = np.flatnonzero(taken)
-    for shift in around:
-        taken[held + shift] = True
+    lattice = Lattice(low, size, shape)
+    taken = lattice.around(places, 1)
     found = []
     for start in range(0, len(points), CHUNK):
-        found.append(start + np.flatnonzero(taken[_cubes(points[start : start + CHUNK], low, size, shape)]))
+        found.append(start + np.flatnonzero(taken[lattice.cells(points[start : start + CHUNK])]))
     return np.concatenate(found)
 
 
@@ -46,13 +36,3 @@ def within(points: Floats, low: Floats, high: Floats) -> Ints:
         along = points[index, axis]
         index = index[(along > low[axis]) & (along < high[axis])]
     return index
-
-
-def _cubes(points: Floats, low: Floats, size: float, shape: Ints) -> Ints:
-    """The number (N,) of each point's cube, the outermost for those beyond."""
-    number = np.zeros(len(points), np.int64)
-    for axis in range(3):
-        along = (points[:, axis] - low[axis]) * (1 / size)
-        number *= shape[axis]
-        number += np.clip(along, 0, shape[axis] - 1, out=along).astype(np.int64)
-    return number

@@ -59,11 +59,7 @@ def fit(target: Target, points: Floats, pose: Floats, band: float, noise: float,
         deviation = 1.4826 * float(np.median(np.abs(distance[within])))
         normal = normals[within]
         weight = (1 - (distance[within] / band) ** 2) ** 2
-        jacobian = np.column_stack([np.cross(at[within], normal), normal])
-        hessian = jacobian.T @ (jacobian * weight[:, None])
-        # A little damping holds the motions that the surface does not fix, such as a shaft's turning.
-        hessian += np.diag(np.full(6, 1e-6 * max(float(np.trace(hessian)), 1e-12)))
-        twist = -np.linalg.solve(hessian, jacobian.T @ (weight * offset[within]))
+        twist, jacobian = gauss_newton(at[within], normal, weight, offset[within])
         pose = motion(twist[None])[0] @ pose
         step = float(np.hypot(np.linalg.norm(twist[:3]) / 2, np.linalg.norm(twist[3:])))
         drift += step
@@ -73,6 +69,16 @@ def fit(target: Target, points: Floats, pose: Floats, band: float, noise: float,
             break
         band = narrower
     return Fit(pose, max(band, narrowest), residue)
+
+
+def gauss_newton(at: Floats, normals: Floats, weight: Floats, offset: Floats) -> tuple[Floats, Floats]:
+    """The twist (6,) that brings points (N,3) nearest to planes, from whose ``normals`` (N,3) and ``offset`` (N,) of
+    the points, each with its ``weight`` (N,); and what each point's offset gains by it (N,6)."""
+    jacobian = np.column_stack([np.cross(at, normals), normals])
+    hessian = jacobian.T @ (jacobian * weight[:, None])
+    # A little damping holds the motions that the surface does not fix, such as a shaft's turning.
+    hessian += np.diag(np.full(6, 1e-6 * max(float(np.trace(hessian)), 1e-12)))
+    return np.asarray(-np.linalg.solve(hessian, jacobian.T @ (weight * offset))), jacobian
 
 
 def loss(distance: Floats, band: float) -> Floats:

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.lattice import faced_cubes
 from damageest.stages.align._field import Target
-from damageest.stages.align._fine import REACH, Fit, moved
+from damageest.stages.align._fine import REACH, Fit, gauss_newton, moved
 from damageest.stages.align._search import motion
 
 PATCH = 4.0
@@ -28,7 +29,7 @@ def settled(target: Target, points: Floats, best: Fit, rounds: int = 8) -> Fit:
     within = np.abs(distance) < best.band
     points, foot, face = points[within], foot[within], face[within]
     normals = target.normals[face]
-    patch = _patches(moved(pose, points), normals, edge)
+    patch = np.unique(faced_cubes(moved(pose, points), normals, edge)[1], return_inverse=True)[1]
     count = np.bincount(patch)
     many = count >= FEWEST
     if many.sum() < 30:
@@ -40,20 +41,8 @@ def settled(target: Target, points: Floats, best: Fit, rounds: int = 8) -> Fit:
         band = REACH * 1.4826 * float(np.median(np.abs(mean[many])))
         share = np.maximum(1 - (mean / max(band, 1e-12)) ** 2, 0) ** 2 * many
         weight = (1 - np.minimum(np.abs(offset) / best.band, 1) ** 2) ** 2 * share[patch]
-        jacobian = np.column_stack([np.cross(at, normals), normals])
-        hessian = jacobian.T @ (jacobian * weight[:, None])
-        hessian += np.diag(np.full(6, 1e-6 * max(float(np.trace(hessian)), 1e-12)))
-        twist = -np.linalg.solve(hessian, jacobian.T @ (weight * offset))
+        twist, _ = gauss_newton(at, normals, weight, offset)
         pose = motion(twist[None])[0] @ pose
         if float(np.abs(twist).max()) < 1e-3 * band:
             break
     return replace(best, pose=pose)
-
-
-def _patches(at: Floats, normals: Floats, edge: float) -> np.ndarray:
-    """(N,) number of the cube and of the six directions that each point belongs to."""
-    cell = np.floor((at - at.min(axis=0)) / edge).astype(np.int64)
-    axis = np.abs(normals).argmax(axis=1)
-    way = 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0)
-    size = cell.max(axis=0) + 1
-    return np.unique(((cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]) * 6 + way, return_inverse=True)[1]

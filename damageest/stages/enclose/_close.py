@@ -82,16 +82,12 @@ def agreed(surface: Surface, rims: Rims, intact: Floats) -> tuple[Surface, Rims]
     if not len(intact) or not rims.loops:
         return surface, rims
     label = _pieces(surface)
-    normal = np.zeros_like(surface.vertices)
-    for corner in range(3):
-        np.add.at(normal, surface.faces[:, corner], surface.cross)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     nodes = np.concatenate(rims.loops)
     count = min(BESIDE, len(intact))
     beside = np.asarray(cKDTree(intact).query(surface.vertices[nodes], count, workers=2)[1]).reshape(len(nodes), count)
     # The nearest lie above the rim, which ends a tolerance below the skin; the farther ones lie to the side.
     way = intact[beside[:, count // 2 :]] - surface.vertices[nodes][:, None]
-    lean = np.einsum("ijk,ik->ij", way, normal[nodes]) / np.maximum(np.linalg.norm(way, axis=2), 1e-300)
+    lean = np.einsum("ijk,ik->ij", way, surface.vertex_normals[nodes]) / np.maximum(np.linalg.norm(way, axis=2), 1e-300)
     piece_of = np.zeros(len(surface.vertices), dtype=np.int64)
     piece_of[surface.faces] = label[:, None]
     size = label.max() + 1

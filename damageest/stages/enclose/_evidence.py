@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Deviation, Floats, Ints, Part, Samples, Scan, Sites
+from damageest.lattice import cubes
 from damageest.stages.enclose._fit import averaged, neighbours, subset, thinned
 from damageest.stages.enclose._orient import toward_void
 from damageest.stages.enclose._poisson import Field, Grid, refined
@@ -127,12 +128,9 @@ def _groups(
     link = max(3 * tolerance, 1.5 * spacing, 1.2 * float(np.quantile(around, 0.9)) if len(around) else 0.0)
     gone = np.flatnonzero(skin.gone)
     every = np.concatenate([points, skin.points[gone]])
-    cubes = np.floor((every - every.min(axis=0)) / (link / 2)).astype(np.int64)
-    size = cubes.max(axis=0) + 1
-    _, first, cube = np.unique(
-        (cubes[:, 0] * size[1] + cubes[:, 1]) * size[2] + cubes[:, 2], return_index=True, return_inverse=True
-    )
-    pairs = cKDTree(cubes[first]).query_pairs(2.5, output_type="ndarray")
+    cell, number = cubes(every, link / 2)
+    _, first, cube = np.unique(number, return_index=True, return_inverse=True)
+    pairs = cKDTree(cell[first]).query_pairs(2.5, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     _, component = connected_components(links, directed=False)
     group = component[cube]

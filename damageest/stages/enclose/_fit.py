@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
+from damageest.lattice import cubes
 
 ROUNDS = 3
 SCALES = (32, 64, 128)
@@ -16,19 +17,16 @@ CHUNK = 4000
 
 def thinned(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
     """Means (M,3) of the points (N,3) in each cube of edge ``cell``, how many each stands for, and one of those."""
-    keys = np.floor((points - points.min(0)) / cell).astype(np.int64)
-    size = keys.max(0) + 1
-    flat = (keys[:, 0] * size[1] + keys[:, 1]) * size[2] + keys[:, 2]
-    _, first, group, counts = np.unique(flat, return_index=True, return_inverse=True, return_counts=True)
+    _, first, group, counts = np.unique(
+        cubes(points, cell)[1], return_index=True, return_inverse=True, return_counts=True
+    )
     sums = np.stack([np.bincount(group, points[:, axis]) for axis in range(3)], axis=1)
     return sums / counts[:, None], counts.astype(np.int64), first
 
 
 def subset(points: Floats, cell: float) -> Ints:
     """Index of the first of the points (N,3) in each cube of edge ``cell``."""
-    keys = np.floor((points - points.min(0)) / cell).astype(np.int64)
-    size = keys.max(0) + 1
-    return np.sort(np.unique((keys[:, 0] * size[1] + keys[:, 1]) * size[2] + keys[:, 2], return_index=True)[1])
+    return np.sort(np.unique(cubes(points, cell)[1], return_index=True)[1])
 
 
 def neighbours(points: Floats, count: int, among: Floats | None = None, reach: float = np.inf) -> tuple[Floats, Ints]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
+from damageest.lattice import cubes
 from damageest.stages.enclose._fit import neighbours, subset
 
 SMOOTH = 0.8
@@ -50,7 +51,7 @@ def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     near = 1 / (1 + (distance[:, 1:].ravel() / np.median(distance[:, -1])) ** 2)
 
     # Small patches, so that the few wrong agreements (across a thin fin, a narrow slot) are outvoted along borders.
-    block = _blocks(points, max(3 * float(np.median(distance[:, -1])), 1e-9 * float(np.ptp(points)), 1e-300))
+    block = cubes(points, max(3 * float(np.median(distance[:, -1])), 1e-9 * float(np.ptp(points)), 1e-300))[1]
     firm = (np.abs(agree) > SMOOTH) & (block[first] == block[second])
     sign, patch = _spanned(len(points), first[firm], second[firm], agree[firm])
     strength = near * agree * np.abs(agree)
@@ -86,13 +87,6 @@ def _settled(sign: Floats, links: Any, vote: Floats, most: int) -> Floats:
         row = slice(links.indptr[worst], links.indptr[worst + 1])
         field[links.indices[row]] += links.data[row] * sign[worst]
     return sign
-
-
-def _blocks(points: Floats, size: float) -> Ints:
-    """Number (N,) of the cube of a lattice that each point lies in."""
-    cubes = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
-    counts = cubes.max(axis=0) + 1
-    return np.asarray((cubes[:, 0] * counts[1] + cubes[:, 1]) * counts[2] + cubes[:, 2])
 
 
 def _summed(size: int, a: Ints, b: Ints, strength: Floats) -> Any:

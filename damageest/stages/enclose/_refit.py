@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh, Solid
+from damageest.artefacts import Floats, Solid
 from damageest.stages.enclose._fit import neighbours
 
 NEAR = 12
@@ -23,7 +23,7 @@ def refitted(region: Solid, points: Floats, normals: Floats, most: float) -> Sol
     distance, index = neighbours(vertices, NEAR, points)
     near = np.flatnonzero(distance[:, 0] < 2 * most + np.median(distance[:, 0]))
     distance, index, at = distance[near], index[near], vertices[near]
-    own = _normals(region)[near]
+    own = region.vertex_normals[near]
     facing = -np.einsum("ij,ikj->ik", own, normals[index])
     reach = distance[:, -1:]
     weights = np.exp(-3 * (distance / reach) ** 2) * np.maximum(facing, 0) ** 2
@@ -46,11 +46,3 @@ def refitted(region: Solid, points: Floats, normals: Floats, most: float) -> Sol
         return Solid(moved, region.faces)
     except ValueError:
         return region
-
-
-def _normals(mesh: Mesh) -> Floats:
-    """Unit normals (V,3) of the vertices."""
-    normal = np.zeros_like(mesh.vertices)
-    for corner in range(3):
-        np.add.at(normal, mesh.faces[:, corner], mesh.cross)
-    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None])

@@ -29,13 +29,10 @@ def carried_on(surface: Surface, rims: Rims, by: float) -> Wide:
         raise StageError("the damage surface has no rim by which to join it to the background", "method: implicit")
     vertices, faces, ends = [surface.vertices], [surface.faces], []
     start = len(surface.vertices)
-    normals = np.zeros_like(surface.vertices)
-    for corner in range(3):
-        np.add.at(normals, surface.faces[:, corner], surface.cross)
     for loop in rims.loops:
         at = surface.vertices[loop]
         along = np.roll(at, -2, axis=0) - np.roll(at, 2, axis=0)
-        out = np.cross(along, normals[loop])
+        out = np.cross(along, surface.vertex_cross[loop])
         out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
         for _ in range(3):
             out = out + np.roll(out, 1, axis=0) + np.roll(out, -1, axis=0)

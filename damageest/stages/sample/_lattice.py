@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
+from damageest.lattice import cubes
 
 
 def lattice(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats, Ints]:
@@ -71,9 +72,7 @@ def _one_per_cell(points: Floats, cell: float, among: Ints | None = None) -> Int
     among = np.arange(len(points)) if among is None else among
     if not len(among):
         return among
-    keys = np.floor((points[among] - points.min(axis=0)) / cell).astype(np.int64)
-    size = keys.max(axis=0) + 1
-    _, first = np.unique((keys[:, 0] * size[1] + keys[:, 1]) * size[2] + keys[:, 2], return_index=True)
+    _, first = np.unique(cubes(points[among], cell, points.min(axis=0))[1], return_index=True)
     return among[np.sort(first)]
 
 

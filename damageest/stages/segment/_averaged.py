@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Part, Scan
+from damageest.lattice import cubes, faced_cubes
 
 Flags = NDArray[np.bool_]
 
@@ -91,11 +92,7 @@ def worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: flo
 def _cubes(points: Floats, normals: Floats, depth: Floats, edge: float) -> tuple[Ints, Ints, Floats, Ints]:
     """Cubes (C,3) that hold points of one of six directions, the cube of each point (N,), and of each cube the mean
     ``depth`` and the number of its points (C,)."""
-    cell = np.floor((points - points.min(axis=0)) / edge).astype(np.int64)
-    axis = np.abs(normals).argmax(axis=1)
-    way = 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0)
-    size = cell.max(axis=0) + 1
-    key = ((cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]) * 6 + way
+    cell, key = faced_cubes(points, normals, edge)
     _, first, group, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
     return cell[first], group, np.bincount(group, weights=depth) / count, count
 
@@ -143,9 +140,7 @@ def _in_regions(points: Floats, link: float) -> Flags:
 
     if len(points) < REGION:
         return np.zeros(len(points), bool)
-    cell = np.floor((points - points.min(axis=0)) / link).astype(np.int64)
-    size = cell.max(axis=0) + 1
-    key = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
+    cell, key = cubes(points, link)
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
     pairs = cKDTree(cell[first]).query_pairs(1.9, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))

@@ -7,21 +7,18 @@ the distance of the others, as far as they are over that triangle, or over other
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.lattice import CHUNK, MOST_ALONG, Lattice
 
 Flags = NDArray[np.bool_]
 Exact = Callable[[Floats], tuple[Floats, Ints]]
 
 PER_CELL = 16
 """Points of the surface in a cell, about."""
-
-MOST_ALONG = 320
-"""Cells along an axis at most, for the memory's sake."""
 
 ROUNDS = 4
 """Times that a cell's points are given another triangle to be over."""
@@ -33,35 +30,7 @@ hundredth of their distance."""
 CLEAR = 3.0
 """How far from the edges of its triangle a point beside a sharp edge has to be, in heights over it."""
 
-PAD, CHUNK = 4, 1 << 18
-
-
-class Lattice(NamedTuple):
-    """Cells of edge ``size`` from corner ``low`` (3,), ``shape`` (3,) of them."""
-
-    low: Floats
-    size: float
-    shape: Ints
-
-    def cells(self, points: Floats) -> Ints:
-        """The number (N,) of each point's cell; beyond the lattice, of the outermost."""
-        number = np.zeros(len(points), np.int64)
-        for axis in range(3):
-            along = (points[:, axis] - self.low[axis]) * (1 / self.size)
-            number *= self.shape[axis]
-            number += np.clip(along, 0, self.shape[axis] - 1, out=along).astype(np.int64)
-        return number
-
-    def around(self, points: Floats, layers: int) -> Flags:
-        """(cells,) whether a cell holds one of the points or is at most ``layers`` from one that does."""
-        taken = np.zeros(int(np.prod(self.shape)), bool)
-        taken[self.cells(points)] = True
-        steps = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
-        for step in steps:  # one axis after the other
-            held = np.flatnonzero(taken)
-            for shift in range(-layers, layers + 1):
-                taken[held + shift * step] = True
-        return taken
+PAD = 4
 
 
 def by_cells(points: Floats, part: Mesh, near: float, exact: Exact) -> tuple[Floats, Ints]:

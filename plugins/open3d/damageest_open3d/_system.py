@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import ctypes
-
 from damageest.errors import PluginError
+from damageest.sharedlibs import load, loads, require
+
+__all__ = ["PACKAGES", "check", "load"]
 
 PACKAGES = {
     "libEGL.so.1": "libegl1",
@@ -16,37 +17,18 @@ PACKAGES = {
 """Each library and the Debian or Ubuntu package that has it."""
 
 
-def load(library: str) -> None:
-    """Loads a shared library into the process, for others to find. Raises OSError where it is not there."""
-    ctypes.CDLL(library)
-
-
 def check() -> None:
     """Loads what Open3D needs, without Open3D itself: some milliseconds instead of seconds.
 
     Raises PluginError that names what is missing and how to install it.
     """
-    missing = [library for library in PACKAGES if not _loads(library)]
-    if missing:
-        raise PluginError(
-            f"Open3D needs {', '.join(missing)} from the system, and does not find it here",
-            f"apt-get install {' '.join(PACKAGES[library] for library in missing)}, "
-            "or the packages that have these files on this system",
-        )
+    require("Open3D", PACKAGES, load)
     # By its name the dynamic linker takes it for the one Open3D asks for, wherever it was loaded from.
-    if not _loads("libusb-1.0.so.0") and not _loads(_bundled_usb()):
+    if not loads("libusb-1.0.so.0", load) and not loads(_bundled_usb(), load):
         raise PluginError(
             "Open3D needs libusb-1.0.so.0, which neither the system nor the package libusb-package has here",
             "pip install libusb-package, or apt-get install libusb-1.0-0",
         )
-
-
-def _loads(library: str) -> bool:
-    try:
-        load(library)
-    except OSError:
-        return False
-    return True
 
 
 def _bundled_usb() -> str:

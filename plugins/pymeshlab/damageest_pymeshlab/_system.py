@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import ctypes
+from damageest.sharedlibs import load, require
 
-from damageest.errors import PluginError
+__all__ = ["PACKAGES", "check", "load"]
 
 PACKAGES = {
     "libGL.so.1": "libgl1",
@@ -15,25 +15,6 @@ PACKAGES = {
 """Each library and the Debian or Ubuntu package that has it."""
 
 
-def load(library: str) -> None:
-    """Loads a shared library into the process. Raises OSError where it is not there."""
-    ctypes.CDLL(library)
-
-
 def check() -> None:
     """Raises PluginError that names what PyMeshLab needs, but is missing, and how to install it."""
-    missing = [library for library in PACKAGES if not _loads(library)]
-    if missing:
-        raise PluginError(
-            f"PyMeshLab needs {', '.join(missing)} from the system, and does not find it here",
-            f"apt-get install {' '.join(PACKAGES[library] for library in missing)}, "
-            "or the packages that have these files on this system",
-        )
-
-
-def _loads(library: str) -> bool:
-    try:
-        load(library)
-    except OSError:
-        return False
-    return True
+    require("PyMeshLab", PACKAGES, load)

@@ -50,10 +50,7 @@ def carried_on(mesh: Mesh, rim: Ints, way: Floats, by: float, steepest: float) -
     line = smooth(at)
     out = np.cross(np.roll(line, -1, axis=0) - np.roll(line, 1, axis=0), way)
     out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
-    normal = np.zeros_like(mesh.vertices)
-    for corner in range(3):
-        np.add.at(normal, mesh.faces[:, corner], mesh.cross)
-    slope = smooth(normal[rim])
+    slope = smooth(mesh.vertex_cross[rim])
     angle = np.arctan2(-np.einsum("ij,ij->i", slope, out), np.maximum(slope @ way, 1e-300))
     angle = np.clip(angle, *np.deg2rad([-steepest, steepest]))[:, None]
     far = at + by * (np.cos(angle) * out + np.sin(angle) * way)
