@@ -140,6 +140,25 @@ class Solid(Mesh):
 
 
 @dataclass(frozen=True, eq=False)
+class Deposit(Solid):
+    """What is to be deposited for one damage, stock to be milled off again included.
+
+    ``cavity`` is the damage volume (DV) enlarged by the cut-back into sound metal, None where the DV stays as it was;
+    ``cut_back_volume`` what that takes more. ``stock_volume``: of what stands proud of the nominal surface;
+    ``thickness``: its least, mean and largest height over the skin where stock was asked for, None without any;
+    ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`, empty where the part has
+    none. ``notes`` are warnings.
+    """
+
+    cavity: Solid | None = None
+    stock_volume: float = 0.0
+    cut_back_volume: float = 0.0
+    thickness: tuple[float, float, float] | None = None
+    touched: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Surface(Mesh):
     """An open mesh: the inner damage surface (IDS), normals toward the lost material."""
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import DAMAGE, INTACT, OUTLIER, Deviation, Floats, Part, Pose, Scan, Solid
+from damageest.artefacts import DAMAGE, INTACT, OUTLIER, Deposit, Deviation, Floats, Part, Pose, Scan, Solid
 from damageest.cache import digest
 from damageest.engine import Engine, Joint, Route, State, follow
 from damageest.errors import InputError, StageError
@@ -211,6 +211,9 @@ def gather(engine: Engine, lanes: list[State]) -> list[State]:
     origin = part.bounds.mean(axis=0)
     lost = united((site.damage for site in sites), origin)
     damage = to_solid(lost, origin)
+    # a cut-back is no damage: what was found is compared as it was found
+    cut_back = any(site.damage is not lane["damage"] for site, lane in zip(sites, lanes, strict=True))
+    found = to_solid(united((lane["damage"] for lane in lanes), origin), origin) if cut_back else damage
     result = Result(
         name=engine.job.name,
         units=engine.job.units,
@@ -226,7 +229,7 @@ def gather(engine: Engine, lanes: list[State]) -> list[State]:
         undamaged=to_solid(remainder(to_manifold(part, origin), lost), origin) if sites else part,
         warnings=tuple(dict.fromkeys(engine.warnings)),
         failures=tuple(str(error) for error in engine.failures),
-        truth=_against_truth(damage, scan, whole["pose"], whole["tolerance"]),
+        truth=_against_truth(found, scan, whole["pose"], whole["tolerance"]),
     )
     return [whole.at(0).add("result", result, "")]
 
@@ -241,13 +244,19 @@ def _site(lane: State, part: Part, deviation: Deviation) -> Site:
         )
     if not evidence.consistent:
         warnings = (f"the scan does not bear this damage volume out: {'; '.join(evidence.reasons)}", *warnings)
+    deposit = lane["deposit"]
+    damage = lane["damage"]
+    if isinstance(deposit, Deposit):
+        damage = deposit.cavity or damage
+        warnings += deposit.notes
     return Site(
         id=lane.site,
         clusters=lane["clusters"],
         points=members,
-        damage=lane["damage"],
-        surface=ids_surface(lane["damage"], part),
-        deposit=lane["deposit"],
+        damage=damage,
+        surface=ids_surface(damage, part),
+        deposit=deposit,
+        refused=lane.values.get("refused", False),
         method=lane["method"],
         evidence=evidence,
         max_depth=max(float(-deviation.distance[members].min()), 0.0),

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from damageest.engine import Route
 from damageest.joints import damaged, each_cluster, each_enclosure, either, gather, measured, numbered, placed, settled
+from damageest.material import allowed, apart
 from damageest.stages.align import Align
-from damageest.stages.allowance import Allowance
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
 from damageest.stages.cluster import Cluster
@@ -25,10 +25,11 @@ from damageest.together import enclosed
 ACQUIRE: Route = (ReadPart, ReadScan, measured, Sample, Align, placed, Segment, Cluster, damaged)
 BY_SITE: Route = (each_cluster, Reconstruct, Boundary, enclosed, Repair, Boolean, settled)
 AT_ONCE: Route = (EncloseAll, each_enclosure, Boolean, settled)
+CLOSE: Route = (numbered, allowed, apart, gather)
 
 ROUTES: dict[str, Route] = {
-    "surface": (*ACQUIRE, *BY_SITE, numbered, Allowance, gather),
-    "implicit": (*ACQUIRE, *AT_ONCE, numbered, Allowance, gather),
-    "octree": (*ACQUIRE, *AT_ONCE, numbered, Allowance, gather),
-    "auto": (*ACQUIRE, either(AT_ONCE, BY_SITE), numbered, Allowance, gather),
+    "surface": (*ACQUIRE, *BY_SITE, *CLOSE),
+    "implicit": (*ACQUIRE, *AT_ONCE, *CLOSE),
+    "octree": (*ACQUIRE, *AT_ONCE, *CLOSE),
+    "auto": (*ACQUIRE, either(AT_ONCE, BY_SITE), *CLOSE),
 }

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from damageest.artefacts import Deviation, Evidence, Floats, Part, Pose, Scan, Solid, Surface
+from damageest.artefacts import Deposit, Deviation, Evidence, Floats, Part, Pose, Scan, Solid, Surface
 
 Vector = tuple[float, float, float]
 
@@ -19,8 +19,9 @@ Vector = tuple[float, float, float]
 class Site:
     """One damage: ``damage`` (DV) and ``surface`` (IDS) in the part's frame; ``deposit`` None where it is the DV.
 
-    ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into the scan; ``max_depth``:
-    the farthest of them below the nominal surface.
+    After a cut-back, DV and IDS are those of the enlarged cavity. ``refused``: the stage `allowance` failed, and what
+    to deposit is not known. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into
+    the scan; ``max_depth``: the farthest of them below the nominal surface.
     """
 
     id: int
@@ -33,6 +34,7 @@ class Site:
     evidence: Evidence
     max_depth: float
     warnings: tuple[str, ...] = ()
+    refused: bool = False
 
     @cached_property
     def centroid(self) -> Floats:
@@ -61,8 +63,8 @@ class Result:
     """Everything a run computed. Lengths in ``units``; meshes in the part's frame.
 
     ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of all DVs and
-    ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which sites have no DV and
-    why: then ``status`` is ``incomplete``.
+    ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which sites have no DV
+    or no deposit and why: then ``status`` is ``incomplete``.
     """
 
     name: str
@@ -139,16 +141,41 @@ class FilesReport(_Model):
     deposit: str | None
 
 
+class ThicknessReport(_Model):
+    """Height of the stock over the nominal surface, where stock was asked for."""
+
+    min: float
+    mean: float
+    max: float
+
+
+class DepositReport(_Model):
+    volume: float = Field(description="of what is to be deposited")
+    stock_volume: float = Field(description="of its share beyond the nominal surface, to be milled off")
+    cut_back_volume: float = Field(description="of sound metal to be taken off before, for a clean surface")
+    thickness: ThicknessReport | None = Field(description="of the stock; null where none was asked for or measured")
+    faces: list[int] = Field(description="numbers of the CAD faces that stock stands on; empty without B-rep")
+
+
+class MaterialReport(_Model):
+    """Sums over all sites, but for those that the stage allowance refused."""
+
+    deposit_volume: float
+    stock_volume: float
+    cut_back_volume: float
+
+
 class SiteReport(_Model):
     id: int
     points: int
-    volume: float
+    volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
     surface_area: float = Field(description="of the inner damage surface")
     max_depth: float = Field(description="of the scan below the nominal surface")
     centroid: Vector
     bounds: tuple[Vector, Vector]
     method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
     evidence: EvidenceReport
+    deposit: DepositReport | None = Field(description="null where the stage allowance refused the site")
     files: FilesReport
     warnings: list[str]
 
@@ -174,7 +201,7 @@ class Report(_Model):
     """The content of result.json. Lengths, areas and volumes in ``units``; coordinates in the part's frame."""
 
     version: Literal[1] = Field(1, alias="schema", description="version of this format")
-    status: Literal["ok", "incomplete"] = Field(description="incomplete: some sites have no damage volume")
+    status: Literal["ok", "incomplete"] = Field(description="incomplete: some sites have no damage volume or deposit")
     name: str
     units: str
     tolerance: float
@@ -184,9 +211,10 @@ class Report(_Model):
     sites: list[SiteReport]
     damage_volume: float
     undamaged_volume: float
+    material: MaterialReport = Field(description="what the whole repair takes")
     truth: TruthReport | None
     stages: list[StageReport]
-    failures: list[str] = Field(description="sites without a damage volume, and why")
+    failures: list[str] = Field(description="sites without a damage volume or a deposit, and why")
     warnings: list[str]
     versions: dict[str, str]
 
@@ -198,6 +226,7 @@ def report(result: Result, files: tuple[str, ...] = (), relative: Any = str) -> 
     import damageest
 
     part, scan, pose = result.part, result.scan, result.pose
+    sites = [_site(site, files) for site in result.sites]
     filled = Report(
         status=result.status,
         name=result.name,
@@ -225,9 +254,10 @@ def report(result: Result, files: tuple[str, ...] = (), relative: Any = str) -> 
             alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
             notes=list(pose.notes),
         ),
-        sites=[_site(site, files) for site in result.sites],
+        sites=sites,
         damage_volume=result.damage_volume,
         undamaged_volume=result.undamaged_volume,
+        material=_material([site.deposit for site in sites if site.deposit]),
         truth=_truth(result),
         stages=[StageReport(**vars(record)) for record in result.stages],
         failures=list(result.failures),
@@ -252,9 +282,35 @@ def _site(site: Site, files: tuple[str, ...]) -> SiteReport:
         centroid=tuple(site.centroid.tolist()),
         bounds=(tuple(low), tuple(high)),
         method="surface" if site.method == "surface" else "implicit",
+        deposit=_deposit(site),
         evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
         files=FilesReport(damage=file("damage"), surface=file("surface"), deposit=file("deposit")),
         warnings=list(site.warnings),
+    )
+
+
+def _deposit(site: Site) -> DepositReport | None:
+    if site.refused:
+        return None
+    deposit = site.deposit or site.damage
+    if not isinstance(deposit, Deposit):
+        stock = deposit.volume - site.damage.volume
+        return DepositReport(volume=deposit.volume, stock_volume=stock, cut_back_volume=0, thickness=None, faces=[])
+    low, mean, high = deposit.thickness or (0.0, 0.0, 0.0)
+    return DepositReport(
+        volume=deposit.volume,
+        stock_volume=deposit.stock_volume,
+        cut_back_volume=deposit.cut_back_volume,
+        thickness=ThicknessReport(min=low, mean=mean, max=high) if deposit.thickness else None,
+        faces=list(deposit.touched),
+    )
+
+
+def _material(deposits: list[DepositReport]) -> MaterialReport:
+    return MaterialReport(
+        deposit_volume=sum(deposit.volume for deposit in deposits),
+        stock_volume=sum(deposit.stock_volume for deposit in deposits),
+        cut_back_volume=sum(deposit.cut_back_volume for deposit in deposits),
     )
 
 

@@ -11,10 +11,14 @@ from damageest.stages import Stage
 
 
 class Allowance(Stage, ABC):
-    """Gives what is to be deposited for one damage volume; None where that is the damage volume itself."""
+    """Gives what is to be deposited for one damage volume; None where that is the damage volume itself.
+
+    ``others``: the damage volumes of all other sites as one solid, or None. Where a `Deposit` with a cavity is given,
+    the cavity takes the damage volume's place in the result.
+    """
 
     stage: ClassVar[str] = "allowance"
-    takes: ClassVar[Mapping[str, object]] = {"damage": Solid, "part": Part, "tolerance": float}
+    takes: ClassVar[Mapping[str, object]] = {"damage": Solid, "part": Part, "tolerance": float, "others": Solid}
     gives: ClassVar[str] = "deposit"
 
     @abstractmethod
