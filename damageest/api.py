@@ -52,10 +52,10 @@ def run(
     with workshop(target, cache) as place:
         engine = Engine(job, registry, place.cache)
         result = _follow(engine, job)
-        state = State({"result": result, "folder": place.folder}, {"result": "", "folder": ""})
-        files = engine.call(Export, state)["files"]
+        values = {"result": result, "folder": place.folder, "writers": registry.writers}
+        written = engine.call(Export, State(values, dict.fromkeys(values, "")))["written"]
         result = replace(result, stages=tuple(engine.records))
-        write_report(result, job, place.folder, target, files)
+        write_report(result, job, place.folder, target, written)
         place.finish(engine.stems)
     return result
 

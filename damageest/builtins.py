@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from damageest.hookspecs import hookimpl
 
 if TYPE_CHECKING:
     from damageest.stages import Stage
+    from damageest.stages.export import Writer
 
 
 @hookimpl
@@ -49,3 +51,13 @@ def damageest_stages() -> list[type[Stage]]:
         AllLoops, Offset, BoundingBox, Capsule, Cylinder, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
         NoRepair, Manifold, NoAllowance, Files, Uniform, CloudDistance, SignedDistance, Reconstructed, Octree,
     ]  # fmt: skip
+
+
+@hookimpl
+def damageest_writers() -> Mapping[str, Writer]:
+    """The formats that need no plugin."""
+    from damageest.stages.export import Writer
+    from damageest.stages.export._mesh_files import ply, ply_surface, stl
+    from damageest.stages.export._threemf import threemf
+
+    return {"stl": Writer(stl), "ply": Writer(ply, surface=ply_surface), "3mf": Writer(threemf, together=True)}

@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement: two that add, three that only observe.
+"""The hooks a plugin may implement: three that add, three that only observe.
 
 What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
 what they return is ignored.
@@ -6,7 +6,7 @@ what they return is ignored.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import pluggy
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import typer
 
     from damageest.stages import Stage
+    from damageest.stages.export import Writer
 
 hookspec = pluggy.HookspecMarker("damageest")
 hookimpl = pluggy.HookimplMarker("damageest")
@@ -23,6 +24,12 @@ hookimpl = pluggy.HookimplMarker("damageest")
 @hookspec
 def damageest_stages() -> Sequence[type[Stage]]:  # type: ignore[empty-body]
     """Gives the stage implementations that this plugin provides: classes derived from a contract."""
+
+
+@hookspec
+def damageest_writers() -> Mapping[str, Writer]:  # type: ignore[empty-body]
+    """Gives the file formats that this plugin can write, by the name, which is also the suffix, that a job's
+    `export: {format: ...}` calls them by."""
 
 
 @hookspec

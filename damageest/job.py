@@ -265,7 +265,8 @@ class _Check:
         """The implementation with its options checked, files that it names included."""
         key = item.contract.stage
         try:
-            stage = item.cls.model_validate({"use": item.name, **options}, context={"folder": self.folder})
+            context = {"folder": self.folder, "registry": self.registry}
+            stage = item.cls.model_validate({"use": item.name, **options}, context=context)
         except ValidationError as error:
             valid = [name for name in item.cls.model_fields if name != "use"]
             told = []

@@ -20,12 +20,14 @@ from damageest.cache import Cache
 from damageest.errors import Fault, JobError
 from damageest.job import Job, plain
 from damageest.result import Result, report
+from damageest.stages.export import Written
 
 _OURS = re.compile(
-    r"result\.json|job\.yaml|scan\.ply|(damage|undamaged)\.(stl|ply)|(damage|surface|deposit)/site-\d+\.(stl|ply)"
-    r"|truth/(damage\.(stl|ply)|pose\.json)|stages/.*"
+    r"result\.json|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?(scan\.ply|result\.3mf"
+    r"|(damage|undamaged|(damage|surface|deposit)/site-\d+)\.(stl|ply|step))"
 )
-"""What a run writes, by its path in the output folder. Whatever else stands there is the user's, and stays."""
+"""What a run writes, by its path in the output folder. Whatever else stands there is the user's, and stays, unless the
+old result.json names it as a file of its own, as where a plugin wrote another format."""
 
 
 @dataclass(frozen=True)
@@ -78,9 +80,9 @@ def workshop(target: Path, use_cache: bool = True) -> Iterator[Workshop]:
                 shutil.rmtree(hidden)
 
 
-def write_report(result: Result, job: Job, folder: Path, target: Path, files: tuple[str, ...]) -> None:
+def write_report(result: Result, job: Job, folder: Path, target: Path, written: Written) -> None:
     """Writes result.json and job.yaml into ``folder``, their paths relative to ``target``, where they will stand."""
-    content = report(result, files, lambda path: plain(Path(path), target))
+    content = report(result, written, lambda path: plain(Path(path), target))
     (folder / "result.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
     (folder / "job.yaml").write_text(yamlfile.write(job.written(target)))
 
@@ -93,13 +95,23 @@ def _hand_over(old: Path, target: Path) -> None:
     """Moves the user's own files from the earlier output to the new one, and drops the rest of it."""
     if not old.exists():
         return
+    named = _named(old)
     for path in sorted(old.rglob("*")):
         name = path.relative_to(old)
-        if (path.is_dir() and not path.is_symlink()) or _OURS.fullmatch(name.as_posix()):
+        ours = _OURS.fullmatch(name.as_posix()) or name.as_posix() in named
+        if (path.is_dir() and not path.is_symlink()) or ours:
             continue
         (target / name).parent.mkdir(parents=True, exist_ok=True)
         os.replace(path, target / name)
     shutil.rmtree(old)
+
+
+def _named(old: Path) -> set[str]:
+    """The files that an earlier result.json lists; none where there is none that can be read."""
+    try:
+        return set(json.loads((old / "result.json").read_text())["export"]["files"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
 
 
 def _refuse_strangers(target: Path) -> None:

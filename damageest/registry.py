@@ -1,4 +1,4 @@
-"""Which stage implementations there are here, who provides them, and which plugins are broken.
+"""Which stage implementations and file formats there are here, who provides them, and which plugins are broken.
 
 Discovery gives a value: `Registry.discover()` may be called any number of times and changes nothing outside itself.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import typing
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +18,7 @@ from damageest.contracts import DEFAULTS, STAGES, Contract, contract_of
 from damageest.errors import PluginError
 from damageest.plugins import Broken, Provider, fault_of, load, unwarned
 from damageest.stages import Stage
+from damageest.stages.export import Writer
 
 
 @dataclass(frozen=True)
@@ -32,23 +33,27 @@ class Implementation:
 
 @dataclass(frozen=True)
 class Registry:
-    """All that was found. ``clashes`` are names that two distributions provide: no job can use them."""
+    """All that was found. ``clashes`` are names that two distributions provide: no job can use them. ``writers``: the
+    formats that `export` can write, by name."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]
     broken: tuple[Broken, ...]
     clashes: tuple[tuple[Implementation, ...], ...]
     hooks: pluggy.PluginManager = field(repr=False)
+    writers: Mapping[str, Writer] = field(default_factory=dict, compare=False)
 
     @classmethod
     def discover(cls, observers: Iterable[object] = ()) -> Registry:
         """Finds the built-ins and every installed plugin; ``observers`` are extra objects with observing hooks."""
         manager, loaded, broken = load(observers)
         found: list[Implementation] = []
+        writers: dict[str, Writer] = {}
         for plugin, provider in loaded:
             try:
                 with unwarned():
                     classes = _offered(plugin)
+                    writers |= _writers(plugin, writers)
             except (Exception, SystemExit) as error:
                 broken.append(fault_of(error, provider))
                 continue
@@ -64,7 +69,7 @@ class Registry:
         single = tuple(group[0] for group in groups.values() if len(group) == 1)
         clashes = tuple(group for group in groups.values() if len(group) > 1)
         providers = tuple(dict.fromkeys([p for _, p in loaded] + [b.provider for b in broken]))
-        return cls(single, providers, tuple(broken), clashes, manager)
+        return cls(single, providers, tuple(broken), clashes, manager, writers)
 
     def of(self, stage: str) -> tuple[Implementation, ...]:
         """The implementations of a stage, defaults first, then by name."""
@@ -125,6 +130,16 @@ def _offered(plugin: Any) -> list[Any]:
     if not isinstance(classes, list | tuple):
         raise PluginError(f"its hook damageest_stages gave a {type(classes).__name__} instead of a list of classes")
     return list(classes)
+
+
+def _writers(plugin: Any, known: Mapping[str, Writer]) -> dict[str, Writer]:
+    """The formats that a plugin can write. Raises PluginError for what is no writer, or of a format known already."""
+    found = plugin.damageest_writers() if hasattr(plugin, "damageest_writers") else {}
+    if not isinstance(found, Mapping) or not all(isinstance(writer, Writer) for writer in found.values()):
+        raise PluginError("its hook damageest_writers did not give a mapping of format names to Writers")
+    if twice := sorted(found.keys() & known.keys()):
+        raise PluginError(f"writes {', '.join(twice)}, which another package writes already; uninstall one of them")
+    return dict(found)
 
 
 def _check_defaults(cls: type[Stage]) -> None:

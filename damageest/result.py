@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from damageest.artefacts import Deposit, Deviation, Evidence, Floats, Part, Pose, Scan, Solid, Surface
+from damageest.stages.export import Written
 
 Vector = tuple[float, float, float]
 
@@ -97,6 +98,9 @@ class Result:
         return self.undamaged.volume if self.undamaged else 0.0
 
 
+_NOTHING = Written()
+
+
 class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", populate_by_name=True)
 
@@ -120,6 +124,8 @@ class ScanReport(_Model):
 
 class AlignmentReport(_Model):
     transform: list[list[float]] = Field(description="T_part_scan, 4x4: from the scanner's frame to the part's")
+    quaternion: tuple[float, float, float, float] = Field(description="its rotation: w, x, y, z; w is not negative")
+    translation: Vector = Field(description="its shift, after the rotation")
     rms: float = Field(description="of the inliers' distance to the part")
     inliers: float = Field(description="share of the scan's points")
     alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
@@ -136,9 +142,23 @@ class EvidenceReport(_Model):
 
 
 class FilesReport(_Model):
+    """Where the job asks for several formats or frames, the first of them; `every` has them all."""
+
     damage: str | None
     surface: str | None
     deposit: str | None
+    every: list[str] = Field(description="all files of this site alone")
+
+
+class SplineReport(_Model):
+    deviation: float | None = Field(description="largest distance between surface and spline, either way")
+    trimmed: bool = Field(description="whether it ends at the surface's rim; otherwise it reaches beyond")
+    reason: str = Field(description="why none was written; empty where one was")
+
+
+class ExportReport(_Model):
+    files: list[str] = Field(description="all that were written; those below scan_frame/ are in the scan's frame")
+    notes: list[str] = Field(description="what was written otherwise than asked for, and why")
 
 
 class ThicknessReport(_Model):
@@ -177,6 +197,7 @@ class SiteReport(_Model):
     evidence: EvidenceReport
     deposit: DepositReport | None = Field(description="null where the stage allowance refused the site")
     files: FilesReport
+    spline: SplineReport | None = Field(description="null where the job asks for none")
     warnings: list[str]
 
 
@@ -209,6 +230,7 @@ class Report(_Model):
     scan: ScanReport
     alignment: AlignmentReport
     sites: list[SiteReport]
+    export: ExportReport
     damage_volume: float
     undamaged_volume: float
     material: MaterialReport = Field(description="what the whole repair takes")
@@ -219,14 +241,14 @@ class Report(_Model):
     versions: dict[str, str]
 
 
-def report(result: Result, files: tuple[str, ...] = (), relative: Any = str) -> dict[str, Any]:
+def report(result: Result, written: Written = _NOTHING, relative: Any = str) -> dict[str, Any]:
     """The content of result.json as plain values. ``relative`` turns an absolute input path into the one to write."""
     import platform
 
     import damageest
 
     part, scan, pose = result.part, result.scan, result.pose
-    sites = [_site(site, files) for site in result.sites]
+    sites = [_site(site, written) for site in result.sites]
     filled = Report(
         status=result.status,
         name=result.name,
@@ -249,12 +271,15 @@ def report(result: Result, files: tuple[str, ...] = (), relative: Any = str) -> 
         ),
         alignment=AlignmentReport(
             transform=pose.T_part_scan.tolist(),
+            quaternion=_quaternion(pose.T_part_scan),
+            translation=tuple(pose.T_part_scan[:3, 3].tolist()),
             rms=pose.rms,
             inliers=pose.inliers,
             alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
             notes=list(pose.notes),
         ),
         sites=sites,
+        export=ExportReport(files=list(written.files), notes=list(written.notes)),
         damage_volume=result.damage_volume,
         undamaged_volume=result.undamaged_volume,
         material=_material([site.deposit for site in sites if site.deposit]),
@@ -267,9 +292,20 @@ def report(result: Result, files: tuple[str, ...] = (), relative: Any = str) -> 
     return filled.model_dump(mode="json", by_alias=True)
 
 
-def _site(site: Site, files: tuple[str, ...]) -> SiteReport:
-    def file(kind: str) -> str | None:
-        return next((name for name in files if name.startswith(f"{kind}/site-{site.id}.")), None)
+def _quaternion(T: Floats) -> tuple[float, float, float, float]:
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True).tolist()
+    return w, x, y, z
+
+
+def _site(site: Site, written: Written) -> SiteReport:
+    kinds = ("damage", "surface", "deposit")
+    own = {
+        kind: [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"{kind}/site-{site.id}.")]
+        for kind in kinds
+    }
+    spline = written.splines.get(site.id)
 
     low, high = site.damage.bounds.tolist()
     evidence = {name: value for name, value in vars(site.evidence).items() if name != "reasons"}
@@ -284,7 +320,10 @@ def _site(site: Site, files: tuple[str, ...]) -> SiteReport:
         method="surface" if site.method == "surface" else "implicit",
         deposit=_deposit(site),
         evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
-        files=FilesReport(damage=file("damage"), surface=file("surface"), deposit=file("deposit")),
+        files=FilesReport(
+            **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
+        ),
+        spline=SplineReport(**vars(spline)) if spline else None,
         warnings=list(site.warnings),
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -153,11 +154,11 @@ class ExportContract(Contract):
         self.count += 1
         self.folder = self.home / f"run {self.count}"
         self.folder.mkdir()
-        return super().call(stage, {**given, "folder": self.folder})
+        return super().call(stage, {**given, "folder": self.folder, "writers": _writers()})
 
     def written(self, **changes: Any) -> dict[str, bytes]:
         """The files that a run says it has written, with their bytes."""
-        files = self.run(**changes)
+        files = self.run(**changes).files
         assert len(set(files)) == len(files), "a file twice"
         assert not [name for name in files if Path(name).is_absolute() or ".." in Path(name).parts]
         held = {str(p.relative_to(self.folder)) for p in self.folder.rglob("*") if p.is_file()}
@@ -187,6 +188,13 @@ class ExportContract(Contract):
         plain = result()
         truth = Truth(plain.damage, np.eye(4))
         self.written(result=replace(plain, scan=replace(plain.scan, truth=truth), truth=np.array([1.0, 1.0])))
+
+
+@lru_cache
+def _writers() -> Any:
+    from damageest.registry import Registry
+
+    return Registry.discover().writers
 
 
 def result() -> Any:

@@ -24,6 +24,7 @@ from damageest.stages.boundary.all_loops import AllLoops
 from damageest.stages.cluster.dbscan import Dbscan
 from damageest.stages.enclose.adaptive import Adaptive
 from damageest.stages.enclose.implicit import Implicit
+from damageest.stages.export import Written
 from damageest.stages.export.files import Files
 from damageest.stages.part.file import PartFile
 from damageest.stages.reconstruct.signed_distance import SignedDistance
@@ -102,8 +103,8 @@ def spoilt(value: Any, by: float) -> Any:
             )
         case Enclosures():
             return Enclosures(tuple(replace(item, solid=spoilt(item.solid, by)) for item in value.items))
-        case tuple():
-            return (*value, f"{by}.txt")
+        case Written():
+            return replace(value, files=(*value.files, f"{by}.txt"))
         case None:
             return Solid(*(getattr(_scene.box_round(np.zeros(3), np.full(3, by), 9), n) for n in ("vertices", "faces")))
         case _:

@@ -9,10 +9,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from damageest.artefacts import Deviation, Scan, Solid, Surface, Truth, open_edges
+from damageest.artefacts import Deviation, Pose, Scan, Solid, Surface, Truth, open_edges
 from damageest.meshio import read_mesh, single_precision
+from damageest.registry import Registry
 from damageest.stages.export.files import Files
 from damageest.stages.part._make import make_part
+
+
+def write(result, folder, **options):
+    """The names of the files that a result becomes."""
+    return Files.model_validate(options).run(result, folder, Registry.discover().writers).files
 
 
 def sphere(radius=5.0, at=(0.0, 0, 0), subdivisions=3):
@@ -32,6 +38,7 @@ def result():
     )
     return SimpleNamespace(
         units="mm",
+        pose=Pose(np.eye(4)),
         scan=Scan(points, truth=Truth(body, np.eye(4))),
         aligned=Scan(points),
         deviation=Deviation(rng.normal(size=200), np.zeros(200, int), rng.integers(0, 4, 200)),
@@ -43,7 +50,7 @@ def result():
 
 
 def test_every_file_is_there_and_named(result, tmp_path):
-    files = Files().run(result, tmp_path)
+    files = write(result, tmp_path)
     on_disk = {str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()}
     assert (
         set(files)
@@ -64,11 +71,11 @@ def test_every_file_is_there_and_named(result, tmp_path):
 
 def test_a_result_without_damage_has_no_damage_file(result, tmp_path):
     result.damage, result.sites, result.scan = None, (), Scan(result.scan.points)
-    assert set(Files().run(result, tmp_path)) == {"undamaged.stl", "scan.ply"}
+    assert set(write(result, tmp_path)) == {"undamaged.stl", "scan.ply"}
 
 
 def test_ply_keeps_every_digit(result, tmp_path):
-    files = Files(format="ply").run(result, tmp_path)
+    files = write(result, tmp_path, format="ply")
     assert not any(name.endswith(".stl") for name in files)
     vertices, faces, _ = read_mesh(tmp_path / "damage/site-2.ply")
     np.testing.assert_array_equal(vertices, result.sites[1].damage.vertices)
@@ -76,7 +83,7 @@ def test_ply_keeps_every_digit(result, tmp_path):
 
 
 def test_stl_reads_back_watertight(result, tmp_path):
-    Files().run(result, tmp_path)
+    write(result, tmp_path)
     for path in tmp_path.rglob("*.stl"):
         mesh = trimesh.load_mesh(path)
         assert mesh.is_watertight, path
@@ -85,7 +92,7 @@ def test_stl_reads_back_watertight(result, tmp_path):
 
 
 def test_the_scan_has_distance_label_and_site_per_point(result, tmp_path):
-    Files().run(result, tmp_path)
+    write(result, tmp_path)
     data = trimesh.load(tmp_path / "scan.ply").metadata["_ply_raw"]["vertex"]["data"]
     np.testing.assert_array_equal(np.column_stack([data[a] for a in "xyz"]), result.aligned.points)
     np.testing.assert_array_equal(data["label"], result.deviation.label)
@@ -96,7 +103,7 @@ def test_the_scan_has_distance_label_and_site_per_point(result, tmp_path):
 def test_the_same_result_gives_the_same_bytes(result, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        Files().run(result, tmp_path / name)
+        write(result, tmp_path / name)
     for path in (tmp_path / "a").rglob("*.*"):
         assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes()
 
@@ -116,7 +123,7 @@ def test_a_solid_that_single_precision_would_open_comes_as_ply_too(result, tmp_p
         [trimesh.creation.box((2, 2, 2)), trimesh.creation.box((2, 2, 2)).apply_translation((2, 2, 0))]
     )
     result.damage = Solid(cubes.vertices, cubes.faces)  # they share an edge, with vertices of their own
-    files = Files().run(result, tmp_path)
+    files = write(result, tmp_path)
     assert {"damage.ply", "damage.stl"} <= set(files)
     vertices, faces, _ = read_mesh(tmp_path / "damage.ply")
     assert make_part(vertices, faces).volume == pytest.approx(16)

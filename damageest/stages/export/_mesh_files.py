@@ -1,0 +1,34 @@
+"""Solids and surfaces as STL and PLY, a file for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from damageest.artefacts import Mesh
+from damageest.meshio import single_precision, write_ply, write_stl
+from damageest.stages.export import Body, Written
+
+
+def stl(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
+    """Binary STL. Its coordinates are single precision: a solid that this would open is written as PLY too."""
+    (body,) = bodies
+    single = single_precision(body.solid)
+    write_stl(folder / f"{stem}.stl", single or body.solid)
+    if single is not None:
+        return Written((f"{stem}.stl",))
+    write_ply(folder / f"{stem}.ply", body.solid)
+    note = f"{stem}.stl: single precision, which is all that STL has, opens this solid; {stem}.ply is whole"
+    return Written((f"{stem}.ply", f"{stem}.stl"), (note,))
+
+
+def ply(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
+    """Binary PLY in double precision."""
+    (body,) = bodies
+    write_ply(folder / f"{stem}.ply", body.solid)
+    return Written((f"{stem}.ply",))
+
+
+def ply_surface(path: Path, name: str, mesh: Mesh, unit: str) -> None:
+    """An open mesh as binary PLY in double precision."""
+    write_ply(path, mesh)

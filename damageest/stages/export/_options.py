@@ -1,0 +1,49 @@
+"""The formats that a job names, checked with the job against what the plugins here can write."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+from pydantic_core import PydanticCustomError
+
+from damageest.registry import near
+
+PLUGINS = {"step": "damageest-cadquery"}
+"""The plugin that has a format, for whoever lacks it."""
+
+
+def _known(name: str, info: ValidationInfo) -> str:
+    registry = (info.context or {}).get("registry")
+    if registry is None or name in registry.writers:
+        return name
+    if plugin := PLUGINS.get(name):
+        raise _fault(f"'{name}' needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry)
+    names = sorted(registry.writers)
+    raise _fault(f"no format '{name}'{near(name, names)}; there are: {', '.join(names)}", registry)
+
+
+def _fault(text: str, registry: Any) -> PydanticCustomError:
+    return PydanticCustomError("format", "{text}", {"text": text + registry.missing()})
+
+
+def spline_writer(wanted: bool, info: ValidationInfo) -> bool:
+    """Refuses a spline where nothing here can write one."""
+    registry = (info.context or {}).get("registry")
+    if wanted and registry is not None and not any(writer.patch for writer in registry.writers.values()):
+        plugin = PLUGINS["step"]
+        raise _fault(f"a spline needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry)
+    return wanted
+
+
+Format = Annotated[str, AfterValidator(_known), Field(examples=["stl", "ply", "3mf", "step"])]
+Formats = Annotated[
+    tuple[Format, ...],
+    BeforeValidator(
+        lambda value: (value,) if isinstance(value, str) else value,
+        json_schema_input_type=Format | Annotated[list[Format], Field(min_length=1)],
+    ),
+    AfterValidator(lambda names: tuple(dict.fromkeys(names))),
+    Field(min_length=1),
+]
+"""One format or a list; each once."""
