@@ -35,9 +35,9 @@ def _options(
 
 
 def _commands() -> None:
-    from damageest.cli import evaluate, init, plugins, run, schema, stages, validate
+    from damageest.cli import evaluate, faces, init, plugins, run, schema, stages, validate
 
-    for module in (run, validate, init, stages, plugins, schema):
+    for module in (run, validate, init, faces, stages, plugins, schema):
         app.command(module.__name__.rsplit(".", 1)[1])(module.command)
     app.add_typer(evaluate.app, name="evaluate")
 

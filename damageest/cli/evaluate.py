@@ -21,6 +21,12 @@ Vary = Annotated[
     list[str] | None,
     typer.Option(metavar="STAGE.OPTION=A,B,C", help="stage=a,b and method=a,b as well; may be given repeatedly."),
 ]
+Against = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="SETTINGS", help="Another way to compare with, as 'method=octree enclose.depth=8'; may be repeated."
+    ),
+]
 Noise = Annotated[str, typer.Option(metavar="A,B", help="Multiples of the scan's noise, or lengths as 0.02mm.")]
 Points = Annotated[str, typer.Option(metavar="A,B", help="Points of a scan.")]
 Settings = Annotated[list[str] | None, typer.Option("--set", help="stage.option=value or field=value, for every case.")]
@@ -37,6 +43,7 @@ Plots = Annotated[bool, typer.Option("--plots/--no-plots", help="Whether to draw
 def job_command(
     job: Annotated[Path, typer.Argument(metavar="JOB", help="Its part is used, and a scanner like its scan's.")],
     vary: Vary = None,
+    against: Against = None,
     seeds: Annotated[int, typer.Option(min=1, help="Random damages of each size.")] = 10,
     size: Annotated[
         str,
@@ -65,7 +72,7 @@ def job_command(
     from damageest.registry import Registry
 
     _ready(out, plots)
-    wanted = Wanted(size, noise, points, tolerance, vary or (), settings or ())
+    wanted = Wanted(size, noise, points, tolerance, vary or (), settings or (), against or ())
     with tempfile.TemporaryDirectory(prefix="damageest-evaluate-") as place:
         found = study(job, wanted, seeds, Registry.discover(), Path(place))
         for note in found.notes:
@@ -83,6 +90,7 @@ def suite_command(
     method: Annotated[str, typer.Option(help="auto, implicit, surface or octree.")] = "auto",
     pose: Annotated[str, typer.Option(help="random, or identity: the pose is known.")] = "random",
     vary: Vary = None,
+    against: Against = None,
     size: Annotated[str, typer.Option(metavar="A,B", help="Depths in mm, or as 4x tolerance; 0: none.")] = "any",
     noise: Noise = "",
     points: Points = "",
@@ -93,8 +101,9 @@ def suite_command(
     out: Out = None,
     plots: Plots = True,
     write: Annotated[
-        Path | None, typer.Option(help="A text file whose lines between the suite marks are replaced by the tables.")
+        Path | None, typer.Option(help="A text file whose lines between the marks are replaced by the tables.")
     ] = None,
+    marks: Annotated[str, typer.Option(help="Name of those marks.")] = "suite",
 ) -> None:
     """Random damages on thirteen built-in parts, through the whole route."""
     from damageest.errors import InputError
@@ -108,18 +117,19 @@ def suite_command(
 
     _ready(out, plots)
     if write:
-        placed(write, None, "suite")  # a file without the marks is refused before hours of work
+        placed(write, None, marks)  # a file without the marks is refused before hours of work
     if pose not in ("random", "identity"):
         raise InputError(f"--pose: random or identity, not '{pose}'")
     base = [f"method={method}", *(["align=none"] if pose == "identity" else [])]
     varied = [text for text in base if text.partition("=")[0] not in {name.partition("=")[0] for name in vary or ()}]
-    wanted = Wanted(size, noise, points, tolerance, vary or (), [*varied, *(settings or ())])
+    wanted = Wanted(size, noise, points, tolerance, vary or (), [*varied, *(settings or ())], against or ())
     chosen = [name.strip() for name in parts.split(",")] if parts else list(PARTS)
     rows = _rows(suite.cases(cases, seed, chosen, pose, wanted, Registry.discover()), jobs, timeout, out)
-    _report(rows, ["part"], "mm", out, plots)
+    first = ["part"] if len(chosen) > 1 or not axes_of(rows) else []
+    _report(rows, first, "mm", out, plots)
     typer.echo(f"\n{sentence(rows, 'mm')}")
     if write:
-        write.write_text(placed(write, readme_table(rows, ["part", *axes_of(rows)], "mm", _command()), "suite"))
+        write.write_text(placed(write, readme_table(rows, first + list(axes_of(rows)), "mm", _command()), marks))
 
 
 def _ready(out: Path | None, plots: bool) -> None:
@@ -160,7 +170,7 @@ def _report(rows: list[dict[str, Any]], first: list[str], unit: str, out: Path |
 
 def _command() -> str:
     """The command line, without where its output goes."""
-    words, places = sys.argv[1:], ("--out", "--write")
+    words, places = sys.argv[1:], ("--out", "--write", "--marks")
     kept = [
         word
         for before, word in zip(["", *words], words, strict=False)

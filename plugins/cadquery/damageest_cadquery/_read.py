@@ -45,6 +45,7 @@ def _step(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
     from OCP.IFSelect import IFSelect_RetDone
     from OCP.STEPControl import STEPControl_Reader
     from OCP.TColStd import TColStd_SequenceOfAsciiString
+    from OCP.TopLoc import TopLoc_Location
 
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_RetDone:
@@ -56,10 +57,11 @@ def _step(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
     if len(units) > 1 or None in units:
         units = {"mm"}  # OpenCASCADE converts each part of the file by its own unit, to millimetres
     reader.TransferRoots()
-    transfer = reader.WS().TransferReader()
 
     def name_of(face: Any) -> str:
-        entity = transfer.EntityFromShapeResult(face, 1)
+        transfer = reader.WS().TransferReader()  # asked anew: it forgets everything once its reader is gone
+        unmoved = face.Located(TopLoc_Location())  # as it stands in the file, whatever the assembly does with it
+        entity = transfer.EntityFromShapeResult(face, 1) or transfer.EntityFromShapeResult(unmoved, 1)
         name = entity.Name() if entity is not None and hasattr(entity, "Name") else None
         return name.ToCString() if name is not None else ""
 

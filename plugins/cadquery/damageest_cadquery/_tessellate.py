@@ -72,6 +72,12 @@ def _tessellated(solids: list[Any], chord: float, angle: float, name_of: Callabl
     return builder.joined()
 
 
+def kind_of(adaptor: Any) -> str:
+    """A surface's kind: plane, cylinder, b_spline_surface, ..."""
+    kind: str = adaptor.GetType().name.removeprefix("GeomAbs_")
+    return "".join(f"_{c.lower()}" if c.isupper() else c for c in kind).lstrip("_")
+
+
 class _Builder:
     """Gathers the faces' triangulations and which of their nodes are one point."""
 
@@ -130,10 +136,9 @@ class _Builder:
         location = TopLoc_Location()
         triangulation = BRep_Tool.Triangulation_s(face, location)
         adaptor = BRepAdaptor_Surface(face)
-        kind = adaptor.GetType().name.removeprefix("GeomAbs_")
         number = len(self.names)
         self.names.append(self.name_of(face))
-        self.kinds.append("".join(f"_{c.lower()}" if c.isupper() else c for c in kind).lstrip("_"))
+        self.kinds.append(kind_of(adaptor))
         if triangulation is None:
             return None  # a face narrower than the mesher's resolution: its edges coincide
         move = location.Transformation()

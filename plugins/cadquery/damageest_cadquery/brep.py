@@ -10,7 +10,7 @@ from damageest.artefacts import Part
 from damageest.errors import InputError
 from damageest.meshio import checked_file, reason, sha256
 from damageest.stages import JobPath
-from damageest.stages.part import ReadPart
+from damageest.stages.part import CadFace, ReadPart
 from damageest.stages.part._make import make_part
 from damageest.units import Unit, canonical, factor
 
@@ -70,3 +70,18 @@ class Brep(ReadPart):
             tessellation_error=mesh.error * scale,
             notes=tuple(notes),
         )
+
+    def cad_faces(self, unit: str) -> tuple[CadFace, ...]:
+        """The model's faces, in the order in which `run` numbers them."""
+        suffix = checked_file(self.path, self.reads, "a part")
+        from damageest_cadquery._faces import faces
+        from damageest_cadquery._read import read
+
+        try:
+            model = read(self.path, suffix)
+            source = self.unit or model.unit or unit
+            return faces(model, factor(source, unit) / model.length)
+        except InputError as error:
+            raise InputError(f"{self.path}: {error}") from None
+        except Exception as error:  # OpenCASCADE's exceptions share no base of their own
+            raise InputError(f"{self.path}: not a readable {suffix} file ({reason(error)})") from None
