@@ -18,6 +18,7 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.align.icp import Icp
     from damageest.stages.align.none import Unaligned
     from damageest.stages.align.register import Register
+    from damageest.stages.allowance.milling import Milling
     from damageest.stages.allowance.none import Nothing as NoAllowance
     from damageest.stages.background.bbox import BoundingBox
     from damageest.stages.background.build_volume import BuildVolume
@@ -49,7 +50,7 @@ def damageest_stages() -> list[type[Stage]]:
     return [
         PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Unaligned, MeshDistance, Dbscan, PyVista, LargestLoop,
         AllLoops, Offset, BoundingBox, Capsule, Cylinder, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
-        NoRepair, Manifold, NoAllowance, Files, Uniform, CloudDistance, SignedDistance, Reconstructed, Octree,
+        NoRepair, Manifold, NoAllowance, Milling, Files, Uniform, CloudDistance, SignedDistance, Reconstructed, Octree,
     ]  # fmt: skip
 
 

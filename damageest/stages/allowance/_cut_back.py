@@ -1,0 +1,84 @@
+"""The cavity cut back into sound metal, so that deposition starts on a clean surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Part, Solid
+from damageest.errors import StageError
+from damageest.settle import inner_faces
+from damageest.solids import BALANCE, remainder, to_manifold, to_solid
+
+FINEST, COARSEST = 0.5, 1.0
+"""Edge of a lattice cell, in tolerances: as wished, and as far as the tolerance bears."""
+
+
+def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tolerance: float) -> Solid:
+    """The damage volume and all metal within ``inner`` of its inner damage surface, and up to half a tolerance more.
+
+    Raises StageError where the lattice for it would not fit in memory, or the volumes do not add up.
+    """
+    origin = part.bounds.mean(axis=0)
+    lost, whole = to_manifold(damage, origin), to_manifold(part, origin)
+    inside = inner_faces(damage, part)
+    if not inside.any():
+        return damage
+    round_it = to_manifold(_within(damage, damage.faces[inside], part, inner, tolerance), origin)
+    round_it = round_it.simplify(tolerance / 16)
+    if others is not None:
+        round_it -= to_manifold(others, origin)
+    sound = remainder(whole, lost)
+    rest = sound - round_it
+    ways: tuple[Callable[[], Any], ...] = (
+        lambda: lost + (sound ^ round_it),
+        lambda: lost + (whole ^ round_it),
+        lambda: whole - rest,
+    )
+    tried: list[tuple[float, Any]] = []
+    for way in ways:
+        cavity = way()
+        missing = abs(whole.volume() - rest.volume() - cavity.volume()) + (lost - cavity).volume()
+        tried.append((missing, cavity))
+        if missing <= BALANCE * whole.volume():
+            break
+    missing, cavity = min(tried, key=lambda item: item[0])
+    solid = to_solid(cavity.as_original().simplify(1e-9 * part.diagonal), origin)
+    if solid is None or missing > 1e-3 * lost.volume():
+        raise StageError(
+            f"the cut-back does not add up: {missing:.3g} in volume is lost or counted twice",
+            "a slightly different inner, or boolean: pymeshlab",
+        )
+    return solid
+
+
+def _within(damage: Solid, faces: Any, part: Part, inner: float, tolerance: float) -> Solid:
+    """Everything within ``inner`` and a quarter of a tolerance of some faces of the damage volume, near the part."""
+    import igl
+
+    from damageest.stages.background._contour import MOST_NODES, contour
+
+    origin = part.bounds.mean(axis=0)
+    reach = inner + tolerance / 4
+    vertices, faces = np.ascontiguousarray(damage.vertices - origin), np.ascontiguousarray(faces)
+    used = vertices[np.unique(faces)]
+    margin = reach + 2 * COARSEST * tolerance
+    low = np.maximum(used.min(axis=0) - margin, part.bounds[0] - origin - 4 * tolerance)
+    high = np.minimum(used.max(axis=0) + margin, part.bounds[1] - origin + 4 * tolerance)
+    fitting = float((np.prod(high - low + 2 * tolerance) / MOST_NODES) ** (1 / 3)) * 1.02
+    cell = max(FINEST * tolerance, fitting)
+    if cell > COARSEST * tolerance:
+        raise StageError(
+            f"a damage this large cannot be cut back to within the tolerance {tolerance:.3g} in the memory there is",
+            f"a tolerance of {cell / COARSEST:.3g} or more, or inner: 0",
+        )
+
+    def distance(points: Floats) -> Floats:
+        squared, _, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(points), vertices, faces)
+        return np.asarray(np.sqrt(squared) - reach)
+
+    nx, ny, nz = (np.ceil((high - low) / cell).astype(int) + 1).tolist()
+    found = contour(distance, low, (nx, ny, nz), cell)
+    return Solid(found.vertices + origin, found.faces)

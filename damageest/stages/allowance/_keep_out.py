@@ -1,0 +1,102 @@
+"""What the deposit must not enter, as one solid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Part, Solid
+from damageest.errors import DamageestError, StageError
+from damageest.stages.allowance._selectors import Bar, KeepOut, Wanted
+from damageest.stages.allowance._skin import Skin, sorted_skin
+from damageest.stages.allowance._stock import stock
+
+MOST_ENTERED = 1e-3
+"""Share of a damage volume that may lie in a solid to keep free."""
+SIDES = 256
+"""Of a round bar: it is drawn around the true one, 0.01 % wider at its corners."""
+
+
+def kept_out(
+    items: Sequence[KeepOut],
+    skin: Skin,
+    filled: Any,
+    part: Part,
+    wanted: Wanted,
+    reach: float,
+    origin: Floats,
+    tolerance: float,
+) -> Any:
+    """A Manifold relative to ``origin``: the solids, and the space within ``reach`` over skin, to keep free.
+
+    Raises StageError where what is ``filled`` takes part in one of the solids, or a file is no solid.
+    """
+    from manifold3d import Manifold, OpType
+
+    bodies = []
+    for number, item in enumerate(items):
+        if not item.is_solid():
+            continue
+        body = _body(item, part, origin)
+        entered = (body ^ filled).volume() / filled.volume()
+        if entered > MOST_ENTERED:
+            raise StageError(
+                f"{entered:.1%} of the damage volume, {entered * filled.volume():.4g}, lies in keep_out {number + 1}, "
+                "and the deposit has to hold all of it",
+                "a smaller solid there, or skin (faces, facing, kind) instead, which only keeps the stock away",
+            )
+        bodies.append(body)
+    if wanted.free_skin():
+        bodies.append(stock(replace(skin, height=np.where(skin.free, reach, 0.0)), tolerance))
+        around = _around(skin, part, wanted, reach, origin)
+        if around is not None:
+            bodies.append(stock(replace(around, height=np.where(around.free, reach, 0.0)), tolerance))
+    return Manifold.batch_boolean(bodies, OpType.Add) if bodies else Manifold()
+
+
+def _around(skin: Skin, part: Part, wanted: Wanted, reach: float, origin: Floats) -> Skin | None:
+    """The part's own skin near the damage."""
+    corners = part.triangles - origin
+    low, high = skin.vertices.min(axis=0) - 2 * reach, skin.vertices.max(axis=0) + 2 * reach
+    near = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
+    return sorted_skin(part.vertices - origin, part.faces[near], part, wanted, origin) if near.any() else None
+
+
+def _body(item: KeepOut, part: Part, origin: Floats) -> Any:
+    from manifold3d import Manifold
+
+    if item.box is not None:
+        low, high = np.array(item.box) - origin
+        return Manifold.cube(tuple(high - low)).translate(tuple(low))
+    if item.cylinder is not None:
+        return _bar(item.cylinder, origin)
+    assert item.mesh is not None
+    return _read(item.mesh, part, origin)
+
+
+def _bar(bar: Bar, origin: Floats) -> Any:
+    from manifold3d import Manifold
+
+    start, axis = np.array(bar.start) - origin, np.subtract(bar.end, bar.start)
+    length = float(np.linalg.norm(axis))
+    axis = axis / length
+    side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    side /= np.linalg.norm(side)
+    frame = np.column_stack([side, np.cross(axis, side), axis, start])
+    radius = bar.radius / np.cos(np.pi / SIDES)
+    return Manifold.cylinder(length, radius, radius, SIDES).transform(frame)
+
+
+def _read(path: Path, part: Part, origin: Floats) -> Any:
+    from damageest.solids import to_manifold
+    from damageest.stages.part.file import PartFile
+
+    try:
+        solid: Solid = PartFile(path=path).run(unit=part.unit)
+        return to_manifold(solid, origin)
+    except (DamageestError, ValueError, OSError) as error:
+        raise StageError(f"keep_out: {path}: {error}", "a watertight STL, PLY, OBJ, OFF or 3MF") from None

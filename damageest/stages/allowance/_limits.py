@@ -1,0 +1,83 @@
+"""Where there is no room for the stock: bores it would close, walls it would run into."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import Floats, Part
+from damageest.solids import to_manifold
+from damageest.stages.allowance._skin import ON, Skin
+
+OPPOSITE = -0.5
+"""Cosine between skin and wall from which on the wall faces the skin; a concave corner's does not."""
+SAMPLES = 3000
+
+
+@dataclass(frozen=True, eq=False)
+class Crowd:
+    """Points of the skin whose stock has no room: ``points`` (N,3) relative to the origin, the ``free`` way (N,) along
+    the normal to the opposite wall, the stock ``wanted`` (N,) on this side and on the ``other`` (N,)."""
+
+    points: Floats
+    free: Floats
+    wanted: Floats
+    other: Floats
+
+    def __str__(self) -> str:
+        worst = int(np.argmin(self.free - self.wanted - self.other))
+        x, y, z = self.points[worst]
+        both = f" and {self.other[worst]:.4g} on the opposite wall" if self.other[worst] else ""
+        return (
+            f"no room for the stock at ({x:.4g}, {y:.4g}, {z:.4g}): {self.free[worst]:.4g} is free there, and "
+            f"{self.wanted[worst]:.4g} is wanted{both}"
+        )
+
+
+def probes(skin: Skin, seed: int = 11) -> tuple[Floats, NDArray[np.int64]]:
+    """Points (N,3) spread over the skin and in the middle of its triangles, and the face of each."""
+    points, face = skin.sampled(SAMPLES, seed)
+    large = np.argsort(-skin.areas, kind="stable")[:SAMPLES]
+    return np.concatenate([points, skin.triangles[large].mean(axis=1)]), np.concatenate([face, large])
+
+
+def crowded(skin: Skin, part: Part, origin: Floats) -> Crowd | None:
+    """Places where the stock meets an opposite wall of the part, or that wall's own stock; None where it has room.
+    ``skin`` with what is wanted on it, relative to ``origin`` (3,)."""
+    import igl
+
+    wanted = skin.only(skin.height > 0)
+    if not len(wanted.faces):
+        return None
+    points, face = probes(wanted)
+    normal, height = wanted.normal[face], wanted.height[face]
+    most = float(height.max())
+    away = 10 * ON * part.diagonal
+    body = to_manifold(part, origin)
+    free, place = _way(body, points + away * normal, normal, height + most)
+    hit = np.flatnonzero(np.isfinite(free))
+    if not len(hit):
+        return None
+    squared, opposite, _ = igl.point_mesh_squared_distance(
+        np.ascontiguousarray(place[hit]), wanted.vertices, np.ascontiguousarray(wanted.faces)
+    )
+    other = np.where(squared <= away**2, wanted.height[opposite], 0.0)
+    short = free[hit] + away < height[hit] + other
+    if not short.any():
+        return None
+    some = hit[short]
+    return Crowd(points[some] + origin, free[some] + away, height[some], other[short])
+
+
+def _way(body: Any, start: Floats, direction: Floats, reach: Floats) -> tuple[Floats, Floats]:
+    """The free way (N,) from each start to the first wall that faces it, inf where that is beyond reach or the first
+    wall does not face it; and the place (N,3) where it ends."""
+    free, place = np.full(len(start), np.inf), np.zeros((len(start), 3))
+    for k, (a, d, far) in enumerate(zip(start, direction, reach, strict=True)):
+        hits = body.ray_cast(tuple(a), tuple(a + far * d))
+        if hits and np.dot(hits[0].normal, d) < OPPOSITE:
+            free[k], place[k] = hits[0].distance * far, hits[0].position
+    return free, place

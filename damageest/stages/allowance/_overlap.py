@@ -1,0 +1,65 @@
+"""Skin round the rim of a damage that the stock runs over."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints, Part
+from damageest.solids import to_arrays, to_manifold
+from damageest.stages.allowance._selectors import Wanted
+from damageest.stages.allowance._skin import ON, Skin, clipped, sorted_skin
+
+
+def grown(skin: Skin, part: Part, wanted: Wanted, overlap: float, tolerance: float, origin: Floats) -> Skin | None:
+    """The part's skin within ``overlap`` of the rim, on both sides of it, as far as it hangs together with it; with the
+    same stock as anywhere. None where there is nothing to run over."""
+    import igl
+    from manifold3d import Manifold
+
+    rim = _rim(skin)
+    if not overlap or not len(rim):
+        return None
+    ends = skin.vertices[rim]
+    margin = overlap + tolerance
+    low, high = ends.min(axis=(0, 1)) - margin, ends.max(axis=(0, 1)) + margin
+    near = to_manifold(part, origin) ^ Manifold.cube(tuple(high - low)).translate(tuple(low))
+    # fine enough that distance, linear on each triangle, is right to a fraction of the tolerance
+    near = near.refine_to_length(max(overlap / 3, tolerance / 2))
+    vertices, faces = to_arrays(near)
+    squared, _, _ = igl.point_mesh_squared_distance(vertices, skin.vertices, rim)
+    value = overlap - np.sqrt(squared)
+    close = (value[faces] > 0).any(axis=1)
+    vertices, faces, _, inside = clipped(vertices, faces[close], value)
+    faces = faces[inside]
+    if not len(faces):
+        return None
+    faces = _joined(vertices, faces, ends.mean(axis=1), part)
+    band = sorted_skin(vertices, faces, part, wanted, origin)
+    return band if (band.height > 0).any() else None
+
+
+def _rim(skin: Skin) -> Ints:
+    """(E,2) edges where skin with stock meets intact skin: those that no other skin of the damage shares."""
+    border = skin.rims()
+    if not len(border):
+        return border
+    edges = np.sort(skin.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    tall = edges[skin.height > 0].reshape(-1, 2)
+    size = len(skin.vertices)
+    return np.asarray(border[np.isin(border @ [size, 1], tall @ [size, 1])])
+
+
+def _joined(vertices: Floats, faces: Ints, places: Floats, part: Part) -> Ints:
+    """Those faces that hang together, by their corners, with one that one of the places (M,3) lies on."""
+    import igl
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    size = len(vertices)
+    rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    _, label = connected_components(
+        coo_array((np.ones(len(rows)), (rows, columns)), shape=(size, size)), directed=False
+    )
+    squared, face, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(places), vertices, faces)
+    seeds = np.unique(label[faces[face[squared <= (10 * ON * part.diagonal) ** 2], 0]])
+    return np.asarray(faces[np.isin(label[faces[:, 0]], seeds)])

@@ -1,0 +1,147 @@
+"""The nominal skin that a repair has to restore: the faces of a damage volume that lie on the part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import Floats, Ints, Mesh, Part
+from damageest.solids import to_arrays, to_manifold
+from damageest.stages.allowance._selectors import Wanted
+
+ON = 1e-7
+"""Distance from the part, in its diagonals, up to which a face lies on it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """``vertices`` (V,3) relative to the caller's origin, ``faces`` (F,3); ``parent`` (F,) the part's triangle below
+    each, ``normal`` (F,3) that triangle's, outward; ``height`` (F,) the stock wanted on each; ``free`` (F,) those that
+    must stay without."""
+
+    vertices: Floats
+    faces: Ints
+    parent: Ints
+    normal: Floats
+    height: Floats
+    free: NDArray[np.bool_]
+
+    @property
+    def triangles(self) -> Floats:
+        return self.vertices[self.faces]
+
+    @property
+    def areas(self) -> Floats:
+        """(F,) areas."""
+        a, b, c = np.moveaxis(self.triangles, 1, 0)
+        return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+    def only(self, faces: NDArray[np.bool_]) -> Skin:
+        """The same skin with some of its faces."""
+        return Skin(
+            self.vertices, self.faces[faces], self.parent[faces], self.normal[faces], self.height[faces],
+            self.free[faces],
+        )  # fmt: skip
+
+    def rims(self) -> Ints:
+        """(E,2) edges that only one face has."""
+        edges = np.sort(np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]]), axis=1)
+        unique, count = np.unique(edges, axis=0, return_counts=True)
+        return np.asarray(unique[count == 1])
+
+    def sampled(self, count: int, seed: int) -> tuple[Floats, Ints]:
+        """``count`` random points (N,3), even by area, and the face (N,) of each."""
+        rng = np.random.default_rng(seed)
+        total = np.cumsum(self.areas)
+        if not len(total) or not total[-1] > 0:
+            return np.empty((0, 3)), np.empty(0, np.int64)
+        face = np.minimum(np.searchsorted(total, rng.random(count) * total[-1], side="right"), len(total) - 1)
+        u, v = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
+        a, b, c = np.moveaxis(self.triangles[face], 1, 0)
+        return np.asarray(a * (1 - u) + b * u * (1 - v) + c * u * v), face
+
+
+def skin_of(body: Mesh, part: Part, wanted: Wanted, origin: Floats) -> Skin:
+    """The faces of a solid in the part that lie on the part's surface, cut along the planes of the selectors and told
+    apart by the stock wanted on them."""
+    simple = to_manifold(body, origin).simplify(0.1 * ON * part.diagonal)
+    vertices, faces = to_arrays(simple)
+    return sorted_skin(vertices, faces, part, wanted, origin)
+
+
+def sorted_skin(vertices: Floats, faces: Ints, part: Part, wanted: Wanted, origin: Floats) -> Skin:
+    """Of a mesh relative to ``origin``, the faces that lie on the part, cut and told apart."""
+    on, parent = on_part(vertices, faces, part, origin)
+    faces, parent = faces[on], parent[on]
+    for normal, offset in wanted.planes(origin):
+        value = vertices @ normal - offset
+        vertices, faces, kept, _ = clipped(vertices, faces, np.where(np.abs(value) < ON * part.diagonal, 0.0, value))
+        parent = parent[kept]
+    normal = unit(part.cross)[parent]
+    middle = vertices[faces].mean(axis=1) + origin
+    height = wanted.heights(middle, normal, parent, part)
+    return Skin(vertices, faces, parent, normal, height, wanted.kept_free(middle, normal, parent, part))
+
+
+def on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> tuple[NDArray[np.bool_], Ints]:
+    """Which faces (F,) lie on the part and face the same way, and the part's triangle (F,) below the middle of each."""
+    import igl
+
+    # three points near the corners and the middle: a face of a cut may touch the skin along an edge
+    weights = np.array([[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [1 / 3, 1 / 3, 1 / 3]])
+    corners = vertices[faces]
+    probes = np.einsum("pk,fkj->fpj", weights, corners).reshape(-1, 3)
+    squared, parent, _ = igl.point_mesh_squared_distance(
+        np.ascontiguousarray(probes), np.ascontiguousarray(part.vertices - origin), np.array(part.faces)
+    )
+    near = squared.reshape(-1, 4).max(axis=1) <= (ON * part.diagonal) ** 2
+    parent = np.asarray(parent.reshape(-1, 4)[:, 3], np.int64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return near & (np.einsum("ij,ij->i", cross, part.cross[parent]) > 0), parent
+
+
+def clipped(vertices: Floats, faces: Ints, value: Floats) -> tuple[Floats, Ints, Ints, NDArray[np.bool_]]:
+    """Cuts triangles where a field (V,), linear on each, changes its sign. Neighbours stay joined.
+
+    Returns:
+        Vertices, faces, the face that each came from, and whether the field is positive on it.
+    """
+    sign = np.sign(value)[faces]
+    crossed = (sign.max(axis=1) > 0) & (sign.min(axis=1) < 0)
+    whole = np.flatnonzero(~crossed)
+    cut = np.flatnonzero(crossed)
+    touching = (sign[cut] == 0).any(axis=1)
+    # turned so that the corner on the plane, or the one alone on its side, comes first
+    lone = np.where(touching[:, None], sign[cut] == 0, sign[cut] == -np.sign(sign[cut].sum(axis=1))[:, None])
+    turn = (lone.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(faces[cut], turn, axis=1).T
+    first, last = np.where(touching, b, a), np.where(touching, c, b)
+    pairs = np.concatenate([np.stack([first, last], 1), np.stack([a, c], 1)[~touching]])
+    edges, number = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+    low, high = edges.T
+    share = value[low] / np.where(value[low] == value[high], 1, value[low] - value[high])
+    fresh = vertices[low] + share[:, None] * (vertices[high] - vertices[low])
+    number = number.reshape(-1) + len(vertices)
+    p, q = number[: len(cut)], np.zeros(len(cut), np.int64)
+    q[~touching] = number[len(cut) :]
+    two, three = np.flatnonzero(touching), np.flatnonzero(~touching)
+    pieces = [
+        (whole, faces[whole]),
+        (cut[two], np.stack([a[two], b[two], p[two]], 1)),
+        (cut[two], np.stack([a[two], p[two], c[two]], 1)),
+        (cut[three], np.stack([a[three], p[three], q[three]], 1)),
+        (cut[three], np.stack([p[three], b[three], c[three]], 1)),
+        (cut[three], np.stack([p[three], c[three], q[three]], 1)),
+    ]
+    parent = np.concatenate([owner for owner, _ in pieces])
+    out = np.concatenate([part for _, part in pieces])
+    all_values = np.concatenate([value, np.zeros(len(fresh))])
+    positive = all_values[out].sum(axis=1) > 0
+    return np.concatenate([vertices, fresh]), out, parent, positive
+
+
+def unit(vectors: Floats) -> Floats:
+    """(N,3) of length 1; 0 where there is none."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])

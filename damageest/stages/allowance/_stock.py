@@ -1,0 +1,167 @@
+"""Stock of given height on skin, as a solid: one convex piece over each triangle, each convex edge, each corner.
+
+Where the skin is smooth, the pieces over neighbouring triangles share their upper corners, so nothing gapes. Over a
+sharp convex edge the pieces are joined by a mitre, cut off where the edge is sharper than a right angle. Skin without
+stock beside it is not reached over: at the border the stock has straight walls along the normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints
+from damageest.stages.allowance._skin import Skin, unit
+
+SMOOTH = 30.0
+"""Degrees between neighbouring triangles up to which they may share upper corners."""
+MITRED = 100.0
+"""Degrees between normals up to which an edge is mitred to a point; a sharper one gets `ROUNDS` mitres."""
+ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class _Edges:
+    """Edges between two faces of the skin: ``first`` and ``second`` (E,) the faces, ``a`` and ``b`` (E,) the ends in
+    the first one's sense, ``at`` (E,2,2) the corners (as 3 x face + k) of the first and of the second at a and b."""
+
+    first: Ints
+    second: Ints
+    a: Ints
+    b: Ints
+    at: Ints
+
+
+def stock(skin: Skin, slack: float) -> Any:
+    """A Manifold, relative to the skin's origin: stock of each face's height, and up to ``slack`` more. It reaches a
+    little below the skin, for the caller to cut off."""
+    from manifold3d import Manifold, OpType
+
+    skin = skin.only((skin.height > 0) & (skin.areas > 0))
+    if not len(skin.faces):
+        return Manifold()
+    edges = _edges(skin)
+    height = skin.height + slack / 2
+    group, up = _directions(skin, height, edges, slack / 2)
+    sink = 1e-3 * slack
+    corner = skin.triangles
+    tops = corner + up[group].reshape(-1, 3, 3)
+    lows = corner - sink * unit(up)[group].reshape(-1, 3, 3)
+    clouds = list(np.concatenate([lows, tops], axis=1))
+    over_edges, ends, heads = _over_edges(skin, height, edges, group, tops)
+    clouds += over_edges
+    for vertex in np.flatnonzero(np.bincount(ends, minlength=len(skin.vertices)) >= 2):
+        mine = heads[ends == vertex].reshape(-1, 3)
+        clouds.append(np.concatenate([skin.vertices[vertex : vertex + 1], mine[np.isfinite(mine[:, 0])]]))
+    return Manifold.batch_boolean([Manifold.hull_points(cloud) for cloud in clouds], OpType.Add)
+
+
+def _edges(skin: Skin) -> _Edges:
+    """Edges with exactly two faces, which run along them in opposite senses."""
+    start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
+    size = len(skin.vertices)
+    key = np.minimum(start, stop) * size + np.maximum(start, stop)
+    order = np.argsort(key, kind="stable")
+    _, where, count = np.unique(key[order], return_index=True, return_counts=True)
+    i, j = order[where[count == 2]], order[where[count == 2] + 1]
+    opposite = start[i] == stop[j]
+    i, j = i[opposite], j[opposite]
+    at = np.stack([np.stack([i, _next(i)], 1), np.stack([_next(j), j], 1)], 1)
+    return _Edges(i // 3, j // 3, start[i], stop[i], at)
+
+
+def _next(corner: Ints) -> Ints:
+    return corner // 3 * 3 + (corner % 3 + 1) % 3
+
+
+def _directions(skin: Skin, height: Floats, edges: _Edges, slack: float) -> tuple[Ints, Floats]:
+    """The group (3F,) of each corner of each face, and the way up (G,3) from the skin to the stock's top that all
+    corners of a group share: the faces' mean normal, long enough that each face has its height, none ``slack`` more."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = 3 * len(skin.faces)
+    dot = np.einsum("ij,ij->i", skin.normal[edges.first], skin.normal[edges.second])
+    alike = (dot > np.cos(np.radians(SMOOTH))) & (height[edges.first] == height[edges.second])
+    pairs = edges.at[alike].transpose(0, 2, 1).reshape(-1, 2)
+    owner = np.arange(count) // 3
+    angle = _angles(skin.triangles).ravel()
+
+    def grouped(pairs: Ints) -> tuple[Ints, Floats, Floats]:
+        links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+        size, group = connected_components(links, directed=False)
+        mean = np.zeros((size, 3))
+        np.add.at(mean, group, (angle + 1e-9)[:, None] * skin.normal[owner])
+        mean = unit(mean)
+        least = np.ones(size)
+        np.minimum.at(least, group, np.einsum("ij,ij->i", mean[group], skin.normal[owner]))
+        return group.astype(np.int64), mean, least
+
+    group, _, least = grouped(pairs)
+    # groups that bend too much for one common way up are taken apart
+    bearable = least[group] >= (height / (height + slack))[owner]
+    group, mean, least = grouped(pairs[bearable[pairs].all(axis=1)])
+    tall = np.zeros(len(mean))
+    tall[group] = height[owner]
+    return group, mean * (tall / least)[:, None]
+
+
+def _angles(triangles: Floats) -> Floats:
+    """(F,3) angles at the corners."""
+    along, back = unit_rows(triangles[:, [1, 2, 0]] - triangles), unit_rows(triangles[:, [2, 0, 1]] - triangles)
+    return np.asarray(np.arccos(np.clip(np.einsum("fkj,fkj->fk", along, back), -1, 1)))
+
+
+def unit_rows(vectors: Floats) -> Floats:
+    """(...,3) of length 1."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
+
+
+def _over_edges(
+    skin: Skin, height: Floats, edges: _Edges, group: Ints, tops: Floats
+) -> tuple[list[Floats], Ints, Floats]:
+    """Point clouds of the pieces over sharp convex edges; the vertex (2E,) at either end of each, and the cloud's upper
+    points (2E,K,3) there, NaN where there are fewer."""
+    n, m = skin.normal[edges.first], skin.normal[edges.second]
+    outward = np.cross(skin.vertices[edges.b] - skin.vertices[edges.a], n)
+    turn = np.arctan2(np.einsum("ij,ij->i", m, unit(outward)), np.einsum("ij,ij->i", m, n))
+    parted = (group[edges.at[:, 0]] != group[edges.at[:, 1]]).any(axis=1)
+    some = np.flatnonzero(parted & (turn > 1e-6))
+    mitres = _mitres(n[some], unit(outward)[some], turn[some], height[edges.first[some]], height[edges.second[some]])
+    flat = tops.reshape(-1, 3)
+    heads = []
+    for end, vertex in enumerate((edges.a[some], edges.b[some])):
+        own = flat[edges.at[some][:, :, end]]  # (E,2,3): of the first face and of the second
+        heads.append(np.concatenate([own, skin.vertices[vertex][:, None] + mitres], axis=1))
+    clouds = []
+    for k, edge in enumerate(some):
+        upper = np.concatenate([heads[0][k], heads[1][k]])
+        base = skin.vertices[[edges.a[edge], edges.b[edge]]]
+        clouds.append(np.concatenate([base, upper[np.isfinite(upper[:, 0])]]))
+    return clouds, np.concatenate([edges.a[some], edges.b[some]]), np.concatenate(heads)
+
+
+def _mitres(n: Floats, outward: Floats, turn: Floats, tall: Floats, other: Floats) -> Floats:
+    """(E,ROUNDS,3) from an edge to the points of its mitres, NaN where there are fewer.
+
+    ``n`` (E,3): normal of the first face; ``outward`` (E,3): from it across the edge; ``turn`` (E,): angle to the
+    second one's normal; ``tall``, ``other`` (E,): heights on both.
+    """
+    found = np.full((len(n), ROUNDS, 3), np.nan)
+    blunt = turn <= np.radians(MITRED)
+    # in the plane across the edge: the point `tall` above the first face and `other` above the second
+    aside = (other - tall * np.cos(turn)) / np.sin(turn)
+    short = np.hypot(tall, aside) <= 1.6 * np.maximum(
+        tall, other
+    )  # heights that differ, over a blunt edge, meet far off
+    one = blunt & short
+    found[one, 0] = tall[one, None] * n[one] + aside[one, None] * outward[one]
+    step = turn / ROUNDS
+    for k in range(ROUNDS):
+        at, share = (k + 0.5) * step, (k + 0.5) / ROUNDS
+        reach = ((1 - share) * tall + share * other) / np.cos(step / 2)
+        point = reach[:, None] * (np.cos(at)[:, None] * n + np.sin(at)[:, None] * outward)
+        found[~blunt, k] = point[~blunt]
+    return found

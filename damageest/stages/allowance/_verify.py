@@ -1,0 +1,123 @@
+"""What a deposit has to keep, checked on the finished solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Mesh, Part
+from damageest.errors import StageError
+from damageest.solids import to_arrays
+from damageest.stages.allowance._limits import Crowd
+from damageest.stages.allowance._selectors import Mask
+from damageest.stages.allowance._skin import ON, Skin
+
+VOLUME = 1e-4
+"""Share of its volume that a damage may stick out of its deposit, or a deposit into metal."""
+MISSED = 0.01
+"""Share of sampled points of the skin at which the thickness may be missed: at creases, where it has no one value."""
+SAMPLES = 2000
+LONGEST = 1.6
+"""Of a mitre, in heights."""
+CLIPPED = (
+    "a smaller outer there, or another inner; if neither helps, an export of part and damage would help to mend it"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Worked:
+    """Everything that the check looks at, as Manifolds relative to ``origin``: the ``deposit``, the ``cavity`` it
+    fills, the metal ``left``, what is ``kept_out``; the ``skin`` with its heights."""
+
+    deposit: Any
+    cavity: Any
+    left: Any
+    kept_out: Any
+    skin: Skin
+    origin: Floats
+
+
+def check(work: Worked, part: Part, tolerance: float, crowd: Crowd | None) -> tuple[float, float, float] | None:
+    """The least, mean and largest thickness of the stock; None where none is wanted. Raises StageError with the figure
+    where a guarantee is not kept."""
+    missing = (work.cavity - work.deposit).volume() / work.cavity.volume()
+    if missing > VOLUME:
+        raise StageError(f"the deposit would miss {missing:.2%} of the damage volume", CLIPPED)
+    entered = (work.deposit ^ work.left).volume() / work.deposit.volume()
+    if entered > VOLUME:
+        raise StageError(f"{entered:.2%} of the deposit would lie in metal that is left", CLIPPED)
+    wanted = work.skin.only(work.skin.height > 0)
+    if not len(wanted.faces):
+        return None
+    found = thickness(work, wanted, part, crowd)
+    wrong = found.wrong(tolerance, ON * part.diagonal)
+    if wrong.mean() > MISSED:
+        worst = float(np.abs(found.thick - found.height)[wrong].max())
+        raise StageError(
+            f"the stock's thickness is missed on {wrong.mean():.1%} of the skin, by up to {worst:.3g}",
+            "a larger tolerance, or a smaller outer",
+        )
+    own = found.thick[~found.ended & ~found.covered]
+    return (float(own.min()), float(own.mean()), float(own.max())) if len(own) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Thickness:
+    """At points (N,3) spread over skin with stock: the ``height`` (N,) wanted; how ``thick`` (N,) the stock is along the
+    normal, or where it is ``covered`` (N,) by the stock of other skin as in a concave corner, how far its surface there
+    stands from the nearest skin; and whether (N,) it is ``ended`` by metal, by something to keep free, or by a crowded
+    place."""
+
+    points: Floats
+    height: Floats
+    thick: Floats
+    covered: Mask
+    ended: Mask
+
+    def wrong(self, tolerance: float, rounding: float) -> Mask:
+        """(N,) where the stock is thinner than wanted, or more than a tolerance thicker; over a mitred edge it may stand
+        as high as the mitre."""
+        low = ~self.ended & ~self.covered & (self.thick < self.height * (1 - 1e-6) - rounding)
+        bound = np.where(self.covered, LONGEST * self.height.max(), self.height) + tolerance
+        return np.asarray(low | (self.thick > bound))
+
+
+def thickness(work: Worked, wanted: Skin, part: Part, crowd: Crowd | None) -> Thickness:
+    """Measured by rays along the normal of the skin with stock."""
+    import igl
+
+    rounding = 10 * ON * part.diagonal
+    points, face = wanted.sampled(SAMPLES, seed=23)
+    normal, height = wanted.normal[face], wanted.height[face]
+    reach = 4 * float(height.max()) + part.diagonal
+    far = np.zeros(len(points))
+    for k, (a, n) in enumerate(zip(points - rounding * normal, normal, strict=True)):
+        hits = [hit.distance * reach for hit in work.deposit.ray_cast(tuple(a), tuple(a + reach * n))
+                if np.dot(hit.normal, n) > 0]  # fmt: skip
+        # a feather edge may be left at once, before the stock begins
+        far[k] = next((hit - rounding for hit in hits if hit > 2 * rounding), 0.0)
+    ends = points + far[:, None] * normal
+    squared, _, _ = igl.point_mesh_squared_distance(
+        np.ascontiguousarray(ends), wanted.vertices, np.ascontiguousarray(wanted.faces)
+    )
+    nearest = np.sqrt(squared)
+    covered = nearest < far - rounding
+    ended = _near(ends, work.left, 10 * rounding) | _near(ends, work.kept_out, 10 * rounding)
+    if crowd is not None:
+        squared, _, _ = igl.point_mesh_squared_distance(
+            np.ascontiguousarray(points), crowd.points - work.origin, np.arange(len(crowd.points))[:, None]
+        )
+        ended |= squared <= (2 * height) ** 2
+    return Thickness(points, height, np.where(covered, nearest, far), covered, ended)
+
+
+def _near(points: Floats, body: Any, reach: float) -> Mask:
+    import igl
+
+    if body.is_empty():
+        return np.zeros(len(points), bool)
+    mesh = Mesh(*to_arrays(body))
+    squared, _, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(points), mesh.vertices, mesh.faces.copy())
+    return np.asarray(squared <= reach**2)

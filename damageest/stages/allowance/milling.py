@@ -1,0 +1,113 @@
+"""Stock to mill off again: the deposit stands proud of the nominal surface where it will be milled, and only there."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from damageest.artefacts import Deposit, Floats, Part, Solid
+from damageest.errors import StageError
+from damageest.stages.allowance import Allowance
+from damageest.stages.allowance._selectors import KeepOut, Target, Wanted
+
+
+class Milling(Allowance):
+    """Stock beyond the nominal surface, to be milled off after deposition; skin by skin, with regions kept free, and a
+    cut-back into sound metal. All lengths in the job's unit, all places in part coordinates."""
+
+    use: Literal["milling"] = "milling"
+    outer: float = Field(
+        0.0, ge=0, allow_inf_nan=False,
+        description="stock beyond the nominal surface, along its normal, in the job's unit, where no target matches",
+    )  # fmt: skip
+    targets: tuple[Target, ...] = Field(
+        (),
+        description="skin with an `outer` of its own, the first match wins: {outer: 1.0, ...} with one or more of "
+        "box: [[x, y, z], [x, y, z]]; half_space: {point, normal}; facing: {direction, angle} (degrees); "
+        "faces: [numbers or names of CAD faces]; kind: plane, cylinder or other (of the CAD face). Lengths in the "
+        "job's unit, places in part coordinates",
+    )
+    keep_out: tuple[KeepOut, ...] = Field(
+        (),
+        description="what the deposit must not enter: solids {box: ...}, {cylinder: {from, to, radius}}, {mesh: path}; "
+        "or skin as in `targets`, over which there is no stock then. Lengths in the job's unit",
+    )
+    overlap: float = Field(
+        0.0, ge=0, allow_inf_nan=False,
+        description="how far the stock runs over the intact surface round the rim, in the job's unit; 0: not at all",
+    )  # fmt: skip
+    inner: float = Field(
+        0.0, ge=0, allow_inf_nan=False,
+        description="cut-back: sound metal within this of the inner damage surface goes to the cavity, in the job's "
+        "unit; 0: none",
+    )  # fmt: skip
+    crowded: Literal["refuse", "clip"] = Field(
+        "refuse",
+        description="where stock would run into an opposite wall, close a bore or fill a gap: refuse the site, or "
+        "clip (the stock ends at the wall, a gap fills up; a warning says where)",
+    )
+
+    def run(self, damage: Solid, part: Part, tolerance: float, others: Solid | None) -> Solid | None:
+        """Raises StageError where there is no room for the stock, a region to keep free is already damaged, or a
+        guarantee is not kept."""
+        from damageest.solids import remainder, to_manifold, to_solid
+        from damageest.stages.allowance._cut_back import cut_back
+        from damageest.stages.allowance._keep_out import kept_out
+        from damageest.stages.allowance._limits import crowded
+        from damageest.stages.allowance._overlap import grown
+        from damageest.stages.allowance._skin import skin_of
+        from damageest.stages.allowance._stock import stock
+        from damageest.stages.allowance._verify import Worked, check
+
+        origin: Floats = part.bounds.mean(axis=0)
+        wanted = Wanted(self.outer, self.targets, self.keep_out)
+        cavity = cut_back(damage, part, others, self.inner, tolerance) if self.inner else damage
+        filled, whole = to_manifold(cavity, origin), to_manifold(part, origin)
+        left = remainder(whole, filled)
+        skin = skin_of(cavity, part, wanted, origin)
+        reach = wanted.most + tolerance
+        barred = kept_out(self.keep_out, skin, filled, part, wanted, reach, origin, tolerance)
+        crowd = crowded(skin, part, origin)
+        if crowd is not None and self.crowded == "refuse":
+            raise StageError(str(crowd), "a smaller outer there by targets, keep_out, or crowded: clip")
+        band = grown(skin, part, wanted, self.overlap, tolerance, origin)
+        proud = stock(skin, tolerance / 2)
+        if band is not None:
+            proud += stock(band, tolerance / 2)
+        proud = _touching(proud - left - barred, filled, tolerance)
+        deposit = (filled + proud).as_original().simplify(1e-9 * part.diagonal)
+        thickness = check(Worked(deposit, filled, left, barred, skin, origin), part, tolerance, crowd)
+        body = to_solid(deposit, origin)
+        if body is None:
+            raise StageError("the deposit came out empty", "a slightly different outer")
+        skins = [each for each in (skin, band) if each is not None]
+        notes = [] if crowd is None else [f"{crowd}; clipped there"]
+        if thickness is None:
+            notes.append("no stock is asked for on the skin of this damage: the deposit ends at the nominal surface")
+        return Deposit(
+            body.vertices,
+            body.faces,
+            cavity=None if cavity is damage else cavity,
+            stock_volume=max(body.volume - cavity.volume, 0.0),
+            cut_back_volume=max(cavity.volume - damage.volume, 0.0),
+            thickness=thickness,
+            touched=() if part.faces_brep is None else _touched(part, skins),
+            notes=tuple(notes),
+        )
+
+
+def _touched(part: Part, skins: list[Any]) -> tuple[int, ...]:
+    """The CAD faces that stock stands on."""
+    assert part.faces_brep is not None
+    parents = np.concatenate([skin.parent[skin.height > 0] for skin in skins])
+    return tuple(np.unique(part.faces_brep[parents]).tolist())
+
+
+def _touching(proud: Any, filled: Any, tolerance: float) -> Any:
+    """Without the pieces of stock that do not touch what is filled, as behind a thin wall that cuts them off."""
+    from manifold3d import Manifold
+
+    pieces = [piece for piece in proud.decompose() if piece.min_gap(filled, tolerance) <= 1e-3 * tolerance]
+    return Manifold.compose(pieces) if pieces else Manifold()
