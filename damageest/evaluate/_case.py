@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import resource
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -17,15 +16,25 @@ import numpy as np
 
 from damageest.artefacts import Part, Scan, Solid
 from damageest.errors import DamageestError, StageError
+from damageest.evaluate._meter import Meter, libigl_seconds, started
 from damageest.evaluate._run import MARK
 from damageest.evaluate.damages import random_damage
 from damageest.evaluate.parts import PARTS
 from damageest.evaluate.scores import depth, score
 from damageest.evaluate.sized import sized_damage
+from damageest.registry import Registry
 from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate
 
-TIMES = ("seconds", "stage_seconds", "megabytes")
+TIMES = (
+    "seconds",
+    "stage_seconds",
+    "cpu_seconds",
+    "start_seconds",
+    "libigl_seconds",
+    "megabytes",
+    "stage_megabytes",
+)
 """What of a row differs from run to run; all else follows from the case."""
 
 
@@ -103,6 +112,7 @@ def run_case(case: Case) -> dict[str, Any]:
     ``skipped`` where there is no case."""
     import damageest
 
+    start_seconds = started()
     part, row = part_of(case), blank(case)
     try:
         scan, kinds = scanned(case, part)
@@ -113,16 +123,21 @@ def run_case(case: Case) -> dict[str, Any]:
     lost = truth.damage
     row |= {"kinds": list(kinds), "points": len(scan.points)}
     row |= {"share": lost.volume / part.volume, "depth": depth(lost, part)} if lost else {}
-    start = time.perf_counter()
-    found = None
+    found, meter = None, Meter()
+    registry = Registry.discover([meter])
+    alone = Scan(scan.points, unit=scan.unit)  # without the truth
+    start, busy = time.perf_counter(), time.process_time()
     try:
-        alone = Scan(scan.points, unit=scan.unit)  # without the truth
-        found = damageest.run(case.job or {"version": 1}, part=part, scan=alone, settings=case.settings)
+        found = damageest.run(
+            case.job or {"version": 1}, part=part, scan=alone, settings=case.settings, registry=registry
+        )
     except DamageestError as error:
         # a stage that refuses owns up to it; a job or an input at fault would be the evaluation's own mistake
         row |= {"error": _one_line(error), "flagged": isinstance(error, StageError)}
-    row["seconds"] = time.perf_counter() - start
-    row["megabytes"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # before the scoring
+    row |= {"seconds": time.perf_counter() - start, "cpu_seconds": time.process_time() - busy}
+    row["start_seconds"] = start_seconds
+    row |= {"megabytes": meter.megabytes, "stage_megabytes": meter.stage_megabytes}  # before the scoring
+    row["libigl_seconds"] = libigl_seconds(scan.moved(truth.T_part_scan).points, part)
     row |= _scored(found, part, scan) if found else {"missed": score(part, [], lost, case.tolerance).missed}
     return {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in row.items()}
 

@@ -22,7 +22,8 @@ def figures(rows: Sequence[Row]) -> dict[str, Number]:
     """Of the rows that are cases. IoU, errors and distances: of those with damage. None where there is nothing to say.
 
     ``right``: share of the cases; ``volume_error``, ``surface_error``, ``distance_95``, ``pose_error``, ``seconds``:
-    medians; ``distance_max``, ``seconds_max``, ``megabytes``: the largest; the others: how many.
+    medians; ``distance_max``, ``seconds_max``, ``megabytes``: the largest; ``libigl``: median of processor seconds over
+    those of libigl's exact distance from all points; the others: how many.
     """
     rows = [row for row in rows if not row["skipped"]]
     damaged = [row for row in rows if row["size"] != 0]
@@ -50,6 +51,8 @@ def figures(rows: Sequence[Row]) -> dict[str, Number]:
         "errors": sum(bool(row["error"]) for row in rows),
         "seconds": _of(rows, "seconds", np.median),
         "seconds_max": _of(rows, "seconds", np.max),
+        "libigl": _ratio(rows, "cpu_seconds", "libigl_seconds"),
+        "start_seconds": _of(rows, "start_seconds", np.median),
         "megabytes": _of(rows, "megabytes", np.max),
     }
 
@@ -57,6 +60,24 @@ def figures(rows: Sequence[Row]) -> dict[str, Number]:
 def _of(rows: Sequence[Row], name: str, of: Callable[[Any], Any]) -> float | None:
     known = [row[name] for row in rows if row.get(name) is not None]
     return float(of(np.array(known))) if known else None
+
+
+def _ratio(rows: Sequence[Row], over: str, under: str) -> float | None:
+    known = [row[over] / row[under] for row in rows if row.get(over) is not None and row.get(under)]
+    return float(np.median(known)) if known else None
+
+
+def stages(rows: Sequence[Row]) -> dict[str, tuple[float, float]]:
+    """Of each stage, in the order of the route: median seconds, and the peak memory in MB while it ran."""
+    known = [row for row in rows if row.get("stage_seconds")]
+    names = dict.fromkeys(name for row in known for name in row["stage_seconds"])
+    return {
+        name: (
+            float(np.median([row["stage_seconds"].get(name, 0.0) for row in known])),
+            max(row["stage_megabytes"].get(name, 0.0) for row in known),
+        )
+        for name in names
+    }
 
 
 def axes_of(rows: Sequence[Row]) -> dict[str, list[Any]]:
@@ -88,6 +109,18 @@ def by(rows: Sequence[Row], axis: str) -> dict[Any, list[Row]]:
     if axis == "part":
         return {name: [row for row in rows if row["part"] == name] for name in dict.fromkeys(r["part"] for r in rows)}
     return {label: [row for row in rows if row["varied"].get(axis) == label] for label in axes_of(rows)[axis]}
+
+
+def crossed(rows: Sequence[Row]) -> dict[tuple[Any, ...], list[Row]]:
+    """The rows of each combination of what was varied."""
+    axes = axes_of(rows)
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row["varied"].get(axis, "") for axis in axes), []).append(row)
+    order = {axis: {value: k for k, value in enumerate(values)} for axis, values in axes.items()}
+    return dict(
+        sorted(groups.items(), key=lambda item: [order[a].get(v, -1) for a, v in zip(axes, item[0], strict=True)])
+    )
 
 
 def sentence(rows: Sequence[Row], unit: str) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from damageest.errors import InputError
-from damageest.evaluate._figures import axes_of, title
+from damageest.evaluate._figures import axes_of, crossed, title
 from damageest.evaluate._run import Row
+
+Point = tuple[float, float]
 
 SIZE = (6.0, 4.0)
 """Inches."""
@@ -33,24 +35,43 @@ def draw(rows: Sequence[Row], unit: str, folder: Path) -> list[Path]:
     whole = [row for row in damaged if row.get("surface_error") is not None]
     made: list[Path] = []
 
-    def plot(name: str, x: str, y: str, points: list[tuple[float, float]], **look: Any) -> None:
-        if points:
-            made.extend(_saved(folder / name, x, y, lambda axes: _against(axes, points, **look)))
+    def plot(name: str, x: str, y: str, some: Sequence[Row], point: Callable[[Row], Point], **look: Any) -> None:
+        lines: dict[str, list[Point]] = {}
+        for row in some:
+            lines.setdefault(str(row["varied"].get("way", "")), []).append(point(row))
+        if lines:
+            made.extend(_saved(folder / name, x, y, lambda axes: _against(axes, lines, **look)))
 
     varied = axes_of(rows)
     if "noise" in varied:
-        pairs = [(row["varied"]["noise"], row["surface_error"] * row["tolerance"]) for row in whole]
-        plot("error_by_noise", title("noise", rows, unit), f"surface error, {unit}", pairs)
+
+        def error(row: Row) -> Point:
+            return row["varied"]["noise"], row["surface_error"] * row["tolerance"]
+
+        plot("error_by_noise", title("noise", rows, unit), f"surface error, {unit}", whole, error)
     if "points" in varied:
-        pairs = [(row["varied"]["points"], row["seconds"]) for row in rows]
-        plot("time_by_points", "points of the scan", "seconds", pairs, scale="log")
+        plot("time_by_points", "points of the scan", "seconds", rows, _by_points, scale="log")
     if "tolerance" in varied:
         own = title("tolerance", rows, unit).endswith(unit)
-        pairs = [((1 if own else row["noise"]) / row["tolerance"], row["seconds"]) for row in rows]
-        plot("time_by_tolerance", f"1 / tolerance, 1/{unit}" if own else "noise / tolerance", "seconds", pairs)
+
+        def time(row: Row) -> Point:
+            return (1 if own else row["noise"]) / row["tolerance"], row["seconds"]
+
+        name = f"1 / tolerance, 1/{unit}" if own else "noise / tolerance"
+        plot("time_by_tolerance", name, "seconds", rows, time, scale="log")
     if "size" in varied:
-        pairs = [(row["size"], float(row["found"] > 0 and not row["missed"])) for row in damaged if row["size"]]
-        plot("found_by_depth", f"depth of the damage, {unit}", "share found", pairs, of=np.mean, dots=False)
+
+        def hit(row: Row) -> Point:
+            return row["size"], float(row["found"] > 0 and not row["missed"])
+
+        deep = [row for row in damaged if row["size"]]
+        plot("found_by_depth", f"depth of the damage, {unit}", "share found", deep, hit, of=np.mean, dots=False)
+    if "way" in varied:
+
+        def cost(axes: Any) -> None:
+            _ways(axes, {way: [row for row in whole if row["varied"]["way"] == way] for way in varied["way"]})
+
+        made.extend(_saved(folder / "error_by_time", "seconds", "surface error, tolerances", cost))
     errors = np.array([row["surface_error"] for row in whole])
     if len(errors):
 
@@ -64,21 +85,41 @@ def draw(rows: Sequence[Row], unit: str, folder: Path) -> list[Path]:
     return made
 
 
+def _by_points(row: Row) -> Point:
+    return row["varied"]["points"], row["seconds"]
+
+
 def _against(
     axes: Any,
-    points: Sequence[tuple[float, float]],
+    lines: Mapping[str, Sequence[Point]],
     of: Callable[..., Any] = np.median,
     dots: bool = True,
     scale: str = "linear",
 ) -> None:
-    """All cases as dots, and a line through ``of`` those with the same x."""
-    x, y = np.array(points).T
-    places = np.unique(x)
-    if dots:
-        axes.plot(x, y, "o", color="0.7", markersize=4, label="cases")
-    axes.plot(places, [of(y[x == place]) for place in places], "o-", color="C0", label=of.__name__)
+    """All cases as dots, and for each way a line through ``of`` those with the same x. A log scale is one of both
+    axes, so that a power of x is a straight line."""
+    for number, (way, points) in enumerate(lines.items()):
+        x, y = np.array(points).T
+        places = np.unique(x)
+        if dots:
+            axes.plot(x, y, "o", color="0.7", markersize=4, label="" if number else "cases")
+        axes.plot(places, [of(y[x == place]) for place in places], "o-", color=f"C{number}", label=way or of.__name__)
     axes.set_xscale(scale)
-    axes.set_ylim(bottom=0)
+    axes.set_yscale(scale)
+    if scale == "linear":
+        axes.set_ylim(bottom=0)
+    axes.legend()
+
+
+def _ways(axes: Any, ways: Mapping[str, Sequence[Row]]) -> None:
+    """The median of each way at its tolerances: what accuracy costs."""
+    for number, (way, rows) in enumerate(ways.items()):
+        groups = crossed(rows).values()
+        x = [np.median([row["seconds"] for row in group]) for group in groups]
+        y = [np.median([row["surface_error"] for row in group]) for group in groups]
+        axes.plot(x, y, "o-", color=f"C{number}", label=way)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
     axes.legend()
 
 

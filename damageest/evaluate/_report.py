@@ -8,7 +8,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from damageest.evaluate._figures import RIGHT, WRONG, Number, axes_of, by, figures, label, sentence, title
+from damageest.evaluate._figures import (
+    RIGHT,
+    WRONG,
+    Number,
+    axes_of,
+    by,
+    crossed,
+    figures,
+    label,
+    sentence,
+    stages,
+    title,
+)
 from damageest.evaluate._run import Row
 from damageest.evaluate._table import about, markdown, versions
 
@@ -25,6 +37,7 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "missed": ("missed", "d"),
     "invented": ("invented", "d"),
     "seconds": ("s", ".1f"),
+    "libigl": ("x libigl", ".1f"),
     "megabytes": ("peak MB", ".0f"),
 }
 """Name among the figures to the table's head and the form of the number."""
@@ -36,7 +49,7 @@ def legend(unit: str) -> str:
         f"right: IoU >= {RIGHT}. IoU, volume error (either sign), surface error (in tolerances) and seconds: medians. "
         f"95 % within, all within: how far apart, in {unit}, found and true inner damage surface lie where they are "
         "deeper than the tolerance, median and largest over the cases. found, missed, invented: losses and sites over "
-        "all cases."
+        "all cases. x libigl: processor time over that of one exact distance pass of libigl over the scan's points."
     )
 
 
@@ -45,6 +58,13 @@ def cells(rows: Sequence[Row], axis: str, unit: str) -> list[list[str]]:
     groups = by(rows, axis) if axis else {"all": rows}
     body = [[label(value), *_numbers(figures(group))] for value, group in groups.items()]
     return [[title(axis, rows, unit), *(head for head, _ in COLUMNS.values())], *body]
+
+
+def cross_cells(rows: Sequence[Row], unit: str) -> list[list[str]]:
+    """Head and body of a table with a line for each combination of what was varied."""
+    axes = list(axes_of(rows))
+    body = [[*map(label, values), *_numbers(figures(group))] for values, group in crossed(rows).items()]
+    return [[*(title(axis, rows, unit) for axis in axes), *(head for head, _ in COLUMNS.values())], *body]
 
 
 def _numbers(found: dict[str, Number]) -> list[str]:
@@ -67,7 +87,15 @@ def plain(lines: Sequence[Sequence[str]]) -> str:
 def tables(rows: Sequence[Row], axes: Sequence[str], unit: str) -> str:
     """One for each axis, and what does not go into tables."""
     made = [plain(cells(rows, axis, unit)) for axis in axes or ("",)]
-    return "\n\n".join([*made, legend(unit), remarks(rows)])
+    if "way" in axes:  # a mean over ways to compare says nothing
+        made = [plain(cross_cells(rows, unit))]
+    return "\n\n".join([*made, legend(unit), plain(stage_cells(rows)), remarks(rows)])
+
+
+def stage_cells(rows: Sequence[Row]) -> list[list[str]]:
+    """Head and body of the table of what each stage costs."""
+    body = [[name, f"{seconds:.2f}", f"{most:.0f}"] for name, (seconds, most) in stages(rows).items()]
+    return [["stage", "s", "peak MB"], *body]
 
 
 def remarks(rows: Sequence[Row]) -> str:
@@ -79,6 +107,8 @@ def remarks(rows: Sequence[Row]) -> str:
         f"{found['right_flagged']}; without a result: {found['errors']}; pose off by more than the tolerance: "
         f"{found['pose_lost']}"
     ]
+    if found["start_seconds"] is not None:
+        lines.append(f"beside it, to start Python and import the libraries: {found['start_seconds']:.1f} s")
     if skipped:
         lines.append(f"left out: {len(skipped)}, as {skipped[0]['error']}")
     return "\n".join(lines)
@@ -90,7 +120,10 @@ def readme_table(rows: Sequence[Row], axes: Sequence[str], unit: str, command: s
         markdown([*cells(rows, axis, unit), *([["all", *_numbers(figures(rows))]] if not k else [])])
         for k, axis in enumerate(axes)
     ]
-    return "\n\n".join([*made, f"{legend(unit)} {remarks(rows).splitlines()[0]}.", about(f"`{command}`")])
+    if "way" in axes:
+        made = [markdown(cross_cells(rows, unit), len(axes_of(rows)))]
+    said = f"{legend(unit)} {'; '.join(remarks(rows).splitlines())}."
+    return "\n\n".join([*made, said, about(f"`{command}`")])
 
 
 def line(row: Row) -> str:
@@ -115,7 +148,8 @@ def write_files(rows: Sequence[Row], unit: str, folder: Path, command: str) -> N
         axis: [{"value": v, **figures(g)} for v, g in by(rows, axis).items()] for axis in ("part", *axes_of(rows))
     }
     summary = {"command": command, "unit": unit, **versions(), "sentence": sentence(rows, unit)}
-    summary |= {"all": figures(rows), "by": groups}
+    costs = {name: {"seconds": seconds, "megabytes": most} for name, (seconds, most) in stages(rows).items()}
+    summary |= {"all": figures(rows), "by": groups, "stages": costs}
     (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
 
 

@@ -25,7 +25,8 @@ Axes = dict[str, list[tuple[Label | None, Any]]]
 
 @dataclass(frozen=True)
 class Wanted:
-    """The options as written; empty: as it is. ``size`` may be ``any``; lengths carry a unit, or ``x`` for times."""
+    """The options as written; empty: as it is. ``size`` may be ``any``; lengths carry a unit, or ``x`` for times. Each
+    of ``against`` is settings with spaces between: a way to compare with what the job or the defaults say."""
 
     size: str = ""
     noise: str = ""
@@ -33,6 +34,7 @@ class Wanted:
     tolerance: str = ""
     vary: Sequence[str] = ()
     settings: Sequence[str] = ()
+    against: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ def variants(wanted: Wanted, base: Base) -> list[Variant]:
     axes["noise"] = noise or [(None, None)]
     axes["points"] = [(n, n) for n in _counts(wanted.points)] or [(None, None)]
     axes["tolerance"] = _tolerances(wanted.tolerance, base) or [(None, "auto" if base.auto else base.tolerance)]
+    axes["way"] = [("default", ()), *((text, tuple(text.split())) for text in dict.fromkeys(wanted.against))]
     for text in wanted.vary:
         name, values = _option(text, base)
         if name in axes:
@@ -90,6 +93,8 @@ def _variant(chosen: Mapping[str, tuple[Label | None, Any]], axes: Axes, wanted:
     for name, (_, value) in chosen.items():
         if name.startswith("scan."):
             scanner[name.removeprefix("scan.")] = value
+        elif name == "way":
+            settings += value
         elif name not in ("size", "noise", "points", "tolerance") and value is not None:
             settings.append(value)
     expected = AUTO_TOLERANCE * scanner["noise"] if tolerance == "auto" else float(tolerance)

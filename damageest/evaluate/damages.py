@@ -191,8 +191,21 @@ def beside_gap(site: Site) -> list[Tool]:
     return [_lump(site, point - site.uniform(0.0, 0.5) * radius * normal, radius)]
 
 
+def touching(site: Site) -> list[Tool]:
+    """Two lumps whose rims meet or overlap, or that a thin web of sound surface parts."""
+    point, normal = site.edge() if site.rng.random() < 0.3 else site.pick()
+    radii = site.size * site.rng.uniform(0.04, 0.09, 2)
+    apart = radii.sum() * site.uniform(0.75, 1.05)
+    off = site.points - point
+    level = np.abs(np.linalg.norm(off, axis=1) - apart)
+    other = site.rng.choice(np.argsort(level, kind="stable")[:40])
+    first = point - site.uniform(-0.3, 0.3) * radii[0] * normal
+    second = site.points[other] - site.uniform(-0.3, 0.3) * radii[1] * site.normals[other]
+    return [_lump(site, first, float(radii[0])), _lump(site, second, float(radii[1]))]
+
+
 KINDS: dict[str, Callable[[Site], list[Tool]]] = {
-    make.__name__: make for make in (chip, pit, cut, end, hole, worn_through, groove, beside_gap)
+    make.__name__: make for make in (chip, pit, cut, end, hole, worn_through, groove, beside_gap, touching)
 }
 """Name to maker of one random loss."""
 

@@ -4,8 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from damageest.evaluate._figures import axes_of, by, figures, sentence, surely, title
-from damageest.evaluate._report import cells, line, plain, remarks
+from damageest.evaluate._figures import axes_of, by, crossed, figures, sentence, stages, surely, title
+from damageest.evaluate._report import (
+    COLUMNS,
+    cells,
+    cross_cells,
+    line,
+    plain,
+    readme_table,
+    remarks,
+    stage_cells,
+    tables,
+)
 from tests.evaluate.rows import MISSED, SOUND, row
 
 
@@ -86,3 +96,24 @@ def test_a_case_is_told_with_what_went_wrong() -> None:
     assert line(row(kinds=["pit"])) == "cuboid 5: pit: IoU 0.990, 2.0 s"
     assert line(row(error="align: lost", **MISSED)).endswith("\n  align: lost")
     assert line(row(skipped=True, error="no room")) == "cuboid 5: left out: no room"
+
+
+def test_cost_is_told_in_passes_of_libigl_and_by_stage() -> None:
+    rows = [row(), row(cpu_seconds=1.0, stage_seconds={"align": 3.0}, stage_megabytes={"align": 300}), row(**MISSED)]
+    rows.append(row(error="crashed", cpu_seconds=None, stage_seconds={}))
+    assert figures(rows)["libigl"] == 6
+    assert stages(rows) == {"align": (1.0, 300), "enclose": (0.5, 90)}
+    assert stage_cells(rows)[1] == ["align", "1.00", "300"]
+    assert "to start Python and import the libraries: 1.0 s" in remarks(rows)
+
+
+def test_ways_to_compare_get_a_line_for_each_combination() -> None:
+    rows = [row(varied={"points": n, "way": way}) for n in (1000, 2000) for way in ("default", "method=octree")]
+    assert [len(group) for group in crossed(rows).values()] == [1] * 4
+    head, *body = cross_cells(rows, "mm")
+    assert head[:2] == ["points", "way"]
+    assert [line[:2] for line in body] == [[n, w] for n in ("1000", "2000") for w in ("default", "method=octree")]
+    assert "method=octree" in tables(rows, ["points", "way"], "mm")
+    text = readme_table(rows, ["points", "way"], "mm", "damageest evaluate")
+    assert text.startswith("| points | way | cases |")
+    assert text.splitlines()[1] == "| --- | --- |" + " ---: |" * len(COLUMNS)

@@ -35,6 +35,19 @@ def test_what_was_varied_is_drawn_and_the_errors(tmp_path: Path) -> None:
     assert {path: path.read_bytes() for path in made} == before
 
 
+def test_ways_to_compare_are_lines_of_their_own(tmp_path: Path) -> None:
+    rows = [
+        row(varied={"way": way, "points": p}, seconds=t, surface_error=0.1)
+        for way, p, t in [("default", 1000, 1.0), ("default", 4000, 2.0), ("method=octree", 1000, 5.0)]
+    ]
+    made = {path.name: path for path in draw(rows, "mm", tmp_path)}
+    assert {"error_by_time.svg", "time_by_points.svg", "errors.svg"} <= set(made)
+    (tmp_path / "one").mkdir()
+    alone = {path.name: path for path in draw(rows[:2], "mm", tmp_path / "one")}
+    for name in ("error_by_time.svg", "time_by_points.svg"):
+        assert made[name].read_bytes() != alone[name].read_bytes()
+
+
 def test_nothing_varied_and_nothing_found_draws_nothing(tmp_path: Path) -> None:
     assert draw([row(**MISSED)], "mm", tmp_path) == []
     assert [path.stem for path in draw([row()], "mm", tmp_path)] == ["errors", "errors"]

@@ -43,6 +43,16 @@ def test_all_combinations_of_options_and_implementations() -> None:
     assert ways[2].settings == ("method=auto", "tolerance=0.1", 'cluster="other"')
 
 
+def test_ways_to_compare_are_settings_beside_the_jobs_own() -> None:
+    rival = "method=octree enclose.depth=8"
+    ways = variants(Wanted(tolerance="0.1,0.2", against=[rival, rival], settings=["method=auto"]), MINE)
+    assert [way.varied for way in ways] == [
+        {"tolerance": tolerance, "way": name} for tolerance in (0.1, 0.2) for name in ("default", rival)
+    ]
+    assert ways[0].settings == ("method=auto", "tolerance=0.1")
+    assert ways[1].settings == ("method=auto", "tolerance=0.1", "method=octree", "enclose.depth=8")
+
+
 def test_values_may_be_lists() -> None:
     ways = variants(Wanted(vary=["background.size=[1,2,3],[4,5,6]"]), MINE)
     assert [way.settings[-1] for way in ways] == ["background.size=[1, 2, 3]", "background.size=[4, 5, 6]"]

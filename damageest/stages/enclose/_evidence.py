@@ -166,7 +166,7 @@ def local_areas(points: Floats) -> Floats:
 def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) -> tuple[Floats, Ints, Flags, Ints]:
     """The sites' points and their neighbours that are deeper than the noise makes likely: the rim, where the damage is
     still shallower than the tolerance."""
-    deep = (sites.label == 0) & (deviation.distance < -max(1.5 * aligned.noise, 0.1 * tolerance))
+    deep = (sites.label == 0) & (deviation.distance < -max(2 * aligned.noise, 0.1 * tolerance))
     deep &= deviation.distance >= -tolerance * 1.0001
     candidates = np.flatnonzero(deep)
     seeds = np.flatnonzero(sites.label > 0)
