@@ -42,6 +42,8 @@ class Worked:
 def check(work: Worked, part: Part, tolerance: float, crowd: Crowd | None) -> tuple[float, float, float] | None:
     """The least, mean and largest thickness of the stock; None where none is wanted. Raises StageError with the figure
     where a guarantee is not kept."""
+    import igl
+
     missing = (work.cavity - work.deposit).volume() / work.cavity.volume()
     if missing > VOLUME:
         raise StageError(f"the deposit would miss {missing:.2%} of the damage volume", CLIPPED)
@@ -59,16 +61,21 @@ def check(work: Worked, part: Part, tolerance: float, crowd: Crowd | None) -> tu
             f"the stock's thickness is missed on {wrong.mean():.1%} of the skin, by up to {worst:.3g}",
             "a larger tolerance, or a smaller outer",
         )
-    own = found.thick[~found.ended & ~found.covered]
+    # at the very border the way along the normal may lead out of the wall, which is no thickness of the stock
+    rims = wanted.rims()
+    inner = np.ones(len(found.thick), bool)
+    if len(rims):
+        inner = igl.point_mesh_squared_distance(found.points, wanted.vertices, rims)[0] > (tolerance / 2) ** 2
+    own = found.thick[inner & ~found.ended & ~found.covered]
     return (float(own.min()), float(own.mean()), float(own.max())) if len(own) else None
 
 
 @dataclass(frozen=True, eq=False)
 class Thickness:
-    """At points (N,3) spread over skin with stock: the ``height`` (N,) wanted; how ``thick`` (N,) the stock is along the
-    normal, or where it is ``covered`` (N,) by the stock of other skin as in a concave corner, how far its surface there
-    stands from the nearest skin; and whether (N,) it is ``ended`` by metal, by something to keep free, or by a crowded
-    place."""
+    """At ``points`` (N,3) spread over skin with stock: the ``height`` (N,) wanted; how ``thick`` (N,) the stock is
+    along the normal, or where it is ``covered`` (N,) by the stock of other skin as in a concave corner, how far its
+    surface there stands from the nearest skin; and whether (N,) it is ``ended`` by metal, by something to keep free, or
+    by a crowded place."""
 
     points: Floats
     height: Floats
@@ -77,11 +84,11 @@ class Thickness:
     ended: Mask
 
     def wrong(self, tolerance: float, rounding: float) -> Mask:
-        """(N,) where the stock is thinner than wanted, or more than a tolerance thicker; over a mitred edge it may stand
-        as high as the mitre."""
-        low = ~self.ended & ~self.covered & (self.thick < self.height * (1 - 1e-6) - rounding)
+        """(N,) where the stock is thinner than wanted, or more than a tolerance thicker; covered by other stock, it may
+        be as thick as that one's mitre."""
+        low = ~self.covered & (self.thick < self.height * (1 - 1e-6) - rounding)
         bound = np.where(self.covered, LONGEST * self.height.max(), self.height) + tolerance
-        return np.asarray(low | (self.thick > bound))
+        return np.asarray(~self.ended & (low | (self.thick > bound)))
 
 
 def thickness(work: Worked, wanted: Skin, part: Part, crowd: Crowd | None) -> Thickness:

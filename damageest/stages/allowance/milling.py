@@ -12,6 +12,9 @@ from damageest.errors import StageError
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance._selectors import KeepOut, Target, Wanted
 
+DUST = 1e-9
+"""Share of the stock's volume below which a piece of it is rounding."""
+
 
 class Milling(Allowance):
     """Stock beyond the nominal surface, to be milled off after deposition; skin by skin, with regions kept free, and a
@@ -76,6 +79,7 @@ class Milling(Allowance):
         proud = stock(skin, tolerance / 2)
         if band is not None:
             proud += stock(band, tolerance / 2)
+        proud = proud.as_original().simplify(1e-9 * part.diagonal)
         proud = _touching(proud - left - barred, filled, tolerance)
         deposit = (filled + proud).as_original().simplify(1e-9 * part.diagonal)
         thickness = check(Worked(deposit, filled, left, barred, skin, origin), part, tolerance, crowd)
@@ -106,8 +110,12 @@ def _touched(part: Part, skins: list[Any]) -> tuple[int, ...]:
 
 
 def _touching(proud: Any, filled: Any, tolerance: float) -> Any:
-    """Without the pieces of stock that do not touch what is filled, as behind a thin wall that cuts them off."""
+    """Without the pieces of stock that do not touch what is filled, as behind a thin wall that cuts them off, and
+    without the dust of the Boolean."""
     from manifold3d import Manifold
 
-    pieces = [piece for piece in proud.decompose() if piece.min_gap(filled, tolerance) <= 1e-3 * tolerance]
+    least = DUST * proud.volume()
+    pieces = [piece for piece in proud.decompose() if abs(piece.volume()) > least]
+    if len(pieces) > 1:  # a void has a negative volume, and belongs to the piece round it
+        pieces = [p for p in pieces if p.volume() < 0 or p.min_gap(filled, tolerance) <= 1e-3 * tolerance]
     return Manifold.compose(pieces) if pieces else Manifold()
