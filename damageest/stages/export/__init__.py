@@ -36,11 +36,15 @@ class Spline:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A solid to be written: ``name`` for whoever opens the file, ``colour`` red, green, blue from 0 to 255."""
+    """A solid to be written: ``name`` for whoever opens the file, ``colour`` red, green, blue from 0 to 255.
+
+    ``detail``: how far a writer may move the surface to save facets, where each of them costs; 0: not at all.
+    """
 
     name: str
     solid: Solid
     colour: tuple[int, int, int]
+    detail: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

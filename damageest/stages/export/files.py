@@ -35,6 +35,12 @@ class Files(Export):
     frame: Literal["part", "scan", "both"] = Field(
         "part", description="the part's, the scan's as it was measured (files below scan_frame/), or both"
     )
+    detail: float | None = Field(
+        None,
+        ge=0,
+        description="how far facets of STEP solids may lie off the surface, so that there are fewer of them, in the "
+        "job's unit; default: a tenth of the tolerance",
+    )
     spline: Annotated[bool, AfterValidator(spline_writer)] = Field(
         False,
         description="each inner damage surface as B-spline in STEP too, where one fits within the tolerance (plugin "
@@ -56,7 +62,7 @@ class Files(Export):
         self, result: Result, folder: Path, place: str, writers: Mapping[str, Writer], T: Floats | None
     ) -> list[Written]:
         """One frame's files, below ``place``; ``T`` takes a point of the part there."""
-        lone, bodies = _bodies(result, T)
+        lone, bodies = _bodies(result, T, result.tolerance / 10 if self.detail is None else self.detail)
         done = []
         for name in self.format:
             stems = {f"{place}result": list(bodies.values())} if writers[name].together else {}
@@ -84,11 +90,11 @@ class Files(Export):
         return Written((*done.files, "truth/pose.json"), done.notes)
 
 
-def _bodies(result: Result, T: Floats | None) -> tuple[dict[str, Body], dict[str, Body]]:
+def _bodies(result: Result, T: Floats | None, detail: float) -> tuple[dict[str, Body], dict[str, Body]]:
     """Stem of the file to body: the union of all damages, which a file of all has in pieces, and the others."""
 
     def body(name: str, stem: str, solid: Solid | None, colour: tuple[int, int, int]) -> dict[str, Body]:
-        return {} if solid is None else {stem: Body(name, moved(solid, T), colour)}
+        return {} if solid is None else {stem: Body(name, moved(solid, T), colour, detail)}
 
     several = body("damage", "damage", result.damage, DAMAGE)
     each = body("undamaged part", "undamaged", result.undamaged, UNDAMAGED)

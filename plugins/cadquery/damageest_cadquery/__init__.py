@@ -1,9 +1,12 @@
-"""Parts from STEP, IGES and BREP files, by CadQuery and OpenCASCADE."""
+"""Parts from STEP, IGES and BREP files, and results as STEP, by CadQuery and OpenCASCADE."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from damageest.hookspecs import hookimpl
 from damageest.stages import Stage
+from damageest.stages.export import Writer
 
 
 @hookimpl
@@ -12,3 +15,11 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest_cadquery.brep import Brep
 
     return [Brep]
+
+
+@hookimpl
+def damageest_writers() -> Mapping[str, Writer]:
+    """STEP, of solids."""
+    from damageest_cadquery._step import step
+
+    return {"step": Writer(step)}

@@ -38,6 +38,7 @@ def result():
     )
     return SimpleNamespace(
         units="mm",
+        tolerance=0.1,
         pose=Pose(np.eye(4)),
         scan=Scan(points, truth=Truth(body, np.eye(4))),
         aligned=Scan(points),

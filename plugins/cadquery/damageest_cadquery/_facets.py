@@ -1,0 +1,146 @@
+"""The triangles of a solid gathered into planar faces, so that a flat side of the part is one face again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from damageest.artefacts import Floats, Ints, Solid
+
+FLAT = 1e-8
+"""Share of the solid's diagonal by which corners may lie off their common face, or off their common edge."""
+
+
+@dataclass(frozen=True, eq=False)
+class Facet:
+    """A planar face: its outward unit ``normal`` and ``loops`` of vertex indices, the outer one first."""
+
+    normal: Floats
+    loops: tuple[Ints, ...]
+
+
+def facets(solid: Solid) -> list[Facet]:
+    """The solid's planar faces. Each edge is shared by two of them, once in either direction."""
+    vertices, faces = solid.vertices, solid.faces
+    tolerance = FLAT * solid.diagonal
+    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1)  # (F,3,2)
+    other = _neighbours(edges, len(vertices))
+    label = _flat_regions(solid, other, tolerance)
+    label = _single_loops(label, edges, other, len(vertices))
+    loops, owner = _loops(label, edges, other, len(vertices))
+    loops = _straightened(loops, vertices, tolerance)
+    normal = np.zeros((label.max() + 1, 3))
+    np.add.at(normal, label, solid.cross)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    area = np.array([_area(vertices[loop]) @ normal[region] for loop, region in zip(loops, owner, strict=True)])
+    order = np.lexsort([-area, owner])
+    found: dict[int, list[Ints]] = {}
+    for k in order:
+        found.setdefault(int(owner[k]), []).append(loops[k])
+    return [Facet(normal[region], tuple(mine)) for region, mine in found.items()]
+
+
+def _neighbours(edges: Ints, count: int) -> Ints:
+    """(F,3) the triangle on the other side of each edge."""
+    start, end = edges.reshape(-1, 2).T
+    forward, backward = start * count + end, end * count + start
+    order = np.argsort(forward)
+    other: Ints = order[np.searchsorted(forward, backward, sorter=order)] // 3
+    return other.reshape(-1, 3)
+
+
+def _flat_regions(solid: Solid, other: Ints, tolerance: float) -> Ints:
+    """(F,) number of the flat region that each triangle belongs to; alone where its neighbours lead round a bend."""
+    vertices, faces, cross = solid.vertices, solid.faces, solid.cross
+    size = np.linalg.norm(cross, axis=1)
+    unit = cross / np.maximum(size, 1e-300)[:, None]
+    one, two = np.repeat(np.arange(len(faces)), 3), other.reshape(-1)
+    # judged by the plane of the larger of the two: a sliver's own says nothing
+    here = (size[one] > size[two]) | ((size[one] == size[two]) & (one < two))
+    one, two = one[here], two[here]
+    off = np.einsum("nij,nj->ni", vertices[faces[two]] - vertices[faces[one, 0]][:, None], unit[one])
+    sliver = size[two] <= tolerance * solid.diagonal
+    flat = (np.abs(off).max(1) <= tolerance) & ((np.einsum("ij,ij->i", unit[one], unit[two]) > 0) | sliver)
+    one, two = one[flat], two[flat]
+    graph = coo_array((np.ones(len(one), bool), (one, two)), shape=(len(faces), len(faces)))
+    label = connected_components(graph, directed=False)[1].astype(np.int64)
+    normal = np.zeros((label.max() + 1, 3))
+    np.add.at(normal, label, cross)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    height = np.einsum("nij,nj->ni", vertices[faces], normal[label])
+    low, high = np.full(len(normal), np.inf), np.full(len(normal), -np.inf)
+    np.minimum.at(low, label, height.min(1))
+    np.maximum.at(high, label, height.max(1))
+    return _apart(label, (high - low > 2 * tolerance)[label])
+
+
+def _apart(label: Ints, lone: NDArray[np.bool_]) -> Ints:
+    """The regions, renumbered, with each ``lone`` triangle (F,) one of its own."""
+    label = np.where(lone, label.max() + 1 + np.arange(len(label)), label)
+    return np.unique(label, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+
+def _single_loops(label: Ints, edges: Ints, other: Ints, count: int) -> Ints:
+    """The regions without those whose outline passes a vertex twice: their loops could be told apart in two ways."""
+    region, start, _ = _outline(label, edges, other)
+    codes, times = np.unique(region * count + start, return_counts=True)
+    bad = np.unique(codes[times > 1] // count)
+    return _apart(label, np.isin(label, bad)) if len(bad) else label
+
+
+def _outline(label: Ints, edges: Ints, other: Ints) -> tuple[Ints, Ints, Ints]:
+    """The directed edges between regions: (region, start, end), each (E,)."""
+    rows, sides = np.nonzero(label[:, None] != label[other])
+    start, end = edges[rows, sides].T
+    return label[rows], start, end
+
+
+def _loops(label: Ints, edges: Ints, other: Ints, count: int) -> tuple[list[Ints], Ints]:
+    """The closed outlines as vertex indices, and the region (L,) that each belongs to."""
+    region, start, end = _outline(label, edges, other)
+    code = region * count + start
+    order = np.argsort(code)
+    following = order[np.searchsorted(code, region * count + end, sorter=order)].tolist()
+    vertex, owner = start.tolist(), region.tolist()
+    seen = [False] * len(vertex)
+    loops, owners = [], []
+    for first in range(len(vertex)):
+        if seen[first]:
+            continue
+        loop, at = [], first
+        while not seen[at]:
+            seen[at] = True
+            loop.append(vertex[at])
+            at = following[at]
+        loops.append(np.array(loop, dtype=np.int64))
+        owners.append(owner[first])
+    return loops, np.array(owners, dtype=np.int64)
+
+
+def _straightened(loops: list[Ints], vertices: Floats, tolerance: float) -> list[Ints]:
+    """The loops without the vertices in the middle of a straight edge between just two faces."""
+    at = np.concatenate(loops)
+    before = np.concatenate([np.roll(loop, 1) for loop in loops])
+    after = np.concatenate([np.roll(loop, -1) for loop in loops])
+    way = vertices[after] - vertices[before]
+    length = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
+    off = np.linalg.norm(np.cross(vertices[at] - vertices[before], way), axis=1) / length
+    along = np.einsum("ij,ij->i", vertices[at] - vertices[before], way) / length
+    straight = (off <= tolerance) & (along > 0) & (along < length)
+    uses, bent = np.bincount(at, minlength=len(vertices)), np.zeros(len(vertices), bool)
+    bent[at[~straight]] = True
+    keep = bent | (uses != 2)
+    short = [loop for loop in loops if keep[loop].sum() < 3]
+    if short:
+        keep[np.concatenate(short)] = True
+    return [loop[keep[loop]] for loop in loops]
+
+
+def _area(loop: Floats) -> Floats:
+    """(3,) the vector area of a closed loop of points (K,3)."""
+    off = loop - loop[0]
+    return np.asarray(np.cross(off, np.roll(off, -1, axis=0)).sum(0) / 2)

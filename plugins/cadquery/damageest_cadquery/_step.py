@@ -1,0 +1,153 @@
+"""Solids as STEP: planar faces, the job's unit, a product name, and the same bytes each time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Solid
+from damageest.stages.export import Body, Written
+from damageest.units import MILLIMETRES
+from damageest_cadquery._facets import FLAT, Facet, facets
+from damageest_cadquery._shells import bodies, simplified
+
+UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
+MOST = 50_000
+"""Planar faces above which a STEP file is left out: it would have 50 MB, and most CAM systems give up on fewer."""
+
+
+def step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> Written:
+    """A STEP file of one solid, faceted; left out, with a note, where it would have too many faces to be of use."""
+    (body,) = solids
+    parts = [
+        [_planar(simplified(each, body.detail) if body.detail else each) for each in (outer, *cavities)]
+        for outer, cavities in bodies(body.solid)
+    ]
+    count = sum(len(shell[1]) for part in parts for shell in part)
+    if count > MOST:
+        return Written(
+            notes=(
+                f"{stem}.step was not written: {count} planar faces are more than the {MOST} that such a file "
+                "can usefully have; a larger  detail  gives fewer, or take 3mf",
+            )
+        )
+    write_shape(folder / f"{stem}.step", _shape(parts, MILLIMETRES[unit]), body.name, unit)
+    return Written((f"{stem}.step",))
+
+
+def _planar(solid: Solid) -> tuple[Floats, list[Facet]]:
+    return solid.vertices, facets(solid)
+
+
+def write_shape(path: Path, shape: Any, name: str, unit: str) -> None:
+    """An OpenCASCADE shape, in millimetres, as STEP in ``unit``. Raises OSError."""
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.Interface import Interface_Static
+    from OCP.Message import Message
+    from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
+
+    Message.DefaultMessenger_s().ChangePrinters().Clear()  # else OpenCASCADE writes into the program's own output
+    STEPControl_Controller.Init_s()
+    wanted = {"write.step.unit": UNITS[unit], "write.step.product.name": name}
+    before = {key: Interface_Static.CVal_s(key) for key in wanted}
+    numbers = {"write.surfacecurve.mode": 0, "write.step.assembly": 0}  # no curves in a plane's parameters; one product
+    earlier = {key: Interface_Static.IVal_s(key) for key in numbers}
+    try:
+        for key, value in wanted.items():
+            Interface_Static.SetCVal_s(key, value)
+        for key, number in numbers.items():
+            Interface_Static.SetIVal_s(key, number)
+        writer = STEPControl_Writer()
+        writer.Transfer(shape, STEPControl_AsIs)
+        if writer.Write(str(path)) != IFSelect_RetDone:
+            raise OSError(f"{path}: OpenCASCADE could not write it")
+    finally:
+        for key, value in before.items():
+            Interface_Static.SetCVal_s(key, value)
+        for key, number in earlier.items():
+            Interface_Static.SetIVal_s(key, number)
+    data = path.read_bytes()
+    head, rest = data[:4096], data[4096:]
+    head = re.sub(rb"'\d{4}-\d\d-\d\dT[\d:]+[^']*'", b"'1970-01-01T00:00:00'", head)
+    # OpenCASCADE numbers the products that a process writes
+    head = re.sub(rb"PRODUCT\('(.*?) \d+',\s*'.*? \d+',", rb"PRODUCT('\1','\1',", head, flags=re.DOTALL)
+    path.write_bytes(head + rest)
+
+
+def _shape(parts: list[list[tuple[Floats, list[Facet]]]], scale: float) -> Any:
+    """A solid, or a compound of several; the first shell of each is the outer one."""
+    from OCP.BRep import BRep_Builder
+    from OCP.TopoDS import TopoDS_Compound, TopoDS_Solid
+
+    builder = BRep_Builder()
+    made = []
+    for part in parts:
+        solid = TopoDS_Solid()
+        builder.MakeSolid(solid)
+        for number, (vertices, planar) in enumerate(part):
+            shell = _shell(vertices * scale, planar)
+            builder.Add(solid, shell if number == 0 else shell.Reversed())
+        made.append(solid)
+    if len(made) == 1:
+        return made[0]
+    compound = TopoDS_Compound()
+    builder.MakeCompound(compound)
+    for solid in made:
+        builder.Add(compound, solid)
+    return compound
+
+
+def _shell(vertices: Floats, planar: list[Facet]) -> Any:
+    """A closed shell whose faces share their edges, and its edges their corners. Lengths in millimetres."""
+    from OCP.BRep import BRep_Builder
+    from OCP.Geom import Geom_Line, Geom_Plane
+    from OCP.gp import gp_Dir, gp_Pnt
+    from OCP.TopAbs import TopAbs_REVERSED
+    from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shell, TopoDS_Vertex, TopoDS_Wire
+
+    builder = BRep_Builder()
+    close = max(1e-7, 4 * FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0))))
+    corners: dict[int, Any] = {}
+    edges: dict[tuple[int, int], Any] = {}
+
+    def corner(index: int) -> Any:
+        if index not in corners:
+            corners[index] = TopoDS_Vertex()
+            builder.MakeVertex(corners[index], gp_Pnt(*vertices[index].tolist()), close)
+        return corners[index]
+
+    def edge(start: int, end: int) -> Any:
+        key = (min(start, end), max(start, end))
+        if key not in edges:
+            way = vertices[key[1]] - vertices[key[0]]
+            length = float(np.linalg.norm(way))
+            made = TopoDS_Edge()
+            line = Geom_Line(gp_Pnt(*vertices[key[0]].tolist()), gp_Dir(*(way / length).tolist()))
+            builder.MakeEdge(made, line, close)
+            builder.Add(made, corner(key[0]))
+            builder.Add(made, corner(key[1]).Oriented(TopAbs_REVERSED))
+            builder.Range(made, 0.0, length)
+            edges[key] = made
+        return edges[key] if start < end else edges[key].Reversed()
+
+    shell = TopoDS_Shell()
+    builder.MakeShell(shell)
+    for facet in planar:
+        face = TopoDS_Face()
+        at = vertices[facet.loops[0]].mean(0)
+        builder.MakeFace(face, Geom_Plane(gp_Pnt(*at.tolist()), gp_Dir(*facet.normal.tolist())), close)
+        for loop in facet.loops:
+            wire = TopoDS_Wire()
+            builder.MakeWire(wire)
+            indices = loop.tolist()
+            for start, end in zip(indices, indices[1:] + indices[:1], strict=True):
+                builder.Add(wire, edge(start, end))
+            wire.Closed(True)
+            builder.Add(face, wire)
+        builder.Add(shell, face)
+    shell.Closed(True)
+    return shell
