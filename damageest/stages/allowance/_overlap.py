@@ -24,7 +24,7 @@ def grown(skin: Skin, part: Part, wanted: Wanted, overlap: float, tolerance: flo
     low, high = ends.min(axis=(0, 1)) - margin, ends.max(axis=(0, 1)) + margin
     near = to_manifold(part, origin) ^ Manifold.cube(tuple(high - low)).translate(tuple(low))
     # fine enough that distance, linear on each triangle, is right to a fraction of the tolerance
-    near = near.refine_to_length(max(overlap / 3, tolerance / 2))
+    near = near.refine_to_length(max(overlap / 2, tolerance / 2))
     vertices, faces = to_arrays(near)
     squared, _, _ = igl.point_mesh_squared_distance(vertices, skin.vertices, rim)
     value = overlap - np.sqrt(squared)

@@ -1,4 +1,5 @@
-"""Stock of given height on skin, as a solid: one convex piece over each triangle, each convex edge, each corner.
+"""Stock of given height on skin, as a solid: a shell over each smooth patch, or a convex piece over each triangle where
+that would fold; and convex pieces over convex edges and corners.
 
 Where the skin is smooth, the pieces over neighbouring triangles share their upper corners, so nothing gapes. Over a
 sharp convex edge the pieces are joined by a mitre, cut off where the edge is sharper than a right angle. Skin without
@@ -13,10 +14,13 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
+from damageest.stages.allowance._shells import shells
 from damageest.stages.allowance._skin import Skin, unit
 
 SMOOTH = 30.0
 """Degrees between neighbouring triangles up to which they may share upper corners."""
+LEANING = 8.0
+"""Degrees that a common way up may lean from a triangle's normal."""
 MITRED = 100.0
 """Degrees between normals up to which an edge is mitred to a point; a sharper one gets `ROUNDS` mitres."""
 ROUNDS = 3
@@ -34,9 +38,9 @@ class _Edges:
     at: Ints
 
 
-def stock(skin: Skin, slack: float) -> Any:
+def stock(skin: Skin, slack: float, roomy: bool = True) -> Any:
     """A Manifold, relative to the skin's origin: stock of each face's height, and up to ``slack`` more. It reaches a
-    little below the skin, for the caller to cut off."""
+    little below the skin, for the caller to cut off. ``roomy``: no stock meets that of opposite skin."""
     from manifold3d import Manifold, OpType
 
     skin = skin.only((skin.height > 0) & (skin.areas > 0))
@@ -49,13 +53,18 @@ def stock(skin: Skin, slack: float) -> Any:
     corner = skin.triangles
     tops = corner + up[group].reshape(-1, 3, 3)
     lows = corner - sink * unit(up)[group].reshape(-1, 3, 3)
-    clouds = list(np.concatenate([lows, tops], axis=1))
+    bodies: list[Any] = []
+    rest = np.arange(len(corner))
+    if roomy:
+        shared = (group[edges.at[:, 0]] == group[edges.at[:, 1]]).all(axis=1)
+        bodies, rest = shells(lows, tops, group, np.stack([edges.first, edges.second], 1), shared)
+    clouds = list(np.concatenate([lows, tops], axis=1)[rest])
     over_edges, ends, heads = _over_edges(skin, height, edges, group, tops)
     clouds += over_edges
     for vertex in np.flatnonzero(np.bincount(ends, minlength=len(skin.vertices)) >= 2):
         mine = heads[ends == vertex].reshape(-1, 3)
         clouds.append(np.concatenate([skin.vertices[vertex : vertex + 1], mine[np.isfinite(mine[:, 0])]]))
-    return Manifold.batch_boolean([Manifold.hull_points(cloud) for cloud in clouds], OpType.Add)
+    return Manifold.batch_boolean([*bodies, *(Manifold.hull_points(cloud) for cloud in clouds)], OpType.Add)
 
 
 def _edges(skin: Skin) -> _Edges:
@@ -101,7 +110,7 @@ def _directions(skin: Skin, height: Floats, edges: _Edges, slack: float) -> tupl
 
     group, _, least = grouped(pairs)
     # groups that bend too much for one common way up are taken apart
-    bearable = least[group] >= (height / (height + slack))[owner]
+    bearable = least[group] >= np.maximum(height / (height + slack), np.cos(np.radians(LEANING)))[owner]
     group, mean, least = grouped(pairs[bearable[pairs].all(axis=1)])
     tall = np.zeros(len(mean))
     tall[group] = height[owner]

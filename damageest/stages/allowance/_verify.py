@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +40,7 @@ class Worked:
     origin: Floats
 
 
-def check(work: Worked, part: Part, tolerance: float, crowd: Crowd | None) -> tuple[float, float, float] | None:
+def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -> tuple[float, float, float] | None:
     """The least, mean and largest thickness of the stock; None where none is wanted. Raises StageError with the figure
     where a guarantee is not kept."""
     import igl
@@ -53,7 +54,7 @@ def check(work: Worked, part: Part, tolerance: float, crowd: Crowd | None) -> tu
     wanted = work.skin.only(work.skin.height > 0)
     if not len(wanted.faces):
         return None
-    found = thickness(work, wanted, part, crowd)
+    found = thickness(work, wanted, part, crowds)
     wrong = found.wrong(tolerance, ON * part.diagonal)
     if wrong.mean() > MISSED:
         worst = float(np.abs(found.thick - found.height)[wrong].max())
@@ -91,7 +92,7 @@ class Thickness:
         return np.asarray(~self.ended & (low | (self.thick > bound)))
 
 
-def thickness(work: Worked, wanted: Skin, part: Part, crowd: Crowd | None) -> Thickness:
+def thickness(work: Worked, wanted: Skin, part: Part, crowds: Sequence[Crowd]) -> Thickness:
     """Measured by rays along the normal of the skin with stock."""
     import igl
 
@@ -112,7 +113,7 @@ def thickness(work: Worked, wanted: Skin, part: Part, crowd: Crowd | None) -> Th
     nearest = np.sqrt(squared)
     covered = nearest < far - rounding
     ended = _near(ends, work.left, 10 * rounding) | _near(ends, work.kept_out, 10 * rounding)
-    if crowd is not None:
+    for crowd in crowds:
         squared, _, _ = igl.point_mesh_squared_distance(
             np.ascontiguousarray(points), crowd.points - work.origin, np.arange(len(crowd.points))[:, None]
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ from pydantic import Field
 
 from damageest.artefacts import Deposit, Floats, Part, Solid
 from damageest.errors import StageError
+from damageest.solids import BALANCE
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance._selectors import KeepOut, Target, Wanted
 
@@ -55,6 +57,8 @@ class Milling(Allowance):
     def run(self, damage: Solid, part: Part, tolerance: float, others: Solid | None) -> Solid | None:
         """Raises StageError where there is no room for the stock, a region to keep free is already damaged, or a
         guarantee is not kept."""
+        from manifold3d import Manifold
+
         from damageest.solids import remainder, to_manifold, to_solid
         from damageest.stages.allowance._cut_back import cut_back
         from damageest.stages.allowance._keep_out import kept_out
@@ -72,22 +76,22 @@ class Milling(Allowance):
         skin = skin_of(cavity, part, wanted, origin)
         reach = wanted.most + tolerance
         barred = kept_out(self.keep_out, skin, filled, part, wanted, reach, origin, tolerance)
-        crowd = crowded(skin, part, origin)
-        if crowd is not None and self.crowded == "refuse":
-            raise StageError(str(crowd), "a smaller outer there by targets, keep_out, or crowded: clip")
         band = grown(skin, part, wanted, self.overlap, tolerance, origin)
-        proud = stock(skin, tolerance / 2)
-        if band is not None:
-            proud += stock(band, tolerance / 2)
+        skins = [skin] if band is None else [skin, band]
+        crowds = [crowd for each in skins if (crowd := crowded(each, part, origin)) is not None]
+        if crowds and self.crowded == "refuse":
+            raise StageError(str(crowds[0]), "a smaller outer there by targets, keep_out, or crowded: clip")
+        proud = sum((stock(each, tolerance / 2, roomy=not crowds) for each in skins), Manifold())
         proud = proud.as_original().simplify(1e-9 * part.diagonal)
-        proud = _touching(proud - left - barred, filled, tolerance)
-        deposit = (filled + proud).as_original().simplify(1e-9 * part.diagonal)
-        thickness = check(Worked(deposit, filled, left, barred, skin, origin), part, tolerance, crowd)
+        for body in (left, barred):
+            proud = remainder(proud, proud ^ body) if not (proud.is_empty() or body.is_empty()) else proud
+        deposit = _joined(filled, _touching(proud, filled, tolerance))
+        deposit = deposit.as_original().simplify(1e-9 * part.diagonal)
+        thickness = check(Worked(deposit, filled, left, barred, skin, origin), part, tolerance, crowds)
         body = to_solid(deposit, origin)
         if body is None:
             raise StageError("the deposit came out empty", "a slightly different outer")
-        skins = [each for each in (skin, band) if each is not None]
-        notes = [] if crowd is None else [f"{crowd}; clipped there"]
+        notes = [f"{crowd}; clipped there" for crowd in crowds[:1]]
         if thickness is None:
             notes.append("no stock is asked for on the skin of this damage: the deposit ends at the nominal surface")
         return Deposit(
@@ -119,3 +123,22 @@ def _touching(proud: Any, filled: Any, tolerance: float) -> Any:
     if len(pieces) > 1:  # a void has a negative volume, and belongs to the piece round it
         pieces = [p for p in pieces if p.volume() < 0 or p.min_gap(filled, tolerance) <= 1e-3 * tolerance]
     return Manifold.compose(pieces) if pieces else Manifold()
+
+
+def _joined(filled: Any, proud: Any) -> Any:
+    """The union, by the first of several ways that leaves no volume unaccounted for, else the nearest; as
+    `damageest.solids.remainder`."""
+    whole = filled.volume() + proud.volume() - (filled ^ proud).volume()
+    nudge = 1e-9 * max(abs(bound) for bound in filled.bounding_box())
+    ways: tuple[Callable[[], Any], ...] = (
+        lambda: filled + proud,
+        lambda: filled + (proud - (proud ^ filled)),
+        lambda: filled + proud.translate((nudge, 0.7 * nudge, -0.3 * nudge)),
+    )
+    tried: list[tuple[float, Any]] = []
+    for way in ways:
+        body = way()
+        tried.append((abs(whole - body.volume()), body))
+        if tried[-1][0] <= BALANCE * whole:
+            break
+    return min(tried, key=lambda item: item[0])[1]
