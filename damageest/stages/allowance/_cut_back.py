@@ -12,8 +12,9 @@ from damageest.errors import StageError
 from damageest.settle import inner_faces
 from damageest.solids import BALANCE, remainder, to_manifold, to_solid
 
-FINEST, COARSEST = 0.5, 1.0
-"""Edge of a lattice cell, in tolerances: as wished, and as far as the tolerance bears."""
+FINE, COARSE, COARSEST = 0.5, 0.75, 1.0
+"""Edge of a lattice cell, in tolerances: for a cut-back of less than two tolerances, for a larger one, and as far as
+the memory may make it larger."""
 
 
 def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tolerance: float) -> Solid:
@@ -68,7 +69,7 @@ def _within(damage: Solid, faces: Any, part: Part, inner: float, tolerance: floa
     low = np.maximum(used.min(axis=0) - margin, part.bounds[0] - origin - 4 * tolerance)
     high = np.minimum(used.max(axis=0) + margin, part.bounds[1] - origin + 4 * tolerance)
     fitting = float((np.prod(high - low + 2 * tolerance) / MOST_NODES) ** (1 / 3)) * 1.02
-    cell = max(FINEST * tolerance, fitting)
+    cell = max((FINE if inner < 2 * tolerance else COARSE) * tolerance, fitting)
     if cell > COARSEST * tolerance:
         raise StageError(
             f"a damage this large cannot be cut back to within the tolerance {tolerance:.3g} in the memory there is",

@@ -13,7 +13,7 @@ from damageest.errors import StageError
 from damageest.solids import to_arrays
 from damageest.stages.allowance._limits import Crowd
 from damageest.stages.allowance._selectors import Mask
-from damageest.stages.allowance._skin import ON, Skin
+from damageest.stages.allowance._skin import ON, Skin, unit
 
 VOLUME = 1e-4
 """Share of its volume that a damage may stick out of its deposit, or a deposit into metal."""
@@ -30,13 +30,15 @@ CLIPPED = (
 @dataclass(frozen=True, eq=False)
 class Worked:
     """Everything that the check looks at, as Manifolds relative to ``origin``: the ``deposit``, the ``cavity`` it
-    fills, the metal ``left``, what is ``kept_out``; the ``skin`` with its heights."""
+    fills, the metal ``left``, what is ``kept_out``; the ``skin`` with its heights, and the ``band`` that the stock runs
+    over beside it."""
 
     deposit: Any
     cavity: Any
     left: Any
     kept_out: Any
     skin: Skin
+    band: Skin | None
     origin: Floats
 
 
@@ -51,6 +53,9 @@ def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -
     entered = (work.deposit ^ work.left).volume() / work.deposit.volume()
     if entered > VOLUME:
         raise StageError(f"{entered:.2%} of the deposit would lie in metal that is left", CLIPPED)
+    over = strayed(work, part, tolerance)
+    if over > MISSED:
+        raise StageError(f"stock would stand over {over:.1%} of the skin round it that is to have none", CLIPPED)
     wanted = work.skin.only(work.skin.height > 0)
     if not len(wanted.faces):
         return None
@@ -119,6 +124,40 @@ def thickness(work: Worked, wanted: Skin, part: Part, crowds: Sequence[Crowd]) -
         )
         ended |= squared <= (2 * height) ** 2
     return Thickness(points, height, np.where(covered, nearest, far), covered, ended)
+
+
+def strayed(work: Worked, part: Part, tolerance: float) -> float:
+    """The share of sampled skin without stock, of the damage and of the part round it, that the deposit stands over all
+    the same. Skin nearer to skin with stock than that is high does not count: in a concave corner the stock leans on
+    it."""
+    import igl
+
+    from damageest.stages.segment.mesh_distance import signed_distance
+
+    skins = [work.skin] if work.band is None else [work.skin, work.band]
+    most = max(float(skin.height.max(initial=0)) for skin in skins) + tolerance
+    corners = part.triangles - work.origin
+    low, high = work.skin.vertices.min(axis=0) - 2 * most, work.skin.vertices.max(axis=0) + 2 * most
+    near = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
+    normal = unit(part.cross)[near]
+    zero = np.zeros(len(near))
+    around = Skin(part.vertices - work.origin, part.faces[near], near, normal, zero, zero > 0)
+    points, face = around.sampled(SAMPLES, seed=29)
+    normal = normal[face]
+    bare = np.ones(len(points), bool)
+    for skin in skins:
+        tall = skin.only(skin.height > 0)
+        if len(tall.faces):
+            squared, _, _ = igl.point_mesh_squared_distance(points, tall.vertices, np.ascontiguousarray(tall.faces))
+            bare &= squared > most**2
+    points, normal = points[bare], normal[bare]
+    if not len(points):
+        return 0.0
+    body = Mesh(*to_arrays(work.deposit))
+    inside = [
+        signed_distance(points + share * most * normal, body)[0] < -ON * part.diagonal for share in (0.05, 0.3, 0.8)
+    ]
+    return float(np.any(inside, axis=0).mean())
 
 
 def _near(points: Floats, body: Any, reach: float) -> Mask:

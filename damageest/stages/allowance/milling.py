@@ -87,7 +87,7 @@ class Milling(Allowance):
             proud = remainder(proud, proud ^ body) if not (proud.is_empty() or body.is_empty()) else proud
         deposit = _joined(filled, _touching(proud, filled, tolerance))
         deposit = deposit.as_original().simplify(1e-9 * part.diagonal)
-        thickness = check(Worked(deposit, filled, left, barred, skin, origin), part, tolerance, crowds)
+        thickness = check(Worked(deposit, filled, left, barred, skin, band, origin), part, tolerance, crowds)
         body = to_solid(deposit, origin)
         if body is None:
             raise StageError("the deposit came out empty", "a slightly different outer")
