@@ -58,7 +58,7 @@ def damageest_stages() -> list[type[Stage]]:
 def damageest_writers() -> Mapping[str, Writer]:
     """The formats that need no plugin."""
     from damageest.stages.export import Writer
-    from damageest.stages.export._mesh_files import ply, ply_surface, stl
+    from damageest.stages.export._mesh_files import ply, stl
     from damageest.stages.export._threemf import threemf
 
-    return {"stl": Writer(stl), "ply": Writer(ply, surface=ply_surface), "3mf": Writer(threemf, together=True)}
+    return {"stl": Writer(stl), "ply": Writer(ply), "3mf": Writer(threemf, together=True)}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from damageest.artefacts import Floats, Mesh, Solid
+from damageest.artefacts import Floats, Solid
 from damageest.stages import Stage
 
 
@@ -36,15 +36,11 @@ class Spline:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A solid to be written: ``name`` for whoever opens the file, ``colour`` red, green, blue from 0 to 255.
-
-    ``detail``: how far a writer may move the surface to save facets, where each of them costs; 0: not at all.
-    """
+    """A solid to be written: ``name`` for whoever opens the file, ``colour`` red, green, blue from 0 to 255."""
 
     name: str
     solid: Solid
     colour: tuple[int, int, int]
-    detail: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +63,13 @@ and a note says why."""
 
 @dataclass(frozen=True)
 class Writer:
-    """How a format is written. ``together``: all bodies of a result go into one file. ``surface`` writes an open mesh
-    and ``patch`` a spline, each of ``path, name, what, unit``; None where the format has no such thing."""
+    """How a format is written. ``together``: all bodies of a result go into one file. ``costly``: each facet costs so
+    much there that it gets simplified solids. ``patch`` writes a spline, of ``path, name, patch, unit``; None where the
+    format has no such thing."""
 
     write: Write
     together: bool = False
-    surface: Callable[[Path, str, Mesh, str], None] | None = None
+    costly: bool = False
     patch: Callable[[Path, str, Patch, str], None] | None = None
 
 

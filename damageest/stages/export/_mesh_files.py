@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from damageest.artefacts import Mesh
 from damageest.meshio import single_precision, write_ply, write_stl
 from damageest.stages.export import Body, Written
 
@@ -27,8 +26,3 @@ def ply(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
     (body,) = bodies
     write_ply(folder / f"{stem}.ply", body.solid)
     return Written((f"{stem}.ply",))
-
-
-def ply_surface(path: Path, name: str, mesh: Mesh, unit: str) -> None:
-    """An open mesh as binary PLY in double precision."""
-    write_ply(path, mesh)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -11,7 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from damageest.artefacts import Floats, Scan, Solid
-from damageest.handover import moved, scan_from_part
+from damageest.handover import moved, scan_from_part, simplified
 from damageest.meshio import write_ply, write_points
 from damageest.stages.export import Body, Export, Writer, Written
 from damageest.stages.export._options import Formats, spline_writer
@@ -49,25 +50,25 @@ class Files(Export):
 
     def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> Written:
         """Writes into ``folder`` and gives the paths relative to it. The same result gives the same bytes."""
-        T = scan_from_part(result.pose)
+        detail = result.tolerance / 10 if self.detail is None else self.detail
+        bodies, coarse = _bodies(result), {}
+        if detail and any(writers[name].costly for name in self.format):
+            coarse = {stem: replace(body, solid=simplified(body.solid, detail)) for stem, body in bodies.items()}
         done: list[Written] = []
-        if self.frame in ("part", "both"):
-            done += self._frame(result, folder, "", writers, None)
-        if self.frame in ("scan", "both"):
-            done += self._frame(result, folder, "scan_frame/", writers, T)
+        places = {"part": [""], "scan": ["scan_frame/"], "both": ["", "scan_frame/"]}
+        for place in places[self.frame]:
+            T = scan_from_part(result.pose) if place else None
+            for name in self.format:
+                chosen = coarse if coarse and writers[name].costly else bodies
+                done += _solids(writers[name], folder, place, chosen, T, result.units)
+            done += self._others(result, folder, place, T)
         done.append(self._truth(result, folder, writers))
-        return Written(tuple(f for one in done for f in one.files), tuple(n for one in done for n in one.notes))
+        files = dict.fromkeys(f for one in done for f in one.files)  # STL may have written a PLY already
+        return Written(tuple(files), tuple(n for one in done for n in one.notes))
 
-    def _frame(
-        self, result: Result, folder: Path, place: str, writers: Mapping[str, Writer], T: Floats | None
-    ) -> list[Written]:
-        """One frame's files, below ``place``; ``T`` takes a point of the part there."""
-        lone, bodies = _bodies(result, T, result.tolerance / 10 if self.detail is None else self.detail)
+    def _others(self, result: Result, folder: Path, place: str, T: Floats | None) -> list[Written]:
+        """Surfaces and scan, below ``place``; ``T`` takes a point of the part to their frame."""
         done = []
-        for name in self.format:
-            stems = {f"{place}result": list(bodies.values())} if writers[name].together else {}
-            stems = stems or {f"{place}{stem}": [body] for stem, body in {**lone, **bodies}.items()}
-            done += [_write(writers[name], folder, stem, group, result.units) for stem, group in stems.items()]
         for site in result.sites:
             path = _room(folder, f"{place}surface/site-{site.id}.ply")
             write_ply(path, moved(site.surface, T))
@@ -90,18 +91,27 @@ class Files(Export):
         return Written((*done.files, "truth/pose.json"), done.notes)
 
 
-def _bodies(result: Result, T: Floats | None, detail: float) -> tuple[dict[str, Body], dict[str, Body]]:
-    """Stem of the file to body: the union of all damages, which a file of all has in pieces, and the others."""
-
-    def body(name: str, stem: str, solid: Solid | None, colour: tuple[int, int, int]) -> dict[str, Body]:
-        return {} if solid is None else {stem: Body(name, moved(solid, T), colour, detail)}
-
-    several = body("damage", "damage", result.damage, DAMAGE)
-    each = body("undamaged part", "undamaged", result.undamaged, UNDAMAGED)
+def _bodies(result: Result) -> dict[str, Body]:
+    """Stem of the file to body, in the part's frame."""
+    wanted: list[tuple[str, str, Solid | None, tuple[int, int, int]]] = [
+        ("damage", "damage", result.damage, DAMAGE),
+        ("undamaged", "undamaged part", result.undamaged, UNDAMAGED),
+    ]
     for site in result.sites:
-        each |= body(f"damage site-{site.id}", f"damage/site-{site.id}", site.damage, DAMAGE)
-        each |= body(f"deposit site-{site.id}", f"deposit/site-{site.id}", site.deposit, DEPOSIT)
-    return several, each
+        wanted.append((f"damage/site-{site.id}", f"damage site-{site.id}", site.damage, DAMAGE))
+        wanted.append((f"deposit/site-{site.id}", f"deposit site-{site.id}", site.deposit, DEPOSIT))
+    return {stem: Body(name, solid, colour) for stem, name, solid, colour in wanted if solid is not None}
+
+
+def _solids(
+    writer: Writer, folder: Path, place: str, bodies: Mapping[str, Body], T: Floats | None, unit: str
+) -> list[Written]:
+    """One file for each body; or one of all, where the union of the damages would only double its pieces."""
+    here = {stem: replace(body, solid=moved(body.solid, T)) for stem, body in bodies.items()}
+    if writer.together:
+        pieces = [body for stem, body in here.items() if stem != "damage"]
+        return [_write(writer, folder, f"{place}result", pieces, unit)]
+    return [_write(writer, folder, f"{place}{stem}", [body], unit) for stem, body in here.items()]
 
 
 def _write(writer: Writer, folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:

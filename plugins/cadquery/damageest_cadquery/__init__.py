@@ -22,4 +22,4 @@ def damageest_writers() -> Mapping[str, Writer]:
     """STEP, of solids."""
     from damageest_cadquery._step import step
 
-    return {"step": Writer(step)}
+    return {"step": Writer(step, costly=True)}
