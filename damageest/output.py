@@ -19,7 +19,8 @@ from damageest import yamlfile
 from damageest.cache import Cache
 from damageest.errors import Fault, JobError
 from damageest.job import Job, plain
-from damageest.result import Result, report
+from damageest.report import report
+from damageest.result import Result
 from damageest.stages.export import Written
 
 _OURS = re.compile(

@@ -1,19 +1,17 @@
-"""What a run found, as values and as the report that `result.json` holds."""
+"""What a run found, as values; `report.py` has what result.json says of them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
 
-from damageest.artefacts import Deposit, Deviation, Evidence, Floats, Part, Pose, Scan, Solid, Surface
-from damageest.stages.export import Written
-
-Vector = tuple[float, float, float]
+from damageest.artefacts import Deviation, Evidence, Floats, Mesh, Part, Pose, Scan, Solid, Surface
+from damageest.handover import as_manifold, as_trimesh, scan_from_part
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +43,21 @@ class Site:
         weights = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
         moment = (weights[:, None] * corners.sum(1)).sum(0) / (4 * weights.sum())
         return np.asarray(centre + moment)
+
+    def mesh(self, what: Literal["damage", "surface", "deposit"]) -> Mesh:
+        """The DV, the IDS, or what to deposit, which is the DV where there is no allowance. Raises ValueError."""
+        if what == "deposit" and self.refused:
+            raise ValueError(f"site {self.id} has no deposit: the stage allowance refused it; see Result.failures")
+        found = {"damage": self.damage, "surface": self.surface, "deposit": self.deposit or self.damage}
+        return _chosen(found, what, f"site {self.id}")
+
+    def as_trimesh(self, what: Literal["damage", "surface", "deposit"] = "damage") -> Any:
+        """A ``trimesh.Trimesh`` in the part's frame; see `mesh`."""
+        return as_trimesh(self.mesh(what))
+
+    def as_manifold(self, what: Literal["damage", "deposit"] = "damage") -> Any:
+        """A ``manifold3d.Manifold`` in the part's frame; see `mesh`."""
+        return as_manifold(_closed(self.mesh(what), what))
 
 
 @dataclass(frozen=True)
@@ -97,265 +110,43 @@ class Result:
     def undamaged_volume(self) -> float:
         return self.undamaged.volume if self.undamaged else 0.0
 
+    def mesh(self, what: str, site: int | None = None) -> Mesh:
+        """Without ``site``: part, damage or undamaged; of a site: damage, surface or deposit. Raises ValueError."""
+        if site is None:
+            found = {"part": self.part, "damage": self.damage, "undamaged": self.undamaged}
+            return _chosen(found, what, "the result")
+        own = next((each for each in self.sites if each.id == site), None)
+        if own is None:
+            raise ValueError(
+                f"there is no site {site}; there are: {', '.join(str(s.id) for s in self.sites) or 'none'}"
+            )
+        return own.mesh(what)  # type: ignore[arg-type]
 
-_NOTHING = Written()
+    def as_trimesh(self, what: str, site: int | None = None, frame: Literal["part", "scan"] = "part") -> Any:
+        """A ``trimesh.Trimesh`` in the part's frame or the scanner's; see `mesh`."""
+        return as_trimesh(self.mesh(what, site), self._into(frame))
 
+    def as_manifold(self, what: str, site: int | None = None, frame: Literal["part", "scan"] = "part") -> Any:
+        """A ``manifold3d.Manifold`` in the part's frame or the scanner's; see `mesh`."""
+        return as_manifold(_closed(self.mesh(what, site), what), self._into(frame))
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", populate_by_name=True)
-
-
-class PartReport(_Model):
-    path: str = Field(description="relative to this file; empty for a part given as arrays")
-    sha256: str
-    volume: float
-    watertight: bool
-    tessellation_error: float = Field(description="bound on the distance between CAD surface and triangles")
-    notes: list[str] = Field(description="what was repaired or converted when the part was read")
-
-
-class ScanReport(_Model):
-    paths: list[str]
-    points: int
-    noise: float = Field(description="measured standard deviation of the points off the local surface")
-    spacing: float = Field(description="measured distance that a surface reconstruction has to bridge")
-    notes: list[str]
-
-
-class AlignmentReport(_Model):
-    transform: list[list[float]] = Field(description="T_part_scan, 4x4: from the scanner's frame to the part's")
-    quaternion: tuple[float, float, float, float] = Field(description="its rotation: w, x, y, z; w is not negative")
-    translation: Vector = Field(description="its shift, after the rotation")
-    rms: float = Field(description="of the inliers' distance to the part")
-    inliers: float = Field(description="share of the scan's points")
-    alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
-    notes: list[str]
+    def _into(self, frame: str) -> Floats | None:
+        """T (4,4) that takes a point of the part to a frame; None for the part's own."""
+        if frame not in ("part", "scan"):
+            raise ValueError(f"no frame '{frame}'; there are: part, scan")
+        return scan_from_part(self.pose) if frame == "scan" else None
 
 
-class EvidenceReport(_Model):
-    ids_residual: float = Field(description="95th percentile of the IDS points' distance to the damage volume")
-    intact_points_inside: int = Field(description="intact scan points deeper than the tolerance inside it")
-    skin_contradicted: float = Field(description="share of the removed skin that intact scan points lie on")
-    skin_unseen: float = Field(description="share of the skin beside the damage that the scan does not show")
-    consistent: bool = Field(description="whether the scan bears the damage volume out")
-    reasons: list[str] = Field(description="why it is not")
+def _chosen(found: Mapping[str, Mesh | None], what: str, owner: str) -> Mesh:
+    if what not in found:
+        raise ValueError(f"{owner} has no '{what}'; there are: {', '.join(found)}")
+    mesh = found[what]
+    if mesh is None:
+        raise ValueError(f"{owner} has no {what}: nothing is {'left' if what == 'undamaged' else 'lost'}")
+    return mesh
 
 
-class FilesReport(_Model):
-    """Where the job asks for several formats or frames, the first of them; `every` has them all."""
-
-    damage: str | None
-    surface: str | None
-    deposit: str | None
-    every: list[str] = Field(description="all files of this site alone")
-
-
-class SplineReport(_Model):
-    deviation: float | None = Field(description="largest distance between surface and spline, either way")
-    trimmed: bool = Field(description="whether it ends at the surface's rim; otherwise it reaches beyond")
-    reason: str = Field(description="why none was written; empty where one was")
-
-
-class ExportReport(_Model):
-    files: list[str] = Field(description="all that were written; those below scan_frame/ are in the scan's frame")
-    notes: list[str] = Field(description="what was written otherwise than asked for, and why")
-
-
-class ThicknessReport(_Model):
-    """Height of the stock over the nominal surface, where stock was asked for."""
-
-    min: float
-    mean: float
-    max: float
-
-
-class DepositReport(_Model):
-    volume: float = Field(description="of what is to be deposited")
-    stock_volume: float = Field(description="of its share beyond the nominal surface, to be milled off")
-    cut_back_volume: float = Field(description="of sound metal to be taken off before, for a clean surface")
-    thickness: ThicknessReport | None = Field(description="of the stock; null where none was asked for or measured")
-    faces: list[int] = Field(description="numbers of the CAD faces that stock stands on; empty without B-rep")
-
-
-class MaterialReport(_Model):
-    """Sums over all sites, but for those that the stage allowance refused."""
-
-    deposit_volume: float
-    stock_volume: float
-    cut_back_volume: float
-
-
-class SiteReport(_Model):
-    id: int
-    points: int
-    volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
-    surface_area: float = Field(description="of the inner damage surface")
-    max_depth: float = Field(description="of the scan below the nominal surface")
-    centroid: Vector
-    bounds: tuple[Vector, Vector]
-    method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
-    evidence: EvidenceReport
-    deposit: DepositReport | None = Field(description="null where the stage allowance refused the site")
-    files: FilesReport
-    spline: SplineReport | None = Field(description="null where the job asks for none")
-    warnings: list[str]
-
-
-class TruthReport(_Model):
-    """Only after a virtual scan: how far the result is from what is known to be true."""
-
-    volume: float
-    iou: float = Field(description="intersection over union of found and true damage")
-    transform: list[list[float]] = Field(description="the true T_part_scan")
-
-
-class StageReport(_Model):
-    stage: str
-    use: str
-    provider: str
-    site: int = Field(description="0 for a stage that runs once per job")
-    seconds: float
-    cached: bool
-
-
-class Report(_Model):
-    """The content of result.json. Lengths, areas and volumes in ``units``; coordinates in the part's frame."""
-
-    version: Literal[1] = Field(1, alias="schema", description="version of this format")
-    status: Literal["ok", "incomplete"] = Field(description="incomplete: some sites have no damage volume or deposit")
-    name: str
-    units: str
-    tolerance: float
-    part: PartReport
-    scan: ScanReport
-    alignment: AlignmentReport
-    sites: list[SiteReport]
-    export: ExportReport
-    damage_volume: float
-    undamaged_volume: float
-    material: MaterialReport = Field(description="what the whole repair takes")
-    truth: TruthReport | None
-    stages: list[StageReport]
-    failures: list[str] = Field(description="sites without a damage volume or a deposit, and why")
-    warnings: list[str]
-    versions: dict[str, str]
-
-
-def report(result: Result, written: Written = _NOTHING, relative: Any = str) -> dict[str, Any]:
-    """The content of result.json as plain values. ``relative`` turns an absolute input path into the one to write."""
-    import platform
-
-    import damageest
-
-    part, scan, pose = result.part, result.scan, result.pose
-    sites = [_site(site, written) for site in result.sites]
-    filled = Report(
-        status=result.status,
-        name=result.name,
-        units=result.units,
-        tolerance=result.tolerance,
-        part=PartReport(
-            path=relative(part.path) if part.path else "",
-            sha256=part.sha256,
-            volume=part.volume,
-            watertight=True,
-            tessellation_error=part.tessellation_error,
-            notes=list(part.notes),
-        ),
-        scan=ScanReport(
-            paths=[relative(path) for path in scan.paths],
-            points=len(scan.points),
-            noise=scan.noise,
-            spacing=scan.spacing,
-            notes=list(scan.notes),
-        ),
-        alignment=AlignmentReport(
-            transform=pose.T_part_scan.tolist(),
-            quaternion=_quaternion(pose.T_part_scan),
-            translation=tuple(pose.T_part_scan[:3, 3].tolist()),
-            rms=pose.rms,
-            inliers=pose.inliers,
-            alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
-            notes=list(pose.notes),
-        ),
-        sites=sites,
-        export=ExportReport(files=list(written.files), notes=list(written.notes)),
-        damage_volume=result.damage_volume,
-        undamaged_volume=result.undamaged_volume,
-        material=_material([site.deposit for site in sites if site.deposit]),
-        truth=_truth(result),
-        stages=[StageReport(**vars(record)) for record in result.stages],
-        failures=list(result.failures),
-        warnings=list(result.warnings),
-        versions={"damageest": damageest.__version__, "python": platform.python_version()},
-    )
-    return filled.model_dump(mode="json", by_alias=True)
-
-
-def _quaternion(T: Floats) -> tuple[float, float, float, float]:
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True).tolist()
-    return w, x, y, z
-
-
-def _site(site: Site, written: Written) -> SiteReport:
-    kinds = ("damage", "surface", "deposit")
-    own = {
-        kind: [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"{kind}/site-{site.id}.")]
-        for kind in kinds
-    }
-    spline = written.splines.get(site.id)
-
-    low, high = site.damage.bounds.tolist()
-    evidence = {name: value for name, value in vars(site.evidence).items() if name != "reasons"}
-    return SiteReport(
-        id=site.id,
-        points=len(site.points),
-        volume=site.damage.volume,
-        surface_area=site.surface.area,
-        max_depth=site.max_depth,
-        centroid=tuple(site.centroid.tolist()),
-        bounds=(tuple(low), tuple(high)),
-        method="surface" if site.method == "surface" else "implicit",
-        deposit=_deposit(site),
-        evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
-        files=FilesReport(
-            **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
-        ),
-        spline=SplineReport(**vars(spline)) if spline else None,
-        warnings=list(site.warnings),
-    )
-
-
-def _deposit(site: Site) -> DepositReport | None:
-    if site.refused:
-        return None
-    deposit = site.deposit or site.damage
-    if not isinstance(deposit, Deposit):
-        stock = deposit.volume - site.damage.volume
-        return DepositReport(volume=deposit.volume, stock_volume=stock, cut_back_volume=0, thickness=None, faces=[])
-    low, mean, high = deposit.thickness or (0.0, 0.0, 0.0)
-    return DepositReport(
-        volume=deposit.volume,
-        stock_volume=deposit.stock_volume,
-        cut_back_volume=deposit.cut_back_volume,
-        thickness=ThicknessReport(min=low, mean=mean, max=high) if deposit.thickness else None,
-        faces=list(deposit.touched),
-    )
-
-
-def _material(deposits: list[DepositReport]) -> MaterialReport:
-    return MaterialReport(
-        deposit_volume=sum(deposit.volume for deposit in deposits),
-        stock_volume=sum(deposit.stock_volume for deposit in deposits),
-        cut_back_volume=sum(deposit.cut_back_volume for deposit in deposits),
-    )
-
-
-def _truth(result: Result) -> TruthReport | None:
-    truth = result.scan.truth
-    if truth is None or result.truth is None:
-        return None
-    volume, iou = result.truth.tolist()
-    return TruthReport(volume=volume, iou=iou, transform=truth.T_part_scan.tolist())
+def _closed(mesh: Mesh, what: str) -> Solid:
+    if not isinstance(mesh, Solid):
+        raise ValueError(f"{what} is an open mesh, and manifold3d takes solids; take as_trimesh")
+    return mesh

@@ -9,7 +9,7 @@ from pydantic.json_schema import models_json_schema
 from damageest.contracts import DEFAULTS, STAGES
 from damageest.job import Header
 from damageest.registry import Implementation, Registry
-from damageest.result import Report
+from damageest.report import Report
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

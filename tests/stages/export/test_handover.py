@@ -15,7 +15,8 @@ from scipy.spatial.transform import Rotation
 from damageest.errors import JobError
 from damageest.job import load
 from damageest.registry import Registry
-from damageest.result import Result, report
+from damageest.report import report
+from damageest.result import Result
 from damageest.stages.export.files import DAMAGE, DEPOSIT, UNDAMAGED, Files
 from damageest.units import MILLIMETRES
 from tests.stages.export import results
