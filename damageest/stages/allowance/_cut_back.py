@@ -11,6 +11,7 @@ from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.settle import inner_faces
 from damageest.solids import BALANCE, remainder, to_manifold, to_solid
+from damageest.stages.allowance._booleans import tidied
 
 FINE, COARSE, COARSEST = 0.5, 0.75, 1.0
 """Edge of a lattice cell, in tolerances: for a cut-back of less than two tolerances, for a larger one, and as far as
@@ -46,7 +47,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
         if missing <= BALANCE * whole.volume():
             break
     missing, cavity = min(tried, key=lambda item: item[0])
-    solid = to_solid(cavity.as_original().simplify(1e-9 * part.diagonal), origin)
+    solid = to_solid(tidied(cavity, part.diagonal), origin)
     if solid is None or missing > 1e-3 * lost.volume():
         raise StageError(
             f"the cut-back does not add up: {missing:.3g} in volume is lost or counted twice",

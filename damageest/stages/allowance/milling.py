@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -10,12 +9,8 @@ from pydantic import Field
 
 from damageest.artefacts import Deposit, Floats, Part, Solid
 from damageest.errors import StageError
-from damageest.solids import BALANCE
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance._selectors import KeepOut, Target, Wanted
-
-DUST = 1e-9
-"""Share of the stock's volume below which a piece of it is rounding."""
 
 
 class Milling(Allowance):
@@ -60,6 +55,7 @@ class Milling(Allowance):
         from manifold3d import Manifold
 
         from damageest.solids import remainder, to_manifold, to_solid
+        from damageest.stages.allowance._booleans import joined, tidied, touching
         from damageest.stages.allowance._cut_back import cut_back
         from damageest.stages.allowance._keep_out import kept_out
         from damageest.stages.allowance._limits import crowded
@@ -82,11 +78,10 @@ class Milling(Allowance):
         if crowds and self.crowded == "refuse":
             raise StageError(str(crowds[0]), "a smaller outer there by targets, keep_out, or crowded: clip")
         proud = sum((stock(each, tolerance / 2, roomy=not crowds) for each in skins), Manifold())
-        proud = proud.as_original().simplify(1e-9 * part.diagonal)
+        proud = tidied(proud, part.diagonal)
         for body in (left, barred):
             proud = remainder(proud, proud ^ body) if not (proud.is_empty() or body.is_empty()) else proud
-        deposit = _joined(filled, _touching(proud, filled, tolerance))
-        deposit = deposit.as_original().simplify(1e-9 * part.diagonal)
+        deposit = tidied(joined(filled, touching(proud, filled, tolerance)), part.diagonal)
         thickness = check(Worked(deposit, filled, left, barred, skin, band, origin), part, tolerance, crowds)
         body = to_solid(deposit, origin)
         if body is None:
@@ -111,34 +106,3 @@ def _touched(part: Part, skins: list[Any]) -> tuple[int, ...]:
     assert part.faces_brep is not None
     parents = np.concatenate([skin.parent[skin.height > 0] for skin in skins])
     return tuple(np.unique(part.faces_brep[parents]).tolist())
-
-
-def _touching(proud: Any, filled: Any, tolerance: float) -> Any:
-    """Without the pieces of stock that do not touch what is filled, as behind a thin wall that cuts them off, and
-    without the dust of the Boolean."""
-    from manifold3d import Manifold
-
-    least = DUST * proud.volume()
-    pieces = [piece for piece in proud.decompose() if abs(piece.volume()) > least]
-    if len(pieces) > 1:  # a void has a negative volume, and belongs to the piece round it
-        pieces = [p for p in pieces if p.volume() < 0 or p.min_gap(filled, tolerance) <= 1e-3 * tolerance]
-    return Manifold.compose(pieces) if pieces else Manifold()
-
-
-def _joined(filled: Any, proud: Any) -> Any:
-    """The union, by the first of several ways that leaves no volume unaccounted for, else the nearest; as
-    `damageest.solids.remainder`."""
-    whole = filled.volume() + proud.volume() - (filled ^ proud).volume()
-    nudge = 1e-9 * max(abs(bound) for bound in filled.bounding_box())
-    ways: tuple[Callable[[], Any], ...] = (
-        lambda: filled + proud,
-        lambda: filled + (proud - (proud ^ filled)),
-        lambda: filled + proud.translate((nudge, 0.7 * nudge, -0.3 * nudge)),
-    )
-    tried: list[tuple[float, Any]] = []
-    for way in ways:
-        body = way()
-        tried.append((abs(whole - body.volume()), body))
-        if tried[-1][0] <= BALANCE * whole:
-            break
-    return min(tried, key=lambda item: item[0])[1]

@@ -1,0 +1,153 @@
+"""The guarantees of a milled deposit, on random damages with random options, by other means than the stage's own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from damageest.artefacts import Deposit, Floats, Part, Solid, open_edges
+from damageest.errors import StageError
+from damageest.solids import remainder, to_manifold
+from damageest.stages.allowance.milling import Milling
+from tests.stages.allowance.shapes import (
+    SHAPES,
+    TOLERANCE,
+    block,
+    inside,
+    nearest,
+    part_of,
+    skin_points,
+    solid_of,
+    struck,
+)
+
+CASES = 56
+
+
+def options(rng: np.random.Generator) -> dict[str, Any]:
+    """Random options, lengths up to eight tolerances."""
+    chosen: dict[str, Any] = {"outer": float(rng.choice([0.0, rng.uniform(0.5, 8)])) * TOLERANCE}
+    if rng.random() < 0.4:
+        direction = rng.normal(size=3).tolist()
+        target = {"facing": {"direction": direction, "angle": 70}, "outer": rng.uniform(1, 8) * TOLERANCE}
+        chosen["targets"] = [target]
+    if rng.random() < 0.35:
+        chosen["overlap"] = rng.uniform(1, 6) * TOLERANCE
+    if rng.random() < 0.35:
+        chosen["inner"] = rng.uniform(1, 5) * TOLERANCE
+    return chosen
+
+
+def wanted(chosen: dict[str, Any], normals: Floats) -> Floats:
+    """(N,) the stock that the options ask for over skin of these normals."""
+    height = np.full(len(normals), chosen["outer"])
+    for target in chosen.get("targets", []):
+        direction = np.array(target["facing"]["direction"])
+        close = normals @ direction / np.linalg.norm(direction) >= np.cos(np.radians(70))
+        height[close] = target["outer"]
+    return height
+
+
+def made(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit | str]:
+    """Part, damage, options, and the deposit or why it was refused."""
+    rng = np.random.default_rng([51, seed])
+    body = list(SHAPES.values())[seed % len(SHAPES)]()
+    lost, chosen = solid_of(struck(body, rng)), options(rng)
+    part = part_of(body)
+    try:
+        deposit = Milling.model_validate(chosen).run(lost, part, TOLERANCE, None)
+    except StageError as error:
+        return part, lost, chosen, error.message
+    assert isinstance(deposit, Deposit)
+    return part, lost, chosen, deposit
+
+
+@pytest.mark.parametrize("seed", range(CASES))
+def test_guarantees(seed: int) -> None:
+    part, lost, chosen, deposit = made(seed)
+    if isinstance(deposit, str):
+        assert deposit.startswith("no room for the stock at ("), deposit
+        assert list(SHAPES)[seed % len(SHAPES)] in ("comb", "bored", "dovetail"), deposit
+        return
+    assert open_edges(deposit.faces) == 0
+    cavity = deposit.cavity or lost
+    body, hole, whole = to_manifold(deposit), to_manifold(cavity), to_manifold(part)
+    left = remainder(whole, hole)
+    assert (hole - body).volume() < 1e-3 * hole.volume()
+    assert (body ^ left).volume() < 1e-3 * body.volume()
+    assert deposit.stock_volume == pytest.approx(deposit.volume - cavity.volume, abs=1e-9)
+    assert deposit.cut_back_volume == pytest.approx(cavity.volume - lost.volume, abs=1e-6 * lost.volume)
+    points, normals = skin_points(cavity, part, 1500, seed)
+    height = wanted(chosen, normals)
+    metal = solid_of(left)
+    tall = height > 0
+    if tall.any():
+        assert missed(points[tall], normals[tall], height[tall], deposit, metal) <= 0.01
+    assert bare(points, normals, height, deposit) <= 0.01
+    around, upward = skin_points(metal, part, 3000, seed)
+    far = chosen.get("overlap", 0.0) + wanted(chosen, upward).max(initial=0) + max(height.max(), TOLERANCE)
+    close = (nearest(around, cavity)[0] > far) & (nearest(around, cavity)[0] < far + 3)
+    assert not inside(around[close] + 0.3 * TOLERANCE * upward[close], deposit).any()
+
+
+def missed(points: Floats, normals: Floats, height: Floats, deposit: Solid, metal: Solid) -> float:
+    """The share of skin points over which the stock is thinner than wanted, or more than a tolerance thicker. Metal may
+    stand over it, and in a concave corner the stock of other skin."""
+    low = points + (0.999 * height)[:, None] * normals
+    half = points + (0.5 * height)[:, None] * normals
+    thin = ~(inside(low, deposit) | inside(low, metal)) | ~(inside(half, deposit) | inside(half, metal))
+    high = points + (height + 1.001 * TOLERANCE)[:, None] * normals
+    own = np.ones(len(points), bool)
+    for tall in np.unique(height):
+        cloud = np.ascontiguousarray(points[height == tall])
+        own &= away(high, cloud) > 0.97 * (tall + TOLERANCE)
+    thick = inside(high, deposit) & own
+    return float((thin | thick).mean())
+
+
+def bare(points: Floats, normals: Floats, height: Floats, deposit: Solid) -> float:
+    """The share of skin without stock, farther from any with it than that is high, over which there is stock."""
+    none, tall = height == 0, height > 0
+    if not none.any():
+        return 0.0
+    free = away(points[none], points[tall]) if tall.any() else np.full(int(none.sum()), np.inf)
+    some = free > height.max() + 2 * TOLERANCE
+    over = inside(points[none][some] + 0.3 * TOLERANCE * normals[none][some], deposit)
+    return float(over.mean()) if len(over) else 0.0
+
+
+def away(points: Floats, cloud: Floats) -> Floats:
+    """(N,) distance to the nearest of a cloud (M,3)."""
+    return np.asarray(cKDTree(cloud).query(points)[0])
+
+
+def test_enough_cases_are_not_refused() -> None:
+    rng = [np.random.default_rng([51, seed]) for seed in range(CASES)]
+    assert len(rng) >= 40
+    refused = [seed for seed in range(CASES) if isinstance(made(seed)[3], str)]
+    assert CASES - len(refused) >= 40
+
+
+def test_a_flat_face_gets_its_stock_exactly() -> None:
+    from manifold3d import Manifold
+
+    body = block()
+    lost = solid_of(body ^ Manifold.cube((6, 5, 4)).translate((10, 8, 9)))
+    deposit = Milling(outer=0.7).run(lost, part_of(body), TOLERANCE, None)
+    assert deposit is not None
+    low, high = deposit.bounds
+    assert low == pytest.approx([10, 8, 9])
+    assert high[:2] == pytest.approx([16, 13])
+    assert 0.7 < high[2] - 12 < 0.7 + TOLERANCE
+    assert deposit.volume == pytest.approx(6 * 5 * (high[2] - 9), rel=1e-6)
+
+
+def test_same_bytes_twice() -> None:
+    first, second = made(2)[3], made(2)[3]
+    assert isinstance(first, Deposit)
+    assert isinstance(second, Deposit)
+    assert first.vertices.tobytes() == second.vertices.tobytes()
+    assert first.faces.tobytes() == second.faces.tobytes()
