@@ -13,7 +13,19 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh
 from damageest.hookspecs import hookimpl
 
-HEAVY = ("igl", "manifold3d", "pyvista", "scipy.sparse.csgraph", "scipy.spatial", "scipy.spatial.transform", "trimesh")
+HEAVY = (
+    "igl",
+    "manifold3d",
+    "pyvista",
+    "scipy.fft",
+    "scipy.ndimage",
+    "scipy.sparse.csgraph",
+    "scipy.spatial",
+    "scipy.spatial.transform",
+    "scipy.special",
+    "scipy.stats",
+    "trimesh",
+)
 """What a run imports sooner or later."""
 YARDSTICK = 1_000_000
 """Points above which the pass of libigl is measured on a part of them."""

@@ -8,7 +8,7 @@ from damageest.artefacts import Floats, Ints
 from damageest.lattice import cubes
 
 ROUNDS = 3
-SCALES = (32, 64, 128)
+SCALES = (32, 80, 200)
 """Neighbours of the fits to choose from."""
 KAPPA = 2.0
 """Standard deviations that two fits of one point may lie apart by noise."""
