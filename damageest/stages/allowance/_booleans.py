@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from damageest.solids import BALANCE
-
+SLACK = 1e-5
+"""Share of a solid's volume by which it may change without a word; a tenth of what the check of a deposit bears."""
 DUST = 1e-9
 """Share of the stock's volume below which a piece of it is rounding."""
 
@@ -15,7 +15,7 @@ def tidied(body: Any, diagonal: float) -> Any:
     """A Manifold without what it needs not to have its shape. As it was, where that would change its volume: manifold3d
     was seen to take a facet along."""
     simple = body.as_original().simplify(1e-9 * diagonal)
-    return simple if abs(simple.volume() - body.volume()) <= BALANCE * abs(body.volume()) else body
+    return simple if abs(simple.volume() - body.volume()) <= SLACK * abs(body.volume()) else body
 
 
 def touching(proud: Any, filled: Any, tolerance: float) -> Any:
@@ -44,6 +44,6 @@ def joined(filled: Any, proud: Any) -> Any:
     for way in ways:
         body = way()
         tried.append((abs(whole - body.volume()), body))
-        if tried[-1][0] <= BALANCE * whole:
+        if tried[-1][0] <= SLACK * whole:
             break
     return min(tried, key=lambda item: item[0])[1]

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh, Part
-from damageest.solids import to_arrays, to_manifold
 from damageest.stages.allowance._selectors import Wanted
 
 ON = 1e-7
@@ -66,9 +65,7 @@ class Skin:
 def skin_of(body: Mesh, part: Part, wanted: Wanted, origin: Floats) -> Skin:
     """The faces of a solid in the part that lie on the part's surface, cut along the planes of the selectors and told
     apart by the stock wanted on them."""
-    simple = to_manifold(body, origin).simplify(0.1 * ON * part.diagonal)
-    vertices, faces = to_arrays(simple)
-    return sorted_skin(vertices, faces, part, wanted, origin)
+    return sorted_skin(body.vertices - origin, body.faces, part, wanted, origin)
 
 
 def sorted_skin(vertices: Floats, faces: Ints, part: Part, wanted: Wanted, origin: Floats) -> Skin:
@@ -99,7 +96,9 @@ def on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> tuple[
     near = squared.reshape(-1, 4).max(axis=1) <= (ON * part.diagonal) ** 2
     parent = np.asarray(parent.reshape(-1, 4)[:, 3], np.int64)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return near & (np.einsum("ij,ij->i", cross, part.cross[parent]) > 0), parent
+    # slivers face anywhere, and left out they would leave slits
+    sliver = np.linalg.norm(cross, axis=1) < (100 * ON * part.diagonal) ** 2
+    return near & (sliver | (np.einsum("ij,ij->i", cross, part.cross[parent]) > 0)), parent
 
 
 def clipped(vertices: Floats, faces: Ints, value: Floats) -> tuple[Floats, Ints, Ints, NDArray[np.bool_]]:

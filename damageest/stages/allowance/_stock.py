@@ -43,7 +43,7 @@ def stock(skin: Skin, slack: float, roomy: bool = True) -> Any:
     little below the skin, for the caller to cut off. ``roomy``: no stock meets that of opposite skin."""
     from manifold3d import Manifold, OpType
 
-    skin = skin.only((skin.height > 0) & (skin.areas > 0))
+    skin = skin.only(skin.height > 0)
     if not len(skin.faces):
         return Manifold()
     edges = _edges(skin)

@@ -132,8 +132,6 @@ def strayed(work: Worked, part: Part, tolerance: float) -> float:
     it."""
     import igl
 
-    from damageest.stages.segment.mesh_distance import signed_distance
-
     skins = [work.skin] if work.band is None else [work.skin, work.band]
     most = max(float(skin.height.max(initial=0)) for skin in skins) + tolerance
     corners = part.triangles - work.origin
@@ -153,11 +151,10 @@ def strayed(work: Worked, part: Part, tolerance: float) -> float:
     points, normal = points[bare], normal[bare]
     if not len(points):
         return 0.0
-    body = Mesh(*to_arrays(work.deposit))
-    inside = [
-        signed_distance(points + share * most * normal, body)[0] < -ON * part.diagonal for share in (0.05, 0.3, 0.8)
-    ]
-    return float(np.any(inside, axis=0).mean())
+    vertices, faces = to_arrays(work.deposit)
+    places = np.concatenate([points + share * most * normal for share in (0.05, 0.3, 0.8)])
+    inside = igl.fast_winding_number(vertices, faces, places).reshape(3, -1) > 0.5
+    return float(inside.any(axis=0).mean())
 
 
 def _near(points: Floats, body: Any, reach: float) -> Mask:
