@@ -14,8 +14,9 @@ from pydantic import AfterValidator, Field
 from damageest.artefacts import Floats, Scan, Solid
 from damageest.handover import moved, scan_from_part, simplified
 from damageest.meshio import write_ply, write_points
-from damageest.stages.export import Body, Export, Writer, Written
+from damageest.stages.export import Body, Export, Patch, Writer, Written
 from damageest.stages.export._options import Formats, spline_writer
+from damageest.stages.export._spline import fitted
 
 if TYPE_CHECKING:
     from damageest.result import Result
@@ -50,6 +51,7 @@ class Files(Export):
 
     def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> Written:
         """Writes into ``folder`` and gives the paths relative to it. The same result gives the same bytes."""
+        splines = {s.id: fitted(s.surface, result.tolerance) for s in result.sites} if self.spline else {}
         detail = result.tolerance / 10 if self.detail is None else self.detail
         bodies, coarse = _bodies(result), {}
         if detail and any(writers[name].costly for name in self.format):
@@ -62,9 +64,13 @@ class Files(Export):
                 chosen = coarse if coarse and writers[name].costly else bodies
                 done += _solids(writers[name], folder, place, chosen, T, result.units)
             done += self._others(result, folder, place, T)
+            if splines:
+                patches = {number: patch for number, (patch, _) in splines.items() if patch}
+                done += _patches(writers, folder, place, patches, T, result.units)
         done.append(self._truth(result, folder, writers))
         files = dict.fromkeys(f for one in done for f in one.files)  # STL may have written a PLY already
-        return Written(tuple(files), tuple(n for one in done for n in one.notes))
+        notes = tuple(n for one in done for n in one.notes)
+        return Written(tuple(files), notes, {number: spline for number, (_, spline) in splines.items()})
 
     def _others(self, result: Result, folder: Path, place: str, T: Floats | None) -> list[Written]:
         """Surfaces and scan, below ``place``; ``T`` takes a point of the part to their frame."""
@@ -112,6 +118,20 @@ def _solids(
         pieces = [body for stem, body in here.items() if stem != "damage"]
         return [_write(writer, folder, f"{place}result", pieces, unit)]
     return [_write(writer, folder, f"{place}{stem}", [body], unit) for stem, body in here.items()]
+
+
+def _patches(
+    writers: Mapping[str, Writer], folder: Path, place: str, patches: Mapping[int, Patch], T: Floats | None, unit: str
+) -> list[Written]:
+    """The splines of the sites, by the first format that has such a thing."""
+    suffix, write = next((name, writer.patch) for name, writer in sorted(writers.items()) if writer.patch)
+    done = []
+    for number, patch in patches.items():
+        name = f"{place}surface/site-{number}.{suffix}"
+        here = patch if T is None else replace(patch, poles=patch.poles @ T[:3, :3].T + T[:3, 3])
+        write(_room(folder, name), f"damage surface site-{number}", here, unit)
+        done.append(Written((name,)))
+    return done
 
 
 def _write(writer: Writer, folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:

@@ -19,7 +19,8 @@ def damageest_stages() -> list[type[Stage]]:
 
 @hookimpl
 def damageest_writers() -> Mapping[str, Writer]:
-    """STEP, of solids."""
+    """STEP, of solids and splines."""
+    from damageest_cadquery._patch import step_patch
     from damageest_cadquery._step import step
 
-    return {"step": Writer(step, costly=True)}
+    return {"step": Writer(step, costly=True, patch=step_patch)}

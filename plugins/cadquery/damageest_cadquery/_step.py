@@ -40,8 +40,9 @@ def _planar(solid: Solid) -> tuple[Floats, list[Facet]]:
     return solid.vertices, facets(solid)
 
 
-def write_shape(path: Path, shape: Any, name: str, unit: str) -> None:
-    """An OpenCASCADE shape, in millimetres, as STEP in ``unit``. Raises OSError."""
+def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = False) -> None:
+    """An OpenCASCADE shape, in millimetres, as STEP in ``unit``; ``curves``: with its edges as curves in the parameters
+    of its faces, which planes need not have. Raises OSError."""
     from OCP.IFSelect import IFSelect_RetDone
     from OCP.Interface import Interface_Static
     from OCP.Message import Message
@@ -51,7 +52,7 @@ def write_shape(path: Path, shape: Any, name: str, unit: str) -> None:
     STEPControl_Controller.Init_s()
     wanted = {"write.step.unit": UNITS[unit], "write.step.product.name": name}
     before = {key: Interface_Static.CVal_s(key) for key in wanted}
-    numbers = {"write.surfacecurve.mode": 0, "write.step.assembly": 0}  # no curves in a plane's parameters; one product
+    numbers = {"write.surfacecurve.mode": int(curves), "write.step.assembly": 0}  # the latter: one product
     earlier = {key: Interface_Static.IVal_s(key) for key in numbers}
     try:
         for key, value in wanted.items():

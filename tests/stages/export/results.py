@@ -32,7 +32,7 @@ def make(units: str = "mm", size: float = 1.0) -> Result:
     mesh = trimesh.creation.box((40, 30, 20))
     part = Part(mesh.vertices * size, mesh.faces, unit=units)
     whole = to_manifold(part)
-    lost = [(whole ^ ball(radius, at).scale((size,) * 3)) for radius, at in ((6, (-8, 1, 10)), (4, (11, -5, 11)))]
+    lost = [(whole ^ ball(radius, at).scale((size,) * 3)) for radius, at in ((6, (-8, 1, 13)), (4, (11, -5, 11)))]
     damages = [to_solid(body) for body in lost]
     deposits = (None, to_solid(ball(4, (11, -5, 11)).scale((size,) * 3)))
     sites = tuple(

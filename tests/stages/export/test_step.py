@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from damageest.artefacts import Surface
 from damageest.registry import Registry
+from damageest.report import report
 from damageest.stages.export.files import Files
 from damageest.units import MILLIMETRES
 from tests.stages.export import results
@@ -41,3 +45,35 @@ def test_volumes_and_unit(units: str, detail: float | None, tmp_path: Path, regi
     box = cq.importers.importStep(str(tmp_path / "undamaged.step")).combine().val().BoundingBox()
     assert (box.xmin, box.ymin, box.zmin) == pytest.approx(low, abs=1e-4)
     assert (box.xmax, box.ymax, box.zmax) == pytest.approx(high, abs=1e-4)
+
+
+@pytest.mark.parametrize("units", ["mm", "in"])
+def test_inner_damage_surfaces_as_splines(units: str, tmp_path: Path, registry: Registry) -> None:
+    scale = MILLIMETRES[units]
+    result = results.make(units, 1 / scale)
+    sharp = replace(result.sites[1], surface=Surface(result.part.vertices, result.part.faces))
+    result = replace(result, sites=(result.sites[0], sharp))
+    stage = Files(frame="both", spline=True)
+    written = stage.run(result, tmp_path, registry.writers)
+    assert {name for name in written.files if name.endswith(".step")} == {
+        "surface/site-1.step",
+        "scan_frame/surface/site-1.step",
+    }
+    said = report(result, written)["sites"]
+    assert said[0]["spline"]["reason"] == ""
+    assert said[0]["spline"]["trimmed"]
+    assert 0 < said[0]["spline"]["deviation"] <= result.tolerance
+    assert "surface/site-1.step" in said[0]["files"]["every"]
+    assert said[0]["files"]["surface"] == "surface/site-1.ply"
+    assert "no height field" in said[1]["spline"]["reason"]
+    T = np.linalg.inv(result.pose.T_part_scan)
+    for name, move in (("surface/site-1.step", np.eye(4)), ("scan_frame/surface/site-1.step", T)):
+        (face,) = cq.importers.importStep(str(tmp_path / name)).faces().vals()
+        points = result.sites[0].surface.vertices[np.unique(result.sites[0].surface.faces)][::200]
+        for point in (points @ move[:3, :3].T + move[:3, 3]) * scale:
+            assert face.distance(cq.Vertex.makeVertex(*point.tolist())) <= result.tolerance * scale
+    for k in range(2):
+        (tmp_path / str(k)).mkdir()
+        stage.run(result, tmp_path / str(k), registry.writers)
+    assert (tmp_path / "0/surface/site-1.step").read_bytes() == (tmp_path / "1/surface/site-1.step").read_bytes()
+    assert report(result)["sites"][0]["spline"] is None

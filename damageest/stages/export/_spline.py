@@ -1,0 +1,133 @@
+"""A B-spline through an inner damage surface, where that is a height field over a plane: one smooth face for CAM."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import BSpline, NdBSpline
+from scipy.sparse import csr_array, eye_array, kron
+from scipy.sparse.linalg import spsolve
+
+from damageest.artefacts import Floats, Ints, Surface
+from damageest.stages.export import Patch, Spline
+
+DEGREE = 3
+_OVERHANG = 0.01
+"""Share of the area that may lean over, as slivers do; how far the spline is off there is measured all the same."""
+_SPANS = (4, 8, 16, 32, 64)
+_STIFF = 1e-4
+"""Weight of the poles' second differences, which bridge where the surface has no points."""
+_SPECK = 0.01
+_MARGIN = 0.03
+_SAMPLES = 400
+
+
+def fitted(surface: Surface, tolerance: float) -> tuple[Patch | None, Spline]:
+    """The coarsest spline within half of ``tolerance`` of the surface, else the nearest within it; or why none is.
+
+    Its parameters are lengths in the plane that the surface is a height field over.
+    """
+    axes, overhang = _plane(surface)
+    if overhang > _OVERHANG:
+        return None, Spline(reason=f"no height field over any plane: {overhang:.1%} of its area overhangs")
+    origin = surface.bounds.mean(axis=0)
+    points = (surface.vertices - origin) @ axes.T
+    corners = points[surface.faces]
+    data = np.concatenate([points, corners.mean(axis=1)])
+    rims = _rims(corners[..., :2], tolerance)
+    best: tuple[float, Patch] | None = None
+    for spans in _SPANS:
+        knots, poles = _least_squares(data, spans)
+        off = _deviation(points, surface, knots, poles)
+        if best is None or off < best[0]:
+            best = off, Patch(DEGREE, knots, origin + poles @ axes, tuple(rims))
+        if off <= tolerance / 2:
+            break
+    assert best is not None
+    if best[0] > tolerance:
+        return None, Spline(best[0], reason=f"the nearest is {best[0]:.3g} off, the tolerance {tolerance:.3g}")
+    return best[1], Spline(best[0], bool(rims))
+
+
+def _plane(surface: Surface) -> tuple[Floats, float]:
+    """(3,3) two directions of a plane and its normal, so that little of the surface faces away; and that share."""
+    area = np.linalg.norm(surface.cross, axis=1)
+    unit = surface.cross / np.maximum(area, 1e-300)[:, None]
+    weight, best, least = area / area.sum(), np.zeros(3), np.inf
+    for _ in range(20):  # the steepest gain weight, so that the normal leans toward them
+        normal = weight @ unit
+        normal /= max(float(np.linalg.norm(normal)), 1e-300)
+        away = area[unit @ normal < 0.02].sum() / area.sum()
+        if away < least:
+            best, least = normal, float(away)
+        weight = weight * np.exp(-0.5 * (unit @ normal))
+        weight /= weight.sum()
+    spread = surface.vertices - surface.vertices.mean(axis=0)
+    flat = spread - np.outer(spread @ best, best)
+    first = np.linalg.svd(flat.T @ flat)[0][:, 0]  # along its length
+    first -= best * (first @ best)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(best, first), best]), least
+
+
+def _least_squares(data: Floats, spans: int) -> tuple[tuple[Floats, Floats], Floats]:
+    """Knots of both directions and poles (U,V,3) of the surface nearest to points (N,3), over all of their extent."""
+    low, high = data[:, :2].min(axis=0), data[:, :2].max(axis=0)
+    edge = _MARGIN * (high - low).max()
+    long = (high - low).max()
+    knots, basis, bend = [], [], []
+    for k in range(2):
+        count = max(2, round(spans * (high[k] - low[k]) / long))
+        inner = np.linspace(low[k] - edge, high[k] + edge, count + 1)
+        knots.append(np.concatenate([np.full(DEGREE, inner[0]), inner, np.full(DEGREE, inner[-1])]))
+        basis.append(csr_array(BSpline.design_matrix(data[:, k], knots[k], DEGREE)))
+        size = len(knots[k]) - DEGREE - 1
+        bend.append(csr_array(np.diff(np.eye(size), 2, axis=0)))
+    sizes = [len(k) - DEGREE - 1 for k in knots]
+    u, v = basis
+    # each point meets DEGREE + 1 poles a side: their products, row by row
+    rows = np.repeat(np.arange(len(data)), (DEGREE + 1) ** 2)
+    columns = (u.indices.reshape(-1, DEGREE + 1, 1) * sizes[1] + v.indices.reshape(-1, 1, DEGREE + 1)).reshape(-1)
+    values = (u.data.reshape(-1, DEGREE + 1, 1) * v.data.reshape(-1, 1, DEGREE + 1)).reshape(-1)
+    A = csr_array((values, (rows, columns)), shape=(len(data), sizes[0] * sizes[1]))
+    stiff = kron(bend[0].T @ bend[0], eye_array(sizes[1])) + kron(eye_array(sizes[0]), bend[1].T @ bend[1])
+    heights = spsolve((A.T @ A + _STIFF * len(data) / A.shape[1] * stiff).tocsc(), A.T @ data[:, 2])
+    # the mean of the knots that a pole belongs to: poles there give back the parameters as coordinates
+    at = [np.convolve(k[1:-1], np.full(DEGREE, 1 / DEGREE), "valid") for k in knots]
+    poles = np.dstack([*np.meshgrid(*at, indexing="ij"), np.asarray(heights).reshape(sizes)])
+    return (knots[0], knots[1]), poles
+
+
+def _rims(triangles: Floats, tolerance: float) -> list[Floats]:
+    """The outlines (K,2) of the region that triangles (F,3,2) cover, the outer one first, straightened by a tenth of
+    ``tolerance``; none where it falls into several. Holes and islands of less than a hundredth of it are left out."""
+    from manifold3d import CrossSection, FillRule
+
+    region = CrossSection(list(np.ascontiguousarray(triangles)), FillRule.NonZero)
+    outlines = [np.asarray(loop, dtype=np.float64) for loop in region.simplify(tolerance / 10).to_polygons()]
+    areas = np.array([_area(loop) for loop in outlines])
+    kept = [k for k in np.argsort(-areas) if abs(areas[k]) > _SPECK * np.abs(areas).max()] if len(areas) else []
+    return [outlines[k] for k in kept] if sum(areas[k] > 0 for k in kept) == 1 else []
+
+
+def _area(loop: Floats) -> float:
+    x, y = loop.T
+    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
+
+
+def _deviation(points: Floats, surface: Surface, knots: tuple[Floats, Floats], poles: Floats) -> float:
+    """The largest distance from the surface's vertices (V,3) to the spline, and back from the spline where it lies over
+    the surface; in the plane's coordinates."""
+    import igl
+
+    def off(queries: Floats, vertices: Floats, faces: Ints) -> Floats:
+        return np.asarray(np.sqrt(igl.point_mesh_squared_distance(queries, vertices, faces)[0]))
+
+    sides = [np.linspace(knot[0], knot[-1], _SAMPLES) for knot in knots]
+    grid = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
+    sampled = np.column_stack([grid, NdBSpline(knots, poles[..., 2], DEGREE)(grid)])
+    number = np.arange(len(sampled)).reshape(_SAMPLES, _SAMPLES)
+    a, b, c, d = (x.reshape(-1) for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+    there = off(points, sampled, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])).max()
+    flat, faces = points * [1, 1, 0], np.array(surface.faces)
+    over = off(sampled * [1, 1, 0], flat, faces) <= 1e-9 * surface.diagonal
+    return float(max(there, off(sampled[over], points, faces).max(initial=0.0)))

@@ -1,0 +1,74 @@
+"""A B-spline surface as STEP: one face, which ends at its rims."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats
+from damageest.stages.export import Patch
+from damageest.units import MILLIMETRES
+from damageest_cadquery._step import write_shape
+
+
+def step_patch(path: Path, name: str, patch: Patch, unit: str) -> None:
+    """Writes the patch. Raises OSError."""
+    write_shape(path, _face(patch, MILLIMETRES[unit]), name, unit, curves=True)
+
+
+def _face(patch: Patch, scale: float) -> Any:
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+
+    surface = _surface(patch, scale)
+    if not patch.rims:
+        return BRepBuilderAPI_MakeFace(surface, 1e-7).Face()
+    wires = [_wire(rim, surface) for rim in patch.rims]
+    maker = BRepBuilderAPI_MakeFace(surface, wires[0], True)
+    for wire in wires[1:]:
+        maker.Add(wire)
+    return maker.Face()
+
+
+def _surface(patch: Patch, scale: float) -> Any:
+    from OCP.Geom import Geom_BSplineSurface
+    from OCP.gp import gp_Pnt
+    from OCP.TColgp import TColgp_Array2OfPnt
+    from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
+
+    rows, columns = patch.poles.shape[:2]
+    poles = TColgp_Array2OfPnt(1, rows, 1, columns)
+    for i, row in enumerate((patch.poles * scale).tolist(), 1):
+        for j, pole in enumerate(row, 1):
+            poles.SetValue(i, j, gp_Pnt(*pole))
+    said: list[Any] = []
+    for knots in patch.knots:
+        values, times = np.unique(knots, return_counts=True)
+        real, whole = TColStd_Array1OfReal(1, len(values)), TColStd_Array1OfInteger(1, len(values))
+        for k, (value, count) in enumerate(zip(values.tolist(), times.tolist(), strict=True), 1):
+            real.SetValue(k, value)
+            whole.SetValue(k, count)
+        said.append((real, whole))
+    (u, u_times), (v, v_times) = said
+    return Geom_BSplineSurface(poles, u, v, u_times, v_times, patch.degree, patch.degree)
+
+
+def _wire(rim: Floats, surface: Any) -> Any:
+    """A closed line of straight pieces in the surface's parameters."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeVertex, BRepBuilderAPI_MakeWire
+    from OCP.BRepLib import BRepLib
+    from OCP.Geom2d import Geom2d_Line
+    from OCP.gp import gp_Dir2d, gp_Pnt2d
+
+    maker = BRepBuilderAPI_MakeWire()
+    corners = [BRepBuilderAPI_MakeVertex(surface.Value(*point)).Vertex() for point in rim.tolist()]
+    for k in range(len(rim)):
+        start, end = rim[k], rim[(k + 1) % len(rim)]
+        length = float(np.linalg.norm(end - start))
+        line = Geom2d_Line(gp_Pnt2d(*start.tolist()), gp_Dir2d(*((end - start) / length).tolist()))
+        edge = BRepBuilderAPI_MakeEdge(line, surface, corners[k], corners[(k + 1) % len(rim)], 0.0, length).Edge()
+        maker.Add(edge)
+    wire = maker.Wire()
+    BRepLib.BuildCurves3d_s(wire)
+    return wire
