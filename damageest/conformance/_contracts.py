@@ -7,9 +7,10 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from damageest.artefacts import Floats, Mesh, Part, Samples, Solid
+from damageest.artefacts import Deposit, Floats, Mesh, Part, Samples, Solid
 from damageest.conformance import _scene
 from damageest.conformance._base import REFUSED, Placed, back, right_or_refused
+from damageest.solids import to_manifold
 
 SIZE = (4.0, 3.0, 2.0)
 
@@ -101,9 +102,29 @@ class BooleanContract(BlockContract):
 class AllowanceContract(BlockContract):
     """Checks for `allowance`."""
 
+    def scene(self) -> dict[str, Any]:
+        """The block's, with another site's damage at its far end."""
+        return {**super().scene(), "others": Solid(*block((0, 0, 0), (0.5, 0.5, 0.5)))}
+
     def test_deposit_holds_the_damage(self) -> None:
         deposit = self.plain()
         assert deposit is None or deposit.volume >= self.inputs()["damage"].volume
+
+    def test_alone_on_the_part(self) -> None:
+        assert self.run(others=None) is None or self.run(others=None).volume >= self.inputs()["damage"].volume
+
+    def test_the_cavity_holds_the_damage_and_is_filled(self) -> None:
+        deposit = self.plain()
+        if not isinstance(deposit, Deposit):
+            pytest.skip("it gives no figures of its own")
+        damage, given = to_manifold(self.inputs()["damage"]), to_manifold(deposit)
+        cavity = to_manifold(deposit.cavity) if deposit.cavity else damage
+        others = to_manifold(self.inputs()["others"])
+        assert (damage - cavity).volume() <= 1e-6
+        assert (cavity - given).volume() <= 1e-6
+        assert (cavity ^ others).volume() <= 1e-6
+        assert deposit.stock_volume == pytest.approx(deposit.volume - cavity.volume(), abs=1e-6)
+        assert deposit.cut_back_volume == pytest.approx(cavity.volume() - damage.volume(), abs=1e-6)
 
 
 def _points(output: Any) -> Floats:

@@ -36,6 +36,7 @@ WITH: dict[str, dict[str, Any]] = {
     "scan simulate": {"options": {"points": 20_000}},
     "align icp": {"pose": NEAR},
     "align none": {"pose": np.eye(4)},
+    "allowance milling": {"options": {"outer": 0.3}, "lengths": ("outer",)},
     "background build_volume": {
         "options": {"size": (60.0, 60.0, 60.0)},
         "lengths": ("size",),

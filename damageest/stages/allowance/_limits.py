@@ -12,8 +12,9 @@ from damageest.artefacts import Floats, Part
 from damageest.solids import to_manifold
 from damageest.stages.allowance._skin import ON, Skin
 
-OPPOSITE = -0.5
-"""Cosine between skin and wall from which on the wall faces the skin; a concave corner's does not."""
+OPPOSITE, NARROW = -0.5, -0.87
+"""Cosine between the normals of skin and wall from which on the wall faces the skin, and from which on it does so even
+where the two meet: a concave corner of 30 degrees."""
 SAMPLES = 3000
 
 
@@ -44,7 +45,7 @@ def probes(skin: Skin, seed: int = 11) -> tuple[Floats, NDArray[np.int64]]:
     return np.concatenate([points, skin.triangles[large].mean(axis=1)]), np.concatenate([face, large])
 
 
-def crowded(skin: Skin, part: Part, origin: Floats) -> Crowd | None:
+def crowded(skin: Skin, part: Part, tolerance: float, origin: Floats) -> Crowd | None:
     """Places where the stock meets an opposite wall of the part, or that wall's own stock; None where it has room.
     ``skin`` with what is wanted on it, relative to ``origin`` (3,)."""
     import igl
@@ -57,8 +58,9 @@ def crowded(skin: Skin, part: Part, origin: Floats) -> Crowd | None:
     most = float(height.max())
     away = 10 * ON * part.diagonal
     body = to_manifold(part, origin)
-    free, place = _way(body, points + away * normal, normal, height + most)
+    free, place, facing = _way(body, points + away * normal, normal, height + most)
     hit = np.flatnonzero(np.isfinite(free))
+    hit = hit[~_corner(points[hit], normal[hit], place[hit], facing[hit], part, tolerance, origin)]
     if not len(hit):
         return None
     squared, opposite, _ = igl.point_mesh_squared_distance(
@@ -72,12 +74,32 @@ def crowded(skin: Skin, part: Part, origin: Floats) -> Crowd | None:
     return Crowd(points[some] + origin, free[some] + away, height[some], other[short])
 
 
-def _way(body: Any, start: Floats, direction: Floats, reach: Floats) -> tuple[Floats, Floats]:
+def _corner(
+    points: Floats, normal: Floats, place: Floats, facing: Floats, part: Part, tolerance: float, origin: Floats
+) -> NDArray[np.bool_]:
+    """(N,) whether skin and wall are those of one concave corner: their planes meet on the part's surface. Between the
+    flanks of a gap with a floor they meet below it."""
+    import igl
+
+    if not len(points):
+        return np.zeros(0, bool)
+    across = facing - np.einsum("ij,ij->i", facing, normal)[:, None] * normal
+    steep = np.einsum("ij,ij->i", across, facing)
+    wide = np.einsum("ij,ij->i", facing, normal) > NARROW
+    steps = np.einsum("ij,ij->i", place - points, facing) / np.where(wide, steep, 1)
+    meeting = points + np.where(wide, steps, 0)[:, None] * across
+    squared, _, _ = igl.point_mesh_squared_distance(
+        np.ascontiguousarray(meeting), np.ascontiguousarray(part.vertices - origin), np.array(part.faces)
+    )
+    return np.asarray(wide & (squared <= tolerance**2))
+
+
+def _way(body: Any, start: Floats, direction: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:
     """The free way (N,) from each start to the first wall that faces it, inf where that is beyond reach or the first
-    wall does not face it; and the place (N,3) where it ends."""
-    free, place = np.full(len(start), np.inf), np.zeros((len(start), 3))
+    wall does not face it; the place (N,3) where it ends, and the wall's normal (N,3)."""
+    free, place, facing = np.full(len(start), np.inf), np.zeros((len(start), 3)), np.zeros((len(start), 3))
     for k, (a, d, far) in enumerate(zip(start, direction, reach, strict=True)):
         hits = body.ray_cast(tuple(a), tuple(a + far * d))
         if hits and np.dot(hits[0].normal, d) < OPPOSITE:
-            free[k], place[k] = hits[0].distance * far, hits[0].position
-    return free, place
+            free[k], place[k], facing[k] = hits[0].distance * far, hits[0].position, hits[0].normal
+    return free, place, facing

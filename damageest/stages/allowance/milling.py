@@ -74,7 +74,7 @@ class Milling(Allowance):
         barred = kept_out(self.keep_out, skin, filled, part, wanted, reach, origin, tolerance)
         band = grown(skin, part, wanted, self.overlap, tolerance, origin)
         skins = [skin] if band is None else [skin, band]
-        crowds = [crowd for each in skins if (crowd := crowded(each, part, origin)) is not None]
+        crowds = [crowd for each in skins if (crowd := crowded(each, part, tolerance, origin)) is not None]
         if crowds and self.crowded == "refuse":
             raise StageError(str(crowds[0]), "a smaller outer there by targets, keep_out, or crowded: clip")
         proud = sum((stock(each, tolerance / 2, roomy=not crowds) for each in skins), Manifold())

@@ -1,0 +1,312 @@
+"""Targets, regions to keep free, overlap, cut-back and limits of `allowance: milling`, against known figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+from pydantic import ValidationError
+
+from damageest.artefacts import Deposit, Part, Solid
+from damageest.errors import StageError
+from damageest.meshio import write_stl
+from damageest.solids import to_manifold
+from damageest.stages.allowance.milling import Milling
+from tests.stages.allowance.shapes import (
+    TOLERANCE,
+    blade,
+    block,
+    bored,
+    bracket,
+    comb,
+    dovetail,
+    nearest,
+    part_of,
+    skin_points,
+    solid_of,
+)
+
+MORE = TOLERANCE / 4
+"""What the stock stands above what is asked for, so that it is nowhere less."""
+CHIP = Manifold.cube((6, 5, 4)).translate((0, 0, 8))
+"""At a corner of the block: 6 along x, 5 along y, 4 down from the top."""
+
+
+def run(body: Any, tool: Any, others: Solid | None = None, part: Part | None = None, **chosen: Any) -> Deposit:
+    """The deposit for what a tool takes off a body."""
+    lost = solid_of(body ^ tool)
+    deposit = Milling.model_validate(chosen).run(lost, part or part_of(body), TOLERANCE, others)
+    assert isinstance(deposit, Deposit)
+    return deposit
+
+
+def extent(deposit: Solid) -> list[float]:
+    """The bounds in one list: lowest corner, then highest."""
+    return [*deposit.bounds[0].tolist(), *deposit.bounds[1].tolist()]
+
+
+@pytest.mark.parametrize(
+    ("direction", "expected"),
+    [
+        ((0, 0, 1), [0, 0, 8, 6, 5, 12 + 1 + MORE]),
+        ((0, 0, -1), [0, 0, 8, 6, 5, 12]),
+        ((-1, 0, 0), [-1 - MORE, 0, 8, 6, 5, 12]),
+    ],
+)
+def test_stock_on_skin_that_faces_a_way_alone(direction: tuple[int, int, int], expected: list[float]) -> None:
+    deposit = run(block(), CHIP, targets=[{"facing": {"direction": direction}, "outer": 1}])
+    assert extent(deposit) == pytest.approx(expected)
+    area = {12 + 1 + MORE: 30.0, 12: 0.0}.get(expected[5], 0.0) or (20.0 if expected[0] < 0 else 0.0)
+    assert deposit.stock_volume == pytest.approx(area * (1 + MORE), abs=1e-6)
+
+
+def test_the_first_target_that_matches_wins() -> None:
+    top = {"direction": (0, 0, 1)}
+    targets = [{"facing": top, "outer": 0.4}, {"facing": top, "outer": 2}, {"facing": top, "outer": 0}]
+    deposit = run(block(), CHIP, targets=targets)
+    assert deposit.stock_volume == pytest.approx(30 * (0.4 + MORE), rel=1e-6)
+    assert deposit.thickness == pytest.approx((0.4 + MORE,) * 3)
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        {"box": [[-5, -5, 11], [2, 20, 14]]},
+        {"half_space": {"point": [2, 0, 0], "normal": [-3, 0, 0]}, "facing": {"direction": [0, 0, 1]}},
+    ],
+)
+def test_skin_is_cut_where_a_target_ends(where: dict[str, Any]) -> None:
+    deposit = run(block(), CHIP, targets=[{"facing": {"direction": [0, 0, 1]}, **where, "outer": 1}])
+    assert deposit.stock_volume == pytest.approx(2 * 5 * (1 + MORE), rel=1e-6)
+
+
+def test_two_heights_beside_one_another() -> None:
+    deposit = run(
+        block(), CHIP,
+        targets=[
+            {"facing": {"direction": [0, 0, 1]}, "half_space": {"point": [4, 0, 0], "normal": [1, 0, 0]}, "outer": 2},
+            {"facing": {"direction": [0, 0, 1]}, "outer": 0.5},
+        ],
+    )  # fmt: skip
+    assert deposit.stock_volume == pytest.approx(2 * 5 * (2 + MORE) + 4 * 5 * (0.5 + MORE), rel=1e-6)
+
+
+def test_stock_over_edges_and_corner_stands_proud() -> None:
+    deposit = run(block(), CHIP, outer=1)
+    high = 1 + MORE
+    assert extent(deposit) == pytest.approx([-high, -high, 8, 6, 5, 12 + high])
+    faces = (30 + 20 + 24) * high
+    mitres = (6 + 5 + 4) * high**2
+    assert faces + mitres < deposit.stock_volume < faces + mitres + high**3
+    corner = np.array([[0, 0, 12.0]])
+    assert nearest(corner, deposit)[0] >= 1
+
+
+@pytest.mark.parametrize(
+    ("item", "reached"),
+    [
+        ({"box": [[-9, -9, 12], [3, 9, 20]]}, 15 * (1 + MORE)),
+        ({"cylinder": {"from": [3, 2.5, 12], "to": [3, 2.5, 20], "radius": 1}}, (30 - np.pi) * (1 + MORE)),
+        ({"half_space": {"point": [3, 0, 0], "normal": [-1, 0, 0]}}, 15 * (1 + MORE)),
+        ({"facing": {"direction": [0, 0, 1]}}, 0),
+    ],
+)
+def test_what_is_kept_free(item: dict[str, Any], reached: float) -> None:
+    deposit = run(block(), CHIP, targets=[{"facing": {"direction": [0, 0, 1]}, "outer": 1}], keep_out=[item])
+    assert deposit.stock_volume == pytest.approx(reached, rel=2e-3, abs=1e-6)
+
+
+def test_no_stock_leans_over_skin_kept_free() -> None:
+    """The wall's stock in a concave corner ends above the floor that is kept free."""
+    tool = Manifold.cube((6, 5, 6), True).translate((6, 10, 6))
+    both = run(bracket(), tool, outer=1)
+    free = run(bracket(), tool, outer=1, keep_out=[{"facing": {"direction": [0, 0, 1]}}])
+    floor = Manifold.cube((3, 5, 1)).translate((6, 7.5, 6))
+    assert (to_manifold(both) ^ floor).volume() == pytest.approx(3 * 5, rel=1e-6)
+    assert (to_manifold(free) ^ floor).volume() < 1e-6
+
+
+def test_a_mesh_to_keep_free(tmp_path: Path) -> None:
+    body = solid_of(Manifold.cube((3, 9, 9)).translate((-0.0, 0, 12)))
+    write_stl(tmp_path / "pad.stl", body)
+    target = {"facing": {"direction": [0, 0, 1]}, "outer": 1}
+    deposit = run(block(), CHIP, targets=[target], keep_out=[{"mesh": tmp_path / "pad.stl"}])
+    assert deposit.stock_volume == pytest.approx(15 * (1 + MORE), rel=1e-4)
+
+
+def test_a_damage_in_a_solid_to_keep_free_is_refused() -> None:
+    with pytest.raises(StageError, match=r"50.0% of the damage volume, 60, lies in keep_out 1") as caught:
+        run(block(), CHIP, outer=1, keep_out=[{"box": [[-1, -1, 0], [3, 9, 20]]}])
+    assert "smaller solid" in caught.value.remedy
+
+
+def test_overlap_runs_over_the_intact_skin_round_the_rim() -> None:
+    tool = Manifold.cube((8, 8, 4)).translate((10, 6, 10))
+    deposit = run(block(), tool, outer=1, overlap=1.5)
+    reach = 8 * 8 + 4 * 8 * 1.5 + np.pi * 1.5**2
+    assert deposit.stock_volume / (1 + MORE) == pytest.approx(reach, rel=0.01)
+    low, high = deposit.bounds
+    assert (low[:2] > np.array([8.5, 4.5]) - 1e-6).all()
+    assert low[:2] == pytest.approx([8.5, 4.5], abs=TOLERANCE)
+    assert high[2] == pytest.approx(13 + MORE)
+
+
+def test_overlap_stays_on_its_side_of_a_thin_wall() -> None:
+    plate = Manifold.cube((20, 20, 1))
+    tool = Manifold.cube((4, 4, 1)).translate((8, 8, 0.5))
+    deposit = run(plate, tool, outer=0.5, overlap=3)
+    assert deposit.bounds[0][2] == pytest.approx(0.5)
+
+
+def test_cut_back_takes_sound_metal_and_no_more() -> None:
+    tool = Manifold.sphere(4, 64).translate((15, 10, 12))
+    body, inner = block(), 0.6
+    lost = solid_of(body ^ tool)
+    deposit = run(body, tool, outer=1, inner=inner)
+    assert deposit.cavity is not None
+    least = (Manifold.sphere(4 + inner, 128).translate((15, 10, 12)) ^ body).volume()
+    most = (Manifold.sphere(4 + inner + TOLERANCE / 2, 128).translate((15, 10, 12)) ^ body).volume()
+    assert least * 0.995 < deposit.cavity.volume < most
+    assert deposit.cut_back_volume == pytest.approx(deposit.cavity.volume - lost.volume)
+    assert (to_manifold(lost) - to_manifold(deposit.cavity)).volume() < 1e-6
+    points = deposit.cavity.vertices[nearest(deposit.cavity.vertices, part_of(body))[0] > 1e-3]
+    far = np.linalg.norm(points - [15, 10, 12], axis=1) - 4
+    assert far.min() > inner - 0.02
+    assert far.max() < inner + TOLERANCE / 2
+
+
+def test_cut_back_leaves_the_other_damages_alone() -> None:
+    other = solid_of(Manifold.cube((3, 3, 3)).translate((16.2, 8, 9)))
+    tool = Manifold.cube((4, 4, 3)).translate((12, 8, 9))
+    deposit = run(block(), tool, others=other, inner=0.5)
+    assert deposit.cavity is not None
+    assert (to_manifold(deposit.cavity) ^ to_manifold(other)).volume() < 1e-6
+
+
+def test_stock_on_both_faces_of_a_thin_blade() -> None:
+    tool = Manifold.cube((40, 40, 8), True).translate((0, 0, 30))
+    deposit = run(blade(), tool, outer=0.5)
+    points, normals = skin_points(solid_of(blade() ^ tool), part_of(blade()), 400, 3)
+    away = nearest(points + 0.5 * normals, deposit)[0]
+    assert deposit.thickness is not None
+    assert deposit.thickness[0] >= 0.5
+    assert deposit.thickness[2] <= 0.5 + TOLERANCE
+    assert np.percentile(away, 95) < TOLERANCE
+
+
+GAP = Manifold.cube((11, 6, 5)).translate((0, 4, 9))
+"""Takes the walls of both teeth beside a gap of the comb."""
+
+
+@pytest.mark.parametrize(("outer", "fits"), [(1.4, True), (1.6, False)])
+def test_a_gap_narrower_than_twice_the_stock(outer: float, fits: bool) -> None:
+    flanks = [{"facing": {"direction": [k, 0, 0], "angle": 20}, "outer": outer} for k in (-1, 1)]
+    if fits:
+        assert run(comb(3.0), GAP, targets=flanks).notes == ()
+        return
+    with pytest.raises(
+        StageError, match=r"no room for the stock at \((4|7), .*\): 3 is free there, and 1.6 is wanted and 1.6 on"
+    ):
+        run(comb(3.0), GAP, targets=flanks)
+    clipped = run(comb(3.0), GAP, targets=flanks, crowded="clip")
+    assert "clipped" in clipped.notes[0]
+    between = Manifold.cube((3, 6, 4)).translate((4, 4, 9))
+    assert (to_manifold(clipped) ^ between).volume() == pytest.approx(between.volume(), rel=1e-6)
+
+
+def test_a_bore_that_would_close_is_refused() -> None:
+    tool = Manifold.cylinder(6, 8, 8, 64).translate((15, 10, 8))
+    inward = {"half_space": {"point": [0, 0, 11.9], "normal": [0, 0, -1]}, "outer": 5.5}
+    with pytest.raises(StageError, match=r"no room .* 5.5 is wanted and 5.5 on the opposite wall"):
+        run(bored(), tool, targets=[inward])
+    assert run(bored(), tool, targets=[{**inward, "outer": 2.0}]).thickness is not None
+
+
+def test_an_intact_wall_in_the_way_is_refused() -> None:
+    tool = Manifold.cube((4, 6, 5)).translate((0, 4, 9))  # one tooth alone; the next one is 3 away
+    with pytest.raises(StageError, match=r"3 is free there, and 3.5 is wanted"):
+        run(comb(3.0), tool, outer=3.5)
+    deposit = run(comb(3.0), tool, outer=3.5, crowded="clip")
+    left = comb(3.0) - tool
+    assert (to_manifold(deposit) ^ left).volume() < 1e-6
+
+
+@pytest.mark.parametrize("shape", [bracket, dovetail])
+def test_a_concave_corner_is_no_wall_in_the_way(shape: Any) -> None:
+    place = (6, 10, 6) if shape is bracket else (8.5, 15, 7)
+    deposit = run(shape(), Manifold.cube((4, 4, 4), True).translate(place), outer=0.8)
+    assert deposit.thickness is not None
+    assert deposit.thickness[0] >= 0.8
+
+
+def named(body: Any) -> Part:
+    """A part with CAD faces by their normal: 0 to 5 for -x, +x, -y, +y, -z, +z; 6 for the rest, a cylinder."""
+    part = part_of(body)
+    normal = part.cross / np.linalg.norm(part.cross, axis=1)[:, None]
+    axes = np.repeat(np.eye(3), 2, axis=0) * np.tile([-1, 1], 3)[:, None]
+    close = normal @ axes.T > 0.9999
+    number = np.where(close.any(axis=1), close.argmax(axis=1), 6)
+    names = ("left", "right", "front", "back", "bottom", "top", "bore")
+    kinds = ("plane",) * 6 + ("cylinder",)
+    return Part(part.vertices, part.faces, faces_brep=number, face_names=names, face_kinds=kinds)
+
+
+@pytest.mark.parametrize("where", [{"faces": [5]}, {"faces": ["top"]}, {"faces": ["top", 5]}])
+def test_cad_faces_by_number_and_name(where: dict[str, Any]) -> None:
+    deposit = run(block(), CHIP, part=named(block()), targets=[{**where, "outer": 1}])
+    assert deposit.stock_volume == pytest.approx(30 * (1 + MORE), rel=1e-6)
+    assert deposit.touched == (5,)
+
+
+def test_kinds_of_surface() -> None:
+    tool = Manifold.cube((6, 6, 4)).translate((18, 7, 9))
+    deposit = run(bored(), tool, part=named(bored()), targets=[{"kind": "cylinder", "outer": 0.5}])
+    assert 6 in deposit.touched
+    assert 5 not in deposit.touched
+    assert deposit.bounds[1][2] == pytest.approx(12)
+
+
+@pytest.mark.parametrize(
+    ("part", "where", "message", "remedy"),
+    [
+        (named, {"faces": ["topp"]}, r"no CAD face 'topp' \(did you mean 'top'\?\)", "left, right, front, back"),
+        (named, {"faces": [7]}, "no CAD face 7", "from 0 to 6"),
+        (part_of, {"faces": [1]}, "'faces' picks CAD faces, and the part is a mesh", "STEP, IGES or BREP"),
+        (part_of, {"kind": "plane"}, "'kind' picks CAD faces, and the part is a mesh", "STEP, IGES or BREP"),
+    ],
+)
+def test_faces_that_are_not_there(part: Any, where: dict[str, Any], message: str, remedy: str) -> None:
+    with pytest.raises(StageError, match=message) as caught:
+        run(block(), CHIP, part=part(block()), targets=[{**where, "outer": 1}])
+    assert remedy in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("chosen", "message"),
+    [
+        (
+            {"targets": [{"boxx": 1, "outer": 1}]},
+            r"unknown key 'boxx' \(did you mean 'box'\?\); valid are: box, half_space",
+        ),
+        ({"targets": [{"outer": 1}]}, "says no skin; give one or more of: box, half_space, facing, faces, kind"),
+        ({"targets": [{"box": [[1, 0, 0], [0, 1, 1]], "outer": 1}]}, "the lowest corner first"),
+        ({"targets": [{"facing": {"direction": [0, 0, 0]}, "outer": 1}]}, "a direction must have a length"),
+        ({"keep_out": [{"box": [[0, 0, 0], [1, 1, 1]], "mesh": "a.stl"}]}, "give one of: cylinder; mesh"),
+        ({"keep_out": [{"cylinder": {"from": [0, 0, 0], "to": [0, 0, 0], "radius": 1}}]}, "a bar has a length"),
+        ({"outer": -1}, "greater than or equal to 0"),
+        ({"crowded": "maybe"}, "'refuse' or 'clip'"),
+    ],
+)
+def test_options_that_are_wrong(chosen: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        Milling.model_validate(chosen)
+
+
+def test_no_stock_at_all_is_said() -> None:
+    deposit = run(block(), CHIP)
+    assert deposit.volume == pytest.approx(120)
+    assert deposit.thickness is None
+    assert "no stock is asked for" in deposit.notes[0]
