@@ -48,6 +48,9 @@ def weigh(
     close = tolerance + 4 * grain
     intact = intact[_gap(intact, on_skin, close) <= close]
     intact = intact[_gap(intact, on_ids, 1.5 * reach) > 1.5 * reach]
+    if len(intact):  # against the skin's few faces first: most are beside the damage volume
+        skin_only = igl.point_mesh_squared_distance(np.ascontiguousarray(intact - origin), vertices, faces[~inner])[0]
+        intact = intact[skin_only < tolerance**2]
     inside, contradicted = 0, 0.0
     if len(intact):
         squared, face, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(intact - origin), vertices, faces)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh, Part, Solid, Surface
+from damageest.lattice import cubes
 
 ENOUGH = 5
 """IDS points that have to lie on a piece for it to count."""
@@ -51,12 +52,15 @@ def pieces_of(damage: Solid, points: Floats, label: Ints, reach: float) -> tuple
     origin = damage.bounds.mean(axis=0)
     solids = bodies(damage)
     vertices, faces, owner = _joined(solids)
+    # of points much closer together than the reach, one speaks for those about it
+    cell = cubes(points, reach / 2)[1]
+    _, first, counts = np.unique(np.stack([cell, label]), axis=1, return_index=True, return_counts=True)
     squared, face, _ = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(points - origin), np.ascontiguousarray(vertices - origin), faces
+        np.ascontiguousarray(points[first] - origin), np.ascontiguousarray(vertices - origin), faces
     )
     near = squared < reach**2
     touching = np.zeros((len(solids), int(label.max(initial=0)) + 1), np.int64)
-    np.add.at(touching, (owner[face[near]], label[near]), 1)
+    np.add.at(touching, (owner[face[near]], label[first[near]]), counts[near])
     kept, dropped = [], 0.0
     for solid, counts in zip(solids, touching, strict=True):
         if counts.max() >= ENOUGH:

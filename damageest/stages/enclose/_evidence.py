@@ -13,6 +13,9 @@ from damageest.stages.enclose._orient import toward_void
 from damageest.stages.enclose._poisson import Field, Grid, refined
 from damageest.stages.enclose._skin import Flags, Skin, pushed, skin_near
 
+APART = 0.75
+"""Edge of the cubes that one averaged point each is made for, in cells of the surface."""
+
 Surfels = tuple[Floats, Floats, Floats]
 
 
@@ -103,8 +106,10 @@ def _surface(points: Floats, above: Floats, lost: Floats, lost_normals: Floats, 
     ``above`` (M,3): the normal of the nominal skin nearest to each; ``lost`` (L,3): samples of the skin lost with them.
     """
     points, counts, first = thinned(points, 0.5 * cell)
-    above = above[first]
-    points, normals = averaged(points, counts, noise)
+    # fits overlap much further than this, so more of them would say the same again
+    chosen = subset(points, APART * cell)
+    above = above[first][chosen]
+    points, normals = averaged(points, counts, noise, chosen)
     size, chosen = cell, np.arange(len(lost))
     while len(chosen) > 5000:
         size *= 1.3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
@@ -53,26 +55,33 @@ def smoothed(points: Floats, noise: float, count: int = 32) -> tuple[Floats, Flo
     return points + np.clip(move, -3 * noise, 3 * noise)[:, None] * normals, tilted, distance[:, -1]
 
 
-def averaged(points: Floats, counts: Ints, noise: float) -> tuple[Floats, Floats]:
-    """As `smoothed`, but each point is fitted to as many neighbours as agree: points (N,3) and normals (N,3).
+def averaged(points: Floats, counts: Ints, noise: float, chosen: Ints) -> tuple[Floats, Floats]:
+    """As `smoothed`, but each of the ``chosen`` (M,) points is fitted to as many neighbours as agree: points (M,3) and
+    normals (M,3).
 
     A wider fit averages more noise, and bends what is more curved than it can follow. So it is taken where it lies as
     close to every narrower one as noise explains (Lepski's choice of scale). ``counts`` (N,): how many scan points each
     point is the mean of, which divides the variance of the ``noise``.
     """
+    from scipy.spatial import cKDTree
+
     distance, index = neighbours(points, SCALES[0])
     normals, _ = _planes(points, index, distance, noise)
-    out, tilted = points.copy(), normals.copy()
-    for start in range(0, len(points), CHUNK):
+    out, tilted = points[chosen], normals[chosen]
+    tree = cKDTree(points)
+    for start in range(0, len(chosen), CHUNK):
         own = slice(start, start + CHUNK)
-        out[own], tilted[own] = _widest(points, counts, noise, normals, own)
+        out[own], tilted[own] = _widest(tree, points, counts, noise, normals, chosen[own])
     return out, tilted
 
 
-def _widest(points: Floats, counts: Ints, noise: float, normals: Floats, own: slice) -> tuple[Floats, Floats]:
+def _widest(
+    tree: Any, points: Floats, counts: Ints, noise: float, normals: Floats, own: Ints
+) -> tuple[Floats, Floats]:
     """The fits of the points ``own``, of each the widest that noise explains."""
     at, way = points[own], normals[own]
-    distance, index = neighbours(at, SCALES[-1], points)
+    distance, index = tree.query(at, k=min(SCALES[-1], len(points)), workers=2)
+    distance, index = distance.reshape(len(at), -1), index.reshape(len(at), -1)
     best, turned = at.copy(), way.copy()
     explained = np.ones(len(at), bool)
     narrower: list[tuple[Floats, Floats]] = []
