@@ -53,6 +53,9 @@ def _without(deposit: Deposit, earlier: State, damage: Solid) -> Deposit:
         return deposit
     origin = deposit.bounds.mean(axis=0)
     body, taken = to_manifold(deposit, origin), to_manifold(other, origin)
+    own = to_manifold(damage, origin)
+    if (taken ^ own).volume() > SPECK * damage.volume:  # of an allowance that pays no heed to its neighbours
+        taken -= own
     common = (body ^ taken).volume()
     if common <= SPECK * deposit.volume:
         return deposit
