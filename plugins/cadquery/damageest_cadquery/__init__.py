@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from damageest.hookspecs import hookimpl
 from damageest.stages import Stage
-from damageest.stages.export import Writer
+
+if TYPE_CHECKING:
+    from damageest.stages.export import Writer
 
 
 @hookimpl
@@ -20,6 +23,7 @@ def damageest_stages() -> list[type[Stage]]:
 @hookimpl
 def damageest_writers() -> Mapping[str, Writer]:
     """STEP, of solids and splines."""
+    from damageest.stages.export import Writer
     from damageest_cadquery._patch import step_patch
     from damageest_cadquery._step import step
 
