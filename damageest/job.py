@@ -271,9 +271,10 @@ class _Check:
             valid = [name for name in item.cls.model_fields if name != "use"]
             told = []
             for fault in error.errors():
-                place = tuple(
-                    p for p in fault["loc"] if (key, p) in self.positions or not isinstance(p, str) or p in valid
-                )
+                place: tuple[str | int, ...] = ()
+                for step in fault["loc"]:  # of a value with several kinds, the kind's name is no place
+                    if (key, *place, step) in self.positions or not isinstance(step, str) or step in valid:
+                        place = (*place, step)
                 told.append(((key, *(place or fault["loc"])), _said(fault, options, valid, item.name)))
             self.said(told)
             return None
@@ -307,7 +308,7 @@ def _said(fault: Any, values: Any, valid: Sequence[str] = (), owner: str = "") -
         return f"'{owner}' needs  {name}: ..."
     given = fault.get("input")
     shown = f", not {given!r}" if isinstance(given, (str, int, float, bool, type(None))) else ""
-    message = str(fault["msg"])
+    message = str(fault["msg"]).removeprefix("Value error, ")
     if fault["type"] == "literal_error":
         expected = fault["ctx"]["expected"]
         choices = [part.strip("' ") for part in expected.replace(" or ", ", ").split(",")]
