@@ -34,9 +34,13 @@ def fitted(surface: Surface, tolerance: float) -> tuple[Patch | None, Spline]:
     corners = points[surface.faces]
     data = np.concatenate([points, corners.mean(axis=1)])
     rims = _rims(corners[..., :2], tolerance)
+    upright = np.abs(surface.vertex_normals @ axes[2])
     best: tuple[float, Patch] | None = None
     for spans in _SPANS:
         knots, poles = _least_squares(data, spans)
+        along = np.abs(NdBSpline(knots, poles[..., 2], DEGREE)(points[:, :2]) - points[:, 2]) * upright
+        if along.max() > 2 * tolerance and spans != _SPANS[-1]:
+            continue  # far off, and quick to tell
         off = _deviation(points, surface, knots, poles)
         if best is None or off < best[0]:
             best = off, Patch(DEGREE, knots, origin + poles @ axes, tuple(rims))
