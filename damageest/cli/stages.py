@@ -63,6 +63,8 @@ def _option_lines(item: Implementation) -> None:
 
 
 def _shown(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(map(str, value)) or "none"
     return "none" if value is None else str(value)
 
 
