@@ -41,6 +41,10 @@ class Worked:
     band: Skin | None
     origin: Floats
 
+    def skins(self) -> list[Skin]:
+        """The skin, and the band where there is one."""
+        return [self.skin] if self.band is None else [self.skin, self.band]
+
 
 def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -> tuple[float, float, float] | None:
     """The least, mean and largest thickness of the stock; None where none is wanted. Raises StageError with the figure
@@ -112,12 +116,10 @@ def thickness(work: Worked, wanted: Skin, part: Part, crowds: Sequence[Crowd]) -
         # a feather edge may be left at once, before the stock begins
         far[k] = next((hit - rounding for hit in hits if hit > 2 * rounding), 0.0)
     ends = points + far[:, None] * normal
-    squared, _, _ = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(ends), wanted.vertices, np.ascontiguousarray(wanted.faces)
-    )
-    nearest = np.sqrt(squared)
+    nearest = _to_stock(work, ends)
     covered = nearest < far - rounding
     ended = _near(ends, work.left, 10 * rounding) | _near(ends, work.kept_out, 10 * rounding)
+    ended |= _inside(ends, work.kept_out)
     for crowd in crowds:
         squared, _, _ = igl.point_mesh_squared_distance(
             np.ascontiguousarray(points), crowd.points - work.origin, np.arange(len(crowd.points))[:, None]
@@ -130,10 +132,7 @@ def strayed(work: Worked, part: Part, tolerance: float) -> float:
     """The share of sampled skin without stock, of the damage and of the part round it, that the deposit stands over all
     the same. Skin nearer to skin with stock than that is high does not count: in a concave corner the stock leans on
     it."""
-    import igl
-
-    skins = [work.skin] if work.band is None else [work.skin, work.band]
-    most = max(float(skin.height.max(initial=0)) for skin in skins) + tolerance
+    most = max(float(skin.height.max(initial=0)) for skin in work.skins()) + tolerance
     corners = part.triangles - work.origin
     low, high = work.skin.vertices.min(axis=0) - 2 * most, work.skin.vertices.max(axis=0) + 2 * most
     near = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
@@ -142,19 +141,37 @@ def strayed(work: Worked, part: Part, tolerance: float) -> float:
     around = Skin(part.vertices - work.origin, part.faces[near], near, normal, zero, zero > 0)
     points, face = around.sampled(SAMPLES, seed=29)
     normal = normal[face]
-    bare = np.ones(len(points), bool)
-    for skin in skins:
-        tall = skin.only(skin.height > 0)
-        if len(tall.faces):
-            squared, _, _ = igl.point_mesh_squared_distance(points, tall.vertices, np.ascontiguousarray(tall.faces))
-            bare &= squared > most**2
+    bare = _to_stock(work, points) > most
     points, normal = points[bare], normal[bare]
     if not len(points):
         return 0.0
-    vertices, faces = to_arrays(work.deposit)
     places = np.concatenate([points + share * most * normal for share in (0.05, 0.3, 0.8)])
-    inside = igl.fast_winding_number(vertices, faces, places).reshape(3, -1) > 0.5
-    return float(inside.any(axis=0).mean())
+    return float(_inside(places, work.deposit).reshape(3, -1).any(axis=0).mean())
+
+
+def _to_stock(work: Worked, points: Floats) -> Floats:
+    """(N,) distance to the nearest skin with stock."""
+    import igl
+
+    found = np.full(len(points), np.inf)
+    for skin in work.skins():
+        tall = skin.only(skin.height > 0)
+        if len(tall.faces):
+            squared, _, _ = igl.point_mesh_squared_distance(
+                np.ascontiguousarray(points), tall.vertices, np.ascontiguousarray(tall.faces)
+            )
+            found = np.minimum(found, np.sqrt(squared))
+    return found
+
+
+def _inside(points: Floats, body: Any) -> Mask:
+    """(N,) by winding number."""
+    import igl
+
+    if body.is_empty() or not len(points):
+        return np.zeros(len(points), bool)
+    vertices, faces = to_arrays(body)
+    return np.asarray(igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points)) > 0.5)
 
 
 def _near(points: Floats, body: Any, reach: float) -> Mask:
