@@ -13,8 +13,8 @@ from damageest.errors import StageError
 from damageest.solids import to_manifold, to_solid, united
 from damageest.stages.allowance import Allowance
 
-SPECK = 1e-9
-"""Share of a deposit's volume below which an overlap is rounding."""
+SPECK, TOLD = 1e-9, 1e-5
+"""Shares of a deposit's volume: below the first, an overlap is rounding; below the second, not worth a word."""
 
 
 def allowed(engine: Engine, lanes: list[State]) -> list[State]:
@@ -66,7 +66,12 @@ def _without(deposit: Deposit, earlier: State, damage: Solid) -> Deposit:
         cut_back = max(cavity.volume - damage.volume, 0.0)
     if left is None:
         return deposit
-    note = f"its deposit overlaps that of site {earlier.site} by {common:.4g} in volume, which is counted there"
+    notes = deposit.notes
+    if common > TOLD * deposit.volume:
+        notes = (
+            *notes,
+            f"its deposit overlaps that of site {earlier.site} by {common:.4g} in volume, which is counted there",
+        )
     return replace(
         deposit,
         vertices=left.vertices,
@@ -74,7 +79,7 @@ def _without(deposit: Deposit, earlier: State, damage: Solid) -> Deposit:
         cavity=cavity,
         stock_volume=max(left.volume - (cavity or damage).volume, 0.0),
         cut_back_volume=cut_back,
-        notes=(*deposit.notes, note),
+        notes=notes,
     )
 
 

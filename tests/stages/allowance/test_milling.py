@@ -83,27 +83,37 @@ def test_guarantees(seed: int) -> None:
     points, normals = skin_points(cavity, part, 1500, seed)
     height = wanted(chosen, normals)
     metal = solid_of(left)
+    around, upward = skin_points(metal, part, 3000, seed)
+    over = nearest(around, cavity)[0] < chosen.get("overlap", 0.0)
+    stands = np.concatenate([points, around[over]]), np.concatenate([height, wanted(chosen, upward[over])])
     tall = height > 0
     if tall.any():
-        assert missed(points[tall], normals[tall], height[tall], deposit, metal) <= 0.01
+        assert missed(points[tall], normals[tall], height[tall], stands, deposit, metal, part) <= 0.01
     assert bare(points, normals, height, deposit) <= 0.01
-    around, upward = skin_points(metal, part, 3000, seed)
     far = chosen.get("overlap", 0.0) + wanted(chosen, upward).max(initial=0) + max(height.max(), TOLERANCE)
     close = (nearest(around, cavity)[0] > far) & (nearest(around, cavity)[0] < far + 3)
     assert not inside(around[close] + 0.3 * TOLERANCE * upward[close], deposit).any()
 
 
-def missed(points: Floats, normals: Floats, height: Floats, deposit: Solid, metal: Solid) -> float:
+def missed(
+    points: Floats,
+    normals: Floats,
+    height: Floats,
+    stands: tuple[Floats, Floats],
+    deposit: Solid,
+    metal: Solid,
+    part: Part,
+) -> float:
     """The share of skin points over which the stock is thinner than wanted, or more than a tolerance thicker. Metal may
-    stand over it, and in a concave corner the stock of other skin."""
+    stand over it, and in a concave corner the stock of other skin; ``stands``: points of all skin, and the stock there.
+    """
     low = points + (0.999 * height)[:, None] * normals
     half = points + (0.5 * height)[:, None] * normals
     thin = ~(inside(low, deposit) | inside(low, metal)) | ~(inside(half, deposit) | inside(half, metal))
     high = points + (height + 1.001 * TOLERANCE)[:, None] * normals
-    own = np.ones(len(points), bool)
-    for tall in np.unique(height):
-        cloud = np.ascontiguousarray(points[height == tall])
-        own &= away(high, cloud) > 0.97 * (tall + TOLERANCE)
+    own = nearest(high, part)[0] > 0.97 * (height + TOLERANCE)
+    for tall in np.unique(stands[1][stands[1] > 0]):
+        own &= away(high, stands[0][stands[1] == tall]) > 0.97 * (tall + TOLERANCE)
     thick = inside(high, deposit) & own
     return float((thin | thick).mean())
 
