@@ -1,0 +1,99 @@
+"""The check of a finished deposit: each guarantee that is not kept is refused, with the figure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from damageest.artefacts import Solid
+from damageest.errors import StageError
+from damageest.solids import to_arrays
+from damageest.stages.allowance._booleans import joined, tidied, touching
+from damageest.stages.allowance._selectors import Target, Wanted
+from damageest.stages.allowance._skin import clipped, skin_of
+from damageest.stages.allowance._verify import Worked, check
+from tests.stages.allowance.shapes import TOLERANCE, block, part_of
+
+BITE = Manifold.cube((8, 6, 4)).translate((10, 7, 8))
+"""In the middle of the block's top."""
+TOP = Target(facing={"direction": (0, 0, 1)}, outer=1.0)
+
+
+def checked(stock: Any, hole: Any = BITE, target: Target = TOP) -> tuple[float, float, float] | None:
+    """The thickness of the stock on the bite, checked against what is wanted on its top."""
+    part = part_of(block())
+    wanted = Wanted(0.0, (target,), ())
+    skin = skin_of(Solid(*to_arrays(BITE)), part, wanted, np.zeros(3))
+    work = Worked(hole + stock, BITE, block() - BITE, Manifold(), skin, None, np.zeros(3))
+    return check(work, part, TOLERANCE, [])
+
+
+def slab(height: float, low: float = 0.0) -> Any:
+    return Manifold.cube((8, 6, height - low)).translate((10, 7, 12 + low))
+
+
+def test_what_is_right_passes() -> None:
+    assert checked(slab(1.05)) == pytest.approx((1.05,) * 3)
+
+
+@pytest.mark.parametrize(
+    ("stock", "hole", "message"),
+    [
+        (slab(0.9), BITE, "thickness is missed on 100.0% of the skin, by up to 0.1"),
+        (slab(1.2), BITE, "thickness is missed on 100.0% of the skin, by up to 0.2"),
+        (slab(1.05) - Manifold.cube((2, 2, 1)).translate((11, 8, 12.5)), BITE, "thickness is missed on 8"),
+        (slab(1.05), BITE - Manifold.cube((1, 1, 1)).translate((12, 9, 9)), "would miss 0.52% of the damage volume"),
+        (slab(1.05) + Manifold.cube((1, 1, 2)).translate((9.5, 8, 10)), BITE, "of the deposit would lie in metal"),
+        (
+            slab(1.05) + Manifold.cube((6, 6, 1)).translate((18, 7, 12)),
+            BITE,
+            "of the skin round it that is to have none",
+        ),
+    ],
+)
+def test_what_is_wrong_is_refused(stock: Any, hole: Any, message: str) -> None:
+    with pytest.raises(StageError, match=message):
+        checked(stock, hole)
+
+
+def test_stock_where_none_is_wanted_is_refused() -> None:
+    none = Target(facing={"direction": (0, 0, 1)}, outer=0.0)
+    assert checked(Manifold(), target=none) is None
+    with pytest.raises(StageError, match="that is to have none"):
+        checked(slab(1.05), target=none)
+
+
+def test_pieces_that_do_not_touch_are_dropped() -> None:
+    apart = Manifold.cube((2, 2, 2)).translate((40, 0, 0))
+    kept = touching(slab(1.0) + apart, BITE, TOLERANCE)
+    assert kept.volume() == pytest.approx(48)
+
+
+def test_a_union_adds_up() -> None:
+    whole = tidied(joined(BITE, slab(1.0, -0.01)), 30.0)
+    assert whole.volume() == pytest.approx(8 * 6 * 5)
+    assert whole.num_tri() == 12
+
+
+def test_skin_is_cut_without_gaps() -> None:
+    """Into halves of the right area, whose common border has the same vertices."""
+    rng = np.random.default_rng(3)
+    ball = Manifold.sphere(1, 40)
+    vertices, faces = to_arrays(ball)
+    normal = rng.normal(size=3)
+    value = vertices @ (normal / np.linalg.norm(normal)) - 0.21
+    value[np.abs(value) < 0.02] = 0  # some of the vertices on the plane
+    cut_vertices, cut_faces, parent, positive = clipped(vertices, faces, value)
+    corners = cut_vertices[cut_faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    before = vertices[faces]
+    whole = np.linalg.norm(np.cross(before[:, 1] - before[:, 0], before[:, 2] - before[:, 0]), axis=1)
+    assert np.bincount(parent, area, len(faces)) == pytest.approx(whole)
+    edges = np.sort(np.concatenate([cut_faces[:, [0, 1]], cut_faces[:, [1, 2]], cut_faces[:, [2, 0]]]), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    middle = np.concatenate([value, np.zeros(len(cut_vertices) - len(value))])[cut_faces]
+    assert (middle[positive] >= 0).all()
+    assert (middle[~positive] <= 0).all()
