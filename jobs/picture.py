@@ -1,8 +1,7 @@
-"""Draws the picture of the README from finished outputs: `uv run python jobs/picture.py jobs/out/gear_teeth …`."""
+"""Draws the README's pictures from finished outputs: `uv run python jobs/picture.py`."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +9,20 @@ import pyvista as pv
 
 COLOURS = ("#d1495b", "#edae49", "#00798c", "#66a182", "#8d5b9f")
 HERE = Path(__file__).parent
+CLOSE = {
+    "stock_flanks": ((25.0, 0.0, 7.0), (1.0, 0.7, 0.9), 4.0),
+    "worn_bore": ((0.0, 2.0, 8.0), (0.5, -0.9, 1.6), 2.4),
+}
+"""Where to look at, from which side, and how closely."""
 
 
 def main() -> None:
-    folders = [Path(name) for name in sys.argv[1:]] or [
-        HERE / "out" / n for n in ("block_wedge", "gear_teeth", "half_torus", "four_sites")
-    ]
+    damages([HERE / "out" / name for name in ("block_wedge", "gear_teeth", "half_torus", "four_sites")])
+    stock([HERE / "out" / name for name in ("stock_uniform", "stock_flanks", "worn_bore")])
+
+
+def damages(folders: list[Path]) -> None:
+    """The aligned scans with the points of each site, and the damage volumes in what is left."""
     picture = pv.Plotter(off_screen=True, shape=(2, len(folders)), window_size=(430 * len(folders), 760), border=False)
     picture.set_background("white")
     for column, folder in enumerate(folders):
@@ -33,6 +40,31 @@ def main() -> None:
             picture.add_mesh(pv.read(path), color=COLOURS[number % len(COLOURS)])
         _look(picture)
     picture.screenshot(HERE / "picture.png")
+
+
+def stock(folders: list[Path]) -> None:
+    """What is left in grey, and on it the deposits, coloured by how far they stand beyond the nominal surface."""
+    picture = pv.Plotter(off_screen=True, shape=(1, len(folders)), window_size=(560 * len(folders), 520), border=False)
+    picture.set_background("white")
+    for column, folder in enumerate(folders):
+        picture.subplot(0, column)
+        whole = pv.merge([pv.read(folder / "undamaged.stl"), pv.read(folder / "damage.stl")])
+        left = pv.read(folder / "undamaged.stl")
+        picture.add_mesh(left, color="#c9d1d6", smooth_shading=True, split_sharp_edges=True)
+        deposits = pv.merge([pv.read(path) for path in sorted((folder / "deposit").glob("*.stl"))])
+        deposits = deposits.triangulate().subdivide_adaptive(max_edge_len=0.3, max_n_passes=8)
+        proud = deposits.compute_implicit_distance(whole)
+        proud["stock, mm"] = np.abs(proud["implicit_distance"]).round(3)
+        bar = {"color": "black", "fmt": "%.1f", "n_labels": 3, "width": 0.5, "position_x": 0.25, "position_y": 0.02}
+        title = f"stock, mm{' ' * column}"  # bars of one title would be one bar
+        picture.add_mesh(proud, scalars="stock, mm", cmap="YlOrRd", scalar_bar_args={**bar, "title": title})
+        _look(picture)
+        if folder.name in CLOSE:
+            focus, way, zoom = CLOSE[folder.name]
+            picture.view_vector(way, (0, 0, 1))
+            picture.camera.focal_point = focus
+            picture.camera.zoom(zoom)
+    picture.screenshot(HERE / "stock.png")
 
 
 def _scan(path: Path) -> tuple[np.ndarray, np.ndarray]:

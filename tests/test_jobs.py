@@ -7,16 +7,20 @@ from pathlib import Path
 import pytest
 
 import damageest
-from damageest.artefacts import Solid
+from damageest.artefacts import Deposit, Solid
 
 JOBS = Path(__file__).parents[1] / "jobs"
 SITES = {"block_wedge": 1, "gear_teeth": 4, "cylinder_two_sides": 2, "half_torus": 1, "four_sites": 4}
+STOCK = {"stock_uniform": 0.8, "stock_flanks": 0.3, "worn_bore": 0.5}
+"""Millimetres of stock that the jobs ask for; each has as many sites as `DEPOSITS` says."""
+DEPOSITS = {"stock_uniform": 1, "stock_flanks": 2, "worn_bore": 2}
+FLANKS, BORE = set(range(0, 75, 2)), {5}
 WEDGE = 5929.0
 """Volume in mm3 of the wedge that jobs/make_inputs.py cuts off the block before it scans it."""
 
 
 def test_every_job_is_listed() -> None:
-    assert {path.stem for path in JOBS.glob("*.yaml")} == set(SITES)
+    assert {path.stem for path in JOBS.glob("*.yaml")} == {*SITES, *STOCK}
 
 
 @pytest.mark.parametrize("name", SITES)
@@ -31,3 +35,22 @@ def test_example(name: str) -> None:
         assert result.truth[1] >= 0.97
     else:
         assert result.damage_volume == pytest.approx(WEDGE, rel=0.01)
+
+
+@pytest.mark.parametrize("name", STOCK)
+def test_example_with_stock(name: str) -> None:
+    result = damageest.run(JOBS / f"{name}.yaml")
+    assert result.status == "ok"
+    assert len(result.sites) == DEPOSITS[name]
+    touched = {"stock_uniform": set(), "stock_flanks": FLANKS, "worn_bore": BORE}[name]
+    for site in result.sites:
+        deposit = site.deposit
+        assert isinstance(deposit, Deposit)
+        assert deposit.thickness is not None
+        assert STOCK[name] <= deposit.thickness[0] <= deposit.thickness[2] <= STOCK[name] + result.tolerance
+        assert deposit.volume == pytest.approx(site.damage.volume + deposit.stock_volume, rel=1e-3)
+        assert (deposit.cut_back_volume > 0) == (name == "worn_bore")
+        assert set(deposit.touched) <= touched
+    assert result.undamaged_volume + result.damage_volume == pytest.approx(result.part.volume, rel=1e-6)
+    if result.truth is not None:
+        assert result.truth[1] >= 0.97
