@@ -9,7 +9,6 @@ import pytest
 from scipy.spatial import cKDTree
 
 from damageest.artefacts import Deposit, Floats, Part, Solid, open_edges
-from damageest.errors import StageError
 from damageest.solids import remainder, to_manifold
 from damageest.stages.allowance.milling import Milling
 from tests.stages.allowance.shapes import (
@@ -51,16 +50,13 @@ def wanted(chosen: dict[str, Any], normals: Floats) -> Floats:
     return height
 
 
-def made(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit | str]:
-    """Part, damage, options, and the deposit or why it was refused."""
+def made(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit]:
+    """Part, damage, options, and the deposit; all of these have room for their stock."""
     rng = np.random.default_rng([51, seed])
     body = list(SHAPES.values())[seed % len(SHAPES)]()
     lost, chosen = solid_of(struck(body, rng)), options(rng)
     part = part_of(body)
-    try:
-        deposit = Milling.model_validate(chosen).run(lost, part, TOLERANCE, None)
-    except StageError as error:
-        return part, lost, chosen, error.message
+    deposit = Milling.model_validate(chosen).run(lost, part, TOLERANCE, None)
     assert isinstance(deposit, Deposit)
     return part, lost, chosen, deposit
 
@@ -68,10 +64,6 @@ def made(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit | str]:
 @pytest.mark.parametrize("seed", range(CASES))
 def test_guarantees(seed: int) -> None:
     part, lost, chosen, deposit = made(seed)
-    if isinstance(deposit, str):
-        assert deposit.startswith("no room for the stock at ("), deposit
-        assert list(SHAPES)[seed % len(SHAPES)] in ("comb", "bored", "dovetail"), deposit
-        return
     assert open_edges(deposit.faces) == 0
     cavity = deposit.cavity or lost
     body, hole, whole = to_manifold(deposit), to_manifold(cavity), to_manifold(part)
@@ -134,13 +126,6 @@ def away(points: Floats, cloud: Floats) -> Floats:
     return np.asarray(cKDTree(cloud).query(points)[0])
 
 
-def test_enough_cases_are_not_refused() -> None:
-    rng = [np.random.default_rng([51, seed]) for seed in range(CASES)]
-    assert len(rng) >= 40
-    refused = [seed for seed in range(CASES) if isinstance(made(seed)[3], str)]
-    assert CASES - len(refused) >= 40
-
-
 def test_a_flat_face_gets_its_stock_exactly() -> None:
     from manifold3d import Manifold
 
@@ -157,7 +142,5 @@ def test_a_flat_face_gets_its_stock_exactly() -> None:
 
 def test_same_bytes_twice() -> None:
     first, second = made(2)[3], made(2)[3]
-    assert isinstance(first, Deposit)
-    assert isinstance(second, Deposit)
     assert first.vertices.tobytes() == second.vertices.tobytes()
     assert first.faces.tobytes() == second.faces.tobytes()
