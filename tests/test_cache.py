@@ -12,6 +12,7 @@ import trimesh
 
 from damageest import artefacts
 from damageest.artefacts import (
+    Deposit,
     Deviation,
     Enclosure,
     Enclosures,
@@ -37,6 +38,8 @@ ARTEFACTS: list[Any] = [
     Mesh(BOX.vertices, BOX.faces),
     SOLID,
     Surface(BOX.vertices, BOX.faces[:5]),
+    Deposit(SOLID.vertices, SOLID.faces, SOLID, 0.5, 1 / 3, (0.1, 0.2, 0.3), (4, 7), ("clipped",)),
+    Deposit(SOLID.vertices, SOLID.faces),
     Part(BOX.vertices, BOX.faces, "in", "a/b.stl", "0f", np.arange(12), ("top", "é"), ("plane",), 0.1, ("mended",)),
     Part(BOX.vertices, BOX.faces),
     Truth(None, TURN),

@@ -14,7 +14,6 @@ from manifold3d import Manifold
 
 import damageest
 from damageest.artefacts import Deposit, Solid
-from damageest.cache import Cache
 from damageest.engine import Engine, State
 from damageest.errors import StageError
 from damageest.job import Job
@@ -188,21 +187,6 @@ def test_others_and_refusals() -> None:
     assert ahead[1]["deposit"] is None
     assert ahead[1]["refused"]
     assert [error.site for error in runs.failures] == [2]
-
-
-def test_a_deposit_comes_back_from_the_cache(tmp_path: Path) -> None:
-    given = lane(1, 0, 3, 1.0, 0.4)["deposit"]
-    given = Deposit(
-        given.vertices, given.faces, given.cavity, given.stock_volume, 1.0, (0.1, 0.2, 0.3), (4, 7), ("a", "b")
-    )
-    Cache(tmp_path).put("allowance-1", "key", given)
-    found, back = Cache(tmp_path).get("allowance-1", "key")
-    assert found
-    assert isinstance(back, Deposit)
-    assert isinstance(back.cavity, Solid)
-    assert given.cavity is not None
-    assert back.cavity.vertices.tobytes() == given.cavity.vertices.tobytes()
-    assert (back.thickness, back.touched, back.notes) == ((0.1, 0.2, 0.3), (4, 7), ("a", "b"))
 
 
 def test_milling_is_registered_with_its_provider() -> None:
