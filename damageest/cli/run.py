@@ -80,15 +80,22 @@ def _table(result: Result, target: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
     unit = result.units
     if result.sites:
         table = Table(title=None, box=None, pad_edge=False, header_style="bold")
-        for name in ("site", f"volume {unit}³", f"area {unit}²", f"depth {unit}", "method", "scan agrees"):
+        heads = ["site", f"volume {unit}³", f"area {unit}²", f"depth {unit}"]
+        if any(site.deposit for site in result.sites):
+            heads += [f"deposit {unit}³", f"stock {unit}³"]
+        for name in (*heads, "method", "scan agrees"):
             table.add_column(name, justify="left" if name in ("method", "scan agrees") else "right")
         for site in result.sites:
             agrees = "yes" if site.evidence.consistent else "NO: " + "; ".join(site.evidence.reasons)
-            numbers = (f"{site.damage.volume:.6g}", f"{site.surface.area:.6g}", f"{site.max_depth:.4g}")
+            numbers = [f"{site.damage.volume:.6g}", f"{site.surface.area:.6g}", f"{site.max_depth:.4g}"]
+            if len(heads) > 4:
+                stock = getattr(site.deposit, "stock_volume", None)
+                numbers += [f"{site.deposit.volume:.6g}" if site.deposit else "–"]
+                numbers += ["–" if stock is None else f"{stock:.6g}"]
             table.add_row(str(site.id), *numbers, site.method, agrees)
         console.print(table)
         console.print(f"damage {result.damage_volume:.6g} {unit}³ of the part's {result.part.volume:.6g} {unit}³")

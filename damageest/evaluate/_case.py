@@ -128,9 +128,9 @@ def run_case(case: Case) -> dict[str, Any]:
     alone = Scan(scan.points, unit=scan.unit)  # without the truth
     start, busy = time.perf_counter(), time.process_time()
     try:
-        found = damageest.run(
-            case.job or {"version": 1}, part=part, scan=alone, settings=case.settings, registry=registry
-        )
+        # what is scored is the damage, which a cut-back would enlarge
+        settings = ["allowance=none", *case.settings]
+        found = damageest.run(case.job or {"version": 1}, part=part, scan=alone, settings=settings, registry=registry)
     except DamageestError as error:
         # a stage that refuses owns up to it; a job or an input at fault would be the evaluation's own mistake
         row |= {"error": _one_line(error), "flagged": isinstance(error, StageError)}

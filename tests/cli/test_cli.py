@@ -43,6 +43,17 @@ def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
     assert (tmp_path / "again/damage.stl").read_bytes() == (tmp_path / "out/job/damage.stl").read_bytes()
 
 
+def test_the_table_says_what_to_deposit_and_what_to_mill_off(tmp_path: Path) -> None:
+    stock = "allowance: {use: milling, outer: 1, inner: 0.5}\n"
+    done = call("run", damaged_box.write(tmp_path, damaged_box.JOB + stock))
+    assert done.returncode == 0, done.stderr
+    head, site = (line.split() for line in done.stdout.splitlines() if line.split()[:1] in (["site"], ["1"]))
+    assert [word for word in head if word in ("volume", "deposit", "stock")] == ["volume", "deposit", "stock"]
+    report = json.loads((tmp_path / "out/job/result.json").read_text())["sites"][0]
+    assert site[1] == f"{report['volume']:.6g}"
+    assert site[4:6] == [f"{report['deposit']['volume']:.6g}", f"{report['deposit']['stock_volume']:.6g}"]
+
+
 def test_json_is_the_result_and_fits_its_schema(tmp_path: Path) -> None:
     done = call("run", damaged_box.write(tmp_path), "--json", "--set", "method=implicit", "--no-cache")
     report = json.loads(done.stdout)

@@ -140,3 +140,13 @@ def test_faults_are_named_before_anything_runs(
         study(real, Wanted(**wanted), 1, registry, tmp_path)
     assert said in str(caught.value)
     assert caught.value.exit_status == 2
+
+
+def test_a_jobs_cut_back_is_no_error_of_its_damage(tmp_path: Path) -> None:
+    stock = "allowance: {use: milling, outer: 1, inner: 1}\n"
+    ious = []
+    for text in (SIMULATED, SIMULATED + stock):
+        path = damaged_box.write(tmp_path, text)
+        (case,) = study(path, Wanted(size="4"), 1, Registry.discover(), tmp_path).cases
+        ious.append(_case.run_case(case)["iou"])
+    assert ious[0] == ious[1] > 0.9

@@ -15,16 +15,19 @@ from damageest.evaluate._table import marks
 from damageest.evaluate._vary import Wanted
 from damageest.evaluate.damages import KINDS
 from damageest.evaluate.parts import PARTS
+from damageest.job import load
 from damageest.registry import Registry
+from damageest.stages.part import ReadPart
 from tests.evaluate.call import evaluate, rows_of, timeless
 
 README = Path(__file__).parents[2] / "README.md"
 BEGIN, END = marks("suite")
 
 
-def tables(text: str) -> list[list[list[str]]]:
+def tables(text: str, name: str = "suite") -> list[list[list[str]]]:
     """The Markdown tables between the marks, as lines of words."""
-    lines = text.partition(BEGIN)[2].partition(END)[0].splitlines()
+    begin, end = marks(name)
+    lines = text.partition(begin)[2].partition(end)[0].splitlines()
     found: list[list[list[str]]] = []
     for before, line in zip(["", *lines], lines, strict=False):
         if line.startswith("|"):
@@ -116,6 +119,22 @@ def test_the_readmes_table_is_of_this_suite(registry: Registry) -> None:
         known = {item.name for item in registry.of(axis)} or {"auto", "implicit", "surface", "octree"}
         names = known if axis == "method" or registry.of(axis) else {line[0] for line in table[2:]}
         check(table, names)
+
+
+@pytest.mark.parametrize("name", ["points", "fineness", "rivals", "dense"])
+def test_the_readmes_tables_of_cost_name_what_there_is(name: str, registry: Registry) -> None:
+    (table,) = tables(README.read_text(), name)
+    head, _, *body = table
+    axes = head[: -len(COLUMNS)]
+    assert axes
+    assert set(axes) <= {"points", "tolerance, times the noise", "tolerance, mm", "way", "part"}
+    assert head[len(axes) :] == [title for title, _ in COLUMNS.values()]
+    assert len(body) > 1
+    for line in body:
+        assert all(re.fullmatch(r"\d+(\.\d+)?(e[+-]\d+)?%?|–", word) for word in line[len(axes) :])
+        if "way" in axes and (way := line[axes.index("way")]) != "default":
+            part, scan = PARTS["cuboid"](), {"use": "simulate", "damage": []}
+            load({"version": 1, "scan": scan}, registry, way.split(), {ReadPart: part})
 
 
 def test_an_unknown_part_is_an_error_of_its_own(registry: Registry) -> None:
