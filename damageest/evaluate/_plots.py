@@ -112,12 +112,14 @@ def _against(
 
 
 def _ways(axes: Any, ways: Mapping[str, Sequence[Row]]) -> None:
-    """The median of each way at its tolerances: what accuracy costs."""
-    for number, (way, rows) in enumerate(ways.items()):
-        groups = crossed(rows).values()
-        x = [np.median([row["seconds"] for row in group]) for group in groups]
-        y = [np.median([row["surface_error"] for row in group]) for group in groups]
-        axes.plot(x, y, "o-", color=f"C{number}", label=way)
+    """What accuracy costs: a line for each implementation, through the medians of its settings."""
+    lines: dict[str, list[Point]] = {}
+    for way, rows in ways.items():
+        for group in crossed(rows).values():
+            x, y = (float(np.median([row[name] for row in group])) for name in ("seconds", "surface_error"))
+            lines.setdefault(way.split()[0], []).append((x, y))
+    for number, (name, points) in enumerate(lines.items()):
+        axes.plot(*np.array(sorted(points)).T, "o-", color=f"C{number}", label=name)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.legend()

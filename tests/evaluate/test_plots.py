@@ -38,10 +38,17 @@ def test_what_was_varied_is_drawn_and_the_errors(tmp_path: Path) -> None:
 def test_ways_to_compare_are_lines_of_their_own(tmp_path: Path) -> None:
     rows = [
         row(varied={"way": way, "points": p}, seconds=t, surface_error=0.1)
-        for way, p, t in [("default", 1000, 1.0), ("default", 4000, 2.0), ("method=octree", 1000, 5.0)]
+        for way, p, t in [
+            ("default", 1000, 1.0),
+            ("default", 4000, 2.0),
+            ("method=octree enclose.depth=8", 1000, 5.0),
+            ("method=octree enclose.depth=9", 1000, 20.0),
+        ]
     ]
     made = {path.name: path for path in draw(rows, "mm", tmp_path)}
     assert {"error_by_time.svg", "time_by_points.svg", "errors.svg"} <= set(made)
+    # the rival's settings are one line, with one name
+    assert made["error_by_time.svg"].read_text().count("<!-- method=octree -->") == 1
     (tmp_path / "one").mkdir()
     alone = {path.name: path for path in draw(rows[:2], "mm", tmp_path / "one")}
     for name in ("error_by_time.svg", "time_by_points.svg"):
