@@ -14,7 +14,7 @@ SCALES = (32, 80, 200)
 """Neighbours of the fits to choose from."""
 KAPPA = 2.0
 """Standard deviations that two fits of one point may lie apart by noise."""
-CHUNK = 4000
+CHUNK = 500
 
 
 def thinned(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
@@ -75,9 +75,7 @@ def averaged(points: Floats, counts: Ints, noise: float, chosen: Ints) -> tuple[
     return out, tilted
 
 
-def _widest(
-    tree: Any, points: Floats, counts: Ints, noise: float, normals: Floats, own: Ints
-) -> tuple[Floats, Floats]:
+def _widest(tree: Any, points: Floats, counts: Ints, noise: float, normals: Floats, own: Ints) -> tuple[Floats, Floats]:
     """The fits of the points ``own``, of each the widest that noise explains."""
     at, way = points[own], normals[own]
     distance, index = tree.query(at, k=min(SCALES[-1], len(points)), workers=2)
@@ -85,12 +83,13 @@ def _widest(
     best, turned = at.copy(), way.copy()
     explained = np.ones(len(at), bool)
     narrower: list[tuple[Floats, Floats]] = []
+    around, their_normals, share = points[index], normals[index], counts[index].astype(np.float64)
     for scale in SCALES:
-        near = index[:, :scale]
-        reach = np.maximum(distance[:, : near.shape[1]][:, -1], 1e-12)
-        weights = counts[near] * _bilateral(at, way, points[near], normals[near], distance[:, : near.shape[1]], noise)
-        move, tilted, row = _quadric(at, way, points[near], weights, reach)
-        spread = noise**2 * (row**2 / counts[near]).sum(axis=1)
+        near = slice(0, scale)
+        far = distance[:, near]
+        weights = share[:, near] * _bilateral(at, way, around[:, near], their_normals[:, near], far, noise)
+        move, tilted, row = _quadric(at, way, around[:, near], weights, np.maximum(far[:, -1], 1e-12))
+        spread = noise**2 * (row**2 / share[:, near]).sum(axis=1)
         for other, wide in narrower:
             explained &= (move - other) ** 2 <= KAPPA**2 * np.maximum(wide - spread, 1e-3 * wide)
         best[explained] = (at + np.clip(move, -3 * noise, 3 * noise)[:, None] * way)[explained]
@@ -145,8 +144,9 @@ def _quadric(
     left = np.matmul(heavy, terms.transpose(0, 2, 1))
     # Bending is only taken where the neighbours ask for it: a light penalty keeps thin neighbourhoods flat.
     left += np.diag([1e-9, 1e-6, 1e-6, 3e-4, 3e-4, 3e-4]) * weights.sum(axis=1)[:, None, None]
-    rows = np.linalg.solve(left, heavy)  # (N,6,K): of each coefficient, what each height adds to it
-    fit = np.einsum("isk,ik->is", rows[:, :3], h)
+    # (N,6,3): of height and slopes, what the moments add to each; the matrix is symmetric
+    of_moments = np.linalg.solve(left, np.broadcast_to(np.eye(6, 3), (len(at), 6, 3)))
+    fit = np.matmul(np.matmul(heavy, h[:, :, None])[:, None, :, 0], of_moments)[:, 0]
     tilted = normals - fit[:, 1, None] * u - fit[:, 2, None] * v
     tilted /= np.linalg.norm(tilted, axis=1)[:, None]
-    return fit[:, 0] * reach, tilted, rows[:, 0]
+    return fit[:, 0] * reach, tilted, np.matmul(of_moments[:, None, :, 0], heavy)[:, 0]
