@@ -14,6 +14,9 @@ from damageest.artefacts import Floats, Ints, Solid
 FLAT = 1e-8
 """Share of the solid's diagonal by which corners may lie off their common face, or off their common edge."""
 
+_POINT = 1e-12
+"""Length below which an edge has no direction."""
+
 
 @dataclass(frozen=True, eq=False)
 class Facet:
@@ -21,6 +24,24 @@ class Facet:
 
     normal: Floats
     loops: tuple[Ints, ...]
+
+
+def welded(solid: Solid) -> Solid:
+    """The solid with the ends of edges that have no length made one, and without the triangles that this folds away;
+    as it was, where that would open it."""
+    edges = np.concatenate([solid.faces[:, :2], solid.faces[:, 1:]])
+    short = edges[np.linalg.norm(solid.vertices[edges[:, 0]] - solid.vertices[edges[:, 1]], axis=1) <= _POINT]
+    if not len(short):
+        return solid
+    size = len(solid.vertices)
+    graph = coo_array((np.ones(len(short), bool), (short[:, 0], short[:, 1])), shape=(size, size))
+    _, first, same = np.unique(connected_components(graph, directed=False)[1], return_index=True, return_inverse=True)
+    a, b, c = first[same.reshape(-1)[solid.faces]].T
+    faces = np.stack([a, b, c], axis=1)[(a != b) & (b != c) & (c != a)]
+    try:
+        return Solid(solid.vertices, faces)
+    except ValueError:
+        return solid
 
 
 def facets(solid: Solid) -> list[Facet]:
@@ -41,7 +62,15 @@ def facets(solid: Solid) -> list[Facet]:
     found: dict[int, list[Ints]] = {}
     for k in order:
         found.setdefault(int(owner[k]), []).append(loops[k])
+    for region in np.flatnonzero(np.linalg.norm(normal, axis=1) < 0.5):  # without area: any plane through its line
+        normal[region] = _across(vertices[found[int(region)][0]])
     return [Facet(normal[region], tuple(mine)) for region, mine in found.items()]
+
+
+def _across(loop: Floats) -> Floats:
+    """(3,) a unit vector across points (K,3) on one line."""
+    _, _, axes = np.linalg.svd(loop - loop.mean(0))
+    return np.asarray(axes[-1])
 
 
 def _neighbours(edges: Ints, count: int) -> Ints:

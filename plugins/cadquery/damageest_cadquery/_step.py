@@ -13,7 +13,7 @@ from damageest.artefacts import Floats, Solid
 from damageest.handover import shells
 from damageest.stages.export import Body, Written
 from damageest.units import MILLIMETRES
-from damageest_cadquery._facets import FLAT, Facet, facets
+from damageest_cadquery._facets import FLAT, Facet, facets, welded
 
 UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
 MOST = 100_000
@@ -37,6 +37,7 @@ def step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> Written:
 
 
 def _planar(solid: Solid) -> tuple[Floats, list[Facet]]:
+    solid = welded(solid)
     return solid.vertices, facets(solid)
 
 
@@ -143,7 +144,8 @@ def _shell(vertices: Floats, planar: list[Facet]) -> Any:
             builder.MakeWire(wire)
             indices = loop.tolist()
             for start, end in zip(indices, indices[1:] + indices[:1], strict=True):
-                builder.Add(wire, edge(start, end))
+                if (vertices[start] != vertices[end]).any():  # no length, no direction
+                    builder.Add(wire, edge(start, end))
             wire.Closed(True)
             builder.Add(face, wire)
         builder.Add(shell, face)

@@ -71,6 +71,22 @@ def test_flat_sides_are_one_face_with_their_holes(tmp_path: Path) -> None:
     assert back.val().Volume() == pytest.approx(made.volume, rel=1e-9)
 
 
+def test_edges_without_length_and_faces_without_area(tmp_path: Path) -> None:
+    cube = solid(Manifold.cube((10, 10, 10)))
+    a, b, c = cube.faces[0]
+    count = len(cube.vertices)
+    middle = (cube.vertices[a] + cube.vertices[b]) / 2
+    over = next(i for i, face in enumerate(cube.faces.tolist()) if i and {a, b} <= set(face))
+    (d,) = set(cube.faces[over].tolist()) - {a, b}
+    m, n, k = count, count + 1, count + 2  # m and n at one place, k on the same edge: triangles without area
+    vertices = np.concatenate([cube.vertices, [middle, middle, 0.7 * middle + 0.3 * cube.vertices[b]]])
+    faces = [[a, m, c], [m, b, c], [a, n, m], [n, k, m], [k, b, m], [a, d, n], [n, d, k], [k, d, b]]
+    made = Solid(vertices, np.concatenate([np.delete(cube.faces, [0, over], axis=0), faces]))
+    assert made.volume == pytest.approx(1000)
+    back = written(made, tmp_path)
+    assert back.val().Volume() == pytest.approx(1000, rel=1e-6)
+
+
 def test_a_cavity_stays_one(tmp_path: Path) -> None:
     made = solid(Manifold.cube((10, 10, 10)) - Manifold.cube((2, 3, 4)).translate((3, 3, 3)))
     (pair,) = shells(made)
