@@ -189,13 +189,14 @@ def write_stl(path: Path, mesh: Mesh) -> None:
     path.write_bytes(b"damageest".ljust(80, b"\0") + len(table).to_bytes(4, "little") + table.tobytes())
 
 
-def single_precision(solid: Solid) -> Solid | None:
+def single_precision(solid: Solid, mend: bool = True) -> Solid | None:
     """The solid with coordinates that single precision holds, watertight even where equal vertices count as one.
 
     Rounding can bring vertices together: the triangles that vanish are taken out. Where that opens the mesh, its
-    smallest details are collapsed first, up to 64 times the rounding. None where even then it does not close.
+    smallest details are collapsed first, up to 64 times the rounding, if it is to ``mend``. None where even then it
+    does not close.
     """
-    for steps in (0, 2, 8, 64):
+    for steps in (0, 2, 8, 64) if mend else (0,):
         mesh: Mesh = solid
         if steps:
             mesh = _simplified(solid, steps * float(np.spacing(np.float32(np.abs(solid.vertices).max()))))

@@ -5,8 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
+from damageest.artefacts import Floats, Solid
+
 SLACK = 1e-5
 """Share of a solid's volume by which it may change without a word; a tenth of what the check of a deposit bears."""
+SAME = 5e-7
+"""Distance, in the largest coordinate, within which a reader in single precision takes two points for one."""
 DUST = 1e-9
 """Share of the stock's volume below which a piece of it is rounding."""
 
@@ -47,3 +53,43 @@ def joined(filled: Any, proud: Any) -> Any:
         if tried[-1][0] <= SLACK * whole:
             break
     return min(tried, key=lambda item: item[0])[1]
+
+
+def apart(body: Any, origin: Floats, by: float) -> Solid | None:
+    """A Manifold as a Solid that closes for readers who know vertices by their place alone, in single precision too.
+
+    A Boolean may leave lines along which sheets touch, each with vertices of its own; merged, their edges have four
+    triangles. Such vertices are drawn in by ``by``, and where details finer than that are in the way, those go first.
+    None where the Manifold is empty; as it was where nothing helps.
+    """
+    from damageest.meshio import single_precision
+    from damageest.solids import to_solid
+
+    first = to_solid(body, origin)
+    for detail in (0.0, 0.01, 0.1, 1.0):
+        simple = body.simplify(detail * by) if detail else body
+        if abs(simple.volume() - body.volume()) > SLACK * abs(body.volume()):
+            continue
+        tried = to_solid(simple, origin)
+        for _ in range(3):
+            if tried is None:
+                break
+            if single_precision(tried, mend=False) is not None:
+                return tried
+            tried = _drawn_in(tried, by)
+    return first
+
+
+def _drawn_in(body: Solid, by: float) -> Solid | None:
+    """The solid with those vertices drawn in that stand where another stands; None where it is none any more."""
+    from scipy.spatial import cKDTree
+
+    points = body.vertices
+    pairs = cKDTree(points).query_pairs(SAME * float(np.abs(points).max()), output_type="ndarray")
+    alike = np.unique(pairs)
+    moved = points.copy()
+    moved[alike] -= by * body.vertex_normals[alike]
+    try:
+        return Solid(moved, body.faces)
+    except ValueError:
+        return None

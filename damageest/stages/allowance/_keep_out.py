@@ -51,10 +51,10 @@ def kept_out(
             )
         bodies.append(body)
     if wanted.free_skin():
-        bodies.append(stock(replace(skin, height=np.where(skin.free, reach, 0.0)), tolerance))
+        bodies.append(stock(replace(skin, height=np.where(skin.free, reach, 0.0)), tolerance, drawn_in=0))
         around = _around(skin, part, wanted, reach, origin)
         if around is not None:
-            bodies.append(stock(replace(around, height=np.where(around.free, reach, 0.0)), tolerance))
+            bodies.append(stock(replace(around, height=np.where(around.free, reach, 0.0)), tolerance, drawn_in=0))
     return Manifold.batch_boolean(bodies, OpType.Add) if bodies else Manifold()
 
 

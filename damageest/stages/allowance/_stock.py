@@ -8,7 +8,7 @@ stock beside it is not reached over: at the border the stock has straight walls 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,9 @@ LEANING = 8.0
 MITRED = 100.0
 """Degrees between normals up to which an edge is mitred to a point; a sharper one gets `ROUNDS` mitres."""
 ROUNDS = 3
+DRAWN_IN = 4e-3
+"""Of the slack: how far inside its border the stock begins. What ends exactly where other metal begins would touch it
+along lines without thickness."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +41,13 @@ class _Edges:
     at: Ints
 
 
-def stock(skin: Skin, slack: float, roomy: bool = True) -> Any:
+def stock(skin: Skin, slack: float, roomy: bool = True, drawn_in: float = DRAWN_IN) -> Any:
     """A Manifold, relative to the skin's origin: stock of each face's height, and up to ``slack`` more. It reaches a
-    little below the skin, for the caller to cut off. ``roomy``: no stock meets that of opposite skin."""
+    little below the skin, for the caller to cut off. ``roomy``: no stock meets that of opposite skin; ``drawn_in``: how
+    far inside the skin's border it begins, in slacks."""
     from manifold3d import Manifold, OpType
 
-    skin = skin.only(skin.height > 0)
+    skin = _drawn_in(skin.only(skin.height > 0), drawn_in * slack)
     if not len(skin.faces):
         return Manifold()
     edges = _edges(skin)
@@ -65,6 +69,23 @@ def stock(skin: Skin, slack: float, roomy: bool = True) -> Any:
         mine = heads[ends == vertex].reshape(-1, 3)
         clouds.append(np.concatenate([skin.vertices[vertex : vertex + 1], mine[np.isfinite(mine[:, 0])]]))
     return Manifold.batch_boolean([*bodies, *(Manifold.hull_points(cloud) for cloud in clouds)], OpType.Add)
+
+
+def _drawn_in(skin: Skin, by: float) -> Skin:
+    """The skin with its border moved inward."""
+    start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
+    size = len(skin.vertices)
+    lone = np.flatnonzero(~np.isin(start * size + stop, stop * size + start))
+    a, b = start[lone], stop[lone]
+    inward = unit(np.cross(skin.normal[lone // 3], skin.vertices[b] - skin.vertices[a]))
+    total, count = np.zeros_like(skin.vertices), np.zeros(size)
+    for end in (a, b):
+        np.add.at(total, end, inward)
+        np.add.at(count, end, 1)
+    # as far from both edges at a corner, but not far from a sharp one
+    mean = total / np.maximum(count, 1)[:, None]
+    step = by * mean / np.maximum(np.einsum("ij,ij->i", mean, mean), 0.25)[:, None]
+    return replace(skin, vertices=skin.vertices + step)
 
 
 def _edges(skin: Skin) -> _Edges:

@@ -12,6 +12,11 @@ from damageest.errors import StageError
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance._selectors import KeepOut, Target, Wanted
 
+CRUMBS = 1e-6
+"""Share of the stock's volume."""
+DRAWN_IN = 1e-3
+"""Of the tolerance: by how much sheets that touch are moved apart."""
+
 
 class Milling(Allowance):
     """Stock beyond the nominal surface, to be milled off after deposition; skin by skin, with regions kept free, and a
@@ -54,8 +59,8 @@ class Milling(Allowance):
         guarantee is not kept."""
         from manifold3d import Manifold
 
-        from damageest.solids import remainder, to_manifold, to_solid
-        from damageest.stages.allowance._booleans import joined, tidied, touching
+        from damageest.solids import remainder, to_manifold
+        from damageest.stages.allowance._booleans import apart, joined, tidied, touching
         from damageest.stages.allowance._cut_back import cut_back
         from damageest.stages.allowance._keep_out import kept_out
         from damageest.stages.allowance._limits import crowded
@@ -80,10 +85,13 @@ class Milling(Allowance):
         proud = sum((stock(each, tolerance / 2, roomy=not crowds) for each in skins), Manifold())
         proud = tidied(proud, part.diagonal)
         for body in (left, barred):
-            proud = remainder(proud, proud ^ body) if not (proud.is_empty() or body.is_empty()) else proud
+            within = proud ^ body
+            # crumbs of rounding, cut off, would leave lines where the stock touches what it stands on and no more
+            if within.volume() > CRUMBS * proud.volume():
+                proud = remainder(proud, within)
         deposit = tidied(joined(filled, touching(proud, filled, tolerance)), part.diagonal)
         thickness = check(Worked(deposit, filled, left, barred, skin, band, origin), part, tolerance, crowds)
-        body = to_solid(deposit, origin)
+        body = apart(deposit, origin, DRAWN_IN * tolerance)
         if body is None:
             raise StageError("the deposit came out empty", "a slightly different outer")
         notes = [f"{crowd}; clipped there" for crowd in crowds[:1]]
