@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Part, Scan
-from damageest.lattice import cubes, faced_cubes
+from damageest.lattice import CHUNK, cubes, faced_cubes
 
 Flags = NDArray[np.bool_]
 
@@ -35,6 +35,8 @@ LEAST = 0.35
 """Least threshold in tolerances, whatever the noise: it keeps clear of the pose's error."""
 CLEAR = 2.0
 """How many times what deviates outward, where nothing is worn, wear has to deviate inward."""
+SELDOM = 4.0
+"""Standard deviations below which a cube's mean is not by chance: of a million cubes, at thirty."""
 REGION = 100
 """Points of a worn region at least."""
 
@@ -62,6 +64,8 @@ def worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: flo
     points, depth = aligned.points[some], distance[some]
     cross = part.cross[face[some]]
     normals = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    # Neighbours along the surface: where points lie closer than the noise, the nearest in space are as deep as oneself.
+    points = points - depth[:, None] * normals
 
     cube, group, mean, count = _cubes(points, normals, depth, CUBE * aligned.spacing)
     left = _left(mean[count >= FEWEST], count[count >= FEWEST], aligned.noise)
@@ -76,7 +80,7 @@ def worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: flo
     if threshold >= tolerance:
         return Wear(none, threshold, notes)
 
-    low = (count >= FEWEST // 2) & (mean < -0.6 * threshold)
+    low = (count >= FEWEST // 2) & (mean < -np.maximum(0.6 * threshold, SELDOM * aligned.noise / np.sqrt(count)))
     if not low.any():
         return Wear(none, threshold, notes)
     far = _cubes_away(cube, low)[group]
@@ -123,13 +127,15 @@ def _averages(
     # Direction as a fourth to sixth coordinate: across an edge or a thin wall nothing is near.
     place = np.concatenate([points, reach / SAME_FACE * normals], axis=1)
     count = min(NEIGHBOURS, len(around))
-    gap, index = cKDTree(place[around]).query(
-        place[asked], k=[*range(1, count + 1)], distance_upper_bound=reach, workers=2
-    )
-    there = np.isfinite(gap)
-    number = np.maximum(there.sum(axis=1), 1)
+    tree = cKDTree(place[around])
     padded = np.append(depth[around], 0.0)  # the index of a missing neighbour is len(around)
-    return padded[index].sum(axis=1) / number, number
+    mean, number = np.empty(len(asked)), np.empty(len(asked), np.int64)
+    for start in range(0, len(asked), CHUNK):
+        own = slice(start, start + CHUNK)
+        gap, index = tree.query(place[asked[own]], k=[*range(1, count + 1)], distance_upper_bound=reach, workers=2)
+        number[own] = np.maximum(np.isfinite(gap).sum(axis=1), 1)
+        mean[own] = padded[index].sum(axis=1) / number[own]
+    return mean, number
 
 
 def _in_regions(points: Floats, link: float) -> Flags:
