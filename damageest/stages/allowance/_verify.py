@@ -57,9 +57,13 @@ def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -
     entered = (work.deposit ^ work.left).volume() / work.deposit.volume()
     if entered > VOLUME:
         raise StageError(f"{entered:.2%} of the deposit would lie in metal that is left", CLIPPED)
-    over = strayed(work, part, tolerance)
+    over, place = strayed(work, part, tolerance)
     if over > MISSED:
-        raise StageError(f"stock would stand over {over:.1%} of the skin round it that is to have none", CLIPPED)
+        near = ", ".join(f"{value:.4g}" for value in place)
+        raise StageError(
+            f"stock would stand over {over:.1%} of the skin round it that is to have none, as at ({near})",
+            "a smaller outer there by targets, or keep_out",
+        )
     wanted = work.skin.only(work.skin.height > 0)
     if not len(wanted.faces):
         return None
@@ -128,10 +132,10 @@ def thickness(work: Worked, wanted: Skin, part: Part, crowds: Sequence[Crowd]) -
     return Thickness(points, height, np.where(covered, nearest, far), covered, ended)
 
 
-def strayed(work: Worked, part: Part, tolerance: float) -> float:
+def strayed(work: Worked, part: Part, tolerance: float) -> tuple[float, Floats]:
     """The share of sampled skin without stock, of the damage and of the part round it, that the deposit stands over all
-    the same. Skin nearer to skin with stock than that is high does not count: in a concave corner the stock leans on
-    it."""
+    the same, and one such place (3,) in the part's frame. Skin nearer to skin with stock than that is high does not
+    count: in a concave corner the stock leans on it."""
     most = max(float(skin.height.max(initial=0)) for skin in work.skins()) + tolerance
     corners = part.triangles - work.origin
     low, high = work.skin.vertices.min(axis=0) - 2 * most, work.skin.vertices.max(axis=0) + 2 * most
@@ -144,9 +148,10 @@ def strayed(work: Worked, part: Part, tolerance: float) -> float:
     bare = _to_stock(work, points) > most
     points, normal = points[bare], normal[bare]
     if not len(points):
-        return 0.0
+        return 0.0, work.origin
     places = np.concatenate([points + share * most * normal for share in (0.05, 0.3, 0.8)])
-    return float(_inside(places, work.deposit).reshape(3, -1).any(axis=0).mean())
+    over = _inside(places, work.deposit).reshape(3, -1).any(axis=0)
+    return float(over.mean()), work.origin + points[over.argmax()]
 
 
 def _to_stock(work: Worked, points: Floats) -> Floats:
