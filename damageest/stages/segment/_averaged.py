@@ -35,6 +35,8 @@ LEAST = 0.35
 """Least threshold in tolerances, whatever the noise: it keeps clear of the pose's error."""
 CLEAR = 2.0
 """How many times what deviates outward, where nothing is worn, wear has to deviate inward."""
+NOISE = 2.0
+"""Standard deviations that are taken for noise where neighbours are looked for."""
 SELDOM = 4.0
 """Standard deviations below which a cube's mean is not by chance: of a million cubes, at thirty."""
 REGION = 100
@@ -65,7 +67,9 @@ def worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: flo
     cross = part.cross[face[some]]
     normals = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
     # Neighbours along the surface: where points lie closer than the noise, the nearest in space are as deep as oneself.
-    points = points - depth[:, None] * normals
+    # Only by what is noise: beside a rim, points on the damage stay as far off as they lie deeper than that.
+    noise = NOISE * aligned.noise
+    points = points - np.clip(depth, -noise, noise)[:, None] * normals
 
     cube, group, mean, count = _cubes(points, normals, depth, CUBE * aligned.spacing)
     left = _left(mean[count >= FEWEST], count[count >= FEWEST], aligned.noise)
