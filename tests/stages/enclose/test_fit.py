@@ -37,7 +37,7 @@ def off(points: np.ndarray, radius: float) -> np.ndarray:
 def test_averaging_takes_off_noise_and_adds_no_bias(radius: float) -> None:
     points = cloud(radius)
     inner = middle(points)
-    error = off(averaged(points, np.ones(len(points), np.int64), SIGMA)[0], radius)[inner]
+    error = off(averaged(points, np.ones(len(points), np.int64), SIGMA, np.arange(len(points)))[0], radius)[inner]
     plain = off(smoothed(points, SIGMA)[0], radius)[inner]
     assert error.std() < 0.3 * SIGMA
     assert error.std() < 0.75 * plain.std()
@@ -49,7 +49,7 @@ def test_a_sharp_edge_stays() -> None:
     flat = rng.uniform(-5, 5, (10_000, 2))
     roof = np.column_stack([flat, -np.abs(flat[:, 0])])
     noisy = roof + SIGMA * rng.normal(size=(10_000, 1)) * np.array([0, 0, 1])
-    points, _ = averaged(noisy, np.ones(10_000, np.int64), SIGMA)
+    points, _ = averaged(noisy, np.ones(10_000, np.int64), SIGMA, np.arange(len(noisy)))
     height = (points[:, 2] + np.abs(points[:, 0])) / np.sqrt(2)
     near = np.abs(flat[:, 0]) < 0.5
     assert np.abs(height[near & middle(points)]).mean() < SIGMA
