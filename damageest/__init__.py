@@ -8,14 +8,14 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from damageest.api import run as run
-    from damageest.hookspecs import hookimpl as hookimpl
     from damageest.job import Job as Job
     from damageest.registry import Registry as Registry
+    from damageest.registry.hookspecs import hookimpl as hookimpl
     from damageest.result import Result as Result
 
 _PUBLIC = {
     "run": "damageest.api",
-    "hookimpl": "damageest.hookspecs",
+    "hookimpl": "damageest.registry.hookspecs",
     "Job": "damageest.job",
     "Registry": "damageest.registry",
     "Result": "damageest.result",

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Part, Scan
-from damageest.cache import digest
-from damageest.contracts import Contract
-from damageest.engine import Engine, State, follow
 from damageest.errors import InputError
 from damageest.job import Job, load
-from damageest.output import workshop, write_report
-from damageest.pipeline import ROUTES
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine, follow, start
+from damageest.pipeline.output import workshop, write_report
+from damageest.pipeline.routes import WRITE, route_of
+from damageest.pipeline.state import JobState
 from damageest.registry import Registry
+from damageest.registry.contracts import Contract
 from damageest.result import Result
-from damageest.stages.export import Export
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 
@@ -47,25 +47,18 @@ def run(
         source, given = _split(job, part, scan)
         job = load(source, registry, settings, given)
     if output is False:
-        return _follow(Engine(job, registry), job)
+        return follow(route_of(job.method), Engine(job, registry), start(job)).job.result
     target = job.output if output is True else Path(output).expanduser().resolve()
     with workshop(target, cache) as place:
         engine = Engine(job, registry, place.cache)
-        result = _follow(engine, job)
-        values = {"result": result, "folder": place.folder, "writers": registry.writers}
-        written = engine.call(Export, State(values, dict.fromkeys(values, "")))["written"]
-        result = replace(result, stages=tuple(engine.records))
+        work = follow(route_of(job.method), engine, start(job))
+        state = work.job.with_value(JobState.folder, place.folder, digest(str(target)))
+        state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
+        written = follow(WRITE, engine, replace(work, job=state)).job.written
+        result = replace(state.result, stages=tuple(engine.records))
         write_report(result, job, place.folder, target, written)
         place.finish(engine.stems)
     return result
-
-
-def _follow(engine: Engine, job: Job) -> Result:
-    values = {"unit": job.units, "tolerance": job.tolerance}
-    state = State(values, {name: digest(value) for name, value in values.items()})
-    (lane,) = follow(ROUTES[job.method], engine, [state])
-    result: Result = lane["result"]
-    return replace(result, stages=tuple(engine.records))
 
 
 def _split(
@@ -95,7 +88,7 @@ def _is_data(value: Any) -> bool:
 
 
 def _as_part(value: Any, units: str) -> Part:
-    from damageest.stages.part._make import make_part
+    from damageest.geometry.make_part import make_part
 
     if isinstance(value, Part):
         return value

@@ -6,6 +6,8 @@ line: 2 where the job or an input is at fault, 1 where a sound job met a stage t
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 
@@ -79,3 +81,9 @@ class StageError(DamageestError):
         place += f" (site {self.site})" if self.site else ""
         text = f"{place}: {self.message}" if place else self.message
         return f"{text}\n  try: {self.remedy}" if self.remedy else text
+
+
+def suggest(name: str, valid: Sequence[str]) -> str:
+    """A clause that names the valid word nearest to a wrong one: `` (did you mean 'x'?)``; empty where none is near."""
+    close = difflib.get_close_matches(name, valid, n=1, cutoff=0.6)
+    return f" (did you mean '{close[0]}'?)" if close else ""

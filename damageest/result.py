@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Deviation, Evidence, Floats, Mesh, Part, Pose, Scan, Solid, Surface
-from damageest.handover import as_manifold, as_trimesh, scan_from_part
+from damageest.geometry.transforms import scan_from_part
+from damageest.io.conversions import as_manifold, as_trimesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from damageest.artefacts import Part
 from damageest.evaluate.parts import PARTS
-from damageest.meshio import write_points, write_stl
+from damageest.io.meshes import write_points, write_stl
 from damageest.stages.scan.simulate import Simulate
 
 HERE = Path(__file__).parent

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from damageest.artefacts import Part
-from damageest.meshio import write_points
+from damageest.io.meshes import write_points
 from damageest.stages.scan.simulate import Simulate
 
 SIZE = (40.0, 30.0, 20.0)

@@ -10,7 +10,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from damageest.artefacts import Deviation, Floats, Mesh, Part, Samples, Scan, Sites, Solid
-from damageest.solids import to_arrays
+from damageest.geometry.solids import to_arrays
 from damageest.stages.cluster.dbscan import Dbscan
 from damageest.stages.sample.edge_aware import EdgeAware
 from damageest.stages.segment.mesh_distance import MeshDistance

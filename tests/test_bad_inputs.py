@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from damageest.cli import app
 from damageest.errors import DamageestError
-from damageest.meshio import write_points
+from damageest.io.meshes import write_points
 from tests import damaged_box
 
 Spoil = Callable[[Path], None]

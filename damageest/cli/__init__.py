@@ -78,6 +78,6 @@ def fail(error: Exception) -> None:
 
 def _plugin_commands() -> None:
     """Lets plugins add their commands. Only done where a built-in command does not answer."""
-    from damageest.plugins import load
+    from damageest.registry.loading import load
 
     load()[0].hook.damageest_commands(app=app)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.status import Status
 
-from damageest.hookspecs import hookimpl
+from damageest.registry.hookspecs import hookimpl
 
 
 class Progress:

@@ -21,11 +21,11 @@ def command(
 ) -> None:
     """List a part's CAD faces: number, name, kind, area, centre, and normal, or axis and radius."""
     from damageest.errors import JobError
+    from damageest.geometry.units import canonical
     from damageest.job import load
     from damageest.registry import Registry
     from damageest.stages.part import ReadPart
     from damageest.stages.scan import ReadScan
-    from damageest.units import canonical
 
     unit = canonical(units)
     try:  # as a job's part is found and checked; no scan is needed

@@ -21,7 +21,8 @@ def command(
 ) -> None:
     """Write a commented starter job with values read off the two files."""
     from damageest.errors import Fault, JobError
-    from damageest.joints import inspected
+    from damageest.job import load
+    from damageest.pipeline.prepare import inspect_inputs
     from damageest.registry import Registry
 
     target = job or Path(f"{part.stem}.yaml")
@@ -29,7 +30,8 @@ def command(
         raise JobError([Fault("exists already; --force overwrites it, --job names another file")], str(target))
     paths = [os.path.relpath(path.resolve(), target.resolve().parent) for path in (part, scan)]
     source = {"version": 1, "units": units, "part": str(part), "scan": str(scan)}
-    solid, cloud, tolerance, doubts = inspected(source, Registry.discover())
+    registry = Registry.discover()
+    solid, cloud, tolerance, doubts = inspect_inputs(load(source, registry), registry)
     lines = [
         f"# {part.name}: {' x '.join(f'{s:.4g}' for s in solid.bounds[1] - solid.bounds[0])} {units}, "
         f"{solid.volume:.5g} {units}3, {len(solid.faces)} triangles",

@@ -18,8 +18,9 @@ def command(
     which: Annotated[Which, typer.Argument(help="Schema of the job file or of result.json.")] = Which.job,
 ) -> None:
     """Print the JSON Schema of the job, for the plugins installed here, or of result.json."""
+    from damageest.job.schema import job_schema
     from damageest.registry import Registry
-    from damageest.schema import job_schema, result_schema
+    from damageest.report.result_json import result_schema
 
     content = job_schema(Registry.discover()) if which is Which.job else result_schema()
     typer.echo(json.dumps(content, indent=2))

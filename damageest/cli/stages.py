@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from damageest.errors import suggest
+
 if TYPE_CHECKING:
     from damageest.registry import Implementation, Registry
 
@@ -16,13 +18,13 @@ def command(
     name: Annotated[str | None, typer.Argument(help="Show one implementation, with its options.")] = None,
 ) -> None:
     """List stages, their implementations and options."""
-    from damageest.contracts import STAGES
     from damageest.errors import Fault, JobError, PluginError
-    from damageest.registry import Registry, near
+    from damageest.registry import Registry
+    from damageest.registry.contracts import STAGES
 
     registry = Registry.discover()
     if stage is not None and stage not in STAGES:
-        raise JobError([Fault(f"no stage '{stage}'{near(stage, STAGES)}; there are: {', '.join(STAGES)}")], "stages")
+        raise JobError([Fault(f"no stage '{stage}'{suggest(stage, STAGES)}; there are: {', '.join(STAGES)}")], "stages")
     if stage and name:
         try:
             _options(registry.get(stage, name))
@@ -34,7 +36,7 @@ def command(
 
 
 def _stage(stage: str, registry: Registry, with_options: bool) -> None:
-    from damageest.contracts import DEFAULTS
+    from damageest.registry.contracts import DEFAULTS
 
     items = registry.of(stage)
     typer.secho(stage, bold=True)

@@ -15,8 +15,8 @@ import pytest
 
 from damageest.artefacts import Floats
 from damageest.conformance import _scene
-from damageest.contracts import contract_of
 from damageest.errors import InputError, StageError
+from damageest.registry.contracts import contract_of
 from damageest.stages import Stage
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])

@@ -10,7 +10,7 @@ import pytest
 from damageest.artefacts import Deposit, Floats, Mesh, Part, Samples, Solid
 from damageest.conformance import _scene
 from damageest.conformance._base import REFUSED, Placed, back, right_or_refused
-from damageest.solids import to_manifold
+from damageest.geometry.solids import to_manifold
 
 SIZE = (4.0, 3.0, 2.0)
 

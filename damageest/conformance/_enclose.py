@@ -11,7 +11,8 @@ import pytest
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Enclosures, Floats, Mesh, Rims, Sites, Solid, Surface
 from damageest.conformance import _scene
 from damageest.conformance._base import Placed, back, right_or_refused
-from damageest.solids import iou, to_manifold, to_solid, united
+from damageest.geometry.distance import distance_to_mesh, is_inside
+from damageest.geometry.solids import iou, to_manifold, to_solid, united
 
 
 class EncloseContract(Placed):
@@ -153,12 +154,8 @@ class EncloseAllContract(Placed):
 
 def _deep(points: Floats, mesh: Mesh) -> int:
     """How many points (N,3) lie inside a mesh by more than the tolerance."""
-    import igl
-
     near = points[((points > mesh.bounds[0]) & (points < mesh.bounds[1])).all(axis=1)]
     if not len(near):
         return 0
-    vertices, faces = np.ascontiguousarray(mesh.vertices), np.array(mesh.faces)
-    inside = np.asarray(igl.fast_winding_number(vertices, faces, np.ascontiguousarray(near))).ravel() > 0.5
-    far = np.sqrt(np.asarray(igl.point_mesh_squared_distance(np.ascontiguousarray(near), vertices, faces)[0]))
-    return int((inside & (far > _scene.TOLERANCE)).sum())
+    far = distance_to_mesh(near, mesh)
+    return int((is_inside(near, mesh) & (far > _scene.TOLERANCE)).sum())

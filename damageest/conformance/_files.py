@@ -13,6 +13,7 @@ import pytest
 from damageest.artefacts import Evidence, Floats, Mesh, Part, Scan, Truth
 from damageest.conformance import _scene
 from damageest.conformance._base import REFUSED, Contract, Placed, back, right_or_refused
+from damageest.geometry.distance import distance_to_mesh
 
 BROKEN: dict[str, bytes | None] = {
     "missing": None,
@@ -121,14 +122,12 @@ class ScanContract(_Reader, Placed):
         self.sound(self.plain())
 
     def test_lies_on_what_was_scanned(self) -> None:
-        import igl
-
         mesh, scan = self.mesh or _scene.prism(), self.plain()
         at = scan if scan.truth is None else scan.moved(scan.truth.T_part_scan)
-        far = np.sqrt(igl.point_mesh_squared_distance(at.points, mesh.vertices, np.array(mesh.faces))[0])
+        far = distance_to_mesh(at.points, mesh)
         damage = scan.truth and scan.truth.damage
         if damage:
-            hit = np.sqrt(igl.point_mesh_squared_distance(at.points, damage.vertices, np.array(damage.faces))[0])
+            hit = distance_to_mesh(at.points, damage)
             assert (hit[far > _scene.TOLERANCE] < _scene.TOLERANCE).mean() > 0.95, "points off part and damage"
         else:
             assert (far < _scene.TOLERANCE).mean() > 0.95
@@ -199,8 +198,8 @@ def _writers() -> Any:
 
 def result() -> Any:
     """What a run finds on the scene."""
+    from damageest.geometry.solids import to_manifold, to_solid, united
     from damageest.result import Result, Site
-    from damageest.solids import to_manifold, to_solid, united
 
     scene = _scene.scene()
     losses = [_scene.dent(k) for k in (0, 1)]

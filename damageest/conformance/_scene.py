@@ -28,7 +28,7 @@ from damageest.artefacts import (
     Solid,
     Surface,
 )
-from damageest.solids import to_arrays, to_manifold, to_solid
+from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 
 TOLERANCE = 0.2
 NOISE = 0.02
@@ -151,8 +151,8 @@ def spread(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Floats, Fl
 @lru_cache
 def scene() -> SimpleNamespace:
     """Part, scan and all that lies between, in the part's frame; arrays are read-only."""
+    from damageest.geometry.distance import signed_distance
     from damageest.stages.sample.edge_aware import EdgeAware
-    from damageest.stages.segment.mesh_distance import signed_distance
 
     rng = np.random.default_rng(7)
     part = prism()

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from damageest.artefacts import Floats, Mesh, Rims, Solid, Surface, open_edges
+from damageest.artefacts import Floats, Rims, Solid, Surface, open_edges
 from damageest.conformance import _scene
 from damageest.conformance._base import Placed, back, right_or_refused
+from damageest.geometry.distance import is_inside
 
 EMPTY = Surface(np.empty((0, 3)), np.empty((0, 3), int))
 
@@ -100,7 +101,7 @@ class BackgroundContract(Placed):
     def right(self, solid: Solid) -> None:
         """Holds the damage surface and what is lost."""
         inner = np.concatenate([_scene.bowl().vertices, _scene.dent(0).vertices])
-        assert _inside(inner, solid).all(), "it does not hold the damage"
+        assert is_inside(inner, solid).all(), "it does not hold the damage"
 
     def test_holds_the_damage(self) -> None:
         self.right(self.plain())
@@ -108,7 +109,7 @@ class BackgroundContract(Placed):
     def test_keeps_clear_of_the_damaged_skin(self) -> None:
         skin = _scene.dent(0).vertices
         above = skin[skin[:, 2] > _scene.HALF_HEIGHT - 1e-9] + [0, 0, 0.5 * _scene.TOLERANCE]
-        assert _inside(above, self.plain()).all()
+        assert is_inside(above, self.plain()).all()
 
     def test_a_coarse_one_holds_it_too(self) -> None:
         self.right(self.run(fine=False))
@@ -123,11 +124,3 @@ class BackgroundContract(Placed):
         self.right(Solid(back(got.vertices, scale, turn, shift), got.faces))
         if np.array_equal(turn, np.eye(3)):
             assert got.volume / scale**3 == pytest.approx(plain.volume, rel=1e-3)
-
-
-def _inside(points: Floats, mesh: Mesh) -> Any:
-    """(N,) whether points (N,3) lie inside a closed mesh."""
-    import igl
-
-    vertices, faces = np.ascontiguousarray(mesh.vertices), np.array(mesh.faces)
-    return np.asarray(igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points))).ravel() > 0.5

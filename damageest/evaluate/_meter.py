@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
-from damageest.hookspecs import hookimpl
+from damageest.registry.hookspecs import hookimpl
 
 HEAVY = (
     "igl",
@@ -75,12 +75,11 @@ def libigl_seconds(points: Floats, part: Mesh) -> float:
     What any method has to do that compares a scan with a CAD model point by point, so a yardstick for its cost that
     carries over from machine to machine.
     """
-    import igl
+    from damageest.geometry.distance import run_libigl_pass
 
     some = points[:: -(-len(points) // YARDSTICK)]
     origin = part.bounds.mean(0)
-    places, vertices = np.ascontiguousarray(some - origin), np.ascontiguousarray(part.vertices - origin)
-    faces = np.array(part.faces)
+    places, mesh = np.ascontiguousarray(some - origin), Mesh(part.vertices - origin, part.faces)
     start = time.process_time()
-    igl.signed_distance(places, vertices, faces, sign_type=igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL)
+    run_libigl_pass(places, mesh)
     return (time.process_time() - start) * len(points) / len(some)

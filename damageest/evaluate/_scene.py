@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Part, Scan
-from damageest.cache import digest
-from damageest.engine import Engine, State
+from damageest.artefacts import Floats, Part
 from damageest.errors import Fault, JobError
-from damageest.job import SURFACE_ONLY, Job, load
-from damageest.measure import measure
-from damageest.meshio import write_points, write_stl
+from damageest.geometry.noise import measure
+from damageest.io.meshes import write_points, write_stl
+from damageest.job import load
+from damageest.pipeline.prepare import read_inputs
 from damageest.registry import Implementation, Registry
+from damageest.registry.contracts import SURFACE_ONLY
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
@@ -41,7 +41,7 @@ class Scene:
 def prepared(path: Path, registry: Registry, folder: Path) -> Scene:
     """Raises JobError where the job is at fault or its scan is not simulated."""
     job = load(path, registry)
-    part, scan = _read(job, registry)
+    part, scan = read_inputs(job, registry)
     if scan.truth is None or scan.truth.damage is None:
         raise JobError(
             [Fault("the truth is not known; give a job with  scan: {use: simulate, damage: [...]}")], str(path)
@@ -94,7 +94,7 @@ def settings_for(item: Implementation, scene: Scene) -> dict[str, Any] | str:
     if item.contract in SURFACE_ONLY:
         job["method"] = "surface"
     elif item.contract is EncloseAll:
-        job["method"] = "octree" if use == "octree" else "implicit"
+        job["method"] = item.method
     return {
         "job": {**job, stage: options},
         "own_part": own_part,
@@ -113,14 +113,6 @@ def _off(scene: Scene) -> Floats:
     T[:3, 3] = centre - T[:3, :3] @ centre
     T[0, 3] += OFF_SHARE * float(np.linalg.norm(np.ptp(scene.bounds, axis=0)))
     return T
-
-
-def _read(job: Job, registry: Registry) -> tuple[Part, Scan]:
-    values = {"unit": job.units, "tolerance": job.tolerance}
-    state = State(values, {name: digest(value) for name, value in values.items()})
-    engine = Engine(job, registry)
-    state = engine.call(ReadScan, engine.call(ReadPart, state))
-    return state["part"], state["scan"]
 
 
 def _specimen(part: Part, points: int, noise: float) -> Floats:

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
 
+from damageest.checks.scan_quality import AUTO_TOLERANCE
 from damageest.errors import InputError
-from damageest.joints import AUTO_TOLERANCE
-from damageest.units import factor
-from damageest.yamlfile import parse
+from damageest.geometry.units import factor
+from damageest.job.yamlfile import parse
 
 SHORT = {"tolerance": "--tolerance", "scan.noise": "--noise", "scan.points": "--points"}
 OWN = ("part", "scan", "scan.use", "scan.damage", "scan.seed")

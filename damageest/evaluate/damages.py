@@ -12,7 +12,7 @@ import numpy as np
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.evaluate.scores import depth, surface_points
-from damageest.solids import to_manifold
+from damageest.geometry.solids import to_manifold
 from damageest.stages.scan._scanner import wear
 from damageest.stages.scan._tools import Blob, Box, Cylinder, Plane, Sphere, Tool
 

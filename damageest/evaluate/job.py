@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from damageest.artefacts import Part
-from damageest.cache import digest, file_sha256
-from damageest.engine import Engine, State
+from damageest.checks.scan_quality import choose_tolerance
 from damageest.errors import InputError
 from damageest.evaluate._case import Case, save_part
 from damageest.evaluate._vary import Base, Variant, Wanted, variants
 from damageest.evaluate.damages import KINDS
 from damageest.evaluate.sized import SIZED
+from damageest.geometry.noise import measure
+from damageest.io.files import file_sha256
 from damageest.job import Job, load
-from damageest.joints import tolerance_of
-from damageest.measure import measure
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine, start
 from damageest.registry import Registry
 from damageest.stages.align import Align
 from damageest.stages.part import ReadPart
@@ -94,21 +95,19 @@ def _automatic(part: Part, scanner: dict[str, Any]) -> float:
     from damageest.artefacts import Scan
 
     empty = Scan(part.vertices[:1], noise=scanner["noise"])
-    return tolerance_of(None, empty, part)[0]
+    return choose_tolerance(None, empty, part)[0]
 
 
 def _read(job: Job, registry: Registry) -> tuple[Part, dict[str, Any], tuple[str, ...]]:
     """The part, the options of a virtual scanner like the job's, and what to know about them."""
-    values = {"unit": job.units, "tolerance": job.tolerance}
-    state = State(values, {name: digest(value) for name, value in values.items()})
     engine = Engine(job, registry)
-    state = engine.call(ReadPart, state)
-    part: Part = state["part"]
+    state = engine.call(ReadPart, start(job).job)
+    part = state.part
     own = job.stages[ReadScan]
     if isinstance(own, Simulate):
         scanner = own.model_dump(mode="json", exclude={"use", "damage", "seed"})
         return part, {**scanner, "noise": 0.0005 * part.diagonal if own.noise is None else own.noise}, ()
-    points = engine.call(ReadScan, state)["scan"].points
+    points = engine.call(ReadScan, state).scan.points
     noise, spacing = measure(points)
     if not spacing:
         raise InputError(f"scan: {len(points)} points are too few to measure its noise and spacing")

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Part, Scan, Solid, Truth
-from damageest.contracts import STAGES
 from damageest.errors import DamageestError, Fault, JobError
 from damageest.evaluate._run import MARK, apart
 from damageest.evaluate._scene import Scene, prepared, settings_for
 from damageest.evaluate.scores import score
 from damageest.registry import Implementation, Registry
+from damageest.registry.contracts import STAGES
 
 
 @dataclass(frozen=True)

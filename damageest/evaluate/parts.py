@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Part
-from damageest.solids import to_arrays
+from damageest.geometry.solids import to_arrays
 
 CHORD = 0.008
 """Largest distance in mm between a curve and its chords."""

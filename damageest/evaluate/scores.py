@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Part, Solid
-from damageest.settle import ids_surface
-from damageest.solids import to_manifold, to_solid
+from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.skin import ids_surface
+from damageest.geometry.solids import to_manifold, to_solid
 
 MATCH = 0.1
 """Share of a loss that has to lie in found sites for it to count as found, and of a site in the losses for it not to
@@ -59,12 +60,7 @@ def iou(found: Sequence[Solid], true: Sequence[Solid]) -> float:
 
 def off_part(points: Floats, part: Mesh) -> Floats:
     """(N,) unsigned distance of points (N,3) to the part's surface."""
-    import igl
-
-    origin = part.bounds.mean(0)
-    vertices, faces = np.ascontiguousarray(part.vertices - origin), np.array(part.faces)
-    squared = igl.point_mesh_squared_distance(np.ascontiguousarray(points - origin), vertices, faces)[0]
-    return np.asarray(np.sqrt(squared))
+    return distance_to_mesh(points, part)
 
 
 def surface_points(part: Mesh, count: int, seed: int = 0) -> tuple[Floats, Floats]:

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from functools import cache
 
 from damageest.artefacts import Part
-from damageest.cache import digest
-from damageest.errors import InputError
+from damageest.errors import InputError, suggest
 from damageest.evaluate._case import Case
 from damageest.evaluate._vary import Base, Wanted, variants
 from damageest.evaluate.damages import KINDS
 from damageest.evaluate.job import checked, code
 from damageest.evaluate.parts import PARTS
 from damageest.evaluate.sized import SIZED
-from damageest.registry import Registry, near
+from damageest.pipeline.cache import digest
+from damageest.registry import Registry
 
 SIGMA = 0.0005
 """Noise of the scan as a share of the part's diagonal."""
@@ -32,7 +32,7 @@ def cases(count: int, seed: int, parts: Sequence[str], pose: str, wanted: Wanted
     part that there is not, or for what cannot be varied so."""
     for name in parts:
         if name not in PARTS:
-            raise InputError(f"--parts: no part '{name}'{near(name, list(PARTS))}; there are: {', '.join(PARTS)}")
+            raise InputError(f"--parts: no part '{name}'{suggest(name, list(PARTS))}; there are: {', '.join(PARTS)}")
     if count < 1:
         raise InputError(f"--cases: give 1 or more, not {count}")
     made, computed = [], code(registry)

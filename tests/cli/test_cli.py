@@ -10,7 +10,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from damageest.contracts import STAGES
+from damageest.registry.contracts import STAGES
 from tests import damaged_box
 
 ROOT = Path(__file__).parents[2]

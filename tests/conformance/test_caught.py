@@ -15,7 +15,7 @@ from damageest import conformance
 from damageest.artefacts import Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
 from damageest.conformance import _scene
 from damageest.conformance._base import Contract, Placed
-from damageest.meshio import write_stl
+from damageest.io.meshes import write_stl
 from damageest.stages.align.none import Unaligned
 from damageest.stages.allowance.none import Nothing as NoAllowance
 from damageest.stages.background.bbox import BoundingBox

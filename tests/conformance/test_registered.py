@@ -13,9 +13,9 @@ import pytest
 
 from damageest import conformance
 from damageest.conformance import NEAR, _scene
-from damageest.contracts import DEFAULTS
-from damageest.meshio import write_points, write_stl
+from damageest.io.meshes import write_points, write_stl
 from damageest.registry import Registry
+from damageest.registry.contracts import DEFAULTS
 
 HERE = tempfile.TemporaryDirectory(prefix="damageest-conformance-")
 FOLDER = Path(HERE.name)

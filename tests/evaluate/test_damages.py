@@ -5,7 +5,7 @@ import pytest
 from damageest.evaluate.damages import KINDS, SHARE, random_damage
 from damageest.evaluate.parts import PARTS
 from damageest.evaluate.scores import depth, iou
-from damageest.solids import to_manifold
+from damageest.geometry.solids import to_manifold
 from damageest.stages.scan.simulate import Simulate
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from damageest.contracts import STAGES
 from damageest.errors import InputError, JobError
 from damageest.evaluate._table import marks, placed, table
 from damageest.evaluate.matrix import Cell, matrix
 from damageest.registry import Registry
+from damageest.registry.contracts import STAGES
 from tests import damaged_box
 
 BEGIN, END = marks("matrix")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from damageest.evaluate.parts import CHORD, PARTS
-from damageest.solids import to_manifold
+from damageest.geometry.solids import to_manifold
 
 
 @pytest.mark.parametrize("name", sorted(PARTS))

@@ -9,7 +9,7 @@ import trimesh
 from damageest.artefacts import Floats, Solid
 from damageest.evaluate.parts import PARTS
 from damageest.evaluate.scores import iou, score
-from damageest.settle import ids_surface
+from damageest.geometry.skin import ids_surface
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Solid:

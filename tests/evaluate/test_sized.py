@@ -5,7 +5,7 @@ import pytest
 from damageest.evaluate.parts import PARTS
 from damageest.evaluate.scores import depth
 from damageest.evaluate.sized import CLOSE, SIZED, sized_damage
-from damageest.solids import to_manifold
+from damageest.geometry.solids import to_manifold
 
 
 @pytest.mark.parametrize("kind", SIZED)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Part, Pose, Samples, Scan
-from damageest.stages import Stage
+from damageest.stages import Stage, asked_by_name
 
 
 class Align(Stage, ABC):
@@ -17,8 +16,8 @@ class Align(Stage, ABC):
     """
 
     stage: ClassVar[str] = "align"
-    takes: ClassVar[Mapping[str, object]] = {"scan": Scan, "part": Part, "samples": Samples, "tolerance": float}
     gives: ClassVar[str] = "pose"
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Pose: ...
+    def run(self, scan: Scan, part: Part, samples: Samples, tolerance: float) -> Pose: ...

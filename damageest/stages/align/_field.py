@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.distance import SurfaceTree
 
 Singles = NDArray[np.float32]
 
@@ -24,12 +24,8 @@ class Target:
     mesh: Mesh
 
     @cached_property
-    def _tree(self) -> Any:
-        import igl
-
-        tree = igl.AABB()
-        tree.init(self.mesh.vertices, self.mesh.faces)
-        return tree
+    def _tree(self) -> SurfaceTree:
+        return SurfaceTree(self.mesh)
 
     @cached_property
     def normals(self) -> Floats:
@@ -42,11 +38,9 @@ class Target:
 
         The sign is the nearest face's. On a saddle-shaped corner that can be the wrong one, which a robust fit bears.
         """
-        square, face, foot = self._tree.squared_distance(
-            self.mesh.vertices, self.mesh.faces, np.ascontiguousarray(points, np.float64)
-        )
+        distance, face, foot = self._tree.closest(points)
         outward = np.einsum("ij,ij->i", points - foot, self.normals[face])
-        return np.copysign(np.sqrt(square), outward), foot, face
+        return np.copysign(distance, outward), foot, face
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ class Frame:
     @classmethod
     def of(cls, scan: Scan, part: Part) -> Frame:
         """Raises StageError for a scan of too few or non-finite points, or of a size that cannot be the part's."""
-        from damageest.units import diagnose_scale
+        from damageest.geometry.units import diagnose_scale
 
         if len(scan.points) < FEWEST:
             raise StageError(

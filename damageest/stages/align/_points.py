@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.sampling import sample_by_area
 
 DENSE = 120_000
 """Scan points that the density and the normals are measured on; more of them cost time and teach nothing new."""
@@ -95,15 +96,9 @@ def scan_cloud(
 
 def surface_cloud(part: Mesh, wanted: int, rng: np.random.Generator) -> Cloud:
     """``wanted`` points spread over a mesh by area, with the normals of their faces."""
-    double = np.linalg.norm(part.cross, axis=1)
-    total = np.cumsum(double)
-    at = (np.arange(wanted) + rng.random(wanted)) / wanted * total[-1]
-    face = np.minimum(np.searchsorted(total, at), len(total) - 1)
-    u, v = rng.random((2, wanted))
-    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    a, b, c = np.moveaxis(part.triangles[face], 1, 0)
-    points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
-    return Cloud(points, part.cross[face] / np.maximum(double[face], 1e-300)[:, None], True)
+    points, face = sample_by_area(part, wanted, rng)
+    normal = part.cross[face]
+    return Cloud(points, normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None], True)
 
 
 def by_direction(cloud: Cloud, wanted: int, rng: np.random.Generator) -> Cloud:

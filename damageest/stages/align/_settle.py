@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.lattice import faced_cubes
+from damageest.geometry.voxels import faced_cubes
 from damageest.stages.align._field import Target
 from damageest.stages.align._fine import REACH, Fit, gauss_newton, moved
 from damageest.stages.align._search import motion

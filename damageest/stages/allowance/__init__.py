@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Part, Solid
-from damageest.stages import Stage
+from damageest.stages import Stage, asked_by_name
 
 
 class Allowance(Stage, ABC):
@@ -18,8 +17,9 @@ class Allowance(Stage, ABC):
     """
 
     stage: ClassVar[str] = "allowance"
-    takes: ClassVar[Mapping[str, object]] = {"damage": Solid, "part": Part, "tolerance": float, "others": Solid}
     gives: ClassVar[str] = "deposit"
+    per_site: ClassVar[bool] = True
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Solid | None: ...
+    def run(self, damage: Solid, part: Part, tolerance: float, others: Solid | None) -> Solid | None: ...

@@ -38,7 +38,7 @@ def touching(proud: Any, filled: Any, tolerance: float) -> Any:
 
 def joined(filled: Any, proud: Any) -> Any:
     """The union, by the first of several ways that leaves no volume unaccounted for, else the nearest; as
-    `damageest.solids.remainder`."""
+    `damageest.geometry.solids.remainder`."""
     whole = filled.volume() + proud.volume() - (filled ^ proud).volume()
     nudge = 1e-9 * max(abs(bound) for bound in filled.bounding_box())
     ways: tuple[Callable[[], Any], ...] = (
@@ -62,8 +62,8 @@ def apart(body: Any, origin: Floats, by: float) -> Solid | None:
     triangles. Such vertices are drawn in by ``by``, and where details finer than that are in the way, those go first.
     None where the Manifold is empty; as it was where nothing helps.
     """
-    from damageest.meshio import single_precision
-    from damageest.solids import to_solid
+    from damageest.geometry.rounding import single_precision
+    from damageest.geometry.solids import to_solid
 
     first = to_solid(body, origin)
     for detail in (0.0, 0.01, 0.1, 1.0):

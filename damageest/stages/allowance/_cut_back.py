@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Part, Solid
+from damageest.artefacts import Floats, Mesh, Part, Solid
 from damageest.errors import StageError
-from damageest.settle import inner_faces
-from damageest.solids import BALANCE, remainder, to_manifold, to_solid
+from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.skin import inner_faces
+from damageest.geometry.solids import BALANCE, remainder, to_manifold, to_solid
 from damageest.stages.allowance._booleans import tidied
 
 FINE, COARSE, COARSEST = 0.5, 0.75, 1.0
@@ -58,14 +59,12 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
 
 def _within(damage: Solid, faces: Any, part: Part, inner: float, tolerance: float) -> Solid:
     """Everything within ``inner`` and a quarter of a tolerance of some faces of the damage volume, near the part."""
-    import igl
-
-    from damageest.stages.background._contour import MOST_NODES, contour
+    from damageest.geometry.contour import MOST_NODES, contour
 
     origin = part.bounds.mean(axis=0)
     reach = inner + tolerance / 4
-    vertices, faces = np.ascontiguousarray(damage.vertices - origin), np.ascontiguousarray(faces)
-    used = vertices[np.unique(faces)]
+    mesh = Mesh(damage.vertices - origin, faces)
+    used = mesh.vertices[np.unique(faces)]
     margin = reach + 2 * COARSEST * tolerance
     low = np.maximum(used.min(axis=0) - margin, part.bounds[0] - origin - 4 * tolerance)
     high = np.minimum(used.max(axis=0) + margin, part.bounds[1] - origin + 4 * tolerance)
@@ -78,8 +77,7 @@ def _within(damage: Solid, faces: Any, part: Part, inner: float, tolerance: floa
         )
 
     def distance(points: Floats) -> Floats:
-        squared, _, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(points), vertices, faces)
-        return np.asarray(np.sqrt(squared) - reach)
+        return distance_to_mesh(points, mesh) - reach
 
     nx, ny, nz = (np.ceil((high - low) / cell).astype(int) + 1).tolist()
     found = contour(distance, low, (nx, ny, nz), cell)

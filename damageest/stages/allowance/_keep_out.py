@@ -92,11 +92,11 @@ def _bar(bar: Bar, origin: Floats) -> Any:
 
 
 def _read(path: Path, part: Part, origin: Floats) -> Any:
-    from damageest.solids import to_manifold
-    from damageest.stages.part.file import PartFile
+    from damageest.geometry.solids import to_manifold
+    from damageest.io.parts import read_part
 
     try:
-        solid: Solid = PartFile(path=path).run(unit=part.unit)
+        solid: Solid = read_part(path, part.unit)
         return to_manifold(solid, origin)
     except (DamageestError, ValueError, OSError) as error:
         raise StageError(f"keep_out: {path}: {error}", "a watertight STL, PLY, OBJ, OFF or 3MF") from None

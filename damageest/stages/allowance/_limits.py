@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Floats, Part
-from damageest.solids import to_manifold
+from damageest.artefacts import Floats, Mesh, Part
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
+from damageest.geometry.solids import to_manifold
 from damageest.stages.allowance._skin import ON, Skin
 
 OPPOSITE, NARROW = -0.5, -0.87
@@ -48,7 +49,6 @@ def probes(skin: Skin, seed: int = 11) -> tuple[Floats, NDArray[np.int64]]:
 def crowded(skin: Skin, part: Part, tolerance: float, origin: Floats) -> Crowd | None:
     """Places where the stock meets an opposite wall of the part, or that wall's own stock; None where it has room.
     ``skin`` with what is wanted on it, relative to ``origin`` (3,)."""
-    import igl
 
     wanted = skin.only(skin.height > 0)
     if not len(wanted.faces):
@@ -63,10 +63,8 @@ def crowded(skin: Skin, part: Part, tolerance: float, origin: Floats) -> Crowd |
     hit = hit[~_corner(points[hit], normal[hit], place[hit], facing[hit], part, tolerance, origin)]
     if not len(hit):
         return None
-    squared, opposite, _ = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(place[hit]), wanted.vertices, np.ascontiguousarray(wanted.faces)
-    )
-    other = np.where(squared <= away**2, wanted.height[opposite], 0.0)
+    distance, opposite, _ = closest_on_mesh(place[hit], Mesh(wanted.vertices, wanted.faces))
+    other = np.where(distance <= away, wanted.height[opposite], 0.0)
     short = free[hit] + away < height[hit] + other
     if not short.any():
         return None
@@ -79,8 +77,6 @@ def _corner(
 ) -> NDArray[np.bool_]:
     """(N,) whether skin and wall are those of one concave corner: their planes meet on the part's surface. Between the
     flanks of a gap with a floor they meet below it."""
-    import igl
-
     if not len(points):
         return np.zeros(0, bool)
     across = facing - np.einsum("ij,ij->i", facing, normal)[:, None] * normal
@@ -88,10 +84,7 @@ def _corner(
     wide = np.einsum("ij,ij->i", facing, normal) > NARROW
     steps = np.einsum("ij,ij->i", place - points, facing) / np.where(wide, steep, 1)
     meeting = points + np.where(wide, steps, 0)[:, None] * across
-    squared, _, _ = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(meeting), np.ascontiguousarray(part.vertices - origin), np.array(part.faces)
-    )
-    return np.asarray(wide & (squared <= tolerance**2))
+    return np.asarray(wide & (distance_to_mesh(meeting + origin, part) <= tolerance))
 
 
 def _way(body: Any, start: Floats, direction: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:

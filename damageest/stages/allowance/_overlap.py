@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Part
-from damageest.solids import to_arrays, to_manifold
+from damageest.artefacts import Floats, Ints, Mesh, Part
+from damageest.geometry.distance import closest_on_mesh, distance_to_edges
+from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.allowance._selectors import Wanted
 from damageest.stages.allowance._skin import ON, Skin, clipped, sorted_skin
 
@@ -13,7 +14,6 @@ from damageest.stages.allowance._skin import ON, Skin, clipped, sorted_skin
 def grown(skin: Skin, part: Part, wanted: Wanted, overlap: float, tolerance: float, origin: Floats) -> Skin | None:
     """The part's skin within ``overlap`` of the rim, on both sides of it, as far as it hangs together with it; with the
     same stock as anywhere. None where there is nothing to run over."""
-    import igl
     from manifold3d import Manifold
 
     rim = _rim(skin)
@@ -26,8 +26,7 @@ def grown(skin: Skin, part: Part, wanted: Wanted, overlap: float, tolerance: flo
     # fine enough that distance, linear on each triangle, is right to a fraction of the tolerance
     near = near.refine_to_length(max(overlap / 2, tolerance / 2))
     vertices, faces = to_arrays(near)
-    squared, _, _ = igl.point_mesh_squared_distance(vertices, skin.vertices, rim)
-    value = overlap - np.sqrt(squared)
+    value = overlap - distance_to_edges(vertices, skin.vertices, rim)
     close = (value[faces] > 0).any(axis=1)
     vertices, faces, _, inside = clipped(vertices, faces[close], value)
     faces = faces[inside]
@@ -51,7 +50,6 @@ def _rim(skin: Skin) -> Ints:
 
 def _joined(vertices: Floats, faces: Ints, places: Floats, part: Part) -> Ints:
     """Those faces that hang together, by their corners, with one that one of the places (M,3) lies on."""
-    import igl
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -60,6 +58,6 @@ def _joined(vertices: Floats, faces: Ints, places: Floats, part: Part) -> Ints:
     _, label = connected_components(
         coo_array((np.ones(len(rows)), (rows, columns)), shape=(size, size)), directed=False
     )
-    squared, face, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(places), vertices, faces)
-    seeds = np.unique(label[faces[face[squared <= (10 * ON * part.diagonal) ** 2], 0]])
+    distance, face, _ = closest_on_mesh(places, Mesh(vertices, faces))
+    seeds = np.unique(label[faces[face[distance <= 10 * ON * part.diagonal], 0]])
     return np.asarray(faces[np.isin(label[faces[:, 0]], seeds)])

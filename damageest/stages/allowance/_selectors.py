@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from damageest.artefacts import Floats, Ints, Part
-from damageest.errors import StageError
-from damageest.registry import near
+from damageest.errors import StageError, suggest
 from damageest.stages import JobPath
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
@@ -53,7 +52,9 @@ class Strict(BaseModel):
             raise ValueError(f"give a mapping with one or more of: {', '.join(keys)}")
         unknown = [key for key in value if key not in (*keys, *cls.model_fields)] if isinstance(value, dict) else []
         if unknown:
-            raise ValueError(f"unknown key '{unknown[0]}'{near(str(unknown[0]), keys)}; valid are: {', '.join(keys)}")
+            raise ValueError(
+                f"unknown key '{unknown[0]}'{suggest(str(unknown[0]), keys)}; valid are: {', '.join(keys)}"
+            )
         return value
 
 
@@ -227,4 +228,6 @@ def _number(part: Part, face: int | str) -> int:
     if not names:
         raise StageError(f"no CAD face '{face}': the part's faces have no names", f"a number from 0 to {count - 1}")
     listed = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
-    raise StageError(f"no CAD face '{face}'{near(face, names)}", f"a name of: {listed}; or a number up to {count - 1}")
+    raise StageError(
+        f"no CAD face '{face}'{suggest(face, names)}", f"a name of: {listed}; or a number up to {count - 1}"
+    )

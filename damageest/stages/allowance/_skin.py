@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh, Part
+from damageest.geometry.distance import closest_on_mesh
 from damageest.stages.allowance._selectors import Wanted
 
 ON = 1e-7
@@ -84,16 +85,12 @@ def sorted_skin(vertices: Floats, faces: Ints, part: Part, wanted: Wanted, origi
 
 def on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> tuple[NDArray[np.bool_], Ints]:
     """Which faces (F,) lie on the part and face the same way, and the part's triangle (F,) below the middle of each."""
-    import igl
-
     # three points near the corners and the middle: a face of a cut may touch the skin along an edge
     weights = np.array([[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [1 / 3, 1 / 3, 1 / 3]])
     corners = vertices[faces]
     probes = np.einsum("pk,fkj->fpj", weights, corners).reshape(-1, 3)
-    squared, parent, _ = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(probes), np.ascontiguousarray(part.vertices - origin), np.array(part.faces)
-    )
-    near = squared.reshape(-1, 4).max(axis=1) <= (ON * part.diagonal) ** 2
+    distance, parent, _ = closest_on_mesh(probes + origin, part)
+    near = distance.reshape(-1, 4).max(axis=1) <= ON * part.diagonal
     parent = np.asarray(parent.reshape(-1, 4)[:, 3], np.int64)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # slivers face anywhere, and left out they would leave slits

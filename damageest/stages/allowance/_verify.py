@@ -10,7 +10,8 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.errors import StageError
-from damageest.solids import to_arrays
+from damageest.geometry.distance import distance_to_edges, distance_to_mesh, is_inside
+from damageest.geometry.solids import to_arrays
 from damageest.stages.allowance._limits import Crowd
 from damageest.stages.allowance._selectors import Mask
 from damageest.stages.allowance._skin import ON, Skin, unit
@@ -49,7 +50,6 @@ class Worked:
 def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -> tuple[float, float, float] | None:
     """The least, mean and largest thickness of the stock; None where none is wanted. Raises StageError with the figure
     where a guarantee is not kept."""
-    import igl
 
     missing = (work.cavity - work.deposit).volume() / work.cavity.volume()
     if missing > VOLUME:
@@ -79,7 +79,7 @@ def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -
     rims = wanted.rims()
     inner = np.ones(len(found.thick), bool)
     if len(rims):
-        inner = igl.point_mesh_squared_distance(found.points, wanted.vertices, rims)[0] > (tolerance / 2) ** 2
+        inner = distance_to_edges(found.points, wanted.vertices, rims) > tolerance / 2
     own = found.thick[inner & ~found.ended & ~found.covered]
     return (float(own.min()), float(own.mean()), float(own.max())) if len(own) else None
 
@@ -107,7 +107,7 @@ class Thickness:
 
 def thickness(work: Worked, wanted: Skin, part: Part, crowds: Sequence[Crowd]) -> Thickness:
     """Measured by rays along the normal of the skin with stock."""
-    import igl
+    from scipy.spatial import cKDTree
 
     rounding = 10 * ON * part.diagonal
     points, face = wanted.sampled(SAMPLES, seed=23)
@@ -125,10 +125,8 @@ def thickness(work: Worked, wanted: Skin, part: Part, crowds: Sequence[Crowd]) -
     ended = _near(ends, work.left, 10 * rounding) | _near(ends, work.kept_out, 10 * rounding)
     ended |= _inside(ends, work.kept_out)
     for crowd in crowds:
-        squared, _, _ = igl.point_mesh_squared_distance(
-            np.ascontiguousarray(points), crowd.points - work.origin, np.arange(len(crowd.points))[:, None]
-        )
-        ended |= squared <= (2 * height) ** 2
+        away = np.asarray(cKDTree(crowd.points - work.origin).query(points, workers=2)[0])
+        ended |= away <= 2 * height
     return Thickness(points, height, np.where(covered, nearest, far), covered, ended)
 
 
@@ -156,34 +154,22 @@ def strayed(work: Worked, part: Part, tolerance: float) -> tuple[float, Floats]:
 
 def _to_stock(work: Worked, points: Floats) -> Floats:
     """(N,) distance to the nearest skin with stock."""
-    import igl
-
     found = np.full(len(points), np.inf)
     for skin in work.skins():
         tall = skin.only(skin.height > 0)
         if len(tall.faces):
-            squared, _, _ = igl.point_mesh_squared_distance(
-                np.ascontiguousarray(points), tall.vertices, np.ascontiguousarray(tall.faces)
-            )
-            found = np.minimum(found, np.sqrt(squared))
+            found = np.minimum(found, distance_to_mesh(points, Mesh(tall.vertices, tall.faces)))
     return found
 
 
 def _inside(points: Floats, body: Any) -> Mask:
     """(N,) by winding number."""
-    import igl
-
     if body.is_empty() or not len(points):
         return np.zeros(len(points), bool)
-    vertices, faces = to_arrays(body)
-    return np.asarray(igl.fast_winding_number(vertices, faces, np.ascontiguousarray(points)) > 0.5)
+    return is_inside(points, Mesh(*to_arrays(body)))
 
 
 def _near(points: Floats, body: Any, reach: float) -> Mask:
-    import igl
-
     if body.is_empty():
         return np.zeros(len(points), bool)
-    mesh = Mesh(*to_arrays(body))
-    squared, _, _ = igl.point_mesh_squared_distance(np.ascontiguousarray(points), mesh.vertices, mesh.faces.copy())
-    return np.asarray(squared <= reach**2)
+    return distance_to_mesh(points, Mesh(*to_arrays(body))) <= reach

@@ -59,7 +59,7 @@ class Milling(Allowance):
         guarantee is not kept."""
         from manifold3d import Manifold
 
-        from damageest.solids import remainder, to_manifold
+        from damageest.geometry.solids import remainder, to_manifold
         from damageest.stages.allowance._booleans import apart, joined, tidied, touching
         from damageest.stages.allowance._cut_back import cut_back
         from damageest.stages.allowance._keep_out import kept_out

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Floats, Part, Samples, Solid, Surface
-from damageest.stages import Stage
+from damageest.stages import Stage, asked_by_name
 
 
 class Background(Stage, ABC):
@@ -18,16 +17,18 @@ class Background(Stage, ABC):
     """
 
     stage: ClassVar[str] = "background"
-    takes: ClassVar[Mapping[str, object]] = {
-        "part": Part,
-        "surface": Surface,
-        "tolerance": float,
-        "spacing": float,
-        "fine": bool,
-        "intact": Floats,
-        "samples": Samples,
-    }
     gives: ClassVar[str] = "background"
+    per_site: ClassVar[bool] = True
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Solid: ...
+    def run(
+        self,
+        part: Part,
+        surface: Surface,
+        tolerance: float,
+        spacing: float,
+        fine: bool,
+        intact: Floats,
+        samples: Samples,
+    ) -> Solid: ...

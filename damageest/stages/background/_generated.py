@@ -10,9 +10,10 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Mesh, Part, Solid, Surface
 from damageest.errors import StageError
-from damageest.solids import to_arrays, to_manifold, to_solid
+from damageest.geometry.distance import is_inside
+from damageest.geometry.refinement import halved
+from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.stages.background import Background
-from damageest.stages.enclose._refine import halved
 
 MOST_FACES = 400_000
 PASSES = 6
@@ -100,16 +101,8 @@ def check_surface(surface: Surface) -> None:
 
 def check_holds(background: Solid, skin: Floats, surface: Surface) -> Solid:
     """The background, if IDS and ``skin``, points (N,3) of the part, lie inside it. Raises StageError otherwise."""
-    import igl
-
     inner = np.concatenate([skin, surface.vertices])
-    origin = background.bounds.mean(axis=0)
-    number = igl.fast_winding_number(
-        np.ascontiguousarray(background.vertices - origin),
-        np.array(background.faces),
-        np.ascontiguousarray(inner - origin),
-    )
-    if outside := int((number < 0.5).sum()):
+    if outside := int((~is_inside(inner, background)).sum()):
         raise StageError(
             f"the background does not hold part and damage surface: {outside} of {len(inner)} points lie outside",
             "subdivide: linear, background: minkowski, or method: implicit",

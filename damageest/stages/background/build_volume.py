@@ -44,9 +44,9 @@ class BuildVolume(Background):
         self, part: Part, surface: Surface, samples: Samples, intact: Floats, tolerance: float, spacing: float
     ) -> Solid:
         """Raises StageError where the part does not fit in, or the cells round the site would not fit in memory."""
-        from damageest.stages.background._contour import contour
+        from damageest.geometry.contour import contour
+        from damageest.geometry.distance import signed_distance
         from damageest.stages.background._generated import check_holds, check_surface
-        from damageest.stages.segment.mesh_distance import signed_distance
 
         check_surface(surface)
         by = max(self.clearance * tolerance, 1.5 * spacing)

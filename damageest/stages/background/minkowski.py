@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from damageest.artefacts import Floats, Part, Surface
-from damageest.solids import to_manifold
+from damageest.geometry.solids import to_manifold
 from damageest.stages.background._generated import MOST_FACES, Generated
 
 
@@ -19,8 +19,8 @@ class Minkowski(Generated):
 
     def shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
         """The level of the distance. Raises StageError where its lattice would not fit in memory."""
-        from damageest.stages.background._contour import contour
-        from damageest.stages.segment.mesh_distance import signed_distance
+        from damageest.geometry.contour import contour
+        from damageest.geometry.distance import signed_distance
 
         # Two triangles to a cell: a lattice as fine as the clearance, or as the number of triangles allows.
         cell = max(by, float(np.sqrt(2.5 * part.area / MOST_FACES)))

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Part, Surface
-from damageest.solids import to_manifold
+from damageest.geometry.solids import to_manifold
 from damageest.stages.background._generated import Generated
 
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Part, Solid
-from damageest.stages import Stage
+from damageest.stages import Stage, asked_by_name
 
 
 class Boolean(Stage, ABC):
     """Gives the part of ``solid`` that lies in the part (paper 3.1 step 12); None where there is none."""
 
     stage: ClassVar[str] = "boolean"
-    takes: ClassVar[Mapping[str, object]] = {"solid": Solid, "part": Part}
     gives: ClassVar[str] = "damage"
+    per_site: ClassVar[bool] = True
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Solid | None: ...
+    def run(self, solid: Solid, part: Part) -> Solid | None: ...

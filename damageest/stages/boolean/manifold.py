@@ -18,7 +18,7 @@ class Manifold(Boolean):
         """The part of ``solid`` inside ``part`` (paper 3.1 step 12). Raises StageError where a mesh is refused."""
         from manifold3d import Error
 
-        from damageest.solids import to_manifold, to_solid
+        from damageest.geometry.solids import to_manifold, to_solid
 
         origin = part.bounds.mean(axis=0)
         try:

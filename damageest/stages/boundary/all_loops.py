@@ -21,8 +21,8 @@ class AllLoops(Boundary):
 
     def run(self, surface: Surface, part: Part, tolerance: float) -> Rims:
         """Raises StageError where there is no such loop."""
-        from damageest.stages.boundary._loops import rims
-        from damageest.stages.segment.mesh_distance import signed_distance
+        from damageest.geometry.distance import signed_distance
+        from damageest.geometry.loops import rims
 
         found = rims(surface)
         depth = [-signed_distance(surface.vertices[loop], part)[0] for loop in found]

@@ -15,6 +15,6 @@ class LargestLoop(Boundary):
 
     def run(self, surface: Surface) -> Rims:
         """Raises StageError where there is no loop of more than ten nodes."""
-        from damageest.stages.boundary._loops import rims
+        from damageest.geometry.loops import rims
 
         return Rims(tuple(rims(surface)[:1]))

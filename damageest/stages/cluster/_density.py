@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.lattice import cubes
+from damageest.geometry.voxels import cubes
 
 PAIRS = 20_000_000
 """Pairs of neighbours that may be held at once, 16 bytes each; more, and points are first gathered into a grid."""

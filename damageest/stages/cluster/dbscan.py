@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
 from damageest.artefacts import DAMAGE, Deviation, Floats, Ints, Scan, Sites
-from damageest.nearby import nearby
+from damageest.geometry.neighbourhoods import nearby
 from damageest.stages.cluster import Cluster
 from damageest.stages.cluster._density import dbscan, neighbour_distances
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Deviation, Enclosures, Floats, Mesh, Part, Rims, Samples, Scan, Sites, Solid, Surface
 from damageest.errors import StageError
-from damageest.stages import Stage
+from damageest.stages import Stage, asked_by_name
 
 
 class NotSeparatedError(StageError):
@@ -27,34 +26,37 @@ class Enclose(Stage, ABC):
     refines: ClassVar[bool] = False
 
     stage: ClassVar[str] = "enclose"
-    takes: ClassVar[Mapping[str, object]] = {
-        "surface": Surface,
-        "rims": Rims,
-        "background": Solid,
-        "part": Part,
-        "intact": Floats,
-        "points": Floats,
-        "tolerance": float,
-    }
     gives: ClassVar[str] = "enclosure"
+    per_site: ClassVar[bool] = True
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Mesh: ...
+    def run(
+        self,
+        surface: Surface,
+        rims: Rims,
+        background: Solid,
+        part: Part,
+        intact: Floats,
+        points: Floats,
+        tolerance: float,
+    ) -> Mesh: ...
 
 
 class EncloseAll(Stage, ABC):
-    """Gives enclosures for all sites of the job at once; for routes that do not go site by site."""
+    """Gives enclosures for all sites of the job at once; for routes that do not go site by site.
+
+    ``method``: the value of the job's `method` that chooses the implementation. A plugin may name a method of its own:
+    the job file then knows it.
+    """
+
+    method: ClassVar[str] = "implicit"
 
     stage: ClassVar[str] = "enclose"
-    takes: ClassVar[Mapping[str, object]] = {
-        "part": Part,
-        "aligned": Scan,
-        "deviation": Deviation,
-        "sites": Sites,
-        "samples": Samples,
-        "tolerance": float,
-    }
     gives: ClassVar[str] = "enclosures"
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Enclosures: ...
+    def run(
+        self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
+    ) -> Enclosures: ...

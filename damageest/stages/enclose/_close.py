@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh, Part, Rims, Surface
 from damageest.errors import StageError
+from damageest.geometry.distance import is_inside, winding_number
 from damageest.stages.enclose import NotSeparatedError
 from damageest.stages.enclose._sew import Cycle, Wide, cut_off, filled, strip
 
@@ -54,9 +54,9 @@ def closed(
     # A few thousand tell; of a background that is made round the site alone, those that lie in it. Points beside the
     # rim, no deeper than the tolerance, belong to either side.
     few = near[:: max(1, len(near) // 4000)]
-    few = few[_inside(few, background)]
+    few = few[is_inside(few, background)]
     few = few[cKDTree(surface.vertices).query(few, workers=2)[0] > 3 * tolerance] if len(few) else few
-    kept = [float(_inside(few, mesh).mean()) if len(few) else 0.0 for mesh in found]
+    kept = [float(is_inside(few, mesh).mean()) if len(few) else 0.0 for mesh in found]
     best = int(np.argmin(kept))
     if kept[best] > 0.02:
         raise NotSeparatedError(
@@ -108,7 +108,7 @@ def _pieces(surface: Surface) -> Ints:
 
 def _through(strips: Mesh, part: Part, tolerance: float) -> float:
     """Area of the strips that lies inside the part, farther from its skin than the rim has to be."""
-    from damageest.stages.segment.mesh_distance import signed_distance
+    from damageest.geometry.distance import signed_distance
 
     area = np.linalg.norm(strips.cross, axis=1) / 2
     # A long triangle is looked at along its length: at the middle of it, and between the middle and the corners.
@@ -125,26 +125,10 @@ def _wrongly_sided(mesh: Mesh, count: int, tolerance: float) -> float:
 
     A strip that crosses the surface, or a background cut that folds over, shows there and nowhere else.
     """
-    import igl
-
     chosen = np.unique(np.linspace(0, count - 1, min(count, 1000)).astype(np.int64))
-    origin = mesh.vertices.mean(axis=0)
-    middle = mesh.triangles[chosen].mean(axis=1) - origin
+    middle = mesh.triangles[chosen].mean(axis=1)
     step = mesh.cross[chosen]
     step = step * (0.5 * tolerance / np.maximum(np.linalg.norm(step, axis=1), 1e-300))[:, None]
-    vertices, faces = np.ascontiguousarray(mesh.vertices - origin), np.array(mesh.faces)
-    behind, before = (igl.fast_winding_number(vertices, faces, middle + way * step) for way in (-1, 1))
+    behind, before = (winding_number(middle + way * step, mesh) for way in (-1, 1))
     right = (np.abs(behind - 1) < 0.5) & (np.abs(before) < 0.5)
     return float(1 - right.mean())
-
-
-def _inside(points: Floats, mesh: Mesh) -> NDArray[np.bool_]:
-    """(N,) whether points (N,3) lie inside a closed mesh; of one turned inside out, outside it."""
-    import igl
-
-    if not len(points):
-        return np.empty(0, dtype=bool)
-    origin = points.mean(axis=0)
-    vertices = np.ascontiguousarray(mesh.vertices - origin)
-    number = igl.fast_winding_number(vertices, np.array(mesh.faces), np.ascontiguousarray(points - origin))
-    return np.asarray(number > 0.5)

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Deviation, Floats, Ints, Part, Samples, Scan, Sites
-from damageest.lattice import cubes
-from damageest.stages.enclose._fit import averaged, neighbours, subset, thinned
-from damageest.stages.enclose._orient import toward_void
-from damageest.stages.enclose._poisson import Field, Grid, refined
+from damageest.geometry.local_fits import averaged
+from damageest.geometry.neighbourhoods import local_areas, neighbours, subset, thinned
+from damageest.geometry.orientation import toward_void
+from damageest.geometry.poisson import Field, Grid, refined
+from damageest.geometry.voxels import cubes
 from damageest.stages.enclose._skin import Flags, Skin, pushed, skin_near
 
 APART = 0.75
@@ -156,16 +157,6 @@ def _groups(
         )
         found.append(Group(*surface, skin.points[lost], labels))
     return tuple(found), lost_by
-
-
-def local_areas(points: Floats) -> Floats:
-    """Area (N,) that each of the points on a surface stands for, from its eight nearest."""
-    if len(points) < 3:
-        return np.full(len(points), 1e-12)
-    distance, _ = neighbours(points, 9)
-    count = distance.shape[1] - 1
-    area = np.pi * distance[:, -1] ** 2 / count
-    return np.asarray(np.minimum(area, 4 * np.median(area)))
 
 
 def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) -> tuple[Floats, Ints, Flags, Ints]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Solid
-from damageest.stages.enclose._fit import neighbours
+from damageest.geometry.neighbourhoods import neighbours
 
 NEAR = 12
 """Points that a vertex is fitted to."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Rims, Surface
 from damageest.errors import StageError
-from damageest.stages.boundary._loops import loops
+from damageest.geometry.loops import loops
 
 
 @dataclass(frozen=True, eq=False)

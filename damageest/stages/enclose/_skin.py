@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Samples, Scan, Sites
-from damageest.stages.enclose._fit import neighbours, subset
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.neighbourhoods import neighbours, subset
 
 Flags = NDArray[np.bool_]
 
@@ -90,15 +91,9 @@ def _lattice(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size: flo
 
 def pushed(part: Part, skin: Floats, outward: Floats, push: float) -> Floats:
     """The samples moved outward by ``push``, or by less where another wall stands in the way."""
-    import igl
-
     if not len(skin):
         return skin
-    origin = part.bounds.mean(axis=0)
-    distance, *_ = igl.signed_distance(
-        np.ascontiguousarray(skin + push * outward - origin), np.ascontiguousarray(part.vertices - origin),
-        np.array(part.faces), sign_type=igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
-    )  # fmt: skip
+    distance, _ = signed_distance(skin + push * outward, part)
     by = np.clip(0.45 * (distance + push), 0.05 * push, push)
     by = np.where(distance > 0.9 * push, push, by)
     return np.asarray(skin + by[:, None] * outward)

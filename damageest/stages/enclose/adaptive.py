@@ -43,8 +43,8 @@ class Adaptive(Enclose):
     ) -> Mesh:
         """Raises StageError where paths do not close or lead through the part, or either side holds sound points, and
         NotSeparatedError where they do not split the background."""
+        from damageest.geometry.refinement import inserted, nearest, refined_at
         from damageest.stages.enclose._close import agreed, closed
-        from damageest.stages.enclose._refine import inserted, nearest, refined_at
         from damageest.stages.enclose._sew import carried_on
 
         surface, rims = agreed(surface, rims, intact)
@@ -66,7 +66,7 @@ class Adaptive(Enclose):
 def trail(background: Mesh, foot: Floats, edge: float) -> Floats:
     """Points (K,3) on a background where the closed path through its points ``foot`` (N,3) will run, none farther than
     an edge from the next unless the background has no surface between them."""
-    from damageest.stages.enclose._refine import nearest
+    from damageest.geometry.refinement import nearest
 
     at = foot
     for _ in range(ROUNDS):

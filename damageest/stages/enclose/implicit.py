@@ -30,9 +30,9 @@ class Implicit(EncloseAll):
         self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
     ) -> Enclosures:
         """Raises StageError where no closed surface comes about."""
+        from damageest.geometry.isosurface import closed_region
+        from damageest.geometry.poisson import box, solve_by_halves
         from damageest.stages.enclose._evidence import gathered, oriented, within_reach
-        from damageest.stages.enclose._level import closed_region
-        from damageest.stages.enclose._poisson import box, solve_by_halves
         from damageest.stages.enclose._refit import refitted
 
         if not sites.count:

@@ -6,10 +6,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Floats, Solid
-from damageest.stages import Stage
+from damageest.result import Result
+from damageest.stages import Stage, asked_by_name
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,8 @@ class Export(Stage, ABC):
     """
 
     stage: ClassVar[str] = "export"
-    takes: ClassVar[Mapping[str, object]] = {"result": "Result", "folder": Path, "writers": Mapping[str, Writer]}
     gives: ClassVar[str] = "written"
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Written: ...
+    def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> Written: ...

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from damageest.meshio import single_precision, write_ply, write_stl
+from damageest.geometry.rounding import single_precision
+from damageest.io.meshes import write_ply, write_stl
 from damageest.stages.export import Body, Written
 
 

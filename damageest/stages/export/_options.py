@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from damageest.registry import near
+from damageest.errors import suggest
 
 PLUGINS = {"step": "damageest-cadquery"}
 """The plugin that has a format, for whoever lacks it."""
@@ -20,7 +20,7 @@ def _known(name: str, info: ValidationInfo) -> str:
     if plugin := PLUGINS.get(name):
         raise _fault(f"'{name}' needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry)
     names = sorted(registry.writers)
-    raise _fault(f"no format '{name}'{near(name, names)}; there are: {', '.join(names)}", registry)
+    raise _fault(f"no format '{name}'{suggest(name, names)}; there are: {', '.join(names)}", registry)
 
 
 def _fault(text: str, registry: Any) -> PydanticCustomError:

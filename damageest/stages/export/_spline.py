@@ -7,7 +7,8 @@ from scipy.interpolate import BSpline, NdBSpline
 from scipy.sparse import csr_array, eye_array, kron
 from scipy.sparse.linalg import spsolve
 
-from damageest.artefacts import Floats, Ints, Surface
+from damageest.artefacts import Floats, Ints, Mesh, Surface
+from damageest.geometry.distance import distance_to_mesh
 from damageest.stages.export import Patch, Spline
 
 DEGREE = 3
@@ -121,10 +122,9 @@ def _area(loop: Floats) -> float:
 def _deviation(points: Floats, surface: Surface, knots: tuple[Floats, Floats], poles: Floats) -> float:
     """The largest distance from the surface's vertices (V,3) to the spline, and back from the spline where it lies over
     the surface; in the plane's coordinates."""
-    import igl
 
     def off(queries: Floats, vertices: Floats, faces: Ints) -> Floats:
-        return np.asarray(np.sqrt(igl.point_mesh_squared_distance(queries, vertices, faces)[0]))
+        return distance_to_mesh(queries, Mesh(vertices, faces))
 
     sides = [np.linspace(knot[0], knot[-1], _SAMPLES) for knot in knots]
     grid = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)

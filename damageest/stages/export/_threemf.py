@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from damageest.meshio import single_precision
+from damageest.geometry.rounding import single_precision
 from damageest.stages.export import Body, Written
 
 UNITS = {"um": "micron", "mm": "millimeter", "cm": "centimeter", "m": "meter", "in": "inch", "ft": "foot"}

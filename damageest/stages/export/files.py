@@ -12,8 +12,9 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from damageest.artefacts import Floats, Scan, Solid
-from damageest.handover import moved, scan_from_part, simplified
-from damageest.meshio import write_ply, write_points
+from damageest.geometry.simplification import simplify_within
+from damageest.geometry.transforms import moved, scan_from_part
+from damageest.io.meshes import write_ply, write_points
 from damageest.stages.export import Body, Export, Patch, Writer, Written
 from damageest.stages.export._options import Formats, spline_writer
 from damageest.stages.export._spline import fitted
@@ -55,7 +56,7 @@ class Files(Export):
         detail = result.tolerance / 10 if self.detail is None else self.detail
         bodies, coarse = _bodies(result), {}
         if detail and any(writers[name].costly for name in self.format):
-            coarse = {stem: replace(body, solid=simplified(body.solid, detail)) for stem, body in bodies.items()}
+            coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}
         done: list[Written] = []
         places = {"part": [""], "scan": ["scan_frame/"], "both": ["", "scan_frame/"]}
         for place in places[self.frame]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Part
 from damageest.errors import InputError
-from damageest.stages import Stage
+from damageest.stages import Stage, asked_by_name
 
 Vector = tuple[float, float, float]
 
@@ -45,11 +44,11 @@ class ReadPart(Stage, ABC):
     """
 
     stage: ClassVar[str] = "part"
-    takes: ClassVar[Mapping[str, object]] = {"unit": str, "tolerance": float | None}
     gives: ClassVar[str] = "part"
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Part: ...
+    def run(self, unit: str, tolerance: float | None) -> Part: ...
 
     def cad_faces(self, unit: str) -> tuple[CadFace, ...]:
         """The CAD model's faces, lengths in ``unit``. Raises InputError where what is read has none."""

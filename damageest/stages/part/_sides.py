@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.errors import InputError
-from damageest.stages.enclose._poisson import Grid
+from damageest.geometry.poisson import Grid
 
 MOST_VOXELS = 60_000_000
 

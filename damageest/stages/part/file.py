@@ -7,12 +7,11 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from damageest.artefacts import Part
-from damageest.errors import InputError
-from damageest.meshio import MESH_SUFFIXES, checked_file, read_mesh, sha256
+from damageest.geometry.units import Unit
+from damageest.io.meshes import MESH_SUFFIXES
+from damageest.io.parts import read_part
 from damageest.stages import JobPath
 from damageest.stages.part import ReadPart
-from damageest.stages.part._make import make_part
-from damageest.units import Unit, canonical, factor
 
 
 class PartFile(ReadPart):
@@ -30,16 +29,4 @@ class PartFile(ReadPart):
 
     def run(self, unit: str) -> Part:
         """The part in ``unit``, the job's. Raises InputError for a file that is not a solid and cannot be made one."""
-        checked_file(self.path, self.reads, "a part")
-        vertices, faces, own = read_mesh(self.path)
-        notes: tuple[str, ...] = ()
-        try:
-            source = self.unit or (canonical(own) if own else unit)
-        except InputError as error:
-            raise InputError(f"{self.path}: {error}; set part.unit") from None
-        if canonical(source) != canonical(unit):
-            vertices = vertices * factor(source, unit)
-            notes = (f"converted from {canonical(source)} to {canonical(unit)}",)
-        return make_part(
-            vertices, faces, unit, path=str(self.path), sha256=sha256(self.path), repair=self.repair, notes=notes
-        )
+        return read_part(self.path, unit, self.unit, self.repair)

@@ -9,12 +9,14 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from damageest.artefacts import Floats, Ints, Part
+from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.errors import InputError
-from damageest.meshio import sha256
+from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.units import Unit
+from damageest.io.files import file_sha256
+from damageest.io.scans import read_scan
 from damageest.stages import JobPath
 from damageest.stages.part import ReadPart
-from damageest.units import Unit
 
 FEWEST = 1000
 HELD = 20
@@ -46,11 +48,10 @@ class Reconstructed(ReadPart):
     def run(self, unit: str) -> Part:
         """The part in ``unit``. ``tessellation_error`` is the 95th percentile of the distance of every 20th point,
         not used for the surface, from it: noise included. Raises InputError for a scan that does not close."""
-        from damageest.measure import measure
-        from damageest.stages.scan.file import ScanFile
+        from damageest.geometry.noise import measure
 
-        scan = ScanFile(path=self.path, unit=self.unit).run(unit)
         paths = (self.path,) if isinstance(self.path, Path) else self.path
+        scan = read_scan(paths, unit, self.unit)
         if len(scan.points) < FEWEST:
             raise InputError(f"part: {len(scan.points)} points are too few for a part; {FEWEST} at least")
         noise, spacing = measure(scan.points)
@@ -59,7 +60,7 @@ class Reconstructed(ReadPart):
             openings = _openings(vertices, faces, scan.points)
         except InputError as fault:
             raise InputError(f"{', '.join(map(str, paths))}: {fault}") from None
-        digest = hashlib.sha256("".join(map(sha256, paths)).encode()).hexdigest()
+        digest = hashlib.sha256("".join(map(file_sha256, paths)).encode()).hexdigest()
         note = (
             f"reconstructed from {len(scan.points)} points of a scan, not from CAD: its surface is off by up to "
             f"{error:.3g} (95 % of points held back, their noise of {noise:.3g} included), sharp edges are rounded by "
@@ -72,10 +73,10 @@ class Reconstructed(ReadPart):
 
     def _surface(self, points: Floats, noise: float, spacing: float) -> tuple[Floats, Ints, float, float]:
         """Vertices, faces, resolution and error of the closed surface through ``points`` (N,3)."""
-        from damageest.stages.enclose._evidence import local_areas
-        from damageest.stages.enclose._fit import smoothed, thinned
-        from damageest.stages.enclose._level import closed_region
-        from damageest.stages.enclose._poisson import box, solve_by_halves
+        from damageest.geometry.isosurface import closed_region
+        from damageest.geometry.local_fits import smoothed
+        from damageest.geometry.neighbourhoods import local_areas, thinned
+        from damageest.geometry.poisson import box, solve_by_halves
 
         held = np.arange(len(points)) % HELD == 0
         span = np.ptp(points, axis=0)
@@ -114,10 +115,7 @@ def _outward(cloud: Floats, normals: Floats, voxel: float) -> Floats:
 
 def _error(vertices: Floats, faces: Ints, held: Floats, cell: float, noise: float) -> float:
     """The 95th percentile of the held points' (H,3) distance to the surface; refuses one that misses its points."""
-    import igl
-
-    squared = igl.point_mesh_squared_distance(held, vertices, faces)[0]
-    error = float(np.percentile(np.sqrt(squared), 95))
+    error = float(np.percentile(distance_to_mesh(held, Mesh(vertices, faces)), 95))
     if error > 3 * noise + cell:
         raise InputError(f"the surface misses its points by {error:.3g}; set part.cell smaller than {cell:.3g}")
     return error

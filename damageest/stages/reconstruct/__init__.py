@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Floats, Part, Surface
-from damageest.stages import Stage
+from damageest.stages import Stage, asked_by_name
 
 
 class Reconstruct(Stage, ABC):
@@ -17,14 +16,9 @@ class Reconstruct(Stage, ABC):
     """
 
     stage: ClassVar[str] = "reconstruct"
-    takes: ClassVar[Mapping[str, object]] = {
-        "points": Floats,
-        "part": Part,
-        "tolerance": float,
-        "spacing": float,
-        "noise": float,
-    }
     gives: ClassVar[str] = "surface"
+    per_site: ClassVar[bool] = True
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Surface: ...
+    def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface: ...

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Floats, Ints, Part, Surface
+from damageest.geometry.open_surfaces import middle, opened, oriented
 from damageest.stages.reconstruct import Reconstruct
-from damageest.stages.reconstruct._oriented import middle, opened, oriented
 
 MOST_CELLS = 3e6
 """Cells in the box of a damage."""

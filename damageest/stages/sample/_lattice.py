@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.lattice import cubes
+from damageest.geometry.voxels import cubes
 
 
 def lattice(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats, Ints]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Part, Scan
-from damageest.stages import Stage
+from damageest.stages import Stage, asked_by_name
 
 
 class ReadScan(Stage, ABC):
@@ -18,8 +17,8 @@ class ReadScan(Stage, ABC):
     """
 
     stage: ClassVar[str] = "scan"
-    takes: ClassVar[Mapping[str, object]] = {"unit": str, "part": Part}
     gives: ClassVar[str] = "scan"
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Scan: ...
+    def run(self, unit: str, part: Part) -> Scan: ...

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Mesh, Part, Solid
 from damageest.errors import StageError
-from damageest.solids import to_arrays, to_manifold
+from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.scan._tools import Tool
 
 DUST = 1e-9

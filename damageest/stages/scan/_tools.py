@@ -187,9 +187,9 @@ class MeshTool(Tool):
     transform: RigidMatrix | None = Field(None, description="4x4, rigid, to the part's frame; default: as it is")
 
     def body(self, origin: Floats, diagonal: float) -> Any:
-        from damageest.meshio import read_mesh
-        from damageest.solids import to_manifold
-        from damageest.stages.part._make import make_part
+        from damageest.geometry.make_part import make_part
+        from damageest.geometry.solids import to_manifold
+        from damageest.io.meshes import read_mesh
 
         vertices, faces, _ = read_mesh(self.path)
         solid = make_part(vertices, faces, path=str(self.path))

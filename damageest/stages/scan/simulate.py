@@ -9,10 +9,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic import types as kinds
 
 from damageest.artefacts import Floats, Part, Scan, Solid, Truth
+from damageest.geometry.units import canonical
 from damageest.stages.scan import ReadScan, _noise
 from damageest.stages.scan._scanner import sample, wear
 from damageest.stages.scan._tools import AnyTool, Direction, RigidMatrix, Vector
-from damageest.units import canonical
 
 
 class Unseen(BaseModel):

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from damageest.artefacts import Deviation, Part, Samples, Scan
-from damageest.stages import Stage
+from damageest.stages import Stage, asked_by_name
 
 
 class Segment(Stage, ABC):
@@ -18,8 +17,8 @@ class Segment(Stage, ABC):
     """
 
     stage: ClassVar[str] = "segment"
-    takes: ClassVar[Mapping[str, object]] = {"aligned": Scan, "part": Part, "samples": Samples, "tolerance": float}
     gives: ClassVar[str] = "deviation"
 
+    @asked_by_name
     @abstractmethod
-    def run(self, *args: Any, **kwargs: Any) -> Deviation: ...
+    def run(self, aligned: Scan, part: Part, samples: Samples, tolerance: float) -> Deviation: ...

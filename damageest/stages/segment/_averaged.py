@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Part, Scan
-from damageest.lattice import CHUNK, cubes, faced_cubes
+from damageest.geometry.voxels import CHUNK, cubes, faced_cubes
 
 Flags = NDArray[np.bool_]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from damageest.hookspecs import hookimpl
+from damageest import hookimpl
 from damageest.stages import Stage
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.units import MILLIMETRES
 from damageest.stages.export import Patch
-from damageest.units import MILLIMETRES
 from damageest_cadquery._step import write_shape
 
 

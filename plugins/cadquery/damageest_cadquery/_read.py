@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from damageest.errors import InputError
-from damageest.units import MILLIMETRES, canonical
+from damageest.geometry.units import MILLIMETRES, canonical
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Solid
-from damageest.handover import shells
+from damageest.geometry.bodies import split_shells
+from damageest.geometry.units import MILLIMETRES
 from damageest.stages.export import Body, Written
-from damageest.units import MILLIMETRES
 from damageest_cadquery._facets import FLAT, Facet, facets, welded
 
 UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
@@ -23,7 +23,7 @@ MOST = 100_000
 def step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> Written:
     """A STEP file of one solid, faceted; left out, with a note, where it would have too many faces to be of use."""
     (body,) = solids
-    parts = [[_planar(each) for each in (outer, *cavities)] for outer, cavities in shells(body.solid)]
+    parts = [[_planar(each) for each in (outer, *cavities)] for outer, cavities in split_shells(body.solid)]
     count = sum(len(shell[1]) for part in parts for shell in part)
     if count > MOST:
         return Written(

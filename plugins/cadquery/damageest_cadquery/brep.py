@@ -8,11 +8,11 @@ from pydantic import Field
 
 from damageest.artefacts import Part
 from damageest.errors import InputError
-from damageest.meshio import checked_file, reason, sha256
+from damageest.geometry.make_part import make_part
+from damageest.geometry.units import Unit, canonical, factor
+from damageest.io.files import checked_file, file_sha256, reason
 from damageest.stages import JobPath
 from damageest.stages.part import CadFace, ReadPart
-from damageest.stages.part._make import make_part
-from damageest.units import Unit, canonical, factor
 
 
 class Brep(ReadPart):
@@ -63,7 +63,7 @@ class Brep(ReadPart):
             mesh.faces,
             unit,
             path=str(self.path),
-            sha256=sha256(self.path),
+            sha256=file_sha256(self.path),
             faces_brep=mesh.faces_brep,
             face_names=mesh.names,
             face_kinds=mesh.kinds,

@@ -10,9 +10,9 @@ import pytest
 from damageest_cadquery._patch import step_patch
 
 from damageest.artefacts import Surface
+from damageest.geometry.units import MILLIMETRES
 from damageest.stages.export import Patch
 from damageest.stages.export._spline import fitted
-from damageest.units import MILLIMETRES
 
 cq: Any = pytest.importorskip("cadquery")
 

@@ -13,10 +13,11 @@ from damageest_cadquery._facets import facets
 from manifold3d import Manifold
 
 from damageest.artefacts import Solid
-from damageest.handover import shells, simplified
-from damageest.solids import to_solid
+from damageest.geometry.bodies import split_shells
+from damageest.geometry.simplification import simplify_within
+from damageest.geometry.solids import to_solid
+from damageest.geometry.units import MILLIMETRES
 from damageest.stages.export import Body
-from damageest.units import MILLIMETRES
 
 cq: Any = pytest.importorskip("cadquery")
 
@@ -89,7 +90,7 @@ def test_edges_without_length_and_faces_without_area(tmp_path: Path) -> None:
 
 def test_a_cavity_stays_one(tmp_path: Path) -> None:
     made = solid(Manifold.cube((10, 10, 10)) - Manifold.cube((2, 3, 4)).translate((3, 3, 3)))
-    (pair,) = shells(made)
+    (pair,) = split_shells(made)
     assert [len(pair[0].faces), [len(cavity.faces) for cavity in pair[1]]] == [12, [12]]
     (back,) = written(made, tmp_path).solids().vals()
     assert back.Volume() == pytest.approx(1000 - 24)
@@ -98,13 +99,13 @@ def test_a_cavity_stays_one(tmp_path: Path) -> None:
 
 def test_a_cavity_goes_to_the_body_around_it() -> None:
     hollow = Manifold.cube((10, 10, 10)) - Manifold.cube((2, 3, 4)).translate((3, 3, 3))
-    pairs = shells(solid(hollow + Manifold.cube((4, 4, 4)).translate((-9, 0, 0))))
+    pairs = split_shells(solid(hollow + Manifold.cube((4, 4, 4)).translate((-9, 0, 0))))
     assert {round(outer.volume): len(inner) for outer, inner in pairs} == {64: 0, 1000: 1}
 
 
 def test_fewer_faces_within_the_detail(tmp_path: Path) -> None:
     rough = solid(Manifold.cube((20, 20, 20)) - Manifold.sphere(6, 256).translate((10, 10, 20)))
-    less = simplified(rough, 0.02)
+    less = simplify_within(rough, 0.02)
     assert len(less.faces) < len(rough.faces) / 2
     assert less.volume == pytest.approx(rough.volume, rel=1e-3)
     from igl import point_mesh_squared_distance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from damageest.errors import PluginError
-from damageest.sharedlibs import load, loads, require
+from damageest.registry.system_libraries import load, loads, require
 
 __all__ = ["PACKAGES", "check", "load"]
 

@@ -30,7 +30,7 @@ class BallPivot(Reconstruct):
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
         """Raises StageError where the points are too few, or no surface comes about."""
-        from damageest.stages.reconstruct._oriented import middle, opened, oriented
+        from damageest.geometry.open_surfaces import middle, opened, oriented
 
         cell = self.spacing or max(tolerance, spacing)
         origin = middle(points)

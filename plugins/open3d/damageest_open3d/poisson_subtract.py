@@ -55,8 +55,8 @@ class PoissonSubtract(EncloseAll):
         outside it."""
         from manifold3d import Manifold
 
-        from damageest.settle import pieces_of
-        from damageest.solids import to_manifold, to_solid
+        from damageest.geometry.pieces import pieces_of
+        from damageest.geometry.solids import to_manifold, to_solid
 
         if not sites.count:
             return Enclosures(())
@@ -106,7 +106,7 @@ def _face_normals(part: Part) -> Floats:
 
 def _poisson(points: Floats, above: Floats, cell: float, depth: int, scale: float) -> tuple[Floats, Ints]:
     """The mesh (V,3), (F,3) of points (N,3), whose normals turn outward by ``above`` (N,3) and by one another."""
-    from damageest.stages.enclose._orient import toward_void
+    from damageest.geometry.orientation import toward_void
     from damageest_open3d._system import check
 
     check()

@@ -15,9 +15,9 @@ from manifold3d import Manifold
 import damageest
 from damageest.artefacts import Enclosures, Floats, Mesh, Part, Samples, Scan, Solid
 from damageest.errors import JobError, PluginError, StageError
+from damageest.geometry.solids import iou, to_arrays, to_manifold, to_solid, united
 from damageest.job import load
 from damageest.registry import Registry
-from damageest.solids import iou, to_arrays, to_manifold, to_solid, united
 from damageest.stages.cluster.dbscan import Dbscan
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.scan.simulate import Simulate

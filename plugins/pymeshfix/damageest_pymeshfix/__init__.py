@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from damageest.hookspecs import hookimpl
+from damageest import hookimpl
 from damageest.stages import Stage
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh, Solid
+from damageest.geometry.distance import signed_distance
 
 
 def shells(mesh: Mesh) -> list[Mesh]:
@@ -58,7 +59,7 @@ def closed(pieces: Sequence[Mesh]) -> Solid | None:
 
 def assembled(solids: Sequence[Solid]) -> Any:
     """The solids as one manifold3d.Manifold. One inside an odd number of others bounds a cavity."""
-    from damageest.solids import to_manifold, united
+    from damageest.geometry.solids import to_manifold, united
 
     depth = [sum(_inside(solid.vertices, other) for other in solids if other is not solid) for solid in solids]
     body = united([solid for solid, level in zip(solids, depth, strict=True) if not level])
@@ -69,15 +70,7 @@ def assembled(solids: Sequence[Solid]) -> Any:
 
 
 def _inside(points: Floats, solid: Solid) -> bool:
-    import igl
-
-    signed = igl.signed_distance(
-        np.ascontiguousarray(points),
-        np.array(solid.vertices),
-        np.array(solid.faces),
-        sign_type=igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
-    )[0]
-    return bool((signed < 0).all())
+    return bool((signed_distance(points, solid)[0] < 0).all())
 
 
 def trimmed(vertices: Floats, faces: Ints) -> Mesh:

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from damageest.artefacts import Mesh, Solid
 from damageest.errors import StageError
+from damageest.geometry.distance import distance_to_mesh
 from damageest.stages.repair import Repair
 
 LOST = 0.01
@@ -80,7 +81,7 @@ class PyMeshFix(Repair):
 
 def _one(sound: list[Solid], doubtful: list[Mesh]) -> Solid:
     """All shells as one solid: united where they overlap, those that bound a cavity taken out."""
-    from damageest.solids import to_solid
+    from damageest.geometry.solids import to_solid
     from damageest_pymeshfix._meshfix import assembled
 
     if not sound:
@@ -99,10 +100,6 @@ def _one(sound: list[Solid], doubtful: list[Mesh]) -> Solid:
 
 def _share_off(mesh: Mesh, other: Mesh, tolerance: float) -> float:
     """Share of the area of ``mesh`` farther than ``tolerance`` from ``other``."""
-    import igl
-
     area = np.linalg.norm(mesh.cross, axis=1)
-    square, _, _ = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(mesh.triangles.mean(axis=1)), np.array(other.vertices), np.array(other.faces)
-    )
-    return float(area[np.sqrt(square) > tolerance].sum() / max(area.sum(), 1e-300))
+    distance = distance_to_mesh(mesh.triangles.mean(axis=1), other)
+    return float(area[distance > tolerance].sum() / max(area.sum(), 1e-300))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from damageest.sharedlibs import load, require
+from damageest.registry.system_libraries import load, require
 
 __all__ = ["PACKAGES", "check", "load"]
 

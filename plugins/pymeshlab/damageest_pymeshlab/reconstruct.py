@@ -41,7 +41,7 @@ class PyMeshLabReconstruct(Reconstruct):
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
         """Raises StageError where the points are too few, or no surface comes about."""
-        from damageest.stages.reconstruct._oriented import middle, opened, oriented
+        from damageest.geometry.open_surfaces import middle, opened, oriented
 
         origin = middle(points)
         # Marching cubes fills the bounding box; along its own axes a damage's box is a fraction of the part's.

@@ -10,7 +10,7 @@ from manifold3d import Manifold as Body
 
 from damageest.artefacts import Part, Solid, open_edges
 from damageest.errors import PluginError, StageError
-from damageest.solids import to_arrays
+from damageest.geometry.solids import to_arrays
 from damageest.stages.boolean.manifold import Manifold
 
 

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Ints, Mesh, Part, Rims, Surface, open_edges
 from damageest.errors import StageError
+from damageest.geometry.distance import is_inside
 from damageest.stages.enclose import Enclose
 
 INSTEAD = "enclose: adaptive, or method: implicit"
@@ -62,7 +63,7 @@ def toward_skin(surface: Surface, rim: Ints, part: Part) -> tuple[Ints, Ints, Fl
 
     Raises StageError where the normals cancel out.
     """
-    from damageest.stages.segment.mesh_distance import signed_distance
+    from damageest.geometry.distance import signed_distance
 
     _, nearest = signed_distance(surface.triangles.mean(axis=1), part)
     outward = part.cross[nearest] / np.linalg.norm(part.cross[nearest], axis=1)[:, None]
@@ -85,7 +86,7 @@ def clear(vertices: Floats, way: Floats, part: Part, margin: float) -> float:
 
     Raises StageError where they run into the part again.
     """
-    from damageest.stages.segment.mesh_distance import signed_distance
+    from damageest.geometry.distance import signed_distance
 
     far = margin
     while far < part.diagonal:
@@ -109,7 +110,6 @@ def swept(mesh: Mesh, rim: Ints, by: Floats) -> Mesh:
 def held(mesh: Mesh, intact: Floats, beside: Floats, reach: float) -> int:
     """How many of the sound points (K,3) a closed mesh holds, but for those within ``reach`` of what lies ``beside``
     (M,3) them: near the surface and its rim, noise decides whether a point counts as sound."""
-    import igl
     from scipy.spatial import cKDTree
 
     low, high = mesh.bounds
@@ -117,6 +117,4 @@ def held(mesh: Mesh, intact: Floats, beside: Floats, reach: float) -> int:
     if not len(near):
         return 0
     near = near[cKDTree(beside).query(near, distance_upper_bound=reach, workers=2)[0] > reach]
-    origin = mesh.vertices.mean(axis=0)  # far from it, differences of coordinates lose digits
-    number = igl.fast_winding_number(mesh.vertices - origin, np.array(mesh.faces), near - origin) if len(near) else []
-    return int((np.asarray(number) > 0.5).sum())
+    return int(is_inside(near, mesh).sum())

@@ -9,7 +9,7 @@ import numpy as np
 from manifold3d import CrossSection, Manifold
 
 from damageest.artefacts import Floats, Part, Solid
-from damageest.solids import to_arrays
+from damageest.geometry.solids import to_arrays
 
 TOLERANCE = 0.1
 

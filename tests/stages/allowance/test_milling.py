@@ -11,8 +11,9 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from damageest.artefacts import Deposit, Floats, Part, Solid, open_edges
-from damageest.meshio import single_precision, write_stl
-from damageest.solids import remainder, to_manifold
+from damageest.geometry.rounding import single_precision
+from damageest.geometry.solids import remainder, to_manifold
+from damageest.io.meshes import write_stl
 from damageest.stages.allowance.milling import Milling
 from tests.stages.allowance.shapes import (
     SHAPES,

@@ -10,7 +10,7 @@ from manifold3d import Manifold
 
 from damageest.artefacts import Solid
 from damageest.errors import StageError
-from damageest.solids import to_arrays
+from damageest.geometry.solids import to_arrays
 from damageest.stages.allowance._booleans import joined, tidied, touching
 from damageest.stages.allowance._selectors import Target, Wanted
 from damageest.stages.allowance._skin import clipped, skin_of

@@ -7,11 +7,10 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from damageest import yamlfile
 from damageest.errors import JobError
-from damageest.job import load
+from damageest.job import load, yamlfile
+from damageest.job.schema import job_schema
 from damageest.registry import Registry
-from damageest.schema import job_schema
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance.milling import Milling
 from tests import damaged_box

@@ -12,8 +12,8 @@ from pydantic import ValidationError
 
 from damageest.artefacts import Deposit, Part, Solid
 from damageest.errors import StageError
-from damageest.meshio import write_stl
-from damageest.solids import to_manifold
+from damageest.geometry.solids import to_manifold
+from damageest.io.meshes import write_stl
 from damageest.stages.allowance.milling import Milling
 from tests.stages.allowance.shapes import (
     TOLERANCE,

@@ -7,8 +7,8 @@ import pytest
 
 from damageest.artefacts import Mesh
 from damageest.evaluate.parts import PARTS
+from damageest.geometry.distance import signed_distance
 from damageest.stages.background.minkowski import Minkowski
-from damageest.stages.segment.mesh_distance import signed_distance
 from tests.stages.background.holding import box, dent, gap
 
 

@@ -10,8 +10,8 @@ import trimesh
 from damageest.artefacts import Mesh, Part
 from damageest.errors import StageError
 from damageest.evaluate.parts import PARTS
+from damageest.geometry.distance import signed_distance
 from damageest.stages.background.offset import Offset
-from damageest.stages.segment.mesh_distance import signed_distance
 from tests.stages._open import bowl
 
 

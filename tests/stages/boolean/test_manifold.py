@@ -8,7 +8,7 @@ from manifold3d import Manifold as Body
 
 from damageest.artefacts import Part, Solid, open_edges
 from damageest.errors import StageError
-from damageest.solids import to_arrays
+from damageest.geometry.solids import to_arrays
 from damageest.stages.boolean.manifold import Manifold
 
 

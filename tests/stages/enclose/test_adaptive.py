@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from damageest.artefacts import Mesh, Part, Surface, open_edges
 from damageest.errors import StageError
-from damageest.solids import to_manifold
+from damageest.geometry.refinement import halved, inserted, nearest, refined_at
+from damageest.geometry.solids import to_manifold
 from damageest.stages.background.bbox import BoundingBox
 from damageest.stages.background.capsule import Capsule
 from damageest.stages.background.minkowski import Minkowski
 from damageest.stages.boundary.all_loops import AllLoops
 from damageest.stages.enclose import NotSeparatedError
-from damageest.stages.enclose._refine import halved, inserted, nearest, refined_at
 from damageest.stages.enclose.adaptive import Adaptive
 from tests.stages._open import bowl, pipe
 from tests.stages.enclose.test_shortest_path import NO_POINTS, SIZE, TOLERANCE, sound, volume

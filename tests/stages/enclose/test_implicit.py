@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Enclosures, Sites
-from damageest.solids import iou, to_manifold, to_solid, united
+from damageest.geometry.solids import iou, to_manifold, to_solid, united
 from damageest.stages.enclose.implicit import Implicit
 from tests.scenes import TOLERANCE, Scene, scene
 

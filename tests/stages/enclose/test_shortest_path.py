@@ -8,7 +8,7 @@ import trimesh
 
 from damageest.artefacts import Mesh, Part, Rims, Solid, Surface, open_edges
 from damageest.errors import StageError
-from damageest.solids import to_manifold
+from damageest.geometry.solids import to_manifold
 from damageest.stages.background.bbox import BoundingBox
 from damageest.stages.background.offset import Offset
 from damageest.stages.boundary.all_loops import AllLoops

@@ -10,8 +10,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Deviation, Evidence, Part, Pose, Scan, Solid, Surface
+from damageest.geometry.solids import remainder, to_manifold, to_solid, united
 from damageest.result import Result, Site
-from damageest.solids import remainder, to_manifold, to_solid, united
 
 
 def ball(radius: float, at: tuple[float, float, float]) -> Any:

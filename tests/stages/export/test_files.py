@@ -10,10 +10,11 @@ import pytest
 import trimesh
 
 from damageest.artefacts import Deviation, Pose, Scan, Solid, Surface, Truth, open_edges
-from damageest.meshio import read_mesh, single_precision
+from damageest.geometry.make_part import make_part
+from damageest.geometry.rounding import single_precision
+from damageest.io.meshes import read_mesh
 from damageest.registry import Registry
 from damageest.stages.export.files import Files
-from damageest.stages.part._make import make_part
 
 
 def write(result, folder, **options):

@@ -13,12 +13,12 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from damageest.errors import JobError
+from damageest.geometry.units import MILLIMETRES
 from damageest.job import load
 from damageest.registry import Registry
-from damageest.report import report
+from damageest.report.result_json import report
 from damageest.result import Result
 from damageest.stages.export.files import DAMAGE, DEPOSIT, UNDAMAGED, Files
-from damageest.units import MILLIMETRES
 from tests.stages.export import results
 
 

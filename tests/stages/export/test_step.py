@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Surface
+from damageest.geometry.units import MILLIMETRES
 from damageest.registry import Registry
-from damageest.report import report
+from damageest.report.result_json import report
 from damageest.stages.export.files import Files
-from damageest.units import MILLIMETRES
 from tests.stages.export import results
 
 cq: Any = pytest.importorskip("cadquery")

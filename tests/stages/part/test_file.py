@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from damageest.artefacts import open_edges
 from damageest.errors import InputError
-from damageest.stages.part._heal import heal
-from damageest.stages.part._make import make_part
+from damageest.geometry.healing import heal
+from damageest.geometry.make_part import make_part
 from damageest.stages.part.file import PartFile
 
 quick = settings(

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from damageest.errors import InputError
-from damageest.stages.scan._formats import READERS, read_cloud
-from damageest.stages.scan._formats.pcd import _unpack_lzf
+from damageest.io.points import READERS, read_cloud
+from damageest.io.points.pcd import _unpack_lzf
 from damageest.stages.scan.file import ScanFile
 
 coordinates = st.floats(-1e6, 1e6, allow_nan=False).map(lambda x: x + 0.0)

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.errors import StageError
 from damageest.evaluate.parts import PARTS
-from damageest.solids import to_arrays, to_manifold
+from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.scan.simulate import Simulate
 
 SPHERE = {"tool": "sphere", "centre": (35, 25, 15), "radius": 10}

@@ -13,7 +13,7 @@ from manifold3d import Manifold
 import damageest
 from damageest.artefacts import DAMAGE, Floats, Part, Scan
 from damageest.evaluate.parts import PARTS
-from damageest.solids import to_arrays
+from damageest.geometry.solids import to_arrays
 from damageest.stages.scan.simulate import Simulate
 from damageest.stages.segment._averaged import Wear, worn
 from damageest.stages.segment.mesh_distance import MeshDistance, signed_distance

@@ -1,0 +1,108 @@
+"""The check of a damage volume (DV) against the scan it came from, whatever method made it.
+
+A right DV has its IDS points on its boundary, no sound point inside it or on the skin it takes away, and scan points
+all over its inner surface. A wrong side, a swallowed neighbour, a flat cap each break one of these.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import INTACT, Deviation, Evidence, Floats, Mesh, Part, Scan, Solid
+from damageest.geometry.distance import Flags, closest_on_mesh, distance_to_mesh
+from damageest.geometry.neighbourhoods import within
+from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.skin import inner_faces
+
+MOST = 20_000
+"""Points looked at for each figure; more would not change its second digit."""
+
+
+def weigh(
+    damage: Solid, ids_points: Floats, aligned: Scan, deviation: Deviation, part: Part, tolerance: float
+) -> Evidence:
+    """Weighs one DV.
+
+    Args:
+        ids_points: (M,3) the site's IDS points. aligned, deviation: the whole scan, in the part's frame.
+    """
+    spacing = aligned.spacing
+    reach = max(2.0 * tolerance, 1.5 * spacing)
+    low, high = damage.bounds[0] - 4 * reach, damage.bounds[1] + 4 * reach
+    here = within(aligned.points, low, high)
+    points, label = aligned.points[here], deviation.label[here]
+    ids = ids_points[:: max(1, len(ids_points) // (MOST // 4))]
+    residual = float(np.quantile(distance_to_mesh(ids, damage), 0.95))
+
+    inner = inner_faces(damage, part)
+    on_ids = _spread(damage, inner, MOST // 2)
+    on_skin = _spread(damage, ~inner, MOST // 2)
+    bare = _far(on_ids, points, 1.5 * reach)
+    # Close to the rim sound points are near any skin, so only what is away from the inner surface speaks.
+    intact = points[label == INTACT]
+    grain = float(np.sqrt(np.linalg.norm(damage.cross[~inner], axis=1).sum() / MOST))
+    close = tolerance + 4 * grain
+    intact = intact[_gap(intact, on_skin, close) <= close]
+    intact = intact[_gap(intact, on_ids, 1.5 * reach) > 1.5 * reach]
+    if len(intact):  # against the skin's few faces first: most are beside the damage volume
+        skin_only = Mesh(damage.vertices, damage.faces[~inner])
+        intact = intact[distance_to_mesh(intact, skin_only) < tolerance]
+    inside, contradicted = 0, 0.0
+    if len(intact):
+        distance, face, _ = closest_on_mesh(intact, damage)
+        taken = intact[(distance < tolerance) & ~inner[face]]
+        inside = len(taken)
+        asked = on_skin[_gap(on_skin, on_ids, 1.5 * reach) > 1.5 * reach]
+        contradicted = 1 - _far(asked, taken, max(spacing, tolerance)) if len(asked) > 20 else 0.0
+    unseen = _unseen(part, damage, points, on_skin, reach)
+
+    reasons = []
+    if residual > 1.5 * tolerance + 0.25 * spacing:
+        reasons.append(f"its boundary misses the damaged points (95 % within {residual:.3g})")
+    if inside > max(10, 0.02 * len(ids_points)):
+        reasons.append(f"{inside} sound points lie on what it takes away")
+    if contradicted > 0.1:
+        reasons.append(f"sound points lie on {contradicted:.0%} of the skin it takes away")
+    if bare > 0.1:
+        reasons.append(f"{bare:.0%} of its inner surface has no scan point near")
+    if unseen > 0.25:
+        reasons.append(f"{unseen:.0%} of the skin beside it shows no scan point: the damage may go on there")
+    return Evidence(residual, inside, contradicted, unseen, not reasons, tuple(reasons))
+
+
+def _gap(places: Floats, points: Floats, most: float) -> Floats:
+    """Distance (N,) from each place to the nearest of the points; inf beyond ``most``."""
+    from scipy.spatial import cKDTree
+
+    if not len(places) or not len(points):
+        return np.full(len(places), np.inf)
+    return np.asarray(cKDTree(points).query(places, distance_upper_bound=1.001 * most, workers=2)[0])
+
+
+def _far(places: Floats, points: Floats, distance: float) -> float:
+    """Share of the places (N,3) with none of the points within a distance."""
+    return float((_gap(places, points, distance) > distance).mean()) if len(places) else 0.0
+
+
+def _unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: float) -> float:
+    """Share of the part's skin just outside the DV that carries no scan point."""
+    if not len(on_skin):
+        return 0.0
+    low, high = damage.bounds[0] - 6 * reach, damage.bounds[1] + 6 * reach
+    corners = part.triangles
+    near = ((corners.min(axis=1) < high) & (corners.max(axis=1) > low)).all(axis=1)
+    count = int(np.clip(np.linalg.norm(part.cross[near], axis=1).sum() / 2 / (0.7 * reach) ** 2, 1000, 2 * MOST))
+    skin = _spread(part, near, count)
+    skin = skin[_gap(skin, on_skin, 6 * reach) < 6 * reach]
+    if not len(skin):
+        return 0.0
+    away = distance_to_mesh(skin, damage)
+    ring = skin[(away > 2 * reach) & (away < 6 * reach)]
+    return _far(ring, points, 2 * reach) if len(ring) > 20 else 0.0
+
+
+def _spread(mesh: Solid, chosen: Flags, count: int) -> Floats:
+    """``count`` points spread evenly by area over the chosen faces; none where these have no area."""
+    if not (np.linalg.norm(mesh.cross[chosen], axis=1).sum() > 0):
+        return np.empty((0, 3))
+    return sample_by_area(mesh, count, np.random.default_rng(0), np.flatnonzero(chosen))[0]

@@ -1,0 +1,42 @@
+"""Checks that every reader of files makes first, and the hash of a file."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from damageest.errors import InputError
+
+
+def checked_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
+    """The file's suffix in lower case. Raises InputError where it is missing, empty or not of ``suffixes``."""
+    valid = f"{what} may be: {', '.join(suffixes)}"
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, not a file; {valid}")
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; {valid}")
+    suffix = path.suffix.lower()
+    if suffix not in suffixes:
+        raise InputError(f"{path}: '{suffix}' is not a suffix that can be read here; {valid}")
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(64)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be opened: {error.strerror or error}") from None
+    if not start:
+        raise InputError(f"{path}: the file is empty; {valid}")
+    if start.lstrip().lower().startswith((b"<!doctype html", b"<html")):
+        raise InputError(f"{path}: holds a web page, not {what}; {valid}")
+    return suffix
+
+
+def file_sha256(path: Path) -> str:
+    """The file's SHA-256, in hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def reason(error: BaseException) -> str:
+    """An error of a library in one line."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= 160 else text[:157] + "..."

@@ -1,0 +1,116 @@
+"""Reading and writing triangle meshes and point clouds, the formats and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import Floats, Ints, Mesh
+from damageest.errors import InputError
+from damageest.io.files import checked_file, reason
+
+MESH_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf")
+
+
+def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
+    """Vertices (V,3) and faces (F,3) of all bodies in a mesh file, and the file's own unit where it has one.
+
+    Instances of a scene are placed; nothing is merged or repaired. Raises InputError, naming the file, where it is
+    not a mesh of its kind or is cut short.
+    """
+    suffix = checked_file(path, MESH_SUFFIXES, "a mesh")
+    if suffix == ".stl":
+        vertices, faces = _read_stl(path)
+        return vertices, faces, None
+    import trimesh
+
+    try:
+        scene = trimesh.load_scene(path, process=False, **({"maintain_order": True} if suffix == ".obj" else {}))
+        placed = [(*scene.graph[node],) for node in scene.graph.nodes_geometry]
+        bodies = [(scene.geometry[name], np.asarray(T, dtype=np.float64)) for T, name in placed]
+        meshes = [
+            (np.asarray(g.vertices, dtype=np.float64) @ T[:3, :3].T + T[:3, 3], np.asarray(g.faces, dtype=np.int64))
+            for g, T in bodies
+            if isinstance(g, trimesh.Trimesh) and len(g.faces)
+        ]
+        unit = str(scene.units) if suffix == ".3mf" and scene.units else None
+    except Exception as error:
+        raise InputError(f"{path}: not a readable {suffix} mesh ({reason(error)})") from None
+    if not meshes:
+        raise InputError(f"{path}: holds no triangles; a part must be a closed mesh")
+    vertices, faces = trimesh.util.append_faces(*zip(*meshes, strict=True))
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(f"{path}: a triangle refers to a vertex that the file lacks; it may be cut short")
+    return vertices, faces, unit
+
+
+STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def stl_corners(path: Path) -> Floats:
+    """(F,3,3) the triangles' corners of an STL file, binary or text. Raises InputError."""
+    data = path.read_bytes()
+    if len(data) >= 84:
+        count = int.from_bytes(data[80:84], "little")
+        if len(data) >= 84 + count * 50 and (count or not data.lstrip().startswith(b"solid")):
+            found = np.frombuffer(data, STL_TRIANGLE, count, 84)
+            if not count:
+                raise InputError(f"{path}: the STL file holds no triangles")
+            return found["corners"].astype(np.float64)
+    if not data.lstrip()[:5].lower() == b"solid":
+        raise InputError(
+            f"{path}: not an STL file, or one cut short: {len(data)} bytes do not hold what its header says"
+        )
+    words = data.lower()
+    corners = words.count(b"vertex")
+    if not corners or corners % 3 or words.count(b"facet") % 2 or b"endsolid" not in words[-4096:]:
+        raise InputError(f"{path}: a text STL file without whole triangles, or one cut short")
+    pieces = words.split(b"vertex")[1:]
+    try:
+        numbers = np.array([piece.split(None, 3)[:3] for piece in pieces], dtype="S32").astype(np.float64)
+    except (ValueError, IndexError):
+        raise InputError(f"{path}: a text STL file whose vertices are not numbers") from None
+    return numbers.reshape(-1, 3, 3)
+
+
+def _read_stl(path: Path) -> tuple[Floats, Ints]:
+    corners = stl_corners(path)
+    return corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int64).reshape(-1, 3)
+
+
+def write_ply(path: Path, mesh: Mesh) -> None:
+    """A mesh as binary little-endian PLY with coordinates in double precision."""
+    table = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3)])
+    table["count"], table["corners"] = 3, mesh.faces
+    head = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {len(mesh.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    path.write_bytes(head.encode() + mesh.vertices.astype("<f8").tobytes() + table.tobytes())
+
+
+def write_points(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+    """Points as binary little-endian PLY, one property per column (N,), in the columns' own types."""
+    names = {"f8": "double", "f4": "float", "u1": "uchar", "i4": "int"}
+    kind = np.dtype([(name, values.dtype.newbyteorder("<")) for name, values in columns.items()])
+    table = np.empty(len(next(iter(columns.values()))), kind)
+    for name, values in columns.items():
+        table[name] = values
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(table)}\n"
+    head += "".join(f"property {names[values.dtype.str[1:]]} {name}\n" for name, values in columns.items())
+    path.write_bytes(head.encode() + b"end_header\n" + table.tobytes())
+
+
+def write_stl(path: Path, mesh: Mesh) -> None:
+    """A mesh as binary STL, whose coordinates are single precision; see `single_precision`. No date in its header."""
+    corners = mesh.triangles.astype(np.float32)
+    a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
+    normal = np.cross(b - a, c - a)
+    table = np.zeros(len(corners), STL_TRIANGLE)
+    table["normal"] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    table["corners"] = corners
+    path.write_bytes(b"damageest".ljust(80, b"\0") + len(table).to_bytes(4, "little") + table.tobytes())

@@ -1,0 +1,26 @@
+"""NumPy's own format: an array (N,3), or (N,6) with normals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from damageest.io.points import Cloud, FormatError
+
+
+def read(path: Path, columns: str | None = None) -> Cloud:
+    """An array of numbers; never a pickle, which could run code."""
+    try:
+        array = np.load(path, allow_pickle=False)
+    except (ValueError, EOFError, OSError) as error:
+        raise FormatError(f"not a readable NumPy array ({error})") from None
+    if (
+        not isinstance(array, np.ndarray)
+        or array.ndim != 2
+        or array.shape[1] not in (3, 6)
+        or array.dtype.kind not in "fiu"
+    ):
+        what = f"{array.shape} of {array.dtype}" if isinstance(array, np.ndarray) else "an archive of several arrays"
+        raise FormatError(f"expected an array (N,3), or (N,6) with normals, of numbers; it holds {what}")
+    return Cloud(array[:, :3], array[:, 3:] if array.shape[1] == 6 else None)

@@ -1,0 +1,138 @@
+"""PLY, text and binary of either byte order, with whatever properties and elements besides x, y, z."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from damageest.artefacts import Floats
+from damageest.io.points import Cloud, FormatError
+from damageest.io.points.text import numbers
+
+TYPES = {
+    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
+    **{"float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2"},
+    **{"int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8"},
+}
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    properties: list[tuple[str, str]] = field(default_factory=list)
+    lists: list[tuple[int, str, str]] = field(default_factory=list)  # at which property, count type, item type
+
+
+def _header(data: bytes) -> tuple[str, list[_Element], int]:
+    """The format's name, the elements, and where the body starts."""
+    if not data.startswith(b"ply"):
+        raise FormatError("not a PLY file: it does not start with 'ply'")
+    end = data.find(b"end_header")
+    newline = data.find(b"\n", end)
+    if end < 0 or newline < 0:
+        raise FormatError("the PLY header has no end_header; the file may be cut short")
+    form, elements = "", list[_Element]()
+    for line in data[:end].decode("latin-1").splitlines()[1:]:
+        words = line.split()
+        if not words or words[0] in ("comment", "obj_info"):
+            continue
+        try:
+            if words[0] == "format":
+                form = words[1]
+            elif words[0] == "element":
+                elements.append(_Element(words[1], int(words[2])))
+            elif words[0] == "property" and words[1] == "list":
+                elements[-1].lists.append((len(elements[-1].properties), TYPES[words[2]], TYPES[words[3]]))
+            elif words[0] == "property":
+                elements[-1].properties.append((words[2], TYPES[words[1]]))
+            else:
+                raise KeyError(words[0])
+        except (IndexError, ValueError, KeyError):
+            raise FormatError(f"a line of the PLY header makes no sense: '{line.strip()[:60]}'") from None
+    if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
+        raise FormatError(f"PLY format '{form}' is unknown")
+    return form, elements, newline + 1
+
+
+def read(path: Path, columns: str | None = None) -> Cloud:
+    """The element 'vertex': x, y, z and, where there are any, nx, ny, nz."""
+    data = path.read_bytes()
+    form, elements, start = _header(data)
+    order = [e.name for e in elements]
+    if "vertex" not in order:
+        raise FormatError("the PLY file has no element 'vertex'")
+    vertex = elements[order.index("vertex")]
+    names = [name for name, _ in vertex.properties]
+    if not {"x", "y", "z"} <= set(names):
+        raise FormatError(f"the PLY file's vertices have no x, y, z; they have: {', '.join(names) or 'nothing'}")
+    if vertex.lists:
+        raise FormatError("the PLY file's vertices hold lists, which cannot be read here")
+    before = elements[: order.index("vertex")]
+    get = _text if form == "ascii" else _binary
+    found = get(data, start, before, vertex, ">" if form == "binary_big_endian" else "<")
+
+    def stack(*which: str) -> Floats:
+        out = np.empty((vertex.count, 3))
+        for k, name in enumerate(which):
+            out[:, k] = found[name]
+        return out
+
+    normals = stack("nx", "ny", "nz") if {"nx", "ny", "nz"} <= set(names) else None
+    return Cloud(stack("x", "y", "z"), normals)
+
+
+def _dtype(element: _Element, order: str) -> np.dtype[np.void]:
+    try:
+        return np.dtype([(name, order + kind) for name, kind in element.properties])
+    except ValueError:
+        raise FormatError("two properties of the PLY file have the same name") from None
+
+
+def _binary(
+    data: bytes, start: int, before: list[_Element], vertex: _Element, order: str
+) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+    for element in before:
+        if not element.lists:
+            start += element.count * _dtype(element, order).itemsize
+        elif element.properties or len(element.lists) > 1:
+            raise FormatError(f"the PLY element '{element.name}' before the vertices mixes lists and values")
+        else:
+            _, counter, item = element.lists[0]
+            size, width = np.dtype(counter).itemsize, np.dtype(item).itemsize
+            way = "little" if order == "<" else "big"
+            for _ in range(element.count):
+                if start + size > len(data):
+                    raise FormatError("the PLY file is cut short")
+                start += size + width * int.from_bytes(data[start : start + size], way)  # type: ignore[arg-type]
+    kind = _dtype(vertex, order)
+    have = (len(data) - start) // kind.itemsize
+    if vertex.count < 0 or have < vertex.count:
+        raise FormatError(f"the PLY file is cut short: {max(have, 0)} of {vertex.count} vertices are there")
+    return np.frombuffer(data, kind, vertex.count, start)
+
+
+def _text(data: bytes, start: int, before: list[_Element], vertex: _Element, order: str) -> dict[str, Floats]:
+    skip = sum(e.count for e in before)
+    for _ in range(skip):
+        start = data.find(b"\n", start) + 1
+        if not start:
+            raise FormatError("the PLY file is cut short")
+    width, wanted = len(vertex.properties), vertex.count
+    if wanted * width * 2 > len(data) - start + 1:
+        raise FormatError(f"the PLY file is cut short: its {wanted} vertices are not all there")
+    rest = data[start:]
+    if vertex is not None and rest.count(b"\n") > wanted:  # faces follow: cut after the vertices' lines
+        rest = _first_lines(rest, wanted)
+    values = numbers(rest)
+    if len(values) < wanted * width:
+        raise FormatError(f"the PLY file is cut short: {len(values) // width} of {wanted} vertices are there")
+    table = values[: wanted * width].reshape(wanted, width)
+    return {name: table[:, k] for k, (name, _) in enumerate(vertex.properties)}
+
+
+def _first_lines(data: bytes, count: int) -> bytes:
+    ends = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n"))
+    return data[: int(ends[count - 1]) + 1] if count else b""

@@ -1,0 +1,81 @@
+"""Scans from files, and from points wherever they came from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from damageest.artefacts import Floats, Scan
+from damageest.errors import InputError
+from damageest.geometry.duplicates import first_of_equal
+from damageest.geometry.units import canonical, factor
+from damageest.io.points import read_cloud
+
+
+def make_scan(
+    points: Floats,
+    normals: Floats | None = None,
+    unit: str = "mm",
+    *,
+    paths: tuple[str, ...] = (),
+    notes: tuple[str, ...] = (),
+) -> Scan:
+    """A scan from points (N,3), already in ``unit``; says how many were left out, not finite or there already.
+
+    Normals are brought to length 1, and dropped where any is zero or not finite. Raises InputError where no point is
+    left.
+    """
+    name = ", ".join(paths) or "the scan"
+    points = np.asarray(points, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"{name}: expected points (N,3), got an array of shape {points.shape}")
+    if normals is not None:
+        normals = np.asarray(normals, dtype=np.float64)
+        if normals.shape != points.shape:
+            raise InputError(f"{name}: {len(points)} points, but normals of shape {normals.shape}")
+    finite = np.isfinite(points.sum(1))
+    if not finite.all():
+        notes = (*notes, f"left out {int((~finite).sum())} points whose coordinates are not finite")
+        points, normals = points[finite], None if normals is None else normals[finite]
+    if not len(points):
+        raise InputError(f"{name}: holds no points")
+    keep, _ = first_of_equal(points)
+    if len(keep) < len(points):
+        notes = (*notes, f"left out {len(points) - len(keep)} copies of points that are there already")
+        points, normals = points[keep], None if normals is None else normals[keep]
+    if normals is not None:
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        if np.isfinite(length).all() and length.min() > 1e-6:
+            normals = normals / length
+        else:
+            notes, normals = (*notes, "some normals are zero or not finite: none is used"), None
+    return Scan(points, normals, canonical(unit), paths, notes=notes)
+
+
+def read_scan(paths: Sequence[Path], unit: str, source: str | None = None, columns: str | None = None) -> Scan:
+    """The points of one file, or of several views that share a frame, in ``unit``.
+
+    ``source``: the unit of the files' lengths; None: each file's own (E57: m), else ``unit``. ``columns``: what the
+    columns of a text file are. Raises InputError for a file that cannot be read or holds no points.
+    """
+    if not paths:
+        raise InputError("scan: no file named")
+    clouds = [read_cloud(path, columns) for path in paths]
+    notes: list[str] = []
+    scaled = []
+    for cloud, path in zip(clouds, paths, strict=True):
+        notes.extend(f"{path.name}: {note}" if len(paths) > 1 else note for note in cloud.notes)
+        own = canonical(source or cloud.unit or unit)
+        points = np.asarray(cloud.points, dtype=np.float64)
+        if own != canonical(unit):
+            notes.append(f"{path.name}: converted from {own} to {canonical(unit)}")
+            points = points * factor(own, unit)
+        scaled.append(points)
+    given = [cloud.normals for cloud in clouds if cloud.normals is not None]
+    normals = np.concatenate(given) if len(given) == len(clouds) else None
+    if given and normals is None:
+        notes.append("only some of the files have normals: they are not used")
+    whole = scaled[0] if len(scaled) == 1 else np.concatenate(scaled)
+    return make_scan(whole, normals, unit, paths=tuple(map(str, paths)), notes=tuple(notes))

@@ -1,0 +1,72 @@
+"""A job as values: the fields that are not stages, and the checked job."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from damageest.registry.contracts import DEFAULTS, SURFACE_ONLY, Contract
+from damageest.registry.registry import Implementation
+from damageest.stages import Stage
+from damageest.stages.enclose import EncloseAll
+
+Unit = Literal["um", "mm", "cm", "m", "in", "ft"]
+
+
+class Header(BaseModel):
+    """The fields of a job that are not stages."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    version: Literal[1] = Field(description="version of the job format")
+    name: str = Field("", pattern=r"^[^/\\\x00]*$", description="name of the job; default: the file's stem")
+    units: Unit = Field("mm", description="unit of every length in the job, and of files that carry none")
+    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] | Literal["auto"] = Field(
+        "auto", description="lambda, the threshold of accuracy; auto: four times the scan's noise"
+    )
+    method: str = Field(
+        "auto",
+        description="the route; surface: site by site; implicit: all sites at once; auto: implicit, then surface for "
+        "sites that it fails on or that the scan contradicts; plugins may add others",
+    )
+    output: Path | None = Field(None, description="output folder; default: out/<name>, beside the job file")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A checked job. ``stages`` holds one implementation with its options for every contract, ``given`` the artefacts
+    that a Python caller handed in instead of files. ``tolerance`` None: from the scan's noise."""
+
+    name: str
+    units: str
+    tolerance: float | None
+    method: str
+    stages: Mapping[Contract, Stage]
+    implementations: Mapping[Contract, Implementation]
+    output: Path
+    source: str
+    given: Mapping[Contract, Any] = field(default_factory=dict)
+
+    def written(self, beside: Path) -> dict[str, Any]:
+        """The job as plain values with every default, its paths relative to the folder ``beside``."""
+        head = {"version": 1, "name": self.name, "units": self.units, "tolerance": self.tolerance or "auto"}
+        head |= {"method": self.method}
+        whole_job = EncloseAll in self.stages
+        used = [c for c in DEFAULTS if c in self.stages and not (whole_job and c in SURFACE_ONLY)]
+        body = {c.stage: plain(self.stages[c].model_dump(), beside) for c in used}
+        return head | body
+
+
+def plain(value: Any, beside: Path) -> Any:
+    """Options as YAML and JSON values; absolute paths become relative to ``beside``."""
+    if isinstance(value, Path):
+        return Path(os.path.relpath(value, beside)).as_posix() if value.is_absolute() else value.as_posix()
+    if isinstance(value, Mapping):
+        return {key: plain(item, beside) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item, beside) for item in value]
+    return value

@@ -1,0 +1,134 @@
+"""What each stage gave, kept as .npz (arrays) and .json (the rest), never pickle.
+
+An entry's key is made of the implementation, its provider's version and source, all its options, and the keys of what
+it took; so an entry is valid for ever, and a run that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import shutil
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damageest import artefacts
+from damageest.io.files import file_sha256
+
+_KINDS = {
+    name: kind
+    for name, kind in vars(artefacts).items()
+    if isinstance(kind, type) and dataclasses.is_dataclass(kind) and not name.startswith("_")
+}
+
+
+def digest(*parts: object) -> str:
+    """A short SHA-256 over the parts' text; arrays count by their bytes, paths by their files' content."""
+    total = hashlib.sha256()
+    for part in parts:
+        total.update(_bytes(part))
+        total.update(b"\x00")
+    return total.hexdigest()[:24]
+
+
+def _bytes(part: object) -> bytes:
+    if isinstance(part, np.ndarray):
+        return f"{part.dtype}{part.shape}".encode() + np.ascontiguousarray(part).tobytes()
+    if isinstance(part, Path):
+        return file_sha256(part).encode() if part.is_file() else str(part).encode()
+    if isinstance(part, Mapping):
+        return b"{" + b",".join(_bytes(k) + b":" + _bytes(v) for k, v in part.items()) + b"}"
+    if isinstance(part, (list, tuple)):
+        return b"[" + b",".join(_bytes(item) for item in part) + b"]"
+    if dataclasses.is_dataclass(part) and not isinstance(part, type):
+        return _bytes([getattr(part, f.name) for f in dataclasses.fields(part)])
+    return repr(part).encode()
+
+
+def _encode(value: Any, arrays: dict[str, Any]) -> Any:
+    """A value as JSON, its arrays moved to ``arrays`` and referred to by number."""
+    if isinstance(value, np.ndarray):
+        arrays[f"a{len(arrays)}"] = value
+        return {"array": f"a{len(arrays) - 1}"}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = {f.name: _encode(getattr(value, f.name), arrays) for f in dataclasses.fields(value)}
+        return {"kind": type(value).__name__, "fields": fields}
+    if isinstance(value, tuple):
+        return {"tuple": [_encode(item, arrays) for item in value]}
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise TypeError(f"a stage gave a {type(value).__name__}, which is no artefact")
+
+
+def _decode(value: Any, arrays: Mapping[str, Any]) -> Any:
+    if not isinstance(value, dict):
+        return value
+    if "array" in value:
+        return arrays[value["array"]]
+    if "tuple" in value:
+        return tuple(_decode(item, arrays) for item in value["tuple"])
+    fields = {name: _decode(item, arrays) for name, item in value["fields"].items()}
+    return _KINDS[value["kind"]](**fields)
+
+
+@dataclass(frozen=True)
+class Cache:
+    """Entries in ``folder``; ``older`` folders are looked into as well, and a hit there is carried over."""
+
+    folder: Path
+    older: tuple[Path, ...] = ()
+
+    def get(self, name: str, key: str) -> tuple[bool, Any]:
+        """(found, value). A damaged entry counts as not found."""
+        stem = f"{name}-{key}"
+        for folder in (self.folder, *self.older):
+            try:
+                meta = json.loads((folder / f"{stem}.json").read_text())
+                with np.load(folder / f"{stem}.npz", allow_pickle=False) as stored:
+                    arrays = {n: stored[n] for n in stored.files}
+                value = _decode(meta, arrays)
+            except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+                continue
+            if folder != self.folder:
+                self._carry_over(folder, stem)
+            return True, value
+        return False, None
+
+    def put(self, name: str, key: str, value: Any) -> None:
+        """Keeps a value; a reader never sees half an entry, since the .json that makes it valid is moved in last."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        arrays: dict[str, Any] = {}
+        meta = _encode(value, arrays)
+        stem = f"{name}-{key}"
+        scratch = self.folder / f".{stem}.npz"
+        with scratch.open("wb") as stream:
+            np.savez(stream, **arrays)
+        os.replace(scratch, self.folder / f"{stem}.npz")
+        scratch = self.folder / f".{stem}.json"
+        scratch.write_text(json.dumps(meta))
+        os.replace(scratch, self.folder / f"{stem}.json")
+
+    def keep_only(self, stems: Iterable[str]) -> None:
+        """Drops the entries of earlier jobs, so that a folder does not grow with each change of an option."""
+        wanted = {f"{stem}{suffix}" for stem in stems for suffix in (".npz", ".json")}
+        if self.folder.is_dir():
+            for path in self.folder.iterdir():
+                if path.name not in wanted:
+                    path.unlink()
+
+    def _carry_over(self, folder: Path, stem: str) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        for suffix in (".npz", ".json"):
+            target = self.folder / f"{stem}{suffix}"
+            target.unlink(missing_ok=True)
+            try:
+                os.link(folder / f"{stem}{suffix}", target)
+            except OSError:
+                shutil.copyfile(folder / f"{stem}{suffix}", target)

@@ -1,0 +1,103 @@
+"""The step from the sites back to the job: the result."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
+from damageest.geometry.skin import ids_surface
+from damageest.geometry.solids import iou, remainder, to_manifold, to_solid, united
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.result import Result, Site
+
+FEW = 100
+"""Damaged points below which a site's volume is only a rough figure: a chip of 30 points came out 15 % small."""
+
+
+def collect_result(engine: Engine, work: Work) -> Work:
+    """Puts the result together. Raises the first failure where there are failures and no site."""
+    state = work.job
+    if work.failures and not work.sites:
+        raise work.failures[0]
+    part, scan, deviation = state.part, state.scan, state.deviation
+    sites = tuple(_describe_site(site) for site in work.sites)
+    label = np.zeros(len(scan.points), np.int32)
+    for site in sites:
+        label[site.points] = site.id
+    kept = deviation.label.copy()
+    kept[(kept == DAMAGE) & (state.sites.label == 0)] = OUTLIER
+    origin = part.bounds.mean(axis=0)
+    lost = united((site.damage for site in sites), origin)
+    damage = to_solid(lost, origin)
+    # a cut-back is no damage: what was found is compared as it was found
+    cut_back = any(site.damage is not found.damage for site, found in zip(sites, work.sites, strict=True))
+    found = to_solid(united((site.damage for site in work.sites), origin), origin) if cut_back else damage
+    result = Result(
+        name=engine.job.name,
+        units=engine.job.units,
+        tolerance=state.tolerance,
+        part=part,
+        scan=scan,
+        aligned=state.aligned,
+        pose=state.pose,
+        deviation=replace(deviation, label=kept),
+        site_label=label,
+        sites=sites,
+        damage=damage,
+        undamaged=to_solid(remainder(to_manifold(part, origin), lost), origin) if sites else part,
+        warnings=tuple(dict.fromkeys(work.warnings)),
+        failures=tuple(str(error) for error in work.failures),
+        truth=_compare_with_truth(found, scan, state.pose, state.tolerance),
+        stages=tuple(engine.records),
+    )
+    key = digest(
+        engine.job.name, [state.keys[name] for name in sorted(state.keys)], [s.key("deposit") for s in work.sites]
+    )
+    return replace(work, job=state.with_value(JobState.result, result, key))
+
+
+def _describe_site(found: FoundSite) -> Site:
+    evidence, members, warnings = found.evidence, found.members, found.notes
+    if len(members) < FEW:
+        warnings = (
+            f"only {len(members)} scan points lie on it; for a volume to rely on, scan it more densely",
+            *warnings,
+        )
+    if not evidence.consistent:
+        warnings = (f"the scan does not bear this damage volume out: {'; '.join(evidence.reasons)}", *warnings)
+    deposit, damage = found.deposit, found.damage
+    if isinstance(deposit, Deposit):
+        damage = deposit.cavity or damage
+        warnings += deposit.notes
+    return Site(
+        id=found.number,
+        clusters=found.clusters,
+        points=members,
+        damage=damage,
+        surface=ids_surface(damage, found.job.part),
+        deposit=deposit,
+        refused=found.refused,
+        method=found.method,
+        evidence=evidence,
+        max_depth=max(float(-found.job.deviation.distance[members].min()), 0.0),
+        warnings=warnings,
+    )
+
+
+def _compare_with_truth(damage: Solid | None, scan: Scan, pose: Pose, tolerance: float) -> Floats | None:
+    """(volume, IoU) against a virtual scan's known damage. On a symmetric part any of the poses that map it onto itself
+    is right, so where the pose found is another one, the truth is moved by the difference."""
+    if scan.truth is None:
+        return None
+    truth = scan.truth.damage
+    if truth is None:
+        return np.array([0.0, iou(None, damage)])
+    D = pose.T_part_scan @ np.linalg.inv(scan.truth.T_part_scan)
+    moved = truth.vertices @ D[:3, :3].T + D[:3, 3]
+    if np.linalg.norm(moved - truth.vertices, axis=1).max() > 5 * tolerance:
+        truth = Solid(moved, truth.faces)
+    return np.array([truth.volume, iou(truth, damage)])

@@ -1,0 +1,104 @@
+"""Steps round the stage `allowance`: the other sites, sites that it refuses, and deposits that overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from damageest.artefacts import Deposit, Floats, Solid
+from damageest.errors import StageError
+from damageest.geometry.solids import to_manifold, to_solid, united
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine, Step
+from damageest.pipeline.state import FoundSite, Work
+from damageest.registry.contracts import Contract
+
+SPECK, TOLD = 1e-9, 1e-5
+"""Shares of a deposit's volume: below the first, an overlap is rounding; below the second, not reported."""
+
+
+def make_deposits(allowance: Contract) -> Step:
+    """A step that calls the contract on each site. A site that it refuses keeps its damage volume; what to deposit is
+    not known."""
+
+    def run(engine: Engine, work: Work) -> Work:
+        told = "others" in type(engine.job.stages[allowance]).needs()
+        done: list[FoundSite] = []
+        failures: list[StageError] = []
+        for site in work.sites:
+            rest = [other for other in work.sites if other is not site]
+            others = _unite([other.damage for other in rest]) if told else None
+            key = digest("others", [other.key("damage") for other in rest])
+            site = site.with_value(FoundSite.others, others, key)
+            try:
+                done.append(engine.call(allowance, site))
+            except StageError as error:
+                failures.append(error)
+                site = site.with_value(FoundSite.deposit, None, digest("refused", site.key("damage")))
+                done.append(replace(site, refused=True))
+        return replace(work, sites=tuple(done), failures=(*work.failures, *failures))
+
+    return run
+
+
+def separate_deposits(engine: Engine, work: Work) -> Work:
+    """Takes from each deposit and its cavity what those of the sites before it hold already, so that volumes add up."""
+    done: list[FoundSite] = []
+    for site in work.sites:
+        deposit = site.deposit
+        if isinstance(deposit, Deposit):
+            for earlier in done:
+                deposit = _without(deposit, earlier, site.damage)
+            key = digest("separate", site.key("deposit"), [earlier.key("deposit") for earlier in done])
+            site = site.with_value(FoundSite.deposit, deposit, key)
+        done.append(site)
+    return replace(work, sites=tuple(done))
+
+
+def _without(deposit: Deposit, earlier: FoundSite, damage: Solid) -> Deposit:
+    """A deposit minus the one of an earlier site, for the same damage volume."""
+    other = earlier.deposit or earlier.damage
+    if (deposit.bounds[0] > other.bounds[1]).any() or (other.bounds[0] > deposit.bounds[1]).any():
+        return deposit
+    origin = deposit.bounds.mean(axis=0)
+    body, taken = to_manifold(deposit, origin), to_manifold(other, origin)
+    own = to_manifold(damage, origin)
+    if (taken ^ own).volume() > SPECK * damage.volume:  # of an allowance that pays no heed to its neighbours
+        taken -= own
+    common = (body ^ taken).volume()
+    if common <= SPECK * deposit.volume:
+        return deposit
+    left = to_solid(body - taken, origin)
+    cavity, cut_back = deposit.cavity, deposit.cut_back_volume
+    if cavity is not None:
+        cavity = _shortened(cavity, taken, origin)
+        cut_back = max(cavity.volume - damage.volume, 0.0)
+    if left is None:
+        return deposit
+    notes = deposit.notes
+    if common > TOLD * deposit.volume:
+        notes = (
+            *notes,
+            f"its deposit overlaps that of site {earlier.number} by {common:.4g} in volume, which is counted there",
+        )
+    return replace(
+        deposit,
+        vertices=left.vertices,
+        faces=left.faces,
+        cavity=cavity,
+        stock_volume=max(left.volume - (cavity or damage).volume, 0.0),
+        cut_back_volume=cut_back,
+        notes=notes,
+    )
+
+
+def _shortened(cavity: Solid, taken: Any, origin: Floats) -> Solid:
+    return to_solid(to_manifold(cavity, origin) - taken, origin) or cavity
+
+
+def _unite(solids: Sequence[Solid]) -> Solid | None:
+    if not solids:
+        return None
+    origin = solids[0].bounds.mean(axis=0)
+    return to_solid(united(solids, origin), origin)

@@ -1,0 +1,167 @@
+"""Calls stages: what they take by name, what they gave before, who observes, and what went wrong."""
+
+from __future__ import annotations
+
+import time
+import typing
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+from damageest.artefacts import ArtefactError
+from damageest.errors import DamageestError, InputError, StageError
+from damageest.job.model import Job
+from damageest.pipeline.cache import Cache, digest
+from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
+from damageest.registry.contracts import Contract
+from damageest.registry.registry import Implementation, Registry
+from damageest.result import StageRecord
+from damageest.stages import Stage
+
+S = TypeVar("S", JobState, Candidate, FoundSite)
+
+
+@dataclass
+class Engine:
+    """One run of a job. ``records`` grow as it goes; ``stems`` are the cache entries that it used."""
+
+    job: Job
+    registry: Registry
+    cache: Cache | None = None
+    records: list[StageRecord] = field(default_factory=list)
+    stems: list[str] = field(default_factory=list)
+    memo: dict[str, Any] = field(default_factory=dict)
+
+    def call(self, contract: Contract, state: S) -> S:
+        """Runs the job's implementation of a contract on a state, or takes what it gave before on the same."""
+        if contract in self.job.given:
+            value = self.job.given[contract]
+            return state.with_named(contract.gives, value, digest(value))
+        stage, item = self.job.stages[contract], self.job.implementations[contract]
+        hooks, where = self.registry.hooks.hook, (contract.stage, item.name, state.number)
+        named = dict(zip(("stage", "use", "site"), where, strict=True))
+        needs = item.cls.needs()
+        key = digest(*where[:2], item.provider.fingerprint, stage.model_dump(), [state.key(name) for name in needs])
+        _tell(hooks.damageest_before_stage, **named)
+        start = time.perf_counter()
+        try:
+            cached, value = self.remember(
+                contract.stage + (f"-{state.number}" if state.number else ""),
+                key,
+                lambda: _check_type(stage.run(**{name: state.get(name) for name in needs}), contract),  # type: ignore[attr-defined]
+                keep=contract.stage != "export",
+            )
+        except Exception as error:
+            _tell(hooks.damageest_stage_failed, **named, error=error)
+            raise _locate(error, item, state.number) from error
+        seconds = time.perf_counter() - start
+        self.records.append(StageRecord(*where[:2], str(item.provider), state.number, round(seconds, 3), cached))
+        _tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
+        return state.with_named(contract.gives, value, key)
+
+    def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
+        """(was it there, value): from this run's memory, else from the cache, else computed and kept."""
+        if key in self.memo:
+            return True, self.memo[key]
+        found, value = self.cache.get(name, key) if self.cache and keep else (False, None)
+        if not found:
+            value = compute()
+            if self.cache and keep:
+                self.cache.put(name, key, value)
+        if keep:
+            self.memo[key] = value
+            self.stems.append(f"{name}-{key}")
+        return found, value
+
+
+Step = Callable[[Engine, Work], Work]
+Route = tuple[Contract | Step, ...]
+
+
+def follow(route: Sequence[Contract | Step], engine: Engine, work: Work) -> Work:
+    """Runs a route: a contract once on the job, or once on each candidate; a step on all of the work.
+
+    A candidate whose stage fails leaves the work as one of its ``failures``; the others go on.
+    """
+    for step in route:
+        if not isinstance(step, type):
+            work = step(engine, work)
+        elif issubclass(step, Stage) and step.per_site:
+            work = call_each(engine, step, work)
+        else:
+            work = replace(work, job=engine.call(step, work.job))
+    return work
+
+
+def call_each(engine: Engine, contract: Contract, work: Work) -> Work:
+    """The work with a contract called on each candidate."""
+    done: list[Candidate] = []
+    failures = []
+    for candidate in work.candidates:
+        try:
+            done.append(engine.call(contract, candidate))
+        except StageError as error:
+            failures.append(error)
+    return replace(work, candidates=tuple(done), failures=(*work.failures, *failures))
+
+
+def start(job: Job) -> Work:
+    """The work before any stage: the job's unit and tolerance."""
+    state = JobState().with_value(JobState.unit, job.units, digest(job.units))
+    return Work(state.with_named("tolerance", job.tolerance, digest(job.tolerance)))
+
+
+def _tell(hook: Callable[..., Any], **what: Any) -> None:
+    """Calls observers. A failing one becomes a warning: it changes nothing of what is computed."""
+    try:
+        hook(**what)
+    except Exception as error:
+        text = f"a plugin that observes stage {what['stage']} failed: {type(error).__name__}: {error}"
+        warnings.warn(text, RuntimeWarning, stacklevel=2)
+
+
+def _check_type(value: Any, contract: Contract) -> Any:
+    """The value, if it is of the type that the contract promises."""
+    expected = contract.gives_type()
+    kinds = typing.get_args(expected) or (expected,)
+    kinds = (tuple,) if typing.get_origin(expected) is tuple else kinds
+    if not isinstance(value, kinds):
+        names = " or ".join(getattr(kind, "__name__", str(kind)) for kind in kinds)
+        raise StageError(
+            f"gave a {type(value).__name__} where its contract promises {names}", "update the plugin that it is from"
+        )
+    return value
+
+
+def _locate(error: Exception, item: Implementation, site: int) -> DamageestError:
+    """The error with the stage it came from. One of another kind becomes a StageError that names the provider."""
+    stage = item.contract.stage
+    if isinstance(error, DamageestError) and not isinstance(error, StageError):
+        return error
+    if isinstance(error, OSError) and stage in ("part", "scan"):
+        return InputError(f"{stage}: {item.name}: {error}")
+    placed = error if isinstance(error, StageError) else _explain(error, f"{item.provider}")
+    placed.stage, placed.use, placed.site = stage, item.name, site
+    return placed
+
+
+def _explain(error: Exception, provider: str) -> StageError:
+    """An error that a stage did not raise on purpose, in words for whoever uses or mends it."""
+    first = str(error).splitlines()[0][:400] if str(error) else ""
+    if isinstance(error, MemoryError):
+        return StageError("ran out of memory", "a larger tolerance, or fewer scan points")
+    if isinstance(error, ArtefactError):
+        return StageError(
+            f"gave a result that is not valid: {first}",
+            f"another implementation; report it to the authors of {provider}",
+        )
+    if isinstance(error, ValueError) and "read-only" in first:
+        return StageError(
+            f"tried to edit what it was given, which later stages use as well ({first})",
+            f"another implementation; the authors of {provider} should edit a copy",
+        )
+    return StageError(
+        f"failed unexpectedly: {type(error).__name__}: {first}",
+        f"--debug for the traceback; report it to the authors of {provider}, with job and inputs",
+    )

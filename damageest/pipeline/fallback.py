@@ -1,0 +1,53 @@
+"""The step that tries one route, and another one for the sites that the first fails on or that the scan contradicts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from damageest.errors import StageError
+from damageest.pipeline.engine import Engine, Route, Step, follow
+from damageest.pipeline.state import FoundSite, Work
+
+
+def fall_back(first: Route, second: Route) -> Step:
+    """A step that follows ``first``, and ``second`` for the clusters without a site that the scan agrees with.
+
+    A site of the first route whose evidence is against it stays unless sites of the second route, with evidence for
+    them, stand for all of its clusters. Failures of the first route are not reported: the second route has its own.
+    """
+
+    def run(engine: Engine, work: Work) -> Work:
+        if not work.job.sites.count:
+            return work
+        try:
+            tried = follow(first, engine, replace(work, failures=()))
+        except StageError as error:
+            tried = replace(work, warnings=(*work.warnings, f"fell back to method surface: {error}"))
+        agreed = {cluster for site in tried.sites if site.evidence.consistent for cluster in site.clusters}
+        wanted = tuple(k for k in range(1, work.job.sites.count + 1) if k not in agreed)
+        if not wanted:
+            return replace(tried, failures=work.failures)
+        again = Work(work.job, warnings=tried.warnings, wanted=wanted)
+        again = follow(second, engine, again)
+        sites = merge_sites(tried.sites, again.sites)
+        done = {cluster for site in sites for cluster in site.clusters}
+        failures = tuple(error for error in again.failures if error.site not in done)
+        return replace(work, sites=sites, failures=(*work.failures, *failures), warnings=again.warnings)
+
+    return run
+
+
+def merge_sites(first: tuple[FoundSite, ...], second: tuple[FoundSite, ...]) -> tuple[FoundSite, ...]:
+    """Of the sites of two routes, those that the scan agrees with; for clusters without such a one, the first route's,
+    and else the second's."""
+    kept = [site for site in first if site.evidence.consistent]
+    better = [site for site in second if site.evidence.consistent]
+    doubtful: list[FoundSite] = []
+    for site in (site for site in first if not site.evidence.consistent):
+        takers = [other for other in better if set(other.clusters) & set(site.clusters)]
+        if {cluster for other in takers for cluster in other.clusters} >= set(site.clusters):
+            kept += [other for other in takers if other not in kept]
+        else:
+            doubtful.append(site)
+    done = {cluster for site in (*kept, *doubtful) for cluster in site.clusters}
+    return (*kept, *doubtful, *(site for site in second if not done & set(site.clusters)))

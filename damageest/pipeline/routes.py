@@ -1,0 +1,46 @@
+"""The routes: which contracts are called in which order, and the steps between them.
+
+A contract calls the implementation that the job names, once per job or once per site as the contract says. A step takes
+all of the work and gives it changed; some steps call contracts themselves, and have them as arguments.
+"""
+
+from __future__ import annotations
+
+from damageest.pipeline.collect import collect_result
+from damageest.pipeline.deposits import make_deposits, separate_deposits
+from damageest.pipeline.engine import Route
+from damageest.pipeline.fallback import fall_back
+from damageest.pipeline.grouped_enclosure import enclose_grouped
+from damageest.pipeline.prepare import gather_intact, measure_scan, place_scan
+from damageest.pipeline.sites import gather_sites, number_sites, take_clusters, take_enclosures, where_damaged
+from damageest.stages.align import Align
+from damageest.stages.allowance import Allowance
+from damageest.stages.background import Background
+from damageest.stages.boolean import Boolean
+from damageest.stages.boundary import Boundary
+from damageest.stages.cluster import Cluster
+from damageest.stages.enclose import Enclose, EncloseAll
+from damageest.stages.export import Export
+from damageest.stages.part import ReadPart
+from damageest.stages.reconstruct import Reconstruct
+from damageest.stages.repair import Repair
+from damageest.stages.sample import Sample
+from damageest.stages.scan import ReadScan
+from damageest.stages.segment import Segment
+
+ACQUIRE: Route = (ReadPart, ReadScan, measure_scan, Sample, Align, place_scan, Segment, Cluster, gather_intact)
+BY_SITE: Route = (
+    take_clusters, Reconstruct, Boundary, enclose_grouped(Background, Enclose), Repair, Boolean, gather_sites,
+)  # fmt: skip
+AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
+CLOSE: Route = (number_sites, make_deposits(Allowance), separate_deposits, collect_result)
+
+WRITE: Route = (Export,)
+"""After one of the routes, where the result goes to files."""
+
+
+def route_of(method: str) -> Route:
+    """The route of a job's `method`. One that is none of the three belongs to an implementation that takes all sites at
+    once, as `octree`."""
+    middle = {"surface": BY_SITE, "auto": (fall_back(AT_ONCE, BY_SITE),)}.get(method, (where_damaged(*AT_ONCE),))
+    return (*ACQUIRE, *middle, *CLOSE)

@@ -1,0 +1,101 @@
+"""Steps from the job to candidates for sites, and from their damage volumes to the sites."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.checks.evidence import weigh
+from damageest.errors import StageError
+from damageest.geometry.pieces import pieces_of, sites_of
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine, Step, follow
+from damageest.pipeline.state import Candidate, FoundSite, Work
+from damageest.registry.contracts import Contract
+from damageest.stages.enclose import Enclose, EncloseAll
+
+
+def where_damaged(*route: Contract | Step) -> Step:
+    """A step that follows a route only where the scan shows damage."""
+
+    def run(engine: Engine, work: Work) -> Work:
+        return follow(route, engine, work) if work.job.sites.count else work
+
+    return run
+
+
+def take_clusters(engine: Engine, work: Work) -> Work:
+    """Makes a candidate of each cluster of damaged points, or of each that is still wanted."""
+    state = work.job
+    fine = not getattr(engine.job.stages[Enclose], "refines", False)
+    wanted = range(1, state.sites.count + 1) if work.wanted is None else work.wanted
+    candidates = []
+    for number in wanted:
+        points = state.aligned.points[state.sites.members(number)]
+        key = digest("points", number, state.key("aligned"), state.key("sites"))
+        candidate = Candidate(job=state, number=number, clusters=(number,), method="surface")
+        candidate = candidate.with_value(Candidate.points, points, key)
+        candidates.append(candidate.with_value(Candidate.fine, fine, digest(fine)))
+    return replace(work, candidates=tuple(candidates))
+
+
+def take_enclosures(engine: Engine, work: Work) -> Work:
+    """Makes a candidate of each enclosure."""
+    state, method = work.job, engine.job.stages[EncloseAll].use
+    candidates = []
+    for number, item in enumerate(state.enclosures.items, 1):
+        candidate = Candidate(job=state, number=number, clusters=item.sites, method=method, notes=item.notes)
+        key = digest("solid", number, state.key("enclosures"))
+        candidates.append(candidate.with_value(Candidate.solid, item.solid, key))
+    return replace(work, candidates=tuple(candidates))
+
+
+def gather_sites(engine: Engine, work: Work) -> Work:
+    """Turns damage volumes into sites, each weighed against the scan. Clusters left without a volume are failures."""
+    if not work.candidates:
+        return work
+    state, method = work.job, work.candidates[0].method
+    aligned, sites, tolerance = state.aligned, state.sites, state.tolerance
+    reach = max(2 * tolerance, aligned.spacing)
+    pieces, dropped = [], 0.0
+    for candidate in work.candidates:
+        if candidate.damage is not None:
+            members = np.flatnonzero(np.isin(sites.label, candidate.clusters))
+            found, scraps = pieces_of(candidate.damage, aligned.points[members], sites.label[members], reach)
+            pieces += found
+            dropped += scraps
+    out = []
+    for item in sites_of(pieces):
+        members = np.flatnonzero(np.isin(sites.label, item.clusters))
+        evidence = weigh(item.damage, aligned.points[members], aligned, state.deviation, state.part, tolerance)
+        notes = [
+            note
+            for candidate in work.candidates
+            if set(candidate.clusters) & set(item.clusters)
+            for note in candidate.notes
+        ]
+        site = FoundSite(
+            job=state, clusters=item.clusters, method=method, members=members, evidence=evidence,
+            notes=tuple(dict.fromkeys(notes)),
+        )  # fmt: skip
+        out.append(site.with_value(FoundSite.damage, item.damage, digest(item.damage)))
+    covered = {cluster for site in out for cluster in site.clusters}
+    failures = []
+    for cluster in sorted({c for candidate in work.candidates for c in candidate.clusters} - covered):
+        error = StageError("its points bound no volume of the part", "the other method, or a smaller tolerance")
+        error.stage, error.use, error.site = "boolean", method, cluster
+        failures.append(error)
+    warnings = []
+    if dropped > 1e-3 * sum(site.damage.volume for site in out):
+        warnings.append(f"pieces of {dropped:.3g} in volume that no damaged point touches were dropped")
+    return replace(
+        work, candidates=(), sites=tuple(out), failures=(*work.failures, *failures),
+        warnings=(*work.warnings, *warnings),
+    )  # fmt: skip
+
+
+def number_sites(engine: Engine, work: Work) -> Work:
+    """Numbers the sites, largest first."""
+    ordered = sorted(work.sites, key=lambda site: -site.damage.volume)
+    return replace(work, sites=tuple(replace(site, number=number) for number, site in enumerate(ordered, 1)))

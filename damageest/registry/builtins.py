@@ -1,0 +1,64 @@
+"""The built-in stages, which come in through the same hook as a third party's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from damageest.registry.hookspecs import hookimpl
+
+if TYPE_CHECKING:
+    from damageest.stages import Stage
+    from damageest.stages.export import Writer
+
+
+@hookimpl
+def damageest_stages() -> list[type[Stage]]:
+    """Every built-in implementation. Imported here, so that loading the built-ins costs a command line little."""
+
+    from damageest.stages.align.icp import Icp
+    from damageest.stages.align.none import Unaligned
+    from damageest.stages.align.register import Register
+    from damageest.stages.allowance.milling import Milling
+    from damageest.stages.allowance.none import Nothing as NoAllowance
+    from damageest.stages.background.bbox import BoundingBox
+    from damageest.stages.background.build_volume import BuildVolume
+    from damageest.stages.background.capsule import Capsule
+    from damageest.stages.background.cylinder import Cylinder
+    from damageest.stages.background.minkowski import Minkowski
+    from damageest.stages.background.offset import Offset
+    from damageest.stages.boolean.manifold import Manifold
+    from damageest.stages.boundary.all_loops import AllLoops
+    from damageest.stages.boundary.largest_loop import LargestLoop
+    from damageest.stages.cluster.dbscan import Dbscan
+    from damageest.stages.enclose.adaptive import Adaptive
+    from damageest.stages.enclose.implicit import Implicit
+    from damageest.stages.enclose.shortest_path import ShortestPath
+    from damageest.stages.export.files import Files
+    from damageest.stages.part.file import PartFile
+    from damageest.stages.part.reconstruct import Reconstructed
+    from damageest.stages.reconstruct.pyvista import PyVista
+    from damageest.stages.reconstruct.signed_distance import SignedDistance
+    from damageest.stages.repair.none import Nothing as NoRepair
+    from damageest.stages.sample.edge_aware import EdgeAware
+    from damageest.stages.sample.uniform import Uniform
+    from damageest.stages.scan.file import ScanFile
+    from damageest.stages.scan.simulate import Simulate
+    from damageest.stages.segment.cloud_distance import CloudDistance
+    from damageest.stages.segment.mesh_distance import MeshDistance
+
+    return [
+        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Unaligned, MeshDistance, Dbscan, PyVista, LargestLoop,
+        AllLoops, Offset, BoundingBox, Capsule, Cylinder, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
+        NoRepair, Manifold, NoAllowance, Milling, Files, Uniform, CloudDistance, SignedDistance, Reconstructed,
+    ]  # fmt: skip
+
+
+@hookimpl
+def damageest_writers() -> Mapping[str, Writer]:
+    """The formats that need no plugin."""
+    from damageest.stages.export import Writer
+    from damageest.stages.export._mesh_files import ply, stl
+    from damageest.stages.export._threemf import threemf
+
+    return {"stl": Writer(stl), "ply": Writer(ply), "3mf": Writer(threemf, together=True)}

@@ -1,0 +1,122 @@
+"""Loads the built-ins and the installed plugins; a plugin that fails to import is kept with its error."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import traceback
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import Distribution, EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
+
+import pluggy
+
+import damageest
+from damageest.errors import PluginError
+from damageest.registry import hookspecs
+
+GROUP = "damageest"
+
+
+@dataclass(frozen=True)
+class Provider:
+    """A distribution that provides stages: its ``name``, ``version``, ``licence`` and the ``module`` of its hooks."""
+
+    name: str
+    version: str
+    licence: str
+    module: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.version}"
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Digest over version and source: what a changed implementation gave before is not taken for its own."""
+        digest = hashlib.sha256(str(self).encode())
+        spec = importlib.util.find_spec(self.module.split(".")[0])
+        for place in (spec.submodule_search_locations or [spec.origin or ""]) if spec else []:
+            root = Path(str(place))
+            for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
+                digest.update(path.name.encode() + path.read_bytes())
+        return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A plugin, or one implementation of it, that cannot be used: why, and what to do."""
+
+    provider: Provider
+    reason: str
+    remedy: str
+
+
+def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[tuple[Any, Provider]], list[Broken]]:
+    """The hooks, the plugins that loaded (built-ins first) and those that did not."""
+    manager = pluggy.PluginManager(GROUP)
+    manager.add_hookspecs(hookspecs)
+    loaded: list[tuple[Any, Provider]] = []
+    broken: list[Broken] = []
+    own = EntryPoint("builtins", "damageest.registry.builtins", GROUP)
+    for point, provider in [(own, _own_provider()), *_installed()]:
+        try:
+            with unwarned():
+                plugin = point.load()
+            manager.register(plugin, f"{provider.name}:{point.name}")
+        except (Exception, SystemExit) as error:
+            broken.append(fault_of(error, provider))
+        else:
+            loaded.append((plugin, provider))
+    for observer in observers:
+        manager.register(observer)
+    return manager, loaded, broken
+
+
+@contextmanager
+def unwarned() -> Iterator[None]:
+    """Without pydantic's warning on options that shadow an attribute: the registry refuses those with its own words."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Field name .* shadows an attribute", category=UserWarning)
+        yield
+
+
+def _own_provider() -> Provider:
+    return Provider("damageest", damageest.__version__, "Apache-2.0", "damageest.registry.builtins")
+
+
+def _installed() -> list[tuple[EntryPoint, Provider]]:
+    points = sorted(entry_points(group=GROUP), key=lambda p: (p.dist.name if p.dist else "", p.name))
+    return [(point, _provider(point, point.dist)) for point in points]
+
+
+def _provider(point: EntryPoint, dist: Distribution | None) -> Provider:
+    if dist is None:
+        return Provider(point.name, "?", "?", point.module)
+    meta = dist.metadata
+    licence = next((meta[key] for key in ("License-Expression", "License") if key in meta), "not stated")
+    return Provider(dist.name, dist.version, licence.splitlines()[0], point.module)
+
+
+def fault_of(error: BaseException, provider: Provider) -> Broken:
+    """The plugin as broken by an error, with what to do about it."""
+    return Broken(provider, f"{type(error).__name__}: {error}{_place(error, provider)}", _remedy(error, provider))
+
+
+def _place(error: BaseException, provider: Provider) -> str:
+    """Where in the plugin's own files an error arose; nothing for one that its author wrote for the user."""
+    root = provider.module.split(".")[0]
+    own = [f for f in traceback.extract_tb(error.__traceback__) if root in Path(f.filename).with_suffix("").parts]
+    return f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own and type(error) is not PluginError else ""
+
+
+def _remedy(error: BaseException, provider: Provider) -> str:
+    if isinstance(error, PluginError) and error.remedy:
+        return error.remedy
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        return f"pip install {error.name}, or reinstall {provider.name}"
+    return f"update or uninstall {provider.name}"

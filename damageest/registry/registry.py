@@ -1,0 +1,175 @@
+"""Which stage implementations and file formats there are here, who provides them, and which plugins are broken.
+
+Discovery gives a value: `Registry.discover()` may be called any number of times and changes nothing outside itself.
+"""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import pluggy
+from pydantic import ValidationError
+
+from damageest.errors import PluginError, suggest
+from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
+from damageest.registry.loading import Broken, Provider, fault_of, load, unwarned
+from damageest.stages import Stage
+from damageest.stages.enclose import EncloseAll
+from damageest.stages.export import Writer
+
+
+@dataclass(frozen=True)
+class Implementation:
+    """A stage implementation: the class, the name a job calls it by, the contract it keeps, and who provides it."""
+
+    name: str
+    cls: type[Stage]
+    contract: Contract
+    provider: Provider
+
+    @property
+    def method(self) -> str:
+        """The method that chooses this implementation without naming it: of those that take all sites at once, their
+        own; else `surface` for a stage of that route, and empty for one that each method has."""
+        if issubclass(self.cls, EncloseAll):
+            return self.cls.method
+        return "surface" if self.contract in SURFACE_ONLY else ""
+
+
+@dataclass(frozen=True)
+class Registry:
+    """All that was found. ``clashes`` are names that two distributions provide: no job can use them. ``writers``: the
+    formats that `export` can write, by name."""
+
+    implementations: tuple[Implementation, ...]
+    providers: tuple[Provider, ...]
+    broken: tuple[Broken, ...]
+    clashes: tuple[tuple[Implementation, ...], ...]
+    hooks: pluggy.PluginManager = field(repr=False)
+    writers: Mapping[str, Writer] = field(default_factory=dict, compare=False)
+
+    @classmethod
+    def discover(cls, observers: Iterable[object] = ()) -> Registry:
+        """Finds the built-ins and every installed plugin; ``observers`` are extra objects with observing hooks."""
+        manager, loaded, broken = load(observers)
+        found: list[Implementation] = []
+        writers: dict[str, Writer] = {}
+        for plugin, provider in loaded:
+            try:
+                with unwarned():
+                    classes = _offered(plugin)
+                    writers |= _writers(plugin, writers)
+            except (Exception, SystemExit) as error:
+                broken.append(fault_of(error, provider))
+                continue
+            for stage in classes:
+                try:
+                    found.append(_implementation(stage, provider))
+                except PluginError as error:
+                    broken.append(Broken(provider, str(error), f"update or uninstall {provider.name}"))
+                except Exception as error:
+                    broken.append(fault_of(error, provider))
+        names = [(item.contract.stage, item.name) for item in found]
+        groups = {key: tuple(i for i, n in zip(found, names, strict=True) if n == key) for key in dict.fromkeys(names)}
+        single = tuple(group[0] for group in groups.values() if len(group) == 1)
+        clashes = tuple(group for group in groups.values() if len(group) > 1)
+        providers = tuple(dict.fromkeys([p for _, p in loaded] + [b.provider for b in broken]))
+        return cls(single, providers, tuple(broken), clashes, manager, writers)
+
+    def of(self, stage: str) -> tuple[Implementation, ...]:
+        """The implementations of a stage, defaults first, then by name."""
+        chosen = [item for item in self.implementations if item.contract.stage == stage]
+        return tuple(sorted(chosen, key=lambda item: (DEFAULTS[item.contract] != item.name, item.name)))
+
+    def methods(self, contract: Contract | None = None) -> tuple[str, ...]:
+        """The values of a job's `method`; with a ``contract``, those that its implementations name."""
+        if contract is None:
+            return ("auto", "surface", *self.methods(EncloseAll))
+        return tuple(dict.fromkeys(item.method for item in self.of(contract.stage) if item.contract is contract))
+
+    def usual(self, contract: Contract, method: str) -> str:
+        """The name of the implementation of a contract that a ``method`` takes where the job names none."""
+        serving = [item.name for item in self.of(contract.stage) if (item.contract, item.method) == (contract, method)]
+        return DEFAULTS[contract] if DEFAULTS[contract] in serving or not serving else serving[0]
+
+    def get(self, stage: str, name: str) -> Implementation:
+        """Raises PluginError for a name that clashes, KeyError with a message for one that is not there."""
+        for group in self.clashes:
+            if (group[0].contract.stage, group[0].name) == (stage, name):
+                if len({item.provider for item in group}) == 1:
+                    who = str(group[0].provider)
+                    raise PluginError(
+                        f"{who} provides '{name}' of stage '{stage}' more than once; update or uninstall it"
+                    )
+                who = " and ".join(str(item.provider) for item in group)
+                raise PluginError(f"'{name}' of stage '{stage}' is provided by {who}; uninstall all but one of them")
+        for item in self.of(stage):
+            if item.name == name:
+                return item
+        names = [item.name for item in self.of(stage)]
+        raise KeyError(
+            f"stage '{stage}' has no '{name}'{suggest(name, names)}; there are: {', '.join(names)}{self.missing()}"
+        )
+
+    def missing(self) -> str:
+        """A clause on plugins that are installed but broken, empty where there are none."""
+        parts = [f"{b.provider} is broken ({b.reason.splitlines()[0]}; {b.remedy})" for b in self.broken]
+        return f"; {'; '.join(parts)}" if parts else ""
+
+
+def _implementation(cls: Any, provider: Provider) -> Implementation:
+    """Checks a class against its contract when it is registered, not when it runs."""
+    contract = contract_of(cls) if isinstance(cls, type) else None
+    if contract is None:
+        raise PluginError(f"{cls!r} derives from no contract; the stages are: {', '.join(STAGES)}")
+    reserved = [n for n in cls.model_fields if n != "use" and hasattr(contract, n)]
+    if reserved:
+        raise PluginError(f"{cls.__qualname__}: option {', '.join(map(repr, reserved))} shadows a reserved name")
+    changed = [n for n in ("stage", "gives", "per_site") if getattr(cls, n) != getattr(contract, n)]
+    if changed:
+        raise PluginError(f"{cls.__qualname__} changes {', '.join(map(repr, changed))}, which its contract fixes")
+    cls.needs()
+    name = _name(cls)
+    _check_defaults(cls)
+    return Implementation(name, cls, contract, provider)
+
+
+def _offered(plugin: Any) -> list[Any]:
+    """What a plugin's hook gives. A module without that hook may have others, and then gives no stages."""
+    classes = plugin.damageest_stages() if hasattr(plugin, "damageest_stages") else []
+    if not isinstance(classes, list | tuple):
+        raise PluginError(f"its hook damageest_stages gave a {type(classes).__name__} instead of a list of classes")
+    return list(classes)
+
+
+def _writers(plugin: Any, known: Mapping[str, Writer]) -> dict[str, Writer]:
+    """The formats that a plugin can write. Raises PluginError for what is no writer, or of a format known already."""
+    found = plugin.damageest_writers() if hasattr(plugin, "damageest_writers") else {}
+    if not isinstance(found, Mapping) or not all(isinstance(writer, Writer) for writer in found.values()):
+        raise PluginError("its hook damageest_writers did not give a mapping of format names to Writers")
+    if twice := sorted(found.keys() & known.keys()):
+        raise PluginError(f"writes {', '.join(twice)}, which another package writes already; uninstall one of them")
+    return dict(found)
+
+
+def _check_defaults(cls: type[Stage]) -> None:
+    """Refuses a default that its own option would refuse; options without a default are the job's to give."""
+    fields = {name: field for name, field in cls.model_fields.items() if not field.is_required()}
+    try:
+        cls.model_validate({name: field.get_default(call_default_factory=True) for name, field in fields.items()})
+    except ValidationError as error:
+        # No place: the options contradict each other as a whole, which a job may mend by setting some.
+        wrong = [e for e in error.errors() if e["loc"] and e["loc"][0] in fields]
+        if wrong:
+            text = "; ".join(f"{e['loc'][0]}: {e['msg']}" for e in wrong)
+            raise PluginError(f"{cls.__qualname__}: the default of an option is not valid: {text}") from error
+
+
+def _name(cls: type[Stage]) -> str:
+    choices = typing.get_args(cls.model_fields["use"].annotation)
+    if len(choices) != 1 or not isinstance(choices[0], str):
+        raise PluginError(f"{cls.__qualname__}: declare its name as  use: Literal['name']")
+    return choices[0]

@@ -1,0 +1,1 @@
+"""What a result says: `result.json` and its schema."""

@@ -1,0 +1,280 @@
+"""What result.json says of a result."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from damageest.artefacts import Deposit, Floats
+from damageest.result import Result, Site
+from damageest.stages.export import Written
+
+Vector = tuple[float, float, float]
+_NOTHING = Written()
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+
+class PartReport(_Model):
+    path: str = Field(description="relative to this file; empty for a part given as arrays")
+    sha256: str
+    volume: float
+    watertight: bool
+    tessellation_error: float = Field(description="bound on the distance between CAD surface and triangles")
+    notes: list[str] = Field(description="what was repaired or converted when the part was read")
+
+
+class ScanReport(_Model):
+    paths: list[str]
+    points: int
+    noise: float = Field(description="measured standard deviation of the points off the local surface")
+    spacing: float = Field(description="measured distance that a surface reconstruction has to bridge")
+    notes: list[str]
+
+
+class AlignmentReport(_Model):
+    transform: list[list[float]] = Field(description="T_part_scan, 4x4: from the scanner's frame to the part's")
+    quaternion: tuple[float, float, float, float] = Field(description="its rotation: w, x, y, z; w is not negative")
+    translation: Vector = Field(description="its shift, after the rotation")
+    rms: float = Field(description="of the inliers' distance to the part")
+    inliers: float = Field(description="share of the scan's points")
+    alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
+    notes: list[str]
+
+
+class EvidenceReport(_Model):
+    ids_residual: float = Field(description="95th percentile of the IDS points' distance to the damage volume")
+    intact_points_inside: int = Field(description="intact scan points deeper than the tolerance inside it")
+    skin_contradicted: float = Field(description="share of the removed skin that intact scan points lie on")
+    skin_unseen: float = Field(description="share of the skin beside the damage that the scan does not show")
+    consistent: bool = Field(description="whether the scan bears the damage volume out")
+    reasons: list[str] = Field(description="why it is not")
+
+
+class FilesReport(_Model):
+    """Where the job asks for several formats or frames, the first of them; `every` has them all."""
+
+    damage: str | None
+    surface: str | None
+    deposit: str | None
+    every: list[str] = Field(description="all files of this site alone")
+
+
+class SplineReport(_Model):
+    deviation: float | None = Field(description="largest distance between surface and spline, either way")
+    trimmed: bool = Field(description="whether it ends at the surface's rim; otherwise it reaches beyond")
+    reason: str = Field(description="why none was written; empty where one was")
+
+
+class ExportReport(_Model):
+    files: list[str] = Field(description="all that were written; those below scan_frame/ are in the scan's frame")
+    notes: list[str] = Field(description="what was written otherwise than asked for, and why")
+
+
+class ThicknessReport(_Model):
+    """Height of the stock over the nominal surface, where stock was asked for."""
+
+    min: float
+    mean: float
+    max: float
+
+
+class DepositReport(_Model):
+    volume: float = Field(description="of what is to be deposited")
+    stock_volume: float = Field(description="of its share beyond the nominal surface, to be milled off")
+    cut_back_volume: float = Field(description="of sound metal to be taken off before, for a clean surface")
+    thickness: ThicknessReport | None = Field(description="of the stock; null where none was asked for or measured")
+    faces: list[int] = Field(description="numbers of the CAD faces that stock stands on; empty without B-rep")
+
+
+class MaterialReport(_Model):
+    """Sums over all sites, but for those that the stage allowance refused."""
+
+    deposit_volume: float
+    stock_volume: float
+    cut_back_volume: float
+
+
+class SiteReport(_Model):
+    id: int
+    points: int
+    volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
+    surface_area: float = Field(description="of the inner damage surface")
+    max_depth: float = Field(description="of the scan below the nominal surface")
+    centroid: Vector
+    bounds: tuple[Vector, Vector]
+    method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
+    evidence: EvidenceReport
+    deposit: DepositReport | None = Field(description="null where the stage allowance refused the site")
+    files: FilesReport
+    spline: SplineReport | None = Field(description="null where the job asks for none")
+    warnings: list[str]
+
+
+class TruthReport(_Model):
+    """Only after a virtual scan: how far the result is from what is known to be true."""
+
+    volume: float
+    iou: float = Field(description="intersection over union of found and true damage")
+    transform: list[list[float]] = Field(description="the true T_part_scan")
+
+
+class StageReport(_Model):
+    stage: str
+    use: str
+    provider: str
+    site: int = Field(description="0 for a stage that runs once per job")
+    seconds: float
+    cached: bool
+
+
+class Report(_Model):
+    """The content of result.json. Lengths, areas and volumes in ``units``; coordinates in the part's frame."""
+
+    version: Literal[1] = Field(1, alias="schema", description="version of this format")
+    status: Literal["ok", "incomplete"] = Field(description="incomplete: some sites have no damage volume or deposit")
+    name: str
+    units: str
+    tolerance: float
+    part: PartReport
+    scan: ScanReport
+    alignment: AlignmentReport
+    sites: list[SiteReport]
+    export: ExportReport
+    damage_volume: float
+    undamaged_volume: float
+    material: MaterialReport = Field(description="what the whole repair takes")
+    truth: TruthReport | None
+    stages: list[StageReport]
+    failures: list[str] = Field(description="sites without a damage volume or a deposit, and why")
+    warnings: list[str]
+    versions: dict[str, str]
+
+
+def result_schema() -> dict[str, Any]:
+    """The JSON Schema of result.json."""
+    return {"$schema": DIALECT, **Report.model_json_schema(mode="serialization"), "title": "damageest result"}
+
+
+def report(result: Result, written: Written = _NOTHING, relative: Any = str) -> dict[str, Any]:
+    """The content of result.json as plain values. ``relative`` turns an absolute input path into the one to write."""
+    import platform
+
+    import damageest
+
+    part, scan, pose = result.part, result.scan, result.pose
+    sites = [_site(site, written) for site in result.sites]
+    filled = Report(
+        status=result.status,
+        name=result.name,
+        units=result.units,
+        tolerance=result.tolerance,
+        part=PartReport(
+            path=relative(part.path) if part.path else "",
+            sha256=part.sha256,
+            volume=part.volume,
+            watertight=True,
+            tessellation_error=part.tessellation_error,
+            notes=list(part.notes),
+        ),
+        scan=ScanReport(
+            paths=[relative(path) for path in scan.paths],
+            points=len(scan.points),
+            noise=scan.noise,
+            spacing=scan.spacing,
+            notes=list(scan.notes),
+        ),
+        alignment=AlignmentReport(
+            transform=pose.T_part_scan.tolist(),
+            quaternion=_quaternion(pose.T_part_scan),
+            translation=tuple(pose.T_part_scan[:3, 3].tolist()),
+            rms=pose.rms,
+            inliers=pose.inliers,
+            alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
+            notes=list(pose.notes),
+        ),
+        sites=sites,
+        export=ExportReport(files=list(written.files), notes=list(written.notes)),
+        damage_volume=result.damage_volume,
+        undamaged_volume=result.undamaged_volume,
+        material=_material([site.deposit for site in sites if site.deposit]),
+        truth=_truth(result),
+        stages=[StageReport(**vars(record)) for record in result.stages],
+        failures=list(result.failures),
+        warnings=list(result.warnings),
+        versions={"damageest": damageest.__version__, "python": platform.python_version()},
+    )
+    return filled.model_dump(mode="json", by_alias=True)
+
+
+def _quaternion(T: Floats) -> tuple[float, float, float, float]:
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True).tolist()
+    return w, x, y, z
+
+
+def _site(site: Site, written: Written) -> SiteReport:
+    kinds = ("damage", "surface", "deposit")
+    own = {
+        kind: [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"{kind}/site-{site.id}.")]
+        for kind in kinds
+    }
+    spline = written.splines.get(site.id)
+
+    low, high = site.damage.bounds.tolist()
+    evidence = {name: value for name, value in vars(site.evidence).items() if name != "reasons"}
+    return SiteReport(
+        id=site.id,
+        points=len(site.points),
+        volume=site.damage.volume,
+        surface_area=site.surface.area,
+        max_depth=site.max_depth,
+        centroid=tuple(site.centroid.tolist()),
+        bounds=(tuple(low), tuple(high)),
+        method=site.method,
+        deposit=_deposit(site),
+        evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
+        files=FilesReport(
+            **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
+        ),
+        spline=SplineReport(**vars(spline)) if spline else None,
+        warnings=list(site.warnings),
+    )
+
+
+def _deposit(site: Site) -> DepositReport | None:
+    if site.refused:
+        return None
+    deposit = site.deposit or site.damage
+    if not isinstance(deposit, Deposit):
+        stock = deposit.volume - site.damage.volume
+        return DepositReport(volume=deposit.volume, stock_volume=stock, cut_back_volume=0, thickness=None, faces=[])
+    low, mean, high = deposit.thickness or (0.0, 0.0, 0.0)
+    return DepositReport(
+        volume=deposit.volume,
+        stock_volume=deposit.stock_volume,
+        cut_back_volume=deposit.cut_back_volume,
+        thickness=ThicknessReport(min=low, mean=mean, max=high) if deposit.thickness else None,
+        faces=list(deposit.touched),
+    )
+
+
+def _material(deposits: list[DepositReport]) -> MaterialReport:
+    return MaterialReport(
+        deposit_volume=sum(deposit.volume for deposit in deposits),
+        stock_volume=sum(deposit.stock_volume for deposit in deposits),
+        cut_back_volume=sum(deposit.cut_back_volume for deposit in deposits),
+    )
+
+
+def _truth(result: Result) -> TruthReport | None:
+    truth = result.scan.truth
+    if truth is None or result.truth is None:
+        return None
+    volume, iou = result.truth.tolist()
+    return TruthReport(volume=volume, iou=iou, transform=truth.T_part_scan.tolist())

@@ -1,0 +1,98 @@
+"""Units and the telling of a wrong one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import BaseModel, ValidationError
+
+from damageest.errors import InputError
+from damageest.geometry.units import MILLIMETRES, Unit, canonical, diagnose_scale, factor
+
+units = st.sampled_from(sorted(MILLIMETRES))
+
+
+@given(a=units, b=units, c=units)
+def test_factors_compose(a, b, c):
+    assert factor(a, b) * factor(b, c) == pytest.approx(factor(a, c))
+    assert factor(a, a) == 1
+
+
+def test_names_and_aliases():
+    assert factor("in", "mm") == 25.4
+    assert factor("inches", "Millimeter") == 25.4
+    assert canonical("µm") == canonical("micron") == "um"
+
+
+def test_an_unknown_unit_names_the_near_miss_and_the_valid_ones():
+    with pytest.raises(InputError, match=r"'inchs'.*did you mean 'inch.*valid units: um, mm, cm, m, in, ft"):
+        canonical("inchs")
+
+
+def test_as_an_option_it_is_checked_and_shortened():
+    class Options(BaseModel):
+        unit: Unit
+
+    assert Options(unit="inch").unit == "in"
+    with pytest.raises(ValidationError, match="unknown unit 'parsec'"):
+        Options(unit="parsec")
+
+
+PARTS = {
+    "block": trimesh.creation.box((80, 50, 30)),
+    "shaft": trimesh.creation.cylinder(5, 200),
+    "ring": trimesh.creation.torus(30, 5),
+}
+
+
+def scanned(name, seed=0, keep=1.0):
+    """Points on the part, turned and moved; with ``keep`` < 1 only those of the lower end along a random direction."""
+    rng = np.random.default_rng(seed)
+    points = trimesh.sample.sample_surface(PARTS[name], 5000, seed=seed)[0]
+    along = points @ rng.normal(size=3)
+    points = points[along <= np.quantile(along, keep)]
+    return points @ trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3].T + rng.normal(size=3) * 500
+
+
+@given(name=st.sampled_from(sorted(PARTS)), seed=st.integers(0, 1000), keep=st.floats(0.5, 1.0))
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_partial_scans_in_the_right_unit_pass(name, seed, keep):
+    assert diagnose_scale(scanned(name, seed, keep), PARTS[name].vertices) is None
+
+
+def test_a_fixture_and_outliers_pass():
+    rng = np.random.default_rng(0)
+    plate = rng.uniform(-100, 100, (3000, 3)) * [1, 1, 0.01] + scanned("block").mean(0)
+    assert diagnose_scale(np.concatenate([scanned("block"), plate]), PARTS["block"].vertices) is None
+    stray = rng.normal(size=(20, 3)) * 1e5
+    assert diagnose_scale(np.concatenate([scanned("block"), stray]), PARTS["block"].vertices) is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "unit", "remedies"),
+    [
+        (25.4, "mm", ["part.unit: in"]),
+        (1 / 25.4, "mm", ["scan.unit: in"]),
+        (25.4, "in", ["scan.unit: mm"]),
+        (1e-3, "mm", ["scan.unit: m"]),
+        (1e3, "mm", ["part.unit: m"]),
+        (1e3, "m", ["scan.unit: mm"]),
+        (0.1, "mm", ["scan.unit: cm"]),
+    ],
+)
+@pytest.mark.parametrize("keep", [0.7, 1.0])
+@pytest.mark.parametrize("name", sorted(PARTS))
+def test_a_wrong_unit_is_named_with_what_to_set(wrong, unit, remedies, keep, name):
+    said = diagnose_scale(scanned(name, 3, keep) * wrong, PARTS[name].vertices, unit)
+    assert said is not None
+    for remedy in remedies:
+        assert f"set {remedy}" in said or f"or {remedy}" in said
+
+
+def test_sizes_that_no_unit_explains_are_said_not_to_fit():
+    said = diagnose_scale(scanned("block") * 3.6, PARTS["block"].vertices)
+    assert said is not None
+    assert "no confusion of units" in said

@@ -1,0 +1,161 @@
+"""Plugins at fault: each is named with its reason, and stops nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from damageest.cli import app
+from damageest.errors import PluginError
+from damageest.registry import Registry
+from tests import damaged_box
+from tests.registry.test_registry import GROWN, Site, site
+
+__all__ = ["site"]
+BODY = "return Solid(damage.vertices * self.factor, damage.faces)"
+HOOK = "return [Doubled]"
+
+
+def option(text: str) -> str:
+    return GROWN.replace("factor: float = 2.0", text).replace("self.factor", "2")
+
+
+FAULTS = {
+    "hook gives no list": (GROWN.replace(HOOK, "return Doubled"), "instead of a list"),
+    "hook gives None": (GROWN.replace(HOOK, "return None"), "gave a NoneType"),
+    "variable arguments": (GROWN.replace("damage: Solid)", "*args, **kwargs)"), "without *args"),
+    "option json": (option("json: float = 2.0"), "'json' shadows a reserved name"),
+    "option copy": (option("copy: bool = True"), "'copy' shadows a reserved name"),
+    "option stage": (option("stage: float = 2.0"), "'stage' shadows a reserved name"),
+    "invalid default": (option('factor: float = "much"'), "default of an option is not valid: factor"),
+    "option run": (option("run: float = 2.0"), "'run' shadows a reserved name"),
+    "option model_config": (option("model_config: float = 2.0"), "(acme_faulty.py, line 7)"),
+    "exits on import": ("import sys\nsys.exit(3)", "SystemExit"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_named_and_the_commands_go_on(name: str, site: Site, tmp_path: Path) -> None:
+    source, text = FAULTS[name]
+    site.add("acme-faulty", source)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        broken = Registry.discover().broken
+    assert [str(fault.provider) for fault in broken] == ["acme-faulty 1.2"]
+    assert text in broken[0].reason
+    job = str(damaged_box.write(tmp_path))
+    for words in (["--help"], ["stages"], ["schema", "job"], ["validate", job]):
+        assert CliRunner().invoke(app, words).exit_code == 0
+    assert "acme-faulty" in CliRunner().invoke(app, ["plugins"]).output
+
+
+def test_one_package_that_provides_a_name_twice(site: Site) -> None:
+    site.add("acme-twice", GROWN.replace(HOOK, "return [Doubled, type('Again', (Doubled,), {'__module__': __name__})]"))
+    registry = Registry.discover()
+    with pytest.raises(PluginError, match=r"acme-twice 1\.2 provides 'doubled' of stage 'allowance' more than once"):
+        registry.get("allowance", "doubled")
+
+
+def test_a_stage_that_prints_leaves_json_alone(site: Site, tmp_path: Path) -> None:
+    site.add("acme-loud", GROWN.replace(BODY, f"print('hello'); {BODY}"))
+    job = damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n")
+    done = CliRunner().invoke(app, ["run", "--json", str(job)])
+    assert json.loads(done.stdout)["status"] == "ok"
+    assert "hello" in done.stderr
+
+
+MISBEHAVIOUR = {
+    "edits its inputs": ("damage.vertices[0] = 0; return damage", "tried to edit what it was given"),
+    "open mesh": ("return Solid(damage.vertices, damage.faces[1:])", "gave an artefact that is none: not watertight"),
+    "raises": ("raise IndexError('7')", "failed unexpectedly: IndexError: 7"),
+}
+FORGETFUL = '''
+from damageest.stages.repair import Repair
+
+class Doubled(Repair):
+    """Forgets to return."""
+    use: Literal["doubled"] = "doubled"
+    def run(self, enclosure):
+        pass
+
+@hookimpl
+def damageest_stages():
+    return [Doubled]
+'''
+
+
+@pytest.mark.parametrize("name", MISBEHAVIOUR)
+def test_what_a_stage_does_wrong_is_said_with_whose_it_is(name: str, site: Site, tmp_path: Path) -> None:
+    body, text = MISBEHAVIOUR[name]
+    site.add("acme-bad", GROWN.replace(BODY, body))
+    job = damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n")
+    done = CliRunner().invoke(app, ["run", str(job)])
+    assert done.exit_code == 1
+    told = " ".join(done.output.split())
+    assert f"allowance: doubled (site 1): {text}" in told
+    assert "acme-bad 1.2" in told
+
+
+def test_none_where_the_contract_has_none(site: Site, tmp_path: Path) -> None:
+    site.add("acme-none", FORGETFUL)
+    job = damaged_box.write(tmp_path, damaged_box.JOB + "repair: doubled\n")
+    done = CliRunner().invoke(app, ["run", str(job)])
+    assert done.exit_code == 1
+    assert "gave a NoneType where its contract promises Solid" in " ".join(done.output.split())
+
+
+def test_a_module_without_hooks_provides_nothing(site: Site) -> None:
+    site.add("acme-empty", "")
+    assert not Registry.discover().broken
+    assert "acme-empty 1.2  MIT  no stages" in CliRunner().invoke(app, ["plugins"]).output
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, -signal.SIGTERM)])
+def test_a_stage_that_hangs_can_be_stopped(number: int, status: int, site: Site, tmp_path: Path) -> None:
+    job = damaged_box.write(tmp_path / "job")
+    command = [sys.executable, "-c", "from damageest.cli import main; main()", "run", "-q", str(job)]
+    subprocess.run(command, check=True)
+    before = damaged_box.content(tmp_path / "job" / "out" / "job")
+    assert before
+    hung = tmp_path / "hung"
+    site.add("acme-hang", GROWN.replace(BODY, f"import time; open({str(hung)!r}, 'w').close(); time.sleep(600)"))
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site.folder), os.environ.get("PYTHONPATH", "")])}
+    stuck = [*command, "--set", "allowance=doubled"]
+
+    def heeding() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # shells let what runs in the background ignore it
+
+    with subprocess.Popen(stuck, env=env, stderr=subprocess.PIPE, text=True, preexec_fn=heeding) as process:
+        try:
+            while not hung.exists():
+                assert process.poll() is None, process.communicate()[1]
+                time.sleep(0.05)
+            process.send_signal(number)
+            assert process.wait(timeout=30) == status
+        finally:
+            process.kill()
+    assert damaged_box.content(tmp_path / "job" / "out" / "job") == before
+    subprocess.run(command, check=True)
+
+
+def test_third_party_stages_are_shown_with_their_options(site: Site) -> None:
+    source = GROWN.replace("factor: float = 2.0", 'factor: float = Field(2.0, gt=1, description="how much larger")')
+    site.add("acme-grow", "from pydantic import Field\n" + source)
+    shown = CliRunner().invoke(app, ["stages", "allowance", "doubled"]).output
+    assert "acme-grow 1.2, MIT" in shown
+    assert "how much larger (default 2.0)" in shown
+    assert "doubled" in CliRunner().invoke(app, ["stages"]).output
+    schema = json.loads(CliRunner().invoke(app, ["schema", "job"]).output)
+    own = schema["$defs"]["Doubled"]["properties"]
+    assert own["use"] == {"const": "doubled", "description": "by acme-grow"}
+    assert own["factor"]["exclusiveMinimum"] == 1
+    assert {"$ref": "#/$defs/Doubled"} in schema["properties"]["allowance"]["anyOf"]

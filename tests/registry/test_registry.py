@@ -1,0 +1,149 @@
+"""Plugins: found, used, broken, clashing; observers called."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import damageest
+from damageest.errors import DamageestError, JobError
+from damageest.registry import Registry
+from damageest.registry.contracts import DEFAULTS
+from damageest.registry.hookspecs import hookimpl
+from tests import damaged_box
+
+HEAD = "from typing import Literal\nfrom damageest.registry.hookspecs import hookimpl\n"
+GROWN = '''
+from damageest.artefacts import Solid
+from damageest.stages.allowance import Allowance
+
+class Doubled(Allowance):
+    """Twice as large, about the origin."""
+    use: Literal["doubled"] = "doubled"
+    factor: float = 2.0
+    def run(self, damage: Solid) -> Solid | None:
+        return Solid(damage.vertices * self.factor, damage.faces)
+
+@hookimpl
+def damageest_stages():
+    return [Doubled]
+'''
+
+
+class Site:
+    """A folder on the path that packages with entry points can be put into."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def add(self, name: str, source: str) -> None:
+        module = name.replace("-", "_")
+        (self.folder / f"{module}.py").write_text(HEAD + source)
+        info = self.folder / f"{module}-1.2.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.2\nLicense: MIT\n")
+        (info / "entry_points.txt").write_text(f"[damageest]\n{module} = {module}\n")
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Site]:
+    folder = tmp_path / "site"
+    folder.mkdir()
+    before = set(sys.modules)
+    monkeypatch.syspath_prepend(str(folder))
+    yield Site(folder)
+    for name in set(sys.modules) - before:
+        if getattr(sys.modules[name], "__file__", None) and str(folder) in str(sys.modules[name].__file__):
+            del sys.modules[name]
+
+
+def test_every_default_is_there(registry: Registry) -> None:
+    for contract, name in DEFAULTS.items():
+        assert registry.get(contract.stage, name).contract is contract
+    assert not registry.broken
+    assert not registry.clashes
+
+
+def test_a_plugins_stage_runs(site: Site, tmp_path: Path) -> None:
+    site.add("acme-grow", GROWN)
+    assert any(str(p) == "acme-grow 1.2" and p.licence == "MIT" for p in Registry.discover().providers)
+    result = damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "allowance: {use: doubled, factor: 1.5}\n"))
+    assert result.sites[0].deposit is not None
+    assert result.sites[0].deposit.volume == pytest.approx(1.5**3 * result.damage_volume)
+
+
+FAULTS = {
+    "import nonexistent_thing": "pip install nonexistent_thing",
+    "raise SystemExit(3)": "SystemExit",
+    "@hookimpl\ndef damageest_stages():\n    return [int]": "derives from no contract",
+    GROWN.replace("damage: Solid)", "damage: Solid, weather: int)"): "asks for 'weather'",
+    GROWN.replace('Literal["doubled"] = "doubled"', 'str = "x"'): "Literal['name']",
+    GROWN.replace("factor: float = 2.0", "takes: float = 2.0").replace("self.factor", "2"): "reserved",
+}
+
+
+@pytest.mark.parametrize("source", FAULTS)
+def test_a_broken_plugin_stops_nothing(source: str, site: Site, tmp_path: Path) -> None:
+    site.add("acme-broken", source)
+    registry = Registry.discover()
+    assert len(registry.broken) == 1
+    assert FAULTS[source] in registry.broken[0].reason + registry.broken[0].remedy
+    assert damageest.run(damaged_box.write(tmp_path), registry=registry).status == "ok"
+    with pytest.raises(JobError, match=r"acme-broken 1\.2 is broken"):
+        damageest.run(tmp_path / "job.yaml", settings=["allowance=doubled"], registry=registry)
+
+
+def test_a_clash_names_both(site: Site, tmp_path: Path) -> None:
+    site.add("acme-one", GROWN)
+    site.add("acme-two", GROWN)
+    assert damageest.run(damaged_box.write(tmp_path)).status == "ok"
+    with pytest.raises(JobError, match=r"acme-one 1\.2 and acme-two 1\.2"):
+        damageest.run(tmp_path / "job.yaml", settings=["allowance=doubled"])
+
+
+@pytest.mark.parametrize(
+    ("body", "text"),
+    [
+        ("return 7", "gave a int"),
+        ("raise ValueError('odd')", "ValueError: odd"),
+        ("return Solid(damage.vertices, damage.faces[1:])", "not watertight"),
+    ],
+)
+def test_a_stage_that_misbehaves_is_named(body: str, text: str, site: Site, tmp_path: Path) -> None:
+    site.add("acme-bad", GROWN.replace("return Solid(damage.vertices * self.factor, damage.faces)", body))
+    result = damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n"))
+    assert result.status == "incomplete"
+    assert "allowance: doubled" in result.failures[0]
+    assert text in result.failures[0]
+
+
+class Observer:
+    def __init__(self) -> None:
+        self.seen: list[tuple[str, str]] = []
+
+    @hookimpl
+    def damageest_before_stage(self, stage: str) -> None:
+        self.seen.append(("before", stage))
+
+    @hookimpl
+    def damageest_after_stage(self, stage: str, output: object) -> None:
+        assert output is not None or stage == "allowance"
+        self.seen.append(("after", stage))
+
+    @hookimpl
+    def damageest_stage_failed(self, stage: str, error: Exception) -> None:
+        self.seen.append((type(error).__name__, stage))
+
+
+def test_observers_see_every_stage(tmp_path: Path) -> None:
+    observer = Observer()
+    result = damageest.run(damaged_box.write(tmp_path), registry=Registry.discover([observer]))
+    assert [stage for what, stage in observer.seen if what == "after"] == [record.stage for record in result.stages]
+    observer.seen.clear()
+    (tmp_path / "box.stl").write_bytes(b"solid nothing")
+    with pytest.raises(DamageestError):
+        damageest.run(tmp_path / "job.yaml", registry=Registry.discover([observer]))
+    assert observer.seen == [("before", "part"), ("InputError", "part")]

@@ -1,0 +1,70 @@
+"""File formats that plugins add: found, used by a job, cleared away again; faults named."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+
+import pytest
+
+import damageest
+from damageest.errors import JobError
+from damageest.registry import Registry
+from tests import damaged_box
+from tests.registry.test_registry import Site, site  # noqa: F401 - a fixture
+
+COUNTED = """
+from damageest.stages.export import Writer, Written
+
+def write(folder, stem, bodies, unit):
+    text = "".join(f"{body.name}: {len(body.solid.faces)} {unit}\\n" for body in bodies)
+    (folder / f"{stem}.count").write_text(text)
+    return Written((f"{stem}.count",), ("counted only",))
+
+@hookimpl
+def damageest_writers():
+    return {NAME: Writer(write)}
+"""
+
+
+def test_a_plugins_format_is_written_listed_and_cleared_away(site: Site, tmp_path: Path) -> None:  # noqa: F811
+    site.add("acme-count", COUNTED.replace("NAME", "'count'"))
+    path = damaged_box.write(tmp_path, damaged_box.JOB + "export: {format: [count, stl], frame: both}\n")
+    damageest.run(path, output=True)
+    out = tmp_path / "out/job"
+    faces = (out / "damage/site-1.count").read_text()
+    assert faces.startswith("damage site-1: ")
+    assert faces.endswith(" mm\n")
+    said = json.loads((out / "result.json").read_text())["export"]
+    assert "scan_frame/undamaged.count" in said["files"]
+    assert set(said["notes"]) == {"counted only"}
+    (out / "mine.count").write_text("mine")
+    damageest.run(path, output=True, settings=["export.format=stl", "export.frame=part"])
+    left = {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file() and "stages" not in p.parts}
+    assert {name for name in left if name.endswith(".count")} == {"mine.count"}
+    assert not (out / "scan_frame").exists()
+
+
+def test_a_format_that_is_there_already_and_what_is_no_writer_are_faults(site: Site) -> None:  # noqa: F811
+    site.add("acme-again", COUNTED.replace("NAME", "'stl'"))
+    site.add("acme-wrong", "@hookimpl\ndef damageest_writers():\n    return {'x': 3}\n")
+    site.add("acme-fails", "@hookimpl\ndef damageest_writers():\n    raise OSError('no licence')\n")
+    registry = Registry.discover()
+    broken = {item.provider.name: item.reason for item in registry.broken}
+    assert "writes stl, which another package writes already" in broken["acme-again"]
+    assert "did not give a mapping of format names to Writers" in broken["acme-wrong"]
+    assert "no licence" in broken["acme-fails"]
+    assert {"stl", "ply", "3mf"} <= registry.writers.keys()
+    assert "x" not in registry.writers
+    assert registry.writers["stl"].write.__module__.startswith("damageest.")
+
+
+def test_a_broken_plugin_is_named_where_its_format_is_asked_for(site: Site) -> None:  # noqa: F811
+    site.add("acme-fails", "@hookimpl\ndef damageest_writers():\n    raise OSError('no licence')\n")
+    folder = Path(tempfile.mkdtemp(dir=site.folder))
+    path = damaged_box.write(folder, damaged_box.JOB + "export: {format: acme}\n")
+    with pytest.raises(
+        JobError, match=r"no format 'acme'; there are: .*acme-fails 1\.2 is broken \(OSError: no licence"
+    ):
+        damageest.run(path)
