@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Deviation, Evidence, Floats, Mesh, Part, Pose, Scan, Solid, Surface
-from damageest.geometry.transforms import scan_from_part
+from damageest.geometry.transforms import invert_pose
 from damageest.io.conversions import as_manifold, as_trimesh
 
 
@@ -135,7 +135,7 @@ class Result:
         """T (4,4) that takes a point of the part to a frame; None for the part's own."""
         if frame not in ("part", "scan"):
             raise ValueError(f"no frame '{frame}'; there are: part, scan")
-        return scan_from_part(self.pose) if frame == "scan" else None
+        return invert_pose(self.pose) if frame == "scan" else None
 
 
 def _chosen(found: Mapping[str, Mesh | None], what: str, owner: str) -> Mesh:

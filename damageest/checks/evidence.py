@@ -10,9 +10,9 @@ import numpy as np
 
 from damageest.artefacts import INTACT, Deviation, Evidence, Floats, Mesh, Part, Scan, Solid
 from damageest.geometry.distance import Flags, closest_on_mesh, distance_to_mesh
-from damageest.geometry.neighbourhoods import within
+from damageest.geometry.neighbourhoods import find_in_box
 from damageest.geometry.sampling import sample_by_area
-from damageest.geometry.skin import inner_faces
+from damageest.geometry.skin import find_inner_faces
 
 MOST = 20_000
 """Points looked at for each figure; more would not change its second digit."""
@@ -29,12 +29,12 @@ def weigh(
     spacing = aligned.spacing
     reach = max(2.0 * tolerance, 1.5 * spacing)
     low, high = damage.bounds[0] - 4 * reach, damage.bounds[1] + 4 * reach
-    here = within(aligned.points, low, high)
+    here = find_in_box(aligned.points, low, high)
     points, label = aligned.points[here], deviation.label[here]
     ids = ids_points[:: max(1, len(ids_points) // (MOST // 4))]
     residual = float(np.quantile(distance_to_mesh(ids, damage), 0.95))
 
-    inner = inner_faces(damage, part)
+    inner = find_inner_faces(damage, part)
     on_ids = _spread(damage, inner, MOST // 2)
     on_skin = _spread(damage, ~inner, MOST // 2)
     bare = _far(on_ids, points, 1.5 * reach)

@@ -21,13 +21,13 @@ def command(
 ) -> None:
     """List a part's CAD faces: number, name, kind, area, centre, and normal, or axis and radius."""
     from damageest.errors import JobError
-    from damageest.geometry.units import canonical
+    from damageest.geometry.units import canonical_unit
     from damageest.job import load
     from damageest.registry import Registry
     from damageest.stages.part import ReadPart
     from damageest.stages.scan import ReadScan
 
-    unit = canonical(units)
+    unit = canonical_unit(units)
     try:  # as a job's part is found and checked; no scan is needed
         job = load({"version": 1, "units": unit, "part": str(part)}, Registry.discover(), given={ReadScan: None})
     except JobError as error:

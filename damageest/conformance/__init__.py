@@ -14,7 +14,7 @@ try:
 except ImportError as error:
     raise ImportError("damageest.conformance needs pytest: pip install pytest") from error
 
-from damageest.conformance._base import Contract
+from damageest.conformance._base import StageContract
 from damageest.conformance._contracts import AllowanceContract, BooleanContract, RepairContract, SampleContract
 from damageest.conformance._enclose import EncloseAllContract, EncloseContract
 from damageest.conformance._files import ExportContract, PartContract, ScanContract
@@ -29,7 +29,7 @@ __all__ = [
     "BooleanContract",
     "BoundaryContract",
     "ClusterContract",
-    "Contract",
+    "StageContract",
     "EncloseAllContract",
     "EncloseContract",
     "ExportContract",

@@ -26,7 +26,7 @@ FAR = np.array([3e4, -2e4, 5e4])
 REFUSED = (StageError, InputError)
 
 
-class Contract:
+class StageContract:
     """What every implementation has to keep.
 
     ``stage``: the implementation, with the options to check it with. ``lengths``: those of its options that are
@@ -121,7 +121,7 @@ class Contract:
         assert not self._watched()[1]
 
 
-class Placed(Contract):
+class PlacedContract(StageContract):
     """A contract whose results follow the scene, however large it is and wherever it lies."""
 
     @pytest.mark.parametrize("scale", [1e-3, 1e3])

@@ -9,7 +9,7 @@ import pytest
 
 from damageest.artefacts import Deposit, Floats, Mesh, Part, Samples, Solid
 from damageest.conformance import _scene
-from damageest.conformance._base import REFUSED, Placed, back, right_or_refused
+from damageest.conformance._base import REFUSED, PlacedContract, back, right_or_refused
 from damageest.geometry.solids import to_manifold
 
 SIZE = (4.0, 3.0, 2.0)
@@ -23,7 +23,7 @@ def block(low: tuple[float, ...], high: tuple[float, ...]) -> tuple[Floats, Any]
     return np.array(low) + corner * (np.array(high) - np.array(low)), np.array(faces)
 
 
-class BlockContract(Placed):
+class BlockContract(PlacedContract):
     """What the four have in common."""
 
     tolerance: ClassVar[float] = 0.1

@@ -10,12 +10,12 @@ import pytest
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Enclosures, Floats, Mesh, Rims, Sites, Solid, Surface
 from damageest.conformance import _scene
-from damageest.conformance._base import Placed, back, right_or_refused
+from damageest.conformance._base import PlacedContract, back, right_or_refused
 from damageest.geometry.distance import distance_to_mesh, is_inside
-from damageest.geometry.solids import iou, to_manifold, to_solid, united
+from damageest.geometry.solids import iou, to_manifold, to_solid, unite
 
 
-class EncloseContract(Placed):
+class EncloseContract(PlacedContract):
     """Checks for `enclose`, site by site, on a round dent in a flat face and on a bore worn through.
 
     ``repair``: the implementation of `repair` that it relies on, where it does not give a closed mesh by itself.
@@ -90,7 +90,7 @@ class EncloseContract(Placed):
         self.right(Mesh(back(placed.vertices, scale, turn, shift), placed.faces))
 
 
-class EncloseAllContract(Placed):
+class EncloseAllContract(PlacedContract):
     """Checks for `enclose`, all sites at once, on two round dents on two faces.
 
     ``error``: share of the true volume by which what it finds may be off.
@@ -100,9 +100,9 @@ class EncloseAllContract(Placed):
 
     def right(self, enclosures: Enclosures) -> None:
         """Covers every site once, and holds the dents and of the part nothing else."""
-        part, truth = to_manifold(_scene.prism()), united(_scene.dent(k) for k in (0, 1))
+        part, truth = to_manifold(_scene.prism()), unite(_scene.dent(k) for k in (0, 1))
         assert sorted(k for item in enclosures.items for k in item.sites) == [1, 2]
-        lost = united(item.solid for item in enclosures.items) ^ part
+        lost = unite(item.solid for item in enclosures.items) ^ part
         assert lost.volume() == pytest.approx(truth.volume(), rel=self.error)
         assert iou(to_solid(lost), to_solid(truth)) > 1 - 2 * self.error
         apart = sum((to_manifold(item.solid) ^ part).volume() for item in enclosures.items)

@@ -12,7 +12,7 @@ import pytest
 
 from damageest.artefacts import Evidence, Floats, Mesh, Part, Scan, Truth
 from damageest.conformance import _scene
-from damageest.conformance._base import REFUSED, Contract, Placed, back, right_or_refused
+from damageest.conformance._base import REFUSED, PlacedContract, StageContract, back, right_or_refused
 from damageest.geometry.distance import distance_to_mesh
 
 BROKEN: dict[str, bytes | None] = {
@@ -25,7 +25,7 @@ BROKEN: dict[str, bytes | None] = {
 }
 
 
-class _Reader(Contract):
+class _Reader(StageContract):
     """What readers of part and scan have in common."""
 
     def paths(self) -> list[Path]:
@@ -99,7 +99,7 @@ class PartContract(_Reader):
         assert isinstance(got, Part)
 
 
-class ScanContract(_Reader, Placed):
+class ScanContract(_Reader, PlacedContract):
     """Checks for `scan`. ``mesh``: what the points of the file lie on; a virtual scanner's lie on the part."""
 
     mesh: ClassVar[Mesh | None] = None
@@ -139,7 +139,7 @@ class ScanContract(_Reader, Placed):
         assert np.allclose(got_extent, extent, atol=2 * _scene.TOLERANCE)
 
 
-class ExportContract(Contract):
+class ExportContract(StageContract):
     """Checks for `export`, on a result with two sites, one of them with a deposit of its own."""
 
     @pytest.fixture(autouse=True)
@@ -198,12 +198,12 @@ def _writers() -> Any:
 
 def result() -> Any:
     """What a run finds on the scene."""
-    from damageest.geometry.solids import to_manifold, to_solid, united
+    from damageest.geometry.solids import to_manifold, to_solid, unite
     from damageest.result import Result, Site
 
     scene = _scene.scene()
     losses = [_scene.dent(k) for k in (0, 1)]
-    lost = united(losses)
+    lost = unite(losses)
     sites = [
         Site(k, (k,), scene.sites.members(k), loss, scene.surface, deposit, "surface", Evidence(), 1.8)
         for k, loss, deposit in zip((1, 2), losses, (None, losses[1]), strict=True)

@@ -10,7 +10,7 @@ import pytest
 
 from damageest.artefacts import ADDED, DAMAGE, INTACT, Deviation, Floats, Pose, Scan, Sites
 from damageest.conformance import _scene
-from damageest.conformance._base import FAR, TURN, Placed, right_or_refused
+from damageest.conformance._base import FAR, TURN, PlacedContract, right_or_refused
 
 
 def motion(turn: Floats, shift: Floats) -> Floats:
@@ -25,7 +25,7 @@ NEAR = motion(
 """Three degrees and a small shift."""
 
 
-class AlignContract(Placed):
+class AlignContract(PlacedContract):
     """Checks for `align`.
 
     ``pose`` (4,4): the true one, T_part_scan. The default is far from no motion; give NEAR, or ``np.eye(4)``, to what
@@ -87,7 +87,7 @@ class AlignContract(Placed):
         assert off.max() < 0.25 * _scene.TOLERANCE, "the pose is off"
 
 
-class SegmentContract(Placed):
+class SegmentContract(PlacedContract):
     """Checks for `segment`. ``error``: share of the points whose label may be another than by the exact distance."""
 
     error: ClassVar[float] = 0.01
@@ -125,7 +125,7 @@ class SegmentContract(Placed):
         assert off.mean() < 1e-2, "the distance depends on where the part lies, or how large it is"
 
 
-class ClusterContract(Placed):
+class ClusterContract(PlacedContract):
     """Checks for `cluster`. ``error``: share of the damage's points that may be in no site, or in another."""
 
     error: ClassVar[float] = 0.05

@@ -9,13 +9,13 @@ import pytest
 
 from damageest.artefacts import Floats, Rims, Solid, Surface, open_edges
 from damageest.conformance import _scene
-from damageest.conformance._base import Placed, back, right_or_refused
+from damageest.conformance._base import PlacedContract, back, right_or_refused
 from damageest.geometry.distance import is_inside
 
 EMPTY = Surface(np.empty((0, 3)), np.empty((0, 3), int))
 
 
-class ReconstructContract(Placed):
+class ReconstructContract(PlacedContract):
     """Checks for `reconstruct`, on the points of one round dent."""
 
     def right(self, surface: Surface) -> None:
@@ -55,7 +55,7 @@ class ReconstructContract(Placed):
         self.right(Surface(back(got.vertices, scale, turn, shift), got.faces))
 
 
-class BoundaryContract(Placed):
+class BoundaryContract(PlacedContract):
     """Checks for `boundary`, on the surface of a round dent and the wall of a bore."""
 
     def follows(self, surface: Surface, rims: Rims) -> int:
@@ -95,7 +95,7 @@ class BoundaryContract(Placed):
         assert [set(loop.tolist()) for loop in got.loops] == [set(loop.tolist()) for loop in plain.loops]
 
 
-class BackgroundContract(Placed):
+class BackgroundContract(PlacedContract):
     """Checks for `background`."""
 
     def right(self, solid: Solid) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part
 from damageest.errors import Fault, JobError
-from damageest.geometry.noise import measure
+from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.io.meshes import write_points, write_stl
 from damageest.job import load
 from damageest.pipeline.prepare import read_inputs
@@ -59,7 +59,7 @@ def prepared(path: Path, registry: Registry, folder: Path) -> Scene:
         pose=scan.truth.T_part_scan,
     )
     write_stl(folder / "part.stl", part)
-    noise = measure(scan.points)[0]
+    noise = measure_noise_and_spacing(scan.points)[0]
     for name, points in (("scan", scan.points), ("specimen", _specimen(part, len(scan.points), noise))):
         x, y, z = points.T
         write_points(folder / f"{name}.ply", {"x": x, "y": y, "z": z})

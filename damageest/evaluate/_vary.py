@@ -11,7 +11,7 @@ from typing import Any
 
 from damageest.checks.scan_quality import AUTO_TOLERANCE
 from damageest.errors import InputError
-from damageest.geometry.units import factor
+from damageest.geometry.units import unit_factor
 from damageest.job.yamlfile import parse
 
 SHORT = {"tolerance": "--tolerance", "scan.noise": "--noise", "scan.points": "--points"}
@@ -117,7 +117,7 @@ def _lengths(option: str, text: str, unit: str, base: float, times: bool) -> lis
                 raise InputError(f"{option}: '{word}' is a multiple of 0; give lengths, as 0.01{unit}")
             number *= base
         elif suffix:
-            number *= factor(suffix, unit)
+            number *= unit_factor(suffix, unit)
         number = float(f"{number:.6g}")
         found.append((number, number))
     return list(dict.fromkeys(found))

@@ -14,13 +14,13 @@ from damageest.errors import StageError
 from damageest.evaluate.scores import depth, surface_points
 from damageest.geometry.solids import to_manifold
 from damageest.stages.scan._scanner import wear
-from damageest.stages.scan._tools import Blob, Box, Cylinder, Plane, Sphere, Tool
+from damageest.stages.scan._tools import BlobTool, BoxTool, CylinderTool, PlaneTool, SphereTool, Tool
 
 SHARE = (0.002, 0.33)
 """Least and largest share of the part's volume that a damage takes."""
 
 
-class Site:
+class DamagePlace:
     """A part with what the kinds of damage ask of it; all figures are shares of its ``size``, the diagonal."""
 
     def __init__(self, part: Part, rng: np.random.Generator) -> None:
@@ -87,13 +87,13 @@ def _tuple(point: Floats) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _lump(site: Site, centre: Floats, radius: float) -> Tool:
+def _lump(site: DamagePlace, centre: Floats, radius: float) -> Tool:
     if site.rng.random() < 0.3:
-        return Sphere(centre=_tuple(centre), radius=radius)
-    return Blob(centre=_tuple(centre), radius=radius, seed=site.seed())
+        return SphereTool(centre=_tuple(centre), radius=radius)
+    return BlobTool(centre=_tuple(centre), radius=radius, seed=site.seed())
 
 
-def chip(site: Site) -> list[Tool]:
+def chip(site: DamagePlace) -> list[Tool]:
     """A chip off an edge or corner: a lump, or a rough break across it."""
     point, out = site.edge()
     if site.rng.random() < 0.6:
@@ -103,24 +103,26 @@ def chip(site: Site) -> list[Tool]:
     depth, within = site.size * site.uniform(0.015, 0.05), site.size * site.uniform(0.08, 0.2)
     rough = site.size * site.uniform(0.0005, 0.003)
     return [
-        Plane(point=_tuple(point - depth * tilt), normal=_tuple(tilt), within=within, roughness=rough, seed=site.seed())
+        PlaneTool(
+            point=_tuple(point - depth * tilt), normal=_tuple(tilt), within=within, roughness=rough, seed=site.seed()
+        )
     ]
 
 
-def pit(site: Site) -> list[Tool]:
+def pit(site: DamagePlace) -> list[Tool]:
     """A pit in a face, deeper than a quarter of its width."""
     point, normal = site.pick()
     radius = site.size * site.uniform(0.04, 0.12)
     return [_lump(site, point + site.uniform(-0.1, 0.5) * radius * normal, radius)]
 
 
-def cut(site: Site) -> list[Tool]:
+def cut(site: DamagePlace) -> list[Tool]:
     """A box or a wedge taken out of an edge or a face."""
     point = (site.edge() if site.rng.random() < 0.7 else site.pick())[0]
     a, b, c = site.size * site.rng.uniform(0.06, 0.22, 3)
     rough = site.size * site.uniform(0.0005, 0.002) if site.rng.random() < 0.4 else 0.0
     return [
-        Box(
+        BoxTool(
             centre=_tuple(point),
             size=(float(a), float(b), float(c)),
             rotation=site.turn() if site.rng.random() < 0.6 else (0.0, 0.0, 0.0),
@@ -130,7 +132,7 @@ def cut(site: Site) -> list[Tool]:
     ]
 
 
-def end(site: Site) -> list[Tool]:
+def end(site: DamagePlace) -> list[Tool]:
     """An end broken off, 5 to 30 % of the volume."""
     origin = site.part.bounds.mean(0)
     body = to_manifold(site.part, origin)
@@ -146,20 +148,20 @@ def end(site: Site) -> list[Tool]:
         taken = body.trim_by_plane(_tuple(normal), offset).volume()
         low, high = (offset, high) if taken > wanted else (low, offset)
     rough = site.size * site.uniform(0, 0.004)
-    return [Plane(point=_tuple(origin + offset * normal), normal=_tuple(normal), roughness=rough, seed=site.seed())]
+    return [PlaneTool(point=_tuple(origin + offset * normal), normal=_tuple(normal), roughness=rough, seed=site.seed())]
 
 
-def hole(site: Site) -> list[Tool]:
+def hole(site: DamagePlace) -> list[Tool]:
     """A round hole through all that lies behind a point, more or less square to the surface."""
     point, normal = site.pick()
     axis = -normal + 0.15 * site.rng.normal(size=3)
     axis /= np.linalg.norm(axis)
     radius = site.size * site.uniform(0.025, 0.06)
     back = 0.05 * site.size
-    return [Cylinder(point=_tuple(point - back * axis), axis=_tuple(axis), radius=radius, length=3 * site.size)]
+    return [CylinderTool(point=_tuple(point - back * axis), axis=_tuple(axis), radius=radius, length=3 * site.size)]
 
 
-def worn_through(site: Site) -> list[Tool]:
+def worn_through(site: DamagePlace) -> list[Tool]:
     """A thin wall worn through by something round, so that the loss has two rims."""
     wall = site.thickness
     place = np.flatnonzero(wall < 0.12 * site.size)
@@ -171,7 +173,7 @@ def worn_through(site: Site) -> list[Tool]:
     return [_lump(site, middle, float(radius))]
 
 
-def groove(site: Site) -> list[Tool]:
+def groove(site: DamagePlace) -> list[Tool]:
     """A long, narrow groove scored into a face, open at its ends or not."""
     point, normal = site.pick()
     along = np.cross(normal, site.rng.normal(size=3))
@@ -181,17 +183,17 @@ def groove(site: Site) -> list[Tool]:
 
     turn = Rotation.from_matrix(np.column_stack([along, np.cross(normal, along), normal])).as_euler("xyz", degrees=True)
     size = (site.size * site.uniform(0.25, 0.7), width, 2 * depth)
-    return [Box(centre=_tuple(point), size=size, rotation=_tuple(turn))]
+    return [BoxTool(centre=_tuple(point), size=size, rotation=_tuple(turn))]
 
 
-def beside_gap(site: Site) -> list[Tool]:
+def beside_gap(site: DamagePlace) -> list[Tool]:
     """A lump out of a wall that faces another one closely: in a bore, between teeth, in a slot."""
     point, normal = site.pick(site.gap < 0.15 * site.size)
     radius = site.size * site.uniform(0.04, 0.1)
     return [_lump(site, point - site.uniform(0.0, 0.5) * radius * normal, radius)]
 
 
-def touching(site: Site) -> list[Tool]:
+def touching(site: DamagePlace) -> list[Tool]:
     """Two lumps whose rims meet or overlap, or that a thin web of sound surface parts."""
     point, normal = site.edge() if site.rng.random() < 0.3 else site.pick()
     radii = site.size * site.rng.uniform(0.04, 0.09, 2)
@@ -204,7 +206,7 @@ def touching(site: Site) -> list[Tool]:
     return [_lump(site, first, float(radii[0])), _lump(site, second, float(radii[1]))]
 
 
-KINDS: dict[str, Callable[[Site], list[Tool]]] = {
+KINDS: dict[str, Callable[[DamagePlace], list[Tool]]] = {
     make.__name__: make for make in (chip, pit, cut, end, hole, worn_through, groove, beside_gap, touching)
 }
 """Name to maker of one random loss."""
@@ -225,7 +227,7 @@ def random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), losses: in
     ``kinds``: of the first losses, the rest at random; a kind the part has no place for is replaced by another.
     """
     rng = np.random.default_rng([6173, seed])
-    site = Site(part, rng)
+    site = DamagePlace(part, rng)
     wanted = losses or max(len(kinds), int(rng.choice([1, 2, 3], p=[0.6, 0.25, 0.15])))
     tools: list[Tool] = []
     made: list[str] = []
@@ -245,7 +247,7 @@ def random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), losses: in
     return Damaged(tuple(tools), tuple(made), damage)
 
 
-def _try(site: Site, name: str, before: list[Tool]) -> tuple[list[Tool], Solid] | None:
+def _try(site: DamagePlace, name: str, before: list[Tool]) -> tuple[list[Tool], Solid] | None:
     """The tools with one more loss, and the damage of all; None where it does not suit."""
     part = site.part
     try:

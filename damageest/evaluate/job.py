@@ -14,7 +14,7 @@ from damageest.evaluate._case import Case, save_part
 from damageest.evaluate._vary import Base, Variant, Wanted, variants
 from damageest.evaluate.damages import KINDS
 from damageest.evaluate.sized import SIZED
-from damageest.geometry.noise import measure
+from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.io.files import file_sha256
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
@@ -108,13 +108,13 @@ def _read(job: Job, registry: Registry) -> tuple[Part, dict[str, Any], tuple[str
         scanner = own.model_dump(mode="json", exclude={"use", "damage", "seed"})
         return part, {**scanner, "noise": 0.0005 * part.diagonal if own.noise is None else own.noise}, ()
     points = engine.call(ReadScan, state).scan.points
-    noise, spacing = measure(points)
+    noise, spacing = measure_noise_and_spacing(points)
     if not spacing:
         raise InputError(f"scan: {len(points)} points are too few to measure its noise and spacing")
     known = job.implementations[Align].name != "register"
     scanner = {"points": len(points), "noise": float(f"{noise:.4g}"), "pose": "identity" if known else "random"}
     # as many points as lie so far apart on this part: the job's scan may show half of it, or a fixture as well
     tried = Simulate.model_validate(scanner).run(part.unit, part).points
-    scanner["points"] = round(len(points) * (measure(tried)[1] / spacing) ** 2)
+    scanner["points"] = round(len(points) * (measure_noise_and_spacing(tried)[1] / spacing) ** 2)
     note = f"the scan's points measure a noise of {noise:.3g} and lie {spacing:.3g} {job.units} apart"
     return part, scanner, (f"{note}; what it does not show of the part is taken as seen",)

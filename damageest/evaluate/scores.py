@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Part, Solid
 from damageest.geometry.distance import distance_to_mesh
-from damageest.geometry.skin import ids_surface
+from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import to_manifold, to_solid
 
 MATCH = 0.1
@@ -150,8 +150,8 @@ def score(
     a, b = expected.volume(), actual.volume()
     differs = max(a + b - 2 * common, 0.0)
     # which faces are the part's skin is told in the frame where they lie on it
-    inner = ids_surface(true, part)
-    left = ids_surface(whole, part) if (whole := to_solid(actual, origin)) else None
+    inner = extract_ids(true, part)
+    left = extract_ids(whole, part) if (whole := to_solid(actual, origin)) else None
     far = (nan, nan, nan)
     if left is not None and len(left.faces) and len(inner.faces):
         other = Mesh(inner.vertices @ D[:3, :3].T + D[:3, 3], inner.faces)

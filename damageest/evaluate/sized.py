@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Part
 from damageest.errors import StageError
-from damageest.evaluate.damages import KINDS, Damaged, Site
+from damageest.evaluate.damages import KINDS, Damaged, DamagePlace
 from damageest.evaluate.scores import depth
 from damageest.stages.scan._scanner import wear
 
@@ -23,7 +23,7 @@ def sized_damage(part: Part, seed: int, deep: float, first: str = SIZED[0]) -> D
     none fits, as where the part's walls are thinner.
     """
     rng = np.random.default_rng([5381, seed])
-    site = Site(part, rng)
+    site = DamagePlace(part, rng)
     for attempt in range(24):
         name = first if attempt < 8 else str(rng.choice(SIZED))
         made = _scaled(site, name, deep)
@@ -32,7 +32,7 @@ def sized_damage(part: Part, seed: int, deep: float, first: str = SIZED[0]) -> D
     raise LookupError(f"no damage {deep:.4g} deep fits the part")
 
 
-def _scaled(site: Site, name: str, deep: float) -> Damaged | None:
+def _scaled(site: DamagePlace, name: str, deep: float) -> Damaged | None:
     """The next random loss of a kind, made larger or smaller until it is as deep as asked for; None if it cannot."""
     state = site.rng.bit_generator.state
     site.size = 20 * deep

@@ -36,13 +36,13 @@ def _labels(a: Ints, b: Ints, count: int) -> tuple[Ints, int]:
     return label.astype(np.int64), int(bodies)
 
 
-def components(faces: Ints) -> tuple[Ints, int]:
+def label_bodies(faces: Ints) -> tuple[Ints, int]:
     """Per triangle (F,) the number of its body, joined over shared edges, and how many bodies there are."""
     a, b, _ = _neighbours(faces)
     return _labels(a, b, len(faces))
 
 
-def oriented(faces: Ints) -> tuple[Ints, int | None]:
+def orient_faces(faces: Ints) -> tuple[Ints, int | None]:
     """The faces with windings that agree, and how many were turned; None where the surface is one-sided.
 
     Works on the two-sheeted cover of the triangles' adjacency: triangle f stands twice, as read and turned, and an edge
@@ -102,7 +102,7 @@ def split_pinches(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floa
 
 def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
     """Faces outward, cavities inward, overlapping bodies united. The mesh must be closed."""
-    label, count = components(faces)
+    label, count = label_bodies(faces)
     volumes = signed_volumes(vertices, faces, label, count)
     size = float(np.prod(np.maximum(np.ptp(vertices, axis=0), 1e-300)))
     flat = np.abs(volumes) <= 1e-12 * size
@@ -111,7 +111,7 @@ def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Flo
     if flat.any():
         notes.append(f"dropped {int(flat.sum())} bodies without volume")
         faces = faces[~flat[label]]
-        label, count = components(faces)
+        label, count = label_bodies(faces)
         volumes = signed_volumes(vertices, faces, label, count)
     depth, crossing = _nesting(vertices, faces, label, count)
     if not crossing:

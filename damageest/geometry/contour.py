@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Solid
 from damageest.errors import StageError
-from damageest.geometry.isosurface import closed_region
+from damageest.geometry.isosurface import extract_region
 from damageest.geometry.poisson import Grid
 
 BLOCK = 6
@@ -16,7 +16,9 @@ MOST_NODES = 60_000_000
 """Nodes of a lattice in memory at once, at some 12 bytes each."""
 
 
-def contour(distance: Callable[[Floats], Floats], low: Floats, shape: tuple[int, int, int], cell: float) -> Solid:
+def extract_contour(
+    distance: Callable[[Floats], Floats], low: Floats, shape: tuple[int, int, int], cell: float
+) -> Solid:
     """Where ``distance`` (points (N,3) to signed values (N,), Lipschitz with constant 1) is negative, as a solid, on
     the lattice of ``shape`` nodes from ``low`` (3,) on, ``cell`` apart; the lattice's walls close it.
 
@@ -38,7 +40,7 @@ def contour(distance: Callable[[Floats], Floats], low: Floats, shape: tuple[int,
         at = (BLOCK * some[:, None] + inner).reshape(-1, 3)
         field[tuple(at.T)] = distance(low + cell * at)
     field = -field[: shape[0], : shape[1], : shape[2]]
-    solid = closed_region(Grid(low, cell, shape), np.ascontiguousarray(field, dtype=np.float64))
+    solid = extract_region(Grid(low, cell, shape), np.ascontiguousarray(field, dtype=np.float64))
     if solid is None:
         raise StageError("the background came out empty", "another cell, or method: implicit")
     return solid

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
-from damageest.geometry.voxels import CHUNK, MOST_ALONG, Lattice
+from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid
 
 Flags = NDArray[np.bool_]
 Exact = Callable[[Floats], tuple[Floats, Ints]]
@@ -33,7 +33,7 @@ CLEAR = 3.0
 PAD = 4
 
 
-def by_cells(points: Floats, part: Mesh, near: float, exact: Exact) -> tuple[Floats, Ints]:
+def signed_distance_by_cells(points: Floats, part: Mesh, near: float, exact: Exact) -> tuple[Floats, Ints]:
     """What ``exact`` gives of the points (N,3), signed distance (N,) and nearest triangle (N,), with far fewer of them
     searched for.
 
@@ -42,7 +42,7 @@ def by_cells(points: Floats, part: Mesh, near: float, exact: Exact) -> tuple[Flo
     """
     low, high = part.bounds
     size = max(2 * near, np.sqrt(PER_CELL * part.area / len(points)), float((high - low).max()) / MOST_ALONG)
-    lattice = Lattice(low - PAD * size, size, np.ceil((high - low) / size).astype(np.int64) + 2 * PAD)
+    lattice = VoxelGrid(low - PAD * size, size, np.ceil((high - low) / size).astype(np.int64) + 2 * PAD)
     sharp, bent = (_along(part, edges, size / 4) for edges in _creases(part, near / size))
     beside = lattice.around(sharp, 1)
     # any two points of a cell are 1.74 of its edges apart

@@ -7,7 +7,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints
 
 
-def first_of_equal(points: Floats) -> tuple[Ints, Ints]:
+def find_duplicates(points: Floats) -> tuple[Ints, Ints]:
     """Exact duplicates among points (N,3): ``keep`` (M,), the index of each distinct point's first copy, rising, and
     ``inverse`` (N,), which of them each point equals.
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, open_edges
 from damageest.errors import InputError
-from damageest.geometry.body_repair import components, oriented, resolve_bodies, split_pinches
-from damageest.geometry.duplicates import first_of_equal
+from damageest.geometry.body_repair import label_bodies, orient_faces, resolve_bodies, split_pinches
+from damageest.geometry.duplicates import find_duplicates
 
 _HOLE_EDGES = 12
 _HOLE_AREA = 0.01
@@ -46,7 +46,7 @@ def _merge(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Int
     """Merges equal vertices, then, only while the mesh is open, ever less equal ones up to 1e-5 of the diagonal."""
     if not open_edges(faces):
         return vertices, faces
-    keep, inverse = first_of_equal(vertices)
+    keep, inverse = find_duplicates(vertices)
     before = len(vertices)
     vertices, faces = vertices[keep], inverse[faces]
     soup = before == 3 * len(faces)  # as in every STL file: nothing to tell
@@ -128,7 +128,7 @@ def _drop_doubles(faces: Ints, notes: list[str]) -> Ints:
 
 def _wind(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
     """Makes neighbouring triangles run the same way round."""
-    turned, flipped = oriented(faces)
+    turned, flipped = orient_faces(faces)
     if flipped is None:
         raise InputError(
             "its surface is one-sided (like a Moebius strip): no choice of windings agrees; export it again as a solid"
@@ -225,7 +225,7 @@ def _what_is_open(vertices: Floats, faces: Ints) -> str:
             places = "; ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in at[:3])
             box = f", all between {_point(at.min(0))} and {_point(at.max(0))}" if len(at) > 3 else ""
             parts.append(f"{int(which.sum())} {name}, the first at {places}{box}")
-    _, bodies = components(faces)
+    _, bodies = label_bodies(faces)
     if not parts:
         parts.append(f"{open_edges(faces)} edges whose two triangles run the same way round")
     return (

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Solid
-from damageest.geometry.poisson import Field, Grid
+from damageest.geometry.poisson import Grid, GridValues
 
 
-def closed_region(grid: Grid, field: Field) -> Solid | None:
+def extract_region(grid: Grid, field: GridValues) -> Solid | None:
     """Where the field is positive, closed by the walls of the grid; None where it is so nowhere."""
     from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
     from vtkmodules.vtkCommonDataModel import vtkImageData

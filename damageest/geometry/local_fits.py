@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.neighbourhoods import neighbours
+from damageest.geometry.neighbourhoods import find_neighbours
 
 ROUNDS = 3
 SCALES = (32, 80, 200)
@@ -17,20 +17,20 @@ KAPPA = 2.0
 CHUNK = 500
 
 
-def smoothed(points: Floats, noise: float, count: int = 32) -> tuple[Floats, Floats, Floats]:
+def smooth_points(points: Floats, noise: float, count: int = 32) -> tuple[Floats, Floats, Floats]:
     """Points moved onto a local fit, unit normals of either sign, and the radius of each fit.
 
     Planes are fitted to the neighbours that agree in direction (bilateral weights, after Fleishman et al. 2003), so
     that an edge between two faces stays one; then a quadric in the plane's frame takes the curvature. A point moves
     along its normal only, by three times the noise at most.
     """
-    distance, index = neighbours(points, count)
+    distance, index = find_neighbours(points, count)
     normals, weights = _planes(points, index, distance, noise)
     move, tilted, _ = _quadric(points, normals, points[index], weights, distance[:, -1])
     return points + np.clip(move, -3 * noise, 3 * noise)[:, None] * normals, tilted, distance[:, -1]
 
 
-def averaged(points: Floats, counts: Ints, noise: float, chosen: Ints) -> tuple[Floats, Floats]:
+def average_points(points: Floats, counts: Ints, noise: float, chosen: Ints) -> tuple[Floats, Floats]:
     """As `smoothed`, but each of the ``chosen`` (M,) points is fitted to as many neighbours as agree: points (M,3) and
     normals (M,3).
 
@@ -40,7 +40,7 @@ def averaged(points: Floats, counts: Ints, noise: float, chosen: Ints) -> tuple[
     """
     from scipy.spatial import cKDTree
 
-    distance, index = neighbours(points, SCALES[0])
+    distance, index = find_neighbours(points, SCALES[0])
     normals, _ = _planes(points, index, distance, noise)
     out, tilted = points[chosen], normals[chosen]
     tree = cKDTree(points)

@@ -11,7 +11,7 @@ SMALL = 10
 """Nodes of a loop that counts as a flaw of the reconstruction, to be closed, and not as a rim (paper 3.2)."""
 
 
-def loops(faces: Ints) -> list[Ints]:
+def trace_loops(faces: Ints) -> list[Ints]:
     """Vertex loops along the boundary edges of faces (F,3), in the direction of their faces; longest first.
 
     Raises StageError where two loops meet in a vertex, so that they cannot be told apart.
@@ -36,9 +36,9 @@ def loops(faces: Ints) -> list[Ints]:
     return sorted(found, key=lambda loop: (-len(loop), int(loop.min())))
 
 
-def rims(surface: Surface) -> list[Ints]:
+def trace_rims(surface: Surface) -> list[Ints]:
     """The loops that are no flaws. Raises StageError where there is none."""
-    found = [loop for loop in loops(surface.faces) if len(loop) > SMALL]
+    found = [loop for loop in trace_loops(surface.faces) if len(loop) > SMALL]
     if not found:
         raise StageError("the damage surface has no rim: it is closed, or no more than a speck", "method: implicit")
     return found

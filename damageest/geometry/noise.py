@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.geometry.neighbourhoods import nearby
+from damageest.geometry.neighbourhoods import find_nearby
 
 _SAMPLES = (4000, 1500)
 _WHOLE = 200_000
@@ -16,7 +16,7 @@ _WIDE = 8.0
 _SECTORS = 6
 
 
-def measure(points: Floats, seed: int = 0) -> tuple[float, float]:
+def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, float]:
     """Noise and spacing of a scan, ``points`` (N,3), in its unit of length; the same seed gives the same answer.
 
     Noise: the standard deviation of the points off the local surface. At a few thousand points a quadric is fitted to
@@ -75,7 +75,7 @@ def _around(points: Floats, centres: Floats, count: int, rng: np.random.Generato
     some = points[rng.integers(0, len(points), _WHOLE)]
     enough = max(3, math.ceil(1.3 * count * len(some) / len(points)))
     reach = np.asarray(cKDTree(some).query(centres, k=[enough + 1], workers=2)[0])
-    return points[nearby(points, centres, float(np.percentile(reach, 95)))]
+    return points[find_nearby(points, centres, float(np.percentile(reach, 95)))]
 
 
 def _local(patches: Floats) -> tuple[Floats, Floats]:

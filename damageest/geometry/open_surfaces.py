@@ -7,16 +7,16 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Part, Surface
 from damageest.errors import StageError
 from damageest.geometry.distance import closest_on_mesh, signed_distance
-from damageest.geometry.local_fits import smoothed
-from damageest.geometry.neighbourhoods import thinned
-from damageest.geometry.orientation import toward_void
+from damageest.geometry.local_fits import smooth_points
+from damageest.geometry.neighbourhoods import thin_points
+from damageest.geometry.orientation import turn_toward_void
 
 FEWEST = 16
 SMOOTHED = 32
 """Points of each local fit."""
 
 
-def middle(points: Floats) -> Floats:
+def centre_points(points: Floats) -> Floats:
     """The mean (3,) of points (M,3). Raises StageError where they are too few for a surface."""
     if len(points) < FEWEST:
         raise StageError(f"{len(points)} points are too few for a surface; it takes {FEWEST}", "method: implicit")
@@ -25,7 +25,7 @@ def middle(points: Floats) -> Floats:
 
 def thin_for_surface(points: Floats, cell: float) -> Floats:
     """Points (M,3) thinned to one in each cube of 0.7 ``cell``. Raises StageError where too few are left."""
-    cloud, *_ = thinned(points, 0.7 * cell)
+    cloud, *_ = thin_points(points, 0.7 * cell)
     if len(cloud) < FEWEST:
         raise StageError(
             f"{len(points)} points, {len(cloud)} after thinning, are too few for a surface",
@@ -34,7 +34,7 @@ def thin_for_surface(points: Floats, cell: float) -> Floats:
     return cloud
 
 
-def oriented(points: Floats, part: Part, cell: float, noise: float) -> tuple[Floats, Floats]:
+def orient_points(points: Floats, part: Part, cell: float, noise: float) -> tuple[Floats, Floats]:
     """Points (M,3), thinned to one in each cube of 0.7 ``cell`` and moved onto local fits, and their unit normals,
     which agree with one another and face the nominal skin rather than not.
 
@@ -42,14 +42,14 @@ def oriented(points: Floats, part: Part, cell: float, noise: float) -> tuple[Flo
     """
 
     cloud = thin_for_surface(points, cell)
-    cloud, normals, _ = smoothed(cloud, noise, min(SMOOTHED, len(cloud) // 2))
+    cloud, normals, _ = smooth_points(cloud, noise, min(SMOOTHED, len(cloud) // 2))
     nothing = np.empty((0, 3))
     # The nearest skin may be that behind a thin wall: it breaks the tie between two consistent ways, and no more.
     hint = 1e-4 * _to_skin(cloud, part)
-    return cloud, toward_void(cloud, normals, hint, nothing, nothing, np.empty(0), cell)
+    return cloud, turn_toward_void(cloud, normals, hint, nothing, nothing, np.empty(0), cell)
 
 
-def opened(vertices: Floats, faces: Ints, cloud: Floats, reach: float, part: Part, tolerance: float) -> Surface:
+def trim_surface(vertices: Floats, faces: Ints, cloud: Floats, reach: float, part: Part, tolerance: float) -> Surface:
     """The largest piece (V,3), (F,3) of what lies within ``reach`` of the points, normals toward the lost material.
 
     Raises StageError where nothing is left.

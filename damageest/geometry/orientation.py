@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.neighbourhoods import neighbours, subset
-from damageest.geometry.voxels import cubes
+from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.voxels import number_cubes
 
 SMOOTH = 0.8
 """Agreement of two neighbours above which they lie on the same smooth patch."""
 
 
-def toward_void(
+def turn_toward_void(
     points: Floats, normals: Floats, above: Floats, lost: Floats, lost_normals: Floats, areas: Floats, cell: float
 ) -> Floats:
     """Turns normals (N,3) of either sign toward the lost side.
@@ -30,7 +30,7 @@ def toward_void(
     """
     from scipy.spatial import cKDTree
 
-    eyes = points[subset(points, 2 * cell)] if len(points) > 1500 else points
+    eyes = points[pick_one_per_cube(points, 2 * cell)] if len(points) > 1500 else points
     pull = _pull(eyes, lost, lost_normals, areas, cell) + _overhead(eyes, lost, lost_normals, areas, cell)
     nearest = cKDTree(eyes).query(points, workers=2)[1]
     vote = np.einsum("ij,ij->i", normals, pull[nearest] / np.pi + 0.01 * above)
@@ -39,7 +39,7 @@ def toward_void(
 
 def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     """Sign (N,) of each normal, from the neighbours' and the votes."""
-    distance, index = neighbours(points, 11)
+    distance, index = find_neighbours(points, 11)
     first = np.repeat(np.arange(len(points)), index.shape[1] - 1)
     second = index[:, 1:].ravel()
     step = points[second] - points[first]
@@ -51,7 +51,7 @@ def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     near = 1 / (1 + (distance[:, 1:].ravel() / np.median(distance[:, -1])) ** 2)
 
     # Small patches, so that the few wrong agreements (across a thin fin, a narrow slot) are outvoted along borders.
-    block = cubes(points, max(3 * float(np.median(distance[:, -1])), 1e-9 * float(np.ptp(points)), 1e-300))[1]
+    block = number_cubes(points, max(3 * float(np.median(distance[:, -1])), 1e-9 * float(np.ptp(points)), 1e-300))[1]
     firm = (np.abs(agree) > SMOOTH) & (block[first] == block[second])
     sign, patch = _spanned(len(points), first[firm], second[firm], agree[firm])
     strength = near * agree * np.abs(agree)

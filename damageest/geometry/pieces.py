@@ -17,7 +17,7 @@ from damageest.artefacts import Floats, Mesh, Solid
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.solids import concatenate_meshes
-from damageest.geometry.voxels import cubes
+from damageest.geometry.voxels import number_cubes
 
 ENOUGH = 5
 """IDS points that have to lie on a piece for it to count."""
@@ -32,14 +32,14 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class JoinedPieces:
     """One site: ``damage`` (of one or more pieces) and its ``clusters``; ``dropped`` volume of scraps beside it."""
 
     damage: Solid
     clusters: tuple[int, ...]
 
 
-def pieces_of(damage: Solid, points: Floats, label: NDArray[np.integer], reach: float) -> tuple[list[Piece], float]:
+def find_pieces(damage: Solid, points: Floats, label: NDArray[np.integer], reach: float) -> tuple[list[Piece], float]:
     """Splits a damage volume and drops what no IDS point touches.
 
     Args:
@@ -52,7 +52,7 @@ def pieces_of(damage: Solid, points: Floats, label: NDArray[np.integer], reach: 
     solids = split_bodies(damage)
     vertices, faces, owner = concatenate_meshes(solids)
     # of points much closer together than the reach, one speaks for those about it
-    cell = cubes(points, reach / 2)[1]
+    cell = number_cubes(points, reach / 2)[1]
     _, first, counts = np.unique(np.stack([cell, label]), axis=1, return_index=True, return_counts=True)
     distance, face, _ = closest_on_mesh(points[first], Mesh(vertices, faces))
     near = distance < reach
@@ -68,12 +68,12 @@ def pieces_of(damage: Solid, points: Floats, label: NDArray[np.integer], reach: 
     return kept, dropped
 
 
-def sites_of(pieces: Sequence[Piece]) -> list[Settled]:
+def join_pieces(pieces: Sequence[Piece]) -> list[JoinedPieces]:
     """Joins pieces and clusters that belong together; largest site first. Overlaps between pieces are united."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    from damageest.geometry.solids import to_solid, united
+    from damageest.geometry.solids import to_solid, unite
 
     if not pieces:
         return []
@@ -86,7 +86,7 @@ def sites_of(pieces: Sequence[Piece]) -> list[Settled]:
         members = [piece for piece, g in zip(pieces, group[: len(pieces)], strict=True) if g == number]
         clusters = tuple(sorted({c for piece in members for c in piece.clusters}))
         origin = members[0].solid.bounds.mean(axis=0)
-        whole = members[0].solid if len(members) == 1 else to_solid(united((m.solid for m in members), origin), origin)
+        whole = members[0].solid if len(members) == 1 else to_solid(unite((m.solid for m in members), origin), origin)
         if whole is not None:
-            found.append(Settled(whole, clusters))
+            found.append(JoinedPieces(whole, clusters))
     return sorted(found, key=lambda site: -site.damage.volume)

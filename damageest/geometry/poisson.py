@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
 
-Field = NDArray[np.float32]
+GridValues = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Grid:
         return nodes, weights
 
 
-def box(low: Floats, high: Floats, cell: float) -> Grid:
+def make_grid(low: Floats, high: Floats, cell: float) -> Grid:
     """The grid over a box; its shape suits the cosine transform and two halvings."""
     from scipy.fft import next_fast_len
 
@@ -64,10 +64,10 @@ def box(low: Floats, high: Floats, cell: float) -> Grid:
     return Grid(low - slack / 2, cell, (counts[0], counts[1], counts[2]))
 
 
-def solve(
-    grid: Grid, points: Floats, normals: Floats, areas: Floats, screening: float, start: Field | None = None,
+def solve_poisson(
+    grid: Grid, points: Floats, normals: Floats, areas: Floats, screening: float, start: GridValues | None = None,
     accuracy: float = 2e-3, most: int = 30,
-) -> Field:  # fmt: skip
+) -> GridValues:  # fmt: skip
     """The field (shape of the grid), 0 on the points and rising along their normals.
 
     Args:
@@ -90,11 +90,11 @@ def solve(
     shift = float(pull.sum()) / grid.size
     symbol = _symbol(grid) + shift
 
-    def apply(x: Field) -> Field:
-        drawn: Field = (back @ (pull * (look @ x.ravel()))).reshape(grid.shape)
+    def apply(x: GridValues) -> GridValues:
+        drawn: GridValues = (back @ (pull * (look @ x.ravel()))).reshape(grid.shape)
         return _laplacian(x) + drawn
 
-    x: Field = _precondition(right, symbol) if start is None else start.copy()
+    x: GridValues = _precondition(right, symbol) if start is None else start.copy()
     r = right - apply(x)
     goal = accuracy * float(np.sqrt(np.vdot(right, right)))
     z = _precondition(r, symbol)
@@ -112,29 +112,29 @@ def solve(
     return x
 
 
-def solve_by_halves(grid: Grid, points: Floats, normals: Floats, areas: Floats, screening: float) -> Field:
+def solve_coarse_to_fine(grid: Grid, points: Floats, normals: Floats, areas: Floats, screening: float) -> GridValues:
     """As `solve`, from the solution at half the resolution: a few fine steps do what took many."""
     if grid.size < 300_000:
-        return solve(grid, points, normals, areas, screening)
+        return solve_poisson(grid, points, normals, areas, screening)
     half = grid.coarser()
     inside = half.inside(points)
-    start = solve_by_halves(half, points[inside], normals[inside], areas[inside], screening)
+    start = solve_coarse_to_fine(half, points[inside], normals[inside], areas[inside], screening)
     # The coarse field rises over twice the length: the same step across the surface, so no scaling is due.
-    return solve(grid, points, normals, areas, screening, refined(start), 1e-2, 8)
+    return solve_poisson(grid, points, normals, areas, screening, refine_field(start), 1e-2, 8)
 
 
-def refined(coarse: Field) -> Field:
+def refine_field(coarse: GridValues) -> GridValues:
     """The field of ``Grid.coarser()`` carried to the nodes of the finer grid, linearly."""
-    out: Field = coarse
+    out: GridValues = coarse
     for axis in range(3):
-        x: Field = np.moveaxis(out, axis, 0)
+        x: GridValues = np.moveaxis(out, axis, 0)
         low, high = np.concatenate([x[:1], x[:-1]]), np.concatenate([x[1:], x[-1:]])
         pair = np.stack([0.75 * x + 0.25 * low, 0.75 * x + 0.25 * high], axis=1)
         out = np.moveaxis(pair.reshape(-1, *x.shape[1:]).astype(np.float32), 0, axis)
     return np.ascontiguousarray(out, dtype=np.float32)
 
 
-def _divergence(grid: Grid, points: Floats, vectors: Floats) -> Field:
+def _divergence(grid: Grid, points: Floats, vectors: Floats) -> GridValues:
     """Adjoint of the grid's gradient, applied to vectors splatted to the edges' middles."""
     total = np.zeros(grid.shape, np.float32)
     for axis in range(3):
@@ -142,14 +142,14 @@ def _divergence(grid: Grid, points: Floats, vectors: Floats) -> Field:
         shift[axis] = 0.5
         nodes, weights = grid.corners(points, shift)
         flow = np.bincount(nodes.ravel(), (weights * vectors[:, axis, None]).ravel(), grid.size)
-        along: Field = np.moveaxis(flow.reshape(grid.shape).astype(np.float32), axis, 0)
+        along: GridValues = np.moveaxis(flow.reshape(grid.shape).astype(np.float32), axis, 0)
         out = np.moveaxis(total, axis, 0)
         out[1:] += along[:-1]
         out[:-1] -= along[:-1]
     return total
 
 
-def _laplacian(x: Field) -> Field:
+def _laplacian(x: GridValues) -> GridValues:
     out = np.zeros_like(x)
     for axis in range(3):
         a, o = np.moveaxis(x, axis, 0), np.moveaxis(out, axis, 0)
@@ -159,12 +159,12 @@ def _laplacian(x: Field) -> Field:
     return out
 
 
-def _symbol(grid: Grid) -> Field:
+def _symbol(grid: Grid) -> GridValues:
     waves = [(2 - 2 * np.cos(np.pi * np.arange(n) / n)).astype(np.float32) for n in grid.shape]
     return np.asarray(waves[0][:, None, None] + waves[1][None, :, None] + waves[2][None, None, :], dtype=np.float32)
 
 
-def _precondition(right: Field, symbol: Field) -> Field:
+def _precondition(right: GridValues, symbol: GridValues) -> GridValues:
     from scipy.fft import dctn, idctn
 
     return np.asarray(idctn(dctn(right, workers=2) / symbol, workers=2, overwrite_x=True), dtype=np.float32)

@@ -16,7 +16,7 @@ def nearest(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
     return face, place
 
 
-def refined_at(mesh: Mesh, face: Ints, foot: Floats, edge: float) -> tuple[Mesh, Ints]:
+def refine_at(mesh: Mesh, face: Ints, foot: Floats, edge: float) -> tuple[Mesh, Ints]:
     """The mesh, conforming as it was, with no edge longer than ``edge`` on the faces that hold the points ``foot``
     (N,3), which lie on its faces ``face`` (N,); and the faces that hold them now.
 
@@ -34,7 +34,7 @@ def refined_at(mesh: Mesh, face: Ints, foot: Floats, edge: float) -> tuple[Mesh,
     return Mesh(vertices, faces), face
 
 
-def halved(mesh: Mesh, edge: float) -> Mesh:
+def halve_edges(mesh: Mesh, edge: float) -> Mesh:
     """The mesh, conforming as it was, with no edge longer than ``edge``, by halving the longest of each triangle."""
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
     for _ in range(MOST_ROUNDS):
@@ -94,7 +94,7 @@ def _held(vertices: Floats, faces: Ints, parent: Ints, face: Ints, foot: Floats)
     return np.asarray(children[found])
 
 
-def inserted(mesh: Mesh, face: Ints, foot: Floats) -> tuple[Mesh, Ints]:
+def insert_points(mesh: Mesh, face: Ints, foot: Floats) -> tuple[Mesh, Ints]:
     """The mesh with the points ``foot`` (N,3), on its faces ``face`` (N,), among its vertices, and their numbers (N,).
 
     A point close to a vertex is that vertex; one close to an edge is put a tenth of the triangle's height off it, and

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Mesh, Solid, open_edges
-from damageest.geometry.duplicates import first_of_equal
+from damageest.geometry.duplicates import find_duplicates
 from damageest.geometry.solids import to_arrays, to_manifold
 
 
-def single_precision(solid: Solid, mend: bool = True) -> Solid | None:
+def round_to_single(solid: Solid, mend: bool = True) -> Solid | None:
     """The solid with coordinates that single precision holds, watertight even where equal vertices count as one.
 
     Rounding can bring vertices together: the triangles that vanish are taken out. Where that opens the mesh, its
@@ -21,7 +21,7 @@ def single_precision(solid: Solid, mend: bool = True) -> Solid | None:
         if steps:
             mesh = _simplified(solid, steps * float(np.spacing(np.float32(np.abs(solid.vertices).max()))))
         rounded = mesh.vertices.astype(np.float32).astype(np.float64)
-        keep, inverse = first_of_equal(rounded)
+        keep, inverse = find_duplicates(rounded)
         faces = inverse[mesh.faces]
         a, b, c = faces.T
         faces = faces[(a != b) & (b != c) & (c != a)]

@@ -8,7 +8,7 @@ from damageest.artefacts import Part, Solid, Surface
 from damageest.geometry.distance import Flags, distance_to_mesh
 
 
-def inner_faces(damage: Solid, part: Part) -> Flags:
+def find_inner_faces(damage: Solid, part: Part) -> Flags:
     """Which faces (F,) of a damage volume lie inside the part rather than on its skin."""
     corners = damage.triangles
     # Three points inside each triangle: a face of the cut may touch the skin at a corner or along an edge.
@@ -18,8 +18,8 @@ def inner_faces(damage: Solid, part: Part) -> Flags:
     return np.asarray(distance.reshape(-1, 3).max(axis=1) > 1e-7 * part.diagonal)
 
 
-def ids_surface(damage: Solid, part: Part) -> Surface:
+def extract_ids(damage: Solid, part: Part) -> Surface:
     """The inner damage surface of a damage volume: its faces inside the part, turned toward the lost material."""
-    faces = damage.faces[inner_faces(damage, part)][:, ::-1]
+    faces = damage.faces[find_inner_faces(damage, part)][:, ::-1]
     used, renumbered = np.unique(faces, return_inverse=True)
     return Surface(damage.vertices[used], renumbered.reshape(-1, 3))

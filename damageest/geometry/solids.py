@@ -58,14 +58,14 @@ def concatenate_meshes(meshes: Sequence[Mesh]) -> tuple[Floats, Ints, Ints]:
     return vertices, faces, owner
 
 
-def united(solids: Iterable[Mesh], origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
+def unite(solids: Iterable[Mesh], origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
     """The union of watertight meshes as a Manifold, relative to ``origin``; empty where there are none."""
     from manifold3d import Manifold, OpType
 
     return Manifold.batch_boolean([to_manifold(solid, origin) for solid in solids] or [Manifold()], OpType.Add)
 
 
-def remainder(whole: Any, lost: Any) -> Any:
+def subtract_lost(whole: Any, lost: Any) -> Any:
     """``whole`` minus ``lost``, which lies inside it; both Manifolds, and so is what is given.
 
     Where faces of the two coincide, as a damage volume's outer ones do with the part's, manifold3d 3.5 was seen to take

@@ -12,7 +12,7 @@ from damageest.artefacts import Floats, Mesh, Pose
 M = TypeVar("M", bound=Mesh)
 
 
-def scan_from_part(pose: Pose) -> Floats:
+def invert_pose(pose: Pose) -> Floats:
     """T_scan_part (4,4): takes a point from the part's frame to the scanner's."""
     R, t = pose.T_part_scan[:3, :3], pose.T_part_scan[:3, 3]
     T = np.eye(4)
@@ -20,6 +20,6 @@ def scan_from_part(pose: Pose) -> Floats:
     return T
 
 
-def moved(mesh: M, T: Floats | None) -> M:
+def move_mesh(mesh: M, T: Floats | None) -> M:
     """The mesh with its vertices moved by a rigid T (4,4); itself where T is None."""
     return mesh if T is None else replace(mesh, vertices=mesh.vertices @ T[:3, :3].T + T[:3, 3])

@@ -26,7 +26,7 @@ _ALIASES = {
 _NAMES = {alias: unit for unit, text in _ALIASES.items() for alias in (unit, *text.split())}
 
 
-def canonical(name: str) -> str:
+def canonical_unit(name: str) -> str:
     """The short name of a unit: 'inches' gives 'in'. Raises InputError with the near miss and the valid names."""
     key = name.strip().lower()
     if key in _NAMES:
@@ -34,15 +34,15 @@ def canonical(name: str) -> str:
     raise InputError(f"unknown unit '{name}'{suggest(key, list(_NAMES))}; valid units: {', '.join(MILLIMETRES)}")
 
 
-def factor(source: str, target: str) -> float:
+def unit_factor(source: str, target: str) -> float:
     """What a length in ``source`` is multiplied by to be in ``target``: factor('in', 'mm') is 25.4."""
-    source, target = canonical(source), canonical(target)
+    source, target = canonical_unit(source), canonical_unit(target)
     return 1.0 if source == target else MILLIMETRES[source] / MILLIMETRES[target]
 
 
 def _checked(name: str) -> str:
     try:
-        return canonical(name)
+        return canonical_unit(name)
     except InputError as error:  # pydantic collects ValueErrors, so that a job's faults are all named at once
         raise ValueError(str(error)) from None
 
@@ -87,7 +87,7 @@ def diagnose_scale(
     ratio = scan / part
     if smallest <= ratio <= largest:
         return None
-    here = canonical(unit)
+    here = canonical_unit(unit)
     apart = f"{_times(ratio)} the part's ({scan:.4g} against {part:.4g} {here})"
 
     best: tuple[float, float, str] | None = None
@@ -96,7 +96,7 @@ def diagnose_scale(
             if other == here:
                 continue
             # numbers that mean ``other`` but were read as ``here`` are off by factor(here, other)
-            off = factor(here, other) ** sign
+            off = unit_factor(here, other) ** sign
             left = ratio / off
             if 0.4 <= left <= 1.3:
                 rare = 0.3 if {other, here} & {"um", "ft"} else 0.0

@@ -16,7 +16,7 @@ CHUNK = 1 << 18
 """Points looked up in a `Lattice` at a time, so that what comes between stays in the processor's cache."""
 
 
-class Lattice(NamedTuple):
+class VoxelGrid(NamedTuple):
     """Cubes of edge ``size`` from corner ``low`` (3,), ``shape`` (3,) of them."""
 
     low: Floats
@@ -44,7 +44,7 @@ class Lattice(NamedTuple):
         return taken
 
 
-def cubes(points: Floats, edge: float, low: Floats | None = None) -> tuple[Ints, Ints]:
+def number_cubes(points: Floats, edge: float, low: Floats | None = None) -> tuple[Ints, Ints]:
     """The cube (N,3) of an unbounded lattice from ``low`` (3,), the points' own lowest corner by default, that each of
     the points (N,3) lies in, and its number (N,): equal for points of one cube, rising along x, then y, then z."""
     cell = np.floor((points - (points.min(axis=0) if low is None else low)) / edge).astype(np.int64)
@@ -52,8 +52,8 @@ def cubes(points: Floats, edge: float, low: Floats | None = None) -> tuple[Ints,
     return cell, (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
 
 
-def faced_cubes(points: Floats, normals: Floats, edge: float) -> tuple[Ints, Ints]:
+def number_faced_cubes(points: Floats, normals: Floats, edge: float) -> tuple[Ints, Ints]:
     """As `cubes`, the number (N,) telling apart as well which of the six directions a normal (N,3) is nearest to."""
-    cell, number = cubes(points, edge)
+    cell, number = number_cubes(points, edge)
     axis = np.abs(normals).argmax(axis=1)
     return cell, number * 6 + 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0)

@@ -8,16 +8,16 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Solid
 from damageest.geometry.solids import to_manifold
-from damageest.geometry.transforms import moved
+from damageest.geometry.transforms import move_mesh
 
 
 def as_trimesh(mesh: Mesh, T: Floats | None = None) -> Any:
     """A ``trimesh.Trimesh`` of its own, moved by T, nothing merged or reordered."""
     from trimesh import Trimesh
 
-    return Trimesh(np.array(moved(mesh, T).vertices), np.array(mesh.faces), process=False)
+    return Trimesh(np.array(move_mesh(mesh, T).vertices), np.array(mesh.faces), process=False)
 
 
 def as_manifold(solid: Solid, T: Floats | None = None) -> Any:
     """A ``manifold3d.Manifold``, moved by T."""
-    return to_manifold(moved(solid, T))
+    return to_manifold(move_mesh(solid, T))

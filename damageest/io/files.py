@@ -8,7 +8,7 @@ from pathlib import Path
 from damageest.errors import InputError
 
 
-def checked_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
+def check_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
     """The file's suffix in lower case. Raises InputError where it is missing, empty or not of ``suffixes``."""
     valid = f"{what} may be: {', '.join(suffixes)}"
     if path.is_dir():
@@ -36,7 +36,7 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def reason(error: BaseException) -> str:
+def shorten_error(error: BaseException) -> str:
     """An error of a library in one line."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= 160 else text[:157] + "..."

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.errors import InputError
-from damageest.io.files import checked_file, reason
+from damageest.io.files import check_file, shorten_error
 
 MESH_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf")
 
@@ -21,7 +21,7 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
     Instances of a scene are placed; nothing is merged or repaired. Raises InputError, naming the file, where it is
     not a mesh of its kind or is cut short.
     """
-    suffix = checked_file(path, MESH_SUFFIXES, "a mesh")
+    suffix = check_file(path, MESH_SUFFIXES, "a mesh")
     if suffix == ".stl":
         vertices, faces = _read_stl(path)
         return vertices, faces, None
@@ -38,7 +38,7 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
         ]
         unit = str(scene.units) if suffix == ".3mf" and scene.units else None
     except Exception as error:
-        raise InputError(f"{path}: not a readable {suffix} mesh ({reason(error)})") from None
+        raise InputError(f"{path}: not a readable {suffix} mesh ({shorten_error(error)})") from None
     if not meshes:
         raise InputError(f"{path}: holds no triangles; a part must be a closed mesh")
     vertices, faces = trimesh.util.append_faces(*zip(*meshes, strict=True))
@@ -50,7 +50,7 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def stl_corners(path: Path) -> Floats:
+def read_stl_corners(path: Path) -> Floats:
     """(F,3,3) the triangles' corners of an STL file, binary or text. Raises InputError."""
     data = path.read_bytes()
     if len(data) >= 84:
@@ -77,7 +77,7 @@ def stl_corners(path: Path) -> Floats:
 
 
 def _read_stl(path: Path) -> tuple[Floats, Ints]:
-    corners = stl_corners(path)
+    corners = read_stl_corners(path)
     return corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int64).reshape(-1, 3)
 
 

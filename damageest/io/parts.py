@@ -7,22 +7,22 @@ from pathlib import Path
 from damageest.artefacts import Part
 from damageest.errors import InputError
 from damageest.geometry.make_part import make_part
-from damageest.geometry.units import canonical, factor
-from damageest.io.files import checked_file, file_sha256
+from damageest.geometry.units import canonical_unit, unit_factor
+from damageest.io.files import check_file, file_sha256
 from damageest.io.meshes import MESH_SUFFIXES, read_mesh
 
 
 def read_part(path: Path, unit: str, source: str | None = None, repair: bool = True) -> Part:
     """The part in a mesh file, in ``unit``. ``source``: the unit of the file's lengths; None: the file's own, else
     ``unit``. Raises InputError for a file that is not a solid and cannot be made one."""
-    checked_file(path, MESH_SUFFIXES, "a part")
+    check_file(path, MESH_SUFFIXES, "a part")
     vertices, faces, own = read_mesh(path)
     notes: tuple[str, ...] = ()
     try:
-        source = source or (canonical(own) if own else unit)
+        source = source or (canonical_unit(own) if own else unit)
     except InputError as error:
         raise InputError(f"{path}: {error}; set part.unit") from None
-    if canonical(source) != canonical(unit):
-        vertices = vertices * factor(source, unit)
-        notes = (f"converted from {canonical(source)} to {canonical(unit)}",)
+    if canonical_unit(source) != canonical_unit(unit):
+        vertices = vertices * unit_factor(source, unit)
+        notes = (f"converted from {canonical_unit(source)} to {canonical_unit(unit)}",)
     return make_part(vertices, faces, unit, path=str(path), sha256=file_sha256(path), repair=repair, notes=notes)

@@ -9,9 +9,9 @@ import numpy as np
 
 from damageest.artefacts import Floats, Scan
 from damageest.errors import InputError
-from damageest.geometry.duplicates import first_of_equal
-from damageest.geometry.units import canonical, factor
-from damageest.io.points import read_cloud
+from damageest.geometry.duplicates import find_duplicates
+from damageest.geometry.units import canonical_unit, unit_factor
+from damageest.io.points import read_points
 
 
 def make_scan(
@@ -41,7 +41,7 @@ def make_scan(
         points, normals = points[finite], None if normals is None else normals[finite]
     if not len(points):
         raise InputError(f"{name}: holds no points")
-    keep, _ = first_of_equal(points)
+    keep, _ = find_duplicates(points)
     if len(keep) < len(points):
         notes = (*notes, f"left out {len(points) - len(keep)} copies of points that are there already")
         points, normals = points[keep], None if normals is None else normals[keep]
@@ -51,7 +51,7 @@ def make_scan(
             normals = normals / length
         else:
             notes, normals = (*notes, "some normals are zero or not finite: none is used"), None
-    return Scan(points, normals, canonical(unit), paths, notes=notes)
+    return Scan(points, normals, canonical_unit(unit), paths, notes=notes)
 
 
 def read_scan(paths: Sequence[Path], unit: str, source: str | None = None, columns: str | None = None) -> Scan:
@@ -62,16 +62,16 @@ def read_scan(paths: Sequence[Path], unit: str, source: str | None = None, colum
     """
     if not paths:
         raise InputError("scan: no file named")
-    clouds = [read_cloud(path, columns) for path in paths]
+    clouds = [read_points(path, columns) for path in paths]
     notes: list[str] = []
     scaled = []
     for cloud, path in zip(clouds, paths, strict=True):
         notes.extend(f"{path.name}: {note}" if len(paths) > 1 else note for note in cloud.notes)
-        own = canonical(source or cloud.unit or unit)
+        own = canonical_unit(source or cloud.unit or unit)
         points = np.asarray(cloud.points, dtype=np.float64)
-        if own != canonical(unit):
-            notes.append(f"{path.name}: converted from {own} to {canonical(unit)}")
-            points = points * factor(own, unit)
+        if own != canonical_unit(unit):
+            notes.append(f"{path.name}: converted from {own} to {canonical_unit(unit)}")
+            points = points * unit_factor(own, unit)
         scaled.append(points)
     given = [cloud.normals for cloud in clouds if cloud.normals is not None]
     normals = np.concatenate(given) if len(given) == len(clouds) else None

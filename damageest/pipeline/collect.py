@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
-from damageest.geometry.skin import ids_surface
-from damageest.geometry.solids import iou, remainder, to_manifold, to_solid, united
+from damageest.geometry.skin import extract_ids
+from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid, unite
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
@@ -31,11 +31,11 @@ def collect_result(engine: Engine, work: Work) -> Work:
     kept = deviation.label.copy()
     kept[(kept == DAMAGE) & (state.sites.label == 0)] = OUTLIER
     origin = part.bounds.mean(axis=0)
-    lost = united((site.damage for site in sites), origin)
+    lost = unite((site.damage for site in sites), origin)
     damage = to_solid(lost, origin)
     # a cut-back is no damage: what was found is compared as it was found
     cut_back = any(site.damage is not found.damage for site, found in zip(sites, work.sites, strict=True))
-    found = to_solid(united((site.damage for site in work.sites), origin), origin) if cut_back else damage
+    found = to_solid(unite((site.damage for site in work.sites), origin), origin) if cut_back else damage
     result = Result(
         name=engine.job.name,
         units=engine.job.units,
@@ -48,7 +48,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
         site_label=label,
         sites=sites,
         damage=damage,
-        undamaged=to_solid(remainder(to_manifold(part, origin), lost), origin) if sites else part,
+        undamaged=to_solid(subtract_lost(to_manifold(part, origin), lost), origin) if sites else part,
         warnings=tuple(dict.fromkeys(work.warnings)),
         failures=tuple(str(error) for error in work.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance),
@@ -78,7 +78,7 @@ def _describe_site(found: FoundSite) -> Site:
         clusters=found.clusters,
         points=members,
         damage=damage,
-        surface=ids_surface(damage, found.job.part),
+        surface=extract_ids(damage, found.job.part),
         deposit=deposit,
         refused=found.refused,
         method=found.method,

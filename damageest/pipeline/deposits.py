@@ -8,7 +8,7 @@ from typing import Any
 
 from damageest.artefacts import Deposit, Floats, Solid
 from damageest.errors import StageError
-from damageest.geometry.solids import to_manifold, to_solid, united
+from damageest.geometry.solids import to_manifold, to_solid, unite
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, Step
 from damageest.pipeline.state import FoundSite, Work
@@ -101,4 +101,4 @@ def _unite(solids: Sequence[Solid]) -> Solid | None:
     if not solids:
         return None
     origin = solids[0].bounds.mean(axis=0)
-    return to_solid(united(solids, origin), origin)
+    return to_solid(unite(solids, origin), origin)

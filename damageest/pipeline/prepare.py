@@ -7,7 +7,7 @@ from dataclasses import replace
 from damageest.artefacts import INTACT, Part, Scan
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.errors import InputError
-from damageest.geometry.noise import measure
+from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.units import diagnose_scale
 from damageest.job.model import Job
 from damageest.pipeline.cache import digest
@@ -26,7 +26,7 @@ def measure_scan(engine: Engine, work: Work) -> Work:
         raise InputError(f"scan: {wrong_size}")
     if not scan.noise:
         key = digest("measure", state.key("scan"))
-        _, (noise, spacing) = engine.remember("measure", key, lambda: measure(scan.points))
+        _, (noise, spacing) = engine.remember("measure", key, lambda: measure_noise_and_spacing(scan.points))
         scan = replace(scan, noise=noise, spacing=spacing)
     tolerance, warnings = choose_tolerance(engine.job.tolerance, scan, part)
     state = state.derive(JobState.scan, scan, JobState.scan)
@@ -62,7 +62,7 @@ def inspect_inputs(job: Job, registry: Registry) -> tuple[Part, Scan, float, lis
     """Part, measured scan, a tolerance for them, and what is doubtful; for a new job."""
     part, scan = read_inputs(job, registry)
     doubts = [doubt] if (doubt := diagnose_scale(scan.points, part.vertices, part.unit)) else []
-    noise, spacing = measure(scan.points)
+    noise, spacing = measure_noise_and_spacing(scan.points)
     scan = replace(scan, noise=noise, spacing=spacing)
     tolerance, more = choose_tolerance(None, scan, part)
     return part, scan, tolerance, doubts + more

@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.checks.evidence import weigh
 from damageest.errors import StageError
-from damageest.geometry.pieces import pieces_of, sites_of
+from damageest.geometry.pieces import find_pieces, join_pieces
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, Step, follow
 from damageest.pipeline.state import Candidate, FoundSite, Work
@@ -62,11 +62,11 @@ def gather_sites(engine: Engine, work: Work) -> Work:
     for candidate in work.candidates:
         if candidate.damage is not None:
             members = np.flatnonzero(np.isin(sites.label, candidate.clusters))
-            found, scraps = pieces_of(candidate.damage, aligned.points[members], sites.label[members], reach)
+            found, scraps = find_pieces(candidate.damage, aligned.points[members], sites.label[members], reach)
             pieces += found
             dropped += scraps
     out = []
-    for item in sites_of(pieces):
+    for item in join_pieces(pieces):
         members = np.flatnonzero(np.isin(sites.label, item.clusters))
         evidence = weigh(item.damage, aligned.points[members], aligned, state.deviation, state.part, tolerance)
         notes = [

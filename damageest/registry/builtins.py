@@ -20,11 +20,11 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.align.none import Unaligned
     from damageest.stages.align.register import Register
     from damageest.stages.allowance.milling import Milling
-    from damageest.stages.allowance.none import Nothing as NoAllowance
+    from damageest.stages.allowance.none import NoAllowance as NoAllowance
     from damageest.stages.background.bbox import BoundingBox
     from damageest.stages.background.build_volume import BuildVolume
     from damageest.stages.background.capsule import Capsule
-    from damageest.stages.background.cylinder import Cylinder
+    from damageest.stages.background.cylinder import CylinderBackground
     from damageest.stages.background.minkowski import Minkowski
     from damageest.stages.background.offset import Offset
     from damageest.stages.boolean.manifold import Manifold
@@ -39,7 +39,7 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.part.reconstruct import Reconstructed
     from damageest.stages.reconstruct.pyvista import PyVista
     from damageest.stages.reconstruct.signed_distance import SignedDistance
-    from damageest.stages.repair.none import Nothing as NoRepair
+    from damageest.stages.repair.none import NoRepair as NoRepair
     from damageest.stages.sample.edge_aware import EdgeAware
     from damageest.stages.sample.uniform import Uniform
     from damageest.stages.scan.file import ScanFile
@@ -49,7 +49,8 @@ def damageest_stages() -> list[type[Stage]]:
 
     return [
         PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Unaligned, MeshDistance, Dbscan, PyVista, LargestLoop,
-        AllLoops, Offset, BoundingBox, Capsule, Cylinder, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
+        AllLoops, Offset, BoundingBox, Capsule, CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive,
+        Implicit,
         NoRepair, Manifold, NoAllowance, Milling, Files, Uniform, CloudDistance, SignedDistance, Reconstructed,
     ]  # fmt: skip
 

@@ -14,10 +14,10 @@ import pytest
 from damageest import conformance
 from damageest.artefacts import Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
 from damageest.conformance import _scene
-from damageest.conformance._base import Contract, Placed
+from damageest.conformance._base import PlacedContract, StageContract
 from damageest.io.meshes import write_stl
 from damageest.stages.align.none import Unaligned
-from damageest.stages.allowance.none import Nothing as NoAllowance
+from damageest.stages.allowance.none import NoAllowance as NoAllowance
 from damageest.stages.background.bbox import BoundingBox
 from damageest.stages.boolean.manifold import Manifold
 from damageest.stages.boundary.all_loops import AllLoops
@@ -28,7 +28,7 @@ from damageest.stages.export import Written
 from damageest.stages.export.files import Files
 from damageest.stages.part.file import PartFile
 from damageest.stages.reconstruct.signed_distance import SignedDistance
-from damageest.stages.repair.none import Nothing as NoRepair
+from damageest.stages.repair.none import NoRepair as NoRepair
 from damageest.stages.sample.uniform import Uniform
 from damageest.stages.scan.simulate import Simulate
 from damageest.stages.segment.mesh_distance import MeshDistance
@@ -80,7 +80,7 @@ BAD_INPUT: dict[str, tuple[str, tuple[Any, ...]]] = {
     "Repair": ("test_an_empty_mesh_is_refused", ()),
     "Boolean": ("test_apart_gives_none", ()),
 }
-PLACED = [n for n in GOOD if issubclass(getattr(conformance, f"{n}Contract"), Placed) and n != "Boundary"]
+PLACED = [n for n in GOOD if issubclass(getattr(conformance, f"{n}Contract"), PlacedContract) and n != "Boundary"]
 """Rims are numbers of vertices and have no length."""
 Fault = Callable[[Any, dict[str, Any]], Any]
 
@@ -223,4 +223,4 @@ def test_a_check_that_is_no_check_cannot_be_excepted(tmp_path: Path) -> None:
     made = case("Boolean", tmp_path, lambda result, given: result)
     made.exceptions = {"test_of_nothing": "because"}
     with pytest.raises(AssertionError, match="exceptions name checks"):
-        Contract.test_declares_itself(made)
+        StageContract.test_declares_itself(made)

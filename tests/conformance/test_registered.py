@@ -67,7 +67,7 @@ for _item in FOUND:
 
 @pytest.mark.parametrize("contract", DEFAULTS)
 def test_a_class_for_every_contract(contract: type) -> None:
-    assert issubclass(base(contract), conformance.Contract)
+    assert issubclass(base(contract), conformance.StageContract)
     assert base(contract).__name__ in conformance.__all__
     assert [item for item in FOUND if item.contract is contract]
 

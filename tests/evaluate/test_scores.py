@@ -9,7 +9,7 @@ import trimesh
 from damageest.artefacts import Floats, Solid
 from damageest.evaluate.parts import PARTS
 from damageest.evaluate.scores import iou, score
-from damageest.geometry.skin import ids_surface
+from damageest.geometry.skin import extract_ids
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Solid:
@@ -41,7 +41,7 @@ def test_score_of_a_cut_that_is_too_shallow() -> None:
     result = score(part, [found], true, 0.5)
     assert result.iou == pytest.approx(0.9)
     assert result.volume_error == pytest.approx(-0.1)
-    assert ids_surface(true, part).area == pytest.approx(50 * 30)
+    assert extract_ids(true, part).area == pytest.approx(50 * 30)
     assert result.surface_error == pytest.approx(1 / 0.5)
     assert math.isnan(result.pose_error)
 

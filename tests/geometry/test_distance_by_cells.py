@@ -9,7 +9,7 @@ import trimesh
 from damageest.artefacts import Floats, Ints, Part
 from damageest.evaluate.parts import PARTS
 from damageest.geometry.distance import signed_distance
-from damageest.geometry.distance_by_cells import by_cells
+from damageest.geometry.distance_by_cells import signed_distance_by_cells
 
 
 def around(part: Part, count: int, noise: float) -> Floats:
@@ -34,7 +34,7 @@ def test_distances_are_right_within_a_hundredth_of_them_and_exact_far_off(name: 
         searched += len(some)
         return signed_distance(some, part)
 
-    distance, face = by_cells(points, part, near, exact)
+    distance, face = signed_distance_by_cells(points, part, near, exact)
     right = signed_distance(points, part)[0]
     assert np.abs(distance - right).max() < 0.01 * near
     assert (distance == right)[np.abs(right) > 1.01 * near].all()
@@ -55,5 +55,5 @@ def test_faces_that_share_no_vertices_are_searched_one_by_one() -> None:
     object.__setattr__(loose, "faces", np.arange(3 * len(part.faces)).reshape(-1, 3))
     points = around(part, 20_000, 1e-4 * part.diagonal)
     near = 7e-4 * part.diagonal
-    distance, _ = by_cells(points, loose, near, lambda some: signed_distance(some, part))
+    distance, _ = signed_distance_by_cells(points, loose, near, lambda some: signed_distance(some, part))
     assert np.abs(distance - signed_distance(points, part)[0]).max() < 0.01 * near

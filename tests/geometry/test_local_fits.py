@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from damageest.artefacts import Solid
-from damageest.geometry.local_fits import averaged, smoothed
-from damageest.geometry.neighbourhoods import thinned
+from damageest.geometry.local_fits import average_points, smooth_points
+from damageest.geometry.neighbourhoods import thin_points
 from damageest.stages.enclose._refit import refitted
 
 SIGMA = 0.05
@@ -38,8 +38,8 @@ def off(points: np.ndarray, radius: float) -> np.ndarray:
 def test_averaging_takes_off_noise_and_adds_no_bias(radius: float) -> None:
     points = cloud(radius)
     inner = middle(points)
-    error = off(averaged(points, np.ones(len(points), np.int64), SIGMA, np.arange(len(points)))[0], radius)[inner]
-    plain = off(smoothed(points, SIGMA)[0], radius)[inner]
+    error = off(average_points(points, np.ones(len(points), np.int64), SIGMA, np.arange(len(points)))[0], radius)[inner]
+    plain = off(smooth_points(points, SIGMA)[0], radius)[inner]
     assert error.std() < 0.3 * SIGMA
     assert error.std() < 0.75 * plain.std()
     assert abs(error.mean()) < 0.05 * SIGMA
@@ -50,7 +50,7 @@ def test_a_sharp_edge_stays() -> None:
     flat = rng.uniform(-5, 5, (10_000, 2))
     roof = np.column_stack([flat, -np.abs(flat[:, 0])])
     noisy = roof + SIGMA * rng.normal(size=(10_000, 1)) * np.array([0, 0, 1])
-    points, _ = averaged(noisy, np.ones(10_000, np.int64), SIGMA, np.arange(len(noisy)))
+    points, _ = average_points(noisy, np.ones(10_000, np.int64), SIGMA, np.arange(len(noisy)))
     height = (points[:, 2] + np.abs(points[:, 0])) / np.sqrt(2)
     near = np.abs(flat[:, 0]) < 0.5
     assert np.abs(height[near & middle(points)]).mean() < SIGMA
@@ -60,7 +60,7 @@ def test_a_sharp_edge_stays() -> None:
 @settings(max_examples=25, deadline=None)
 def test_thinning_keeps_the_mean_and_the_count(seed: int, cell: float) -> None:
     points = np.random.default_rng(seed).normal(size=(200, 3))
-    means, counts, first = thinned(points, cell)
+    means, counts, first = thin_points(points, cell)
     assert counts.sum() == 200
     assert np.allclose(np.average(means, axis=0, weights=counts), points.mean(axis=0))
     assert (np.linalg.norm(points[first] - means, axis=1) <= np.sqrt(3) * cell).all()

@@ -6,7 +6,7 @@ import trimesh
 
 from damageest.artefacts import Mesh, Solid
 from damageest.geometry.bodies import split_bodies
-from damageest.geometry.solids import remainder, to_arrays, to_manifold, to_solid
+from damageest.geometry.solids import subtract_lost, to_arrays, to_manifold, to_solid
 
 
 def test_there_and_back_far_from_the_origin_in_float64() -> None:
@@ -31,7 +31,7 @@ def test_what_is_left_and_what_is_lost_make_the_whole(turn: float) -> None:
     frame = trimesh.transformations.rotation_matrix(turn, (1, 2, 3))
     boxes = [trimesh.creation.box(bounds=b) for b in ([(0, 0, 0), (4, 3, 2)], [(3, 1, 0), (4, 3, 1)])]
     whole, lost = (to_manifold(Solid(box.apply_transform(frame).vertices, box.faces)) for box in boxes)
-    assert remainder(whole, lost).volume() == pytest.approx(24 - 2, rel=1e-7)
+    assert subtract_lost(whole, lost).volume() == pytest.approx(24 - 2, rel=1e-7)
 
 
 class Crooked:
@@ -57,7 +57,7 @@ class Crooked:
 
 
 def test_a_difference_that_does_not_balance_is_made_another_way() -> None:
-    assert remainder(Crooked(10), Crooked(3, 1 / 3)).volume() == pytest.approx(7)
+    assert subtract_lost(Crooked(10), Crooked(3, 1 / 3)).volume() == pytest.approx(7)
 
 
 def test_bodies_are_those_of_manifold3d() -> None:

@@ -10,26 +10,26 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from damageest.errors import InputError
-from damageest.geometry.units import MILLIMETRES, Unit, canonical, diagnose_scale, factor
+from damageest.geometry.units import MILLIMETRES, Unit, canonical_unit, diagnose_scale, unit_factor
 
 units = st.sampled_from(sorted(MILLIMETRES))
 
 
 @given(a=units, b=units, c=units)
 def test_factors_compose(a, b, c):
-    assert factor(a, b) * factor(b, c) == pytest.approx(factor(a, c))
-    assert factor(a, a) == 1
+    assert unit_factor(a, b) * unit_factor(b, c) == pytest.approx(unit_factor(a, c))
+    assert unit_factor(a, a) == 1
 
 
 def test_names_and_aliases():
-    assert factor("in", "mm") == 25.4
-    assert factor("inches", "Millimeter") == 25.4
-    assert canonical("µm") == canonical("micron") == "um"
+    assert unit_factor("in", "mm") == 25.4
+    assert unit_factor("inches", "Millimeter") == 25.4
+    assert canonical_unit("µm") == canonical_unit("micron") == "um"
 
 
 def test_an_unknown_unit_names_the_near_miss_and_the_valid_ones():
     with pytest.raises(InputError, match=r"'inchs'.*did you mean 'inch.*valid units: um, mm, cm, m, in, ft"):
-        canonical("inchs")
+        canonical_unit("inchs")
 
 
 def test_as_an_option_it_is_checked_and_shortened():

@@ -24,7 +24,7 @@ from damageest.registry import Registry
 from damageest.report.result_json import report, result_schema
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance.milling import Milling
-from damageest.stages.allowance.none import Nothing
+from damageest.stages.allowance.none import NoAllowance
 from tests import damaged_box
 
 OUTER = 1.0
@@ -142,7 +142,7 @@ def separate(lanes: list[FoundSite]) -> list[Any]:
 def engine(stage: Allowance | None = None) -> Engine:
     """An engine of a job with this allowance alone."""
     registry = Registry.discover()
-    stage = stage or Nothing()
+    stage = stage or NoAllowance()
     item = replace(registry.get("allowance", stage.use), cls=type(stage))
     job = Job("", "mm", 0.1, "auto", {Allowance: stage}, {Allowance: item}, Path(), "")
     return Engine(job, registry)
@@ -175,7 +175,7 @@ def test_deposits_apart_stay_as_they_are() -> None:
     assert separate(lanes) == [site.deposit for site in lanes]
 
 
-class Told(Nothing):
+class Told(NoAllowance):
     """Gives the other sites' damages as its deposit, to see what it was told; refuses site 2."""
 
     def run(self, damage: Solid, others: Solid | None) -> Solid | None:

@@ -7,8 +7,8 @@ import pytest
 from manifold3d import Manifold
 
 from damageest.artefacts import Part, Solid, open_edges
-from damageest.geometry.pieces import pieces_of, sites_of
-from damageest.geometry.skin import ids_surface
+from damageest.geometry.pieces import find_pieces, join_pieces
+from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import to_arrays
 from tests.scenes import scene, spread
 
@@ -27,7 +27,7 @@ def on(body: Manifold, count: int = 60, seed: int = 0) -> np.ndarray:
 
 def test_a_piece_that_no_damaged_point_touches_is_a_scrap() -> None:
     points = on(ONE)
-    pieces, dropped = pieces_of(solid(ONE + SCRAP), points, np.ones(60, int), 0.1)
+    pieces, dropped = find_pieces(solid(ONE + SCRAP), points, np.ones(60, int), 0.1)
     assert [piece.clusters for piece in pieces] == [(1,)]
     assert pieces[0].solid.volume == pytest.approx(64)
     assert dropped == pytest.approx(0.008)
@@ -35,13 +35,13 @@ def test_a_piece_that_no_damaged_point_touches_is_a_scrap() -> None:
 
 def test_two_pieces_with_clusters_of_their_own_are_two_sites() -> None:
     points, label = np.concatenate([on(ONE), on(OTHER)]), np.repeat([1, 2], 60)
-    pieces, _ = pieces_of(solid(ONE + OTHER), points, label, 0.1)
-    assert sorted(site.clusters for site in sites_of(pieces)) == [(1,), (2,)]
+    pieces, _ = find_pieces(solid(ONE + OTHER), points, label, 0.1)
+    assert sorted(site.clusters for site in join_pieces(pieces)) == [(1,), (2,)]
 
 
 def test_one_cluster_over_two_pieces_is_one_site() -> None:
     points = np.concatenate([on(ONE), on(OTHER)])
-    (site,) = sites_of(pieces_of(solid(ONE + OTHER), points, np.ones(120, int), 0.1)[0])
+    (site,) = join_pieces(find_pieces(solid(ONE + OTHER), points, np.ones(120, int), 0.1)[0])
     assert site.damage.volume == pytest.approx(128)
     assert open_edges(site.damage.faces) == 0
 
@@ -49,25 +49,25 @@ def test_one_cluster_over_two_pieces_is_one_site() -> None:
 def test_two_clusters_that_bound_one_piece_are_one_site() -> None:
     points = on(ONE, 200)
     label = np.where(points[:, 0] < 2, 1, 2)
-    (site,) = sites_of(pieces_of(solid(ONE), points, label, 0.1)[0])
+    (site,) = join_pieces(find_pieces(solid(ONE), points, label, 0.1)[0])
     assert site.clusters == (1, 2)
 
 
 def test_pieces_that_overlap_are_united() -> None:
     shifted = ONE.translate((2, 0, 0))
-    pieces = [*pieces_of(solid(ONE), on(ONE), np.ones(60, int), 0.1)[0]]
-    pieces += pieces_of(solid(shifted), on(shifted), np.ones(60, int), 0.1)[0]
-    (site,) = sites_of(pieces)
+    pieces = [*find_pieces(solid(ONE), on(ONE), np.ones(60, int), 0.1)[0]]
+    pieces += find_pieces(solid(shifted), on(shifted), np.ones(60, int), 0.1)[0]
+    (site,) = join_pieces(pieces)
     assert site.damage.volume == pytest.approx(96)
 
 
 def test_no_piece_no_site() -> None:
-    assert sites_of([]) == []
+    assert join_pieces([]) == []
 
 
 def test_the_damage_surface_is_what_lies_inside_the_part_and_faces_the_loss() -> None:
     case = scene("pit")
-    surface = ids_surface(case.truth, case.part)
+    surface = extract_ids(case.truth, case.part)
     # a cap of a sphere of radius 4 about (9, 9, 14), 2 deep: 2 pi r h
     assert surface.area == pytest.approx(2 * np.pi * 4 * 2, rel=0.01)
     toward = np.array([9, 9, 14]) - surface.triangles.mean(axis=1)
@@ -76,4 +76,4 @@ def test_the_damage_surface_is_what_lies_inside_the_part_and_faces_the_loss() ->
 
 def test_a_damage_that_is_all_skin_has_no_damage_surface() -> None:
     whole = solid(ONE)
-    assert len(ids_surface(whole, Part(whole.vertices, whole.faces)).faces) == 0
+    assert len(extract_ids(whole, Part(whole.vertices, whole.faces)).faces) == 0

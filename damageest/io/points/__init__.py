@@ -8,11 +8,11 @@ from pathlib import Path
 
 from damageest.artefacts import Floats
 from damageest.errors import InputError
-from damageest.io.files import checked_file, reason
+from damageest.io.files import check_file, shorten_error
 
 
 @dataclass(frozen=True)
-class Cloud:
+class PointFile:
     """Points (N,3) as the file has them, finite or not; normals (N,3) or None; the unit where the format states one."""
 
     points: Floats
@@ -44,12 +44,12 @@ READERS = {
 """Suffix to the module here whose ``read(path, columns)`` gives a `Cloud`."""
 
 
-def read_cloud(path: Path, columns: str | None = None) -> Cloud:
+def read_points(path: Path, columns: str | None = None) -> PointFile:
     """The points of one file. Raises InputError, naming the file, where it cannot be read or holds no points."""
-    suffix = checked_file(path, tuple(READERS), "a scan")
+    suffix = check_file(path, tuple(READERS), "a scan")
     module = importlib.import_module(f"{__name__}.{READERS[suffix]}")
     try:
-        cloud: Cloud = module.read(path, columns)
+        cloud: PointFile = module.read(path, columns)
     except InputError:
         raise
     except FormatError as error:
@@ -57,7 +57,7 @@ def read_cloud(path: Path, columns: str | None = None) -> Cloud:
     except (KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
     except BaseException as error:  # the readers' libraries raise anything on a broken file, some outside Exception
-        raise InputError(f"{path}: not a readable {suffix} file ({reason(error)})") from None
+        raise InputError(f"{path}: not a readable {suffix} file ({shorten_error(error)})") from None
     if not len(cloud.points):
         raise InputError(f"{path}: holds no points")
     return cloud

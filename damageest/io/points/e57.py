@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.io.points import Cloud, FormatError
+from damageest.io.points import FormatError, PointFile
 
 
-def read(path: Path, columns: str | None = None) -> Cloud:
+def read(path: Path, columns: str | None = None) -> PointFile:
     """The points of all scans in the file's common frame; those the scanner marked invalid left out."""
     import pye57
 
@@ -29,7 +29,7 @@ def read(path: Path, columns: str | None = None) -> Cloud:
         raise FormatError("the E57 file holds no scans")
     whole = [n for n in normals if n is not None]
     notes = (f"{len(pieces)} scans in one E57 file",) if len(pieces) > 1 else ()
-    return Cloud(
+    return PointFile(
         np.concatenate(pieces), np.concatenate(whole) if len(whole) == len(normals) else None, unit="m", notes=notes
     )
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from damageest.io.points import Cloud, FormatError
+from damageest.io.points import FormatError, PointFile
 
 
-def read(path: Path, columns: str | None = None) -> Cloud:
+def read(path: Path, columns: str | None = None) -> PointFile:
     """All points of the file. LAS states no unit that laspy could give."""
     import laspy
 
@@ -28,4 +28,4 @@ def read(path: Path, columns: str | None = None) -> Cloud:
     points = np.column_stack([np.asarray(las.x), np.asarray(las.y), np.asarray(las.z)])
     if len(points) < count:
         raise FormatError(f"the file is cut short: {len(points)} of {count} points are there")
-    return Cloud(points)
+    return PointFile(points)

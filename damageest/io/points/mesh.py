@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.geometry.duplicates import first_of_equal
-from damageest.io.meshes import stl_corners
-from damageest.io.points import Cloud, FormatError
+from damageest.geometry.duplicates import find_duplicates
+from damageest.io.meshes import read_stl_corners
+from damageest.io.points import FormatError, PointFile
 from damageest.io.points.text import numbers
 
 
-def read(path: Path, columns: str | None = None) -> Cloud:
+def read(path: Path, columns: str | None = None) -> PointFile:
     """The mesh's vertices; its triangles are not used."""
     points = {".stl": _stl, ".obj": _obj, ".off": _off}[path.suffix.lower()](path)
-    return Cloud(points, notes=("a mesh: its vertices are taken as the scan's points",))
+    return PointFile(points, notes=("a mesh: its vertices are taken as the scan's points",))
 
 
 def _stl(path: Path) -> Floats:
-    corners = stl_corners(path).reshape(-1, 3)
-    return corners[first_of_equal(corners)[0]]
+    corners = read_stl_corners(path).reshape(-1, 3)
+    return corners[find_duplicates(corners)[0]]
 
 
 def _obj(path: Path) -> Floats:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from damageest.io.points import Cloud, FormatError
+from damageest.io.points import FormatError, PointFile
 
 
-def read(path: Path, columns: str | None = None) -> Cloud:
+def read(path: Path, columns: str | None = None) -> PointFile:
     """An array of numbers; never a pickle, which could run code."""
     try:
         array = np.load(path, allow_pickle=False)
@@ -23,4 +23,4 @@ def read(path: Path, columns: str | None = None) -> Cloud:
     ):
         what = f"{array.shape} of {array.dtype}" if isinstance(array, np.ndarray) else "an archive of several arrays"
         raise FormatError(f"expected an array (N,3), or (N,6) with normals, of numbers; it holds {what}")
-    return Cloud(array[:, :3], array[:, 3:] if array.shape[1] == 6 else None)
+    return PointFile(array[:, :3], array[:, 3:] if array.shape[1] == 6 else None)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.io.points import Cloud, FormatError
+from damageest.io.points import FormatError, PointFile
 from damageest.io.points.text import numbers
 
 _KEYS = ("VERSION", "FIELDS", "COLUMNS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
@@ -30,7 +30,7 @@ def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
     return head, at
 
 
-def read(path: Path, columns: str | None = None) -> Cloud:
+def read(path: Path, columns: str | None = None) -> PointFile:
     """The fields x, y, z and, where there are any, normal_x, normal_y, normal_z."""
     data = path.read_bytes()
     head, start = _header(data)
@@ -84,7 +84,7 @@ def read(path: Path, columns: str | None = None) -> Cloud:
         if view and view != _NO_VIEW and any(map(_nonzero, view[:3]))
         else ()
     )
-    return Cloud(stack("x", "y", "z"), stack(*wanted) if set(wanted) <= set(names) else None, notes=notes)
+    return PointFile(stack("x", "y", "z"), stack(*wanted) if set(wanted) <= set(names) else None, notes=notes)
 
 
 _NO_VIEW = ["0", "0", "0", "1", "0", "0", "0"]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.io.points import Cloud, FormatError
+from damageest.io.points import FormatError, PointFile
 from damageest.io.points.text import numbers
 
 TYPES = {
@@ -57,7 +57,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
     return form, elements, newline + 1
 
 
-def read(path: Path, columns: str | None = None) -> Cloud:
+def read(path: Path, columns: str | None = None) -> PointFile:
     """The element 'vertex': x, y, z and, where there are any, nx, ny, nz."""
     data = path.read_bytes()
     form, elements, start = _header(data)
@@ -81,7 +81,7 @@ def read(path: Path, columns: str | None = None) -> Cloud:
         return out
 
     normals = stack("nx", "ny", "nz") if {"nx", "ny", "nz"} <= set(names) else None
-    return Cloud(stack("x", "y", "z"), normals)
+    return PointFile(stack("x", "y", "z"), normals)
 
 
 def _dtype(element: _Element, order: str) -> np.dtype[np.void]:

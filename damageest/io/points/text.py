@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.io.points import Cloud, FormatError
+from damageest.io.points import FormatError, PointFile
 
 _NAMES = {
     "x": "x", "y": "y", "z": "z", "nx": "nx", "ny": "ny", "nz": "nz",
@@ -34,7 +34,7 @@ def numbers(data: bytes) -> Floats:
     return np.array(words, dtype="S").astype(np.float64)
 
 
-def read(path: Path, columns: str | None = None) -> Cloud:
+def read(path: Path, columns: str | None = None) -> PointFile:
     """Points from the columns x, y, z (and nx, ny, nz), found by header, by ``columns``, or by their number."""
     data = path.read_bytes()
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -110,7 +110,7 @@ def _ragged(data: bytes, width: int) -> str:
     return "rows of unequal length"
 
 
-def _pick(table: Floats, names: list[str] | None) -> Cloud:
+def _pick(table: Floats, names: list[str] | None) -> PointFile:
     width = table.shape[1]
     if names is not None:
         if not {"x", "y", "z"} <= set(names):
@@ -118,12 +118,12 @@ def _pick(table: Floats, names: list[str] | None) -> Cloud:
         if len(names) > width:
             raise FormatError(f"{len(names)} columns are named, but the rows have {width}")
         normals = [names.index(n) for n in ("nx", "ny", "nz")] if {"nx", "ny", "nz"} <= set(names) else None
-        return Cloud(table[:, [names.index(n) for n in "xyz"]], None if normals is None else table[:, normals])
+        return PointFile(table[:, [names.index(n) for n in "xyz"]], None if normals is None else table[:, normals])
     if width < 3:
         raise FormatError(f"rows have {width} columns; a point needs three: x y z")
     for start in (3, width - 3):  # normals, not colours: of length 1, and not all in the first octant as colours are
         if start >= 3 and width >= 6:
             tail = table[:, start : start + 3]
             if np.abs(np.linalg.norm(tail[:: max(1, len(tail) // 1000)], axis=1) - 1).max() < 0.02:
-                return Cloud(table[:, :3], tail)
-    return Cloud(table[:, :3])
+                return PointFile(table[:, :3], tail)
+    return PointFile(table[:, :3])

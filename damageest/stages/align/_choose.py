@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
-from damageest.stages.align._field import Field, Target
+from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._fine import fit, loss, moved
-from damageest.stages.align._points import Cloud, surface_cloud
+from damageest.stages.align._points import OrientedPoints, surface_cloud
 from damageest.stages.align._search import distinct, motion, refine, score
 from damageest.stages.align._turns import Axis, common_axis, families
 
@@ -38,7 +38,9 @@ class Choice:
     band: float
 
 
-def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Floats, noise: float) -> Choice:
+def choose(
+    poses: Floats, target: PartSurface, field: PlaneGrid, scan: OrientedPoints, points: Floats, noise: float
+) -> Choice:
     """Fits the promising ones of the poses (H,4,4) and their counterparts exactly and compares them point by point.
 
     ``points`` (N,3) well spread and in random order, for the exact fit; ``scan`` for the lookups; lengths in diagonals.
@@ -74,12 +76,12 @@ def choose(poses: Floats, target: Target, field: Field, scan: Cloud, points: Flo
     return Choice(pose, others, axis, band)
 
 
-def _close(field: Field, points: Floats, pose: Floats) -> Floats:
+def _close(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
     """Those of the points that a pose puts near the surface; exact queries of the others are slow and of no use."""
     return points[np.abs(field.distance[field.index(moved(pose, points).astype(np.float32))]) < FAR]
 
 
-def _distance(target: Target, field: Field, points: Floats, pose: Floats) -> Floats:
+def _distance(target: PartSurface, field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
     """Signed distances (N,) of the moved points: exact near the surface, by the grid far from it."""
     at = moved(pose, points)
     distance = field.distance[field.index(at.astype(np.float32))].astype(np.float64)
@@ -88,7 +90,7 @@ def _distance(target: Target, field: Field, points: Floats, pose: Floats) -> Flo
     return distance
 
 
-def _counterparts(poses: Floats, field: Field, scan: Cloud) -> tuple[Floats, Axis | None]:
+def _counterparts(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Axis | None]:
     """The promising poses, joined by those turned about the axis by which they differ, and the axis.
 
     A pose one tooth off differs from the right one only at a keyway, and a shaft's keyway is a few degrees wide: the
@@ -107,7 +109,7 @@ def _counterparts(poses: Floats, field: Field, scan: Cloud) -> tuple[Floats, Axi
     return poses[:TRIED], axis
 
 
-def _ranked(poses: Floats, field: Field, scan: Cloud) -> tuple[Floats, Floats]:
+def _ranked(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Floats]:
     scores = score(poses, scan, field, COARSE)
     order = distinct(poses, scores, 0.5 * COARSE, len(poses))
     return poses[order], scores[order]
@@ -135,7 +137,7 @@ def worse(cost: Floats, best: Floats) -> bool:
     return total > 0.0005 * len(more) and total > 5 * float(np.sqrt((more**2).sum()))
 
 
-def unfixed(pose: Floats, target: Target, points: Floats, band: float) -> tuple[str, ...]:
+def unfixed(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[str, ...]:
     """A note where the scan leaves the part free to slide: a bar of which both ends are missing or unseen fits anywhere
     along itself. Every slide or turn that the points' planes hardly resist is tried, a few bands far, either way."""
     at = moved(pose, points)
@@ -156,7 +158,7 @@ def unfixed(pose: Floats, target: Target, points: Floats, band: float) -> tuple[
     return ()
 
 
-def in_words(choice: Choice, target: Target) -> tuple[str, ...]:
+def in_words(choice: Choice, target: PartSurface) -> tuple[str, ...]:
     """What a user should know about the other poses; nothing where there are none."""
     notes: list[str] = []
     if choice.axis is not None:

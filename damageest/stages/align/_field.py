@@ -18,7 +18,7 @@ CELLS = 220_000
 
 
 @dataclass(frozen=True)
-class Target:
+class PartSurface:
     """The part, centred and scaled to a diagonal of 1, ready for exact closest-point queries."""
 
     mesh: Mesh
@@ -44,7 +44,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Field:
+class PlaneGrid:
     """A grid over the part's surroundings; each cell knows its centre's closest point and that point's plane.
 
     A point's distance to that plane is exact on flat parts and good to second order elsewhere, so a coarse grid does.
@@ -58,7 +58,7 @@ class Field:
     distance: Singles
 
     @classmethod
-    def of(cls, target: Target, margin: float = 0.12) -> Field:
+    def of(cls, target: PartSurface, margin: float = 0.12) -> PlaneGrid:
         low, high = target.mesh.bounds + np.array([[-margin], [margin]])
         cell = float(np.prod(high - low) / CELLS) ** (1 / 3)
         shape = np.ceil((high - low) / cell).astype(int)

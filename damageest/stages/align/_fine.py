@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.stages.align._field import Target
+from damageest.stages.align._field import PartSurface
 from damageest.stages.align._search import motion
 
 REACH = 3.5
@@ -32,7 +32,7 @@ def moved(pose: Floats, points: Floats) -> Floats:
     return points @ pose[:3, :3].T + pose[:3, 3]
 
 
-def fit(target: Target, points: Floats, pose: Floats, band: float, noise: float, rounds: int) -> Fit:
+def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: float, rounds: int) -> Fit:
     """Point-to-plane Gauss-Newton steps on the closest points of the triangles, weighted by Tukey's biweight.
 
     The kernel starts ``band`` wide and narrows to `REACH` standard deviations, measured on the points within it and at

@@ -10,7 +10,7 @@ from pydantic import AfterValidator
 
 from damageest.artefacts import Floats, Mesh, Part, Scan
 from damageest.errors import StageError
-from damageest.stages.align._field import Target
+from damageest.stages.align._field import PartSurface
 
 FEWEST = 200
 """Scan points without which an alignment would be guesswork."""
@@ -38,7 +38,7 @@ class Frame:
     """The ``target`` and what leads to it: the part's ``size`` (its diagonal) and ``centre`` (3,), and the
     scan's ``middle`` (3,)."""
 
-    target: Target
+    target: PartSurface
     size: float
     centre: Floats
     middle: Floats
@@ -59,7 +59,7 @@ class Frame:
             raise StageError(wrong, "set the unit of scan or part, or crop the scan to the part")
         size, centre = part.diagonal, part.bounds.mean(0)
         middle = np.median(scan.points[:: max(1, len(scan.points) // 100_000)], axis=0)
-        return cls(Target(Mesh((part.vertices - centre) / size, part.faces)), size, centre, middle)
+        return cls(PartSurface(Mesh((part.vertices - centre) / size, part.faces)), size, centre, middle)
 
     def points(self, scan: Scan) -> Floats:
         return (scan.points - self.middle) / self.size

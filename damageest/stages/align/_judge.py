@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.errors import StageError
-from damageest.stages.align._field import Target
+from damageest.stages.align._field import PartSurface
 from damageest.stages.align._fine import Fit, moved
 from damageest.stages.align._points import strided, surface_cloud
 
@@ -45,7 +45,7 @@ class Verdict:
         )
 
 
-def judge(target: Target, best: Fit, even: Floats, raw: Floats, tolerance: float) -> Verdict:
+def judge(target: PartSurface, best: Fit, even: Floats, raw: Floats, tolerance: float) -> Verdict:
     """``even`` (N,3): points spread evenly over the scanned area; ``raw`` (M,3): any unbiased subset; in diagonals.
 
     A point counts as on the surface within the tolerance, or within the fit's own band where noise makes that wider.

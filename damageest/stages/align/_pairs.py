@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
-from damageest.stages.align._points import Cloud, by_direction
+from damageest.stages.align._points import OrientedPoints, by_direction
 
 MODEL_POINTS, MODEL_PAIRS = 1600, 1_600_000
 SCAN_POINTS, SCAN_PAIRS, KEPT_PAIRS = 1200, 40_000, 6000
@@ -21,7 +21,7 @@ BINS = (26, 18, 18, 24)
 """Of the distance (0 to 1, in diagonals), the two angles with the line, the angle round the line."""
 
 
-def candidates(scan: Cloud, part: Cloud, wanted: int, rng: np.random.Generator) -> Floats:
+def candidates(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: np.random.Generator) -> Floats:
     """About ``wanted`` poses (H,4,4) from scan to part, of which some are near the true one.
 
     Where the scan's normals have no sign, every pair is tried with both signs at either end.
@@ -63,7 +63,7 @@ def candidates(scan: Cloud, part: Cloud, wanted: int, rng: np.random.Generator) 
     return poses
 
 
-def _keys(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, NDArray[np.bool_]]:
+def _keys(cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, NDArray[np.bool_]]:
     """The hash (M,) of each pair's four figures, and whether they are well defined. ``a``, ``b``: signs of normals."""
     points, normals = cloud.points.astype(np.float32), cloud.normals.astype(np.float32)
     line = points[j] - points[i]
@@ -95,7 +95,7 @@ def _keys(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, N
     return every, good
 
 
-def _frames(cloud: Cloud, i: Ints, j: Ints, a: Floats, b: Floats, cosine: Floats) -> tuple[Floats, Floats]:
+def _frames(cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats, cosine: Floats) -> tuple[Floats, Floats]:
     """A right-handed frame (M,3,3), columns the axes, and an origin (M,3) that move with the pair.
 
     From the two normals where they differ enough by ``cosine`` (M,), since they are better known than the line; else

@@ -14,7 +14,7 @@ DENSE = 120_000
 
 
 @dataclass(frozen=True)
-class Cloud:
+class OrientedPoints:
     """Oriented points: ``points`` (N,3), unit ``normals`` (N,3). ``signed`` tells whether the normals point outward or
     only lie along the surface's normal, either way round."""
 
@@ -22,8 +22,8 @@ class Cloud:
     normals: Floats
     signed: bool
 
-    def take(self, index: Ints) -> Cloud:
-        return Cloud(self.points[index], self.normals[index], self.signed)
+    def take(self, index: Ints) -> OrientedPoints:
+        return OrientedPoints(self.points[index], self.normals[index], self.signed)
 
 
 def strided(count: int, wanted: int, rng: np.random.Generator) -> Ints:
@@ -56,7 +56,7 @@ def spread(points: Floats, weights: Floats, wanted: int, rng: np.random.Generato
 
 def scan_cloud(
     points: Floats, normals: Floats | None, noise: float, wanted: int, rng: np.random.Generator
-) -> tuple[Floats, Floats, Cloud]:
+) -> tuple[Floats, Floats, OrientedPoints]:
     """The dense subset (D,3), the weight of each of its points (D,), and about ``wanted`` oriented points.
 
     ``points`` (N,3) and ``noise`` in units of the part's diagonal. A point's weight is the area that it stands for, so
@@ -91,17 +91,17 @@ def scan_cloud(
         direction = np.where(np.einsum("ij,ij->i", direction, given)[:, None] < 0, -direction, direction)
         flat &= np.linalg.norm(given, axis=1) > 0.5
     keep = np.flatnonzero(flat)
-    return dense, weights, Cloud(dense[chosen][keep], direction[keep], normals is not None)
+    return dense, weights, OrientedPoints(dense[chosen][keep], direction[keep], normals is not None)
 
 
-def surface_cloud(part: Mesh, wanted: int, rng: np.random.Generator) -> Cloud:
+def surface_cloud(part: Mesh, wanted: int, rng: np.random.Generator) -> OrientedPoints:
     """``wanted`` points spread over a mesh by area, with the normals of their faces."""
     points, face = sample_by_area(part, wanted, rng)
     normal = part.cross[face]
-    return Cloud(points, normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None], True)
+    return OrientedPoints(points, normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None], True)
 
 
-def by_direction(cloud: Cloud, wanted: int, rng: np.random.Generator) -> Cloud:
+def by_direction(cloud: OrientedPoints, wanted: int, rng: np.random.Generator) -> OrientedPoints:
     """``wanted`` points of a cloud, rare directions of the normal over-represented: a plate's rim says more about its
     pose than another thousand points on its faces."""
     count = 128

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
-from damageest.stages.align._field import Field, Singles
-from damageest.stages.align._points import Cloud, by_direction
+from damageest.stages.align._field import PlaneGrid, Singles
+from damageest.stages.align._points import OrientedPoints, by_direction
 
 CHUNK = 2_000_000
 """Points looked up at a time, for the memory's sake."""
 
 
-def score(poses: Floats, scan: Cloud, field: Field, band: float) -> Floats:
+def score(poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float) -> Floats:
     """How well each of the poses (H,4,4) explains the scan: 1 where all points lie on the surface.
 
     A point within ``band`` of the surface and facing its way counts for it, the more the closer. A point inside the
@@ -32,7 +32,7 @@ def score(poses: Floats, scan: Cloud, field: Field, band: float) -> Floats:
     return result
 
 
-def refine(poses: Floats, scan: Cloud, field: Field, bands: Floats) -> Floats:
+def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats) -> Floats:
     """Robust point-to-plane steps, one per entry of ``bands``, for all poses (H,4,4) at once.
 
     Weights are Tukey's with the band as their reach, so that points on damage have no say.
@@ -84,7 +84,7 @@ def distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:
 
 
 def _look(
-    poses: Floats, scan: Cloud, field: Field, band: float, planes: bool = False
+    poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float, planes: bool = False
 ) -> tuple[Singles, Singles, NDArray[np.bool_], Singles, NDArray[Any]]:
     """Moved points (H,M,3), their offsets from the nearest plane, whether that plane is near, how well the normals
     agree (0 to 1), and the cells' signed distances, or with ``planes`` the cells."""
@@ -100,7 +100,7 @@ def _look(
     return moved, offset, np.abs(distance) < band + field.cell, agree, index if planes else distance
 
 
-def search(poses: Floats, scan: Cloud, field: Field, rng: np.random.Generator) -> Floats:
+def search(poses: Floats, scan: OrientedPoints, field: PlaneGrid, rng: np.random.Generator) -> Floats:
     """The at most 80 poses (K,4,4), best first, that are left of the rough ones (H,4,4) after refining."""
     few, some, many = (by_direction(scan, count, rng) for count in (100, 250, 600))
     poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:3000]]

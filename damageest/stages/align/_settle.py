@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.geometry.voxels import faced_cubes
-from damageest.stages.align._field import Target
+from damageest.geometry.voxels import number_faced_cubes
+from damageest.stages.align._field import PartSurface
 from damageest.stages.align._fine import REACH, Fit, gauss_newton, moved
 from damageest.stages.align._search import motion
 
@@ -17,7 +17,7 @@ PATCH = 4.0
 FEWEST = 6
 
 
-def settled(target: Target, points: Floats, best: Fit, rounds: int = 8) -> Fit:
+def settled(target: PartSurface, points: Floats, best: Fit, rounds: int = 8) -> Fit:
     """As `fit`, on from ``best``, each point weighted by the mean distance of its patch as well.
 
     Wear of three standard deviations of the noise is within the kernel for single points and pulls the pose; the mean
@@ -29,7 +29,7 @@ def settled(target: Target, points: Floats, best: Fit, rounds: int = 8) -> Fit:
     within = np.abs(distance) < best.band
     points, foot, face = points[within], foot[within], face[within]
     normals = target.normals[face]
-    patch = np.unique(faced_cubes(moved(pose, points), normals, edge)[1], return_inverse=True)[1]
+    patch = np.unique(number_faced_cubes(moved(pose, points), normals, edge)[1], return_inverse=True)[1]
     count = np.bincount(patch)
     many = count >= FEWEST
     if many.sum() < 30:

@@ -23,7 +23,7 @@ class Unaligned(Align):
 
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The given pose; inliers are the scan points within the tolerance of the part (of at most some 100,000)."""
-        from damageest.stages.align._field import Target
+        from damageest.stages.align._field import PartSurface
 
         T = np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan)
         if not len(scan.points):
@@ -31,7 +31,7 @@ class Unaligned(Align):
         if not np.isfinite(scan.points).all():
             raise StageError("the scan has points that are not finite", "remove them from the file")
         points = scan.points[:: max(1, len(scan.points) // 100_000)]
-        distance = Target(part).closest(points @ T[:3, :3].T + T[:3, 3])[0]
+        distance = PartSurface(part).closest(points @ T[:3, :3].T + T[:3, 3])[0]
         hit = np.abs(distance) <= tolerance
         rms = float(np.sqrt((distance[hit] ** 2).mean())) if hit.any() else 0.0
         share = float(hit.mean())

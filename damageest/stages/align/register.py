@@ -28,7 +28,7 @@ class Register(Align):
         """Raises StageError where no pose explains the scan: another part, another unit, or mostly clutter."""
         from damageest.errors import StageError
         from damageest.stages.align._choose import COARSE, choose, in_words, unfixed
-        from damageest.stages.align._field import Field
+        from damageest.stages.align._field import PlaneGrid
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import FEWEST, Frame
         from damageest.stages.align._judge import judge
@@ -46,7 +46,7 @@ class Register(Align):
                 f"only {len(oriented.points)} places of the scan look like a surface, the rest is too sparse or noisy",
                 "give a denser scan, or align: none with the pose, if it is known",
             )
-        field = Field.of(target)
+        field = PlaneGrid.of(target)
         rough = candidates(oriented, surface_cloud(target.mesh, 20_000, rng), self.trials, rng)
         few = oriented.take(strided(len(oriented.points), 1500, rng))
         fine = rng.permutation(dense[spread(dense, weights, self.points, rng)])

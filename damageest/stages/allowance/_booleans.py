@@ -62,7 +62,7 @@ def apart(body: Any, origin: Floats, by: float) -> Solid | None:
     triangles. Such vertices are drawn in by ``by``, and where details finer than that are in the way, those go first.
     None where the Manifold is empty; as it was where nothing helps.
     """
-    from damageest.geometry.rounding import single_precision
+    from damageest.geometry.rounding import round_to_single
     from damageest.geometry.solids import to_solid
 
     first = to_solid(body, origin)
@@ -74,7 +74,7 @@ def apart(body: Any, origin: Floats, by: float) -> Solid | None:
         for _ in range(3):
             if tried is None:
                 break
-            if single_precision(tried, mend=False) is not None:
+            if round_to_single(tried, mend=False) is not None:
                 return tried
             tried = _drawn_in(tried, by)
     return first

@@ -10,8 +10,8 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh, Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
-from damageest.geometry.skin import inner_faces
-from damageest.geometry.solids import BALANCE, remainder, to_manifold, to_solid
+from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.solids import BALANCE, subtract_lost, to_manifold, to_solid
 from damageest.stages.allowance._booleans import tidied
 
 FINE, COARSE, COARSEST = 0.5, 0.75, 1.0
@@ -26,14 +26,14 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
     """
     origin = part.bounds.mean(axis=0)
     lost, whole = to_manifold(damage, origin), to_manifold(part, origin)
-    inside = inner_faces(damage, part)
+    inside = find_inner_faces(damage, part)
     if not inside.any():
         return damage
     round_it = to_manifold(_within(damage, damage.faces[inside], part, inner, tolerance), origin)
     round_it = round_it.simplify(tolerance / 16)
     if others is not None:
         round_it -= to_manifold(others, origin)
-    sound = remainder(whole, lost)
+    sound = subtract_lost(whole, lost)
     rest = sound - round_it
     ways: tuple[Callable[[], Any], ...] = (
         lambda: lost + (sound ^ round_it),
@@ -59,7 +59,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
 
 def _within(damage: Solid, faces: Any, part: Part, inner: float, tolerance: float) -> Solid:
     """Everything within ``inner`` and a quarter of a tolerance of some faces of the damage volume, near the part."""
-    from damageest.geometry.contour import MOST_NODES, contour
+    from damageest.geometry.contour import MOST_NODES, extract_contour
 
     origin = part.bounds.mean(axis=0)
     reach = inner + tolerance / 4
@@ -80,5 +80,5 @@ def _within(damage: Solid, faces: Any, part: Part, inner: float, tolerance: floa
         return distance_to_mesh(points, mesh) - reach
 
     nx, ny, nz = (np.ceil((high - low) / cell).astype(int) + 1).tolist()
-    found = contour(distance, low, (nx, ny, nz), cell)
+    found = extract_contour(distance, low, (nx, ny, nz), cell)
     return Solid(found.vertices + origin, found.faces)

@@ -12,7 +12,7 @@ import numpy as np
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import DamageestError, StageError
 from damageest.stages.allowance._selectors import Bar, KeepOut, Wanted
-from damageest.stages.allowance._skin import Skin, sorted_skin
+from damageest.stages.allowance._skin import SkinFaces, sorted_skin
 from damageest.stages.allowance._stock import stock
 
 MOST_ENTERED = 1e-3
@@ -23,7 +23,7 @@ SIDES = 256
 
 def kept_out(
     items: Sequence[KeepOut],
-    skin: Skin,
+    skin: SkinFaces,
     filled: Any,
     part: Part,
     wanted: Wanted,
@@ -58,7 +58,7 @@ def kept_out(
     return Manifold.batch_boolean(bodies, OpType.Add) if bodies else Manifold()
 
 
-def _around(skin: Skin, part: Part, wanted: Wanted, reach: float, origin: Floats) -> Skin | None:
+def _around(skin: SkinFaces, part: Part, wanted: Wanted, reach: float, origin: Floats) -> SkinFaces | None:
     """The part's own skin near the damage."""
     corners = part.triangles - origin
     low, high = skin.vertices.min(axis=0) - 2 * reach, skin.vertices.max(axis=0) + 2 * reach

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.solids import to_manifold
-from damageest.stages.allowance._skin import ON, Skin
+from damageest.stages.allowance._skin import ON, SkinFaces
 
 OPPOSITE, NARROW = -0.5, -0.87
 """Cosine between the normals of skin and wall from which on the wall faces the skin, and from which on it does so even
@@ -39,14 +39,14 @@ class Crowd:
         )
 
 
-def probes(skin: Skin, seed: int = 11) -> tuple[Floats, NDArray[np.int64]]:
+def probes(skin: SkinFaces, seed: int = 11) -> tuple[Floats, NDArray[np.int64]]:
     """Points (N,3) spread over the skin and in the middle of its triangles, and the face of each."""
     points, face = skin.sampled(SAMPLES, seed)
     large = np.argsort(-skin.areas, kind="stable")[:SAMPLES]
     return np.concatenate([points, skin.triangles[large].mean(axis=1)]), np.concatenate([face, large])
 
 
-def crowded(skin: Skin, part: Part, tolerance: float, origin: Floats) -> Crowd | None:
+def crowded(skin: SkinFaces, part: Part, tolerance: float, origin: Floats) -> Crowd | None:
     """Places where the stock meets an opposite wall of the part, or that wall's own stock; None where it has room.
     ``skin`` with what is wanted on it, relative to ``origin`` (3,)."""
 

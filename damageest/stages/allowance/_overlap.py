@@ -8,10 +8,12 @@ from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh, distance_to_edges
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.allowance._selectors import Wanted
-from damageest.stages.allowance._skin import ON, Skin, clipped, sorted_skin
+from damageest.stages.allowance._skin import ON, SkinFaces, clipped, sorted_skin
 
 
-def grown(skin: Skin, part: Part, wanted: Wanted, overlap: float, tolerance: float, origin: Floats) -> Skin | None:
+def grown(
+    skin: SkinFaces, part: Part, wanted: Wanted, overlap: float, tolerance: float, origin: Floats
+) -> SkinFaces | None:
     """The part's skin within ``overlap`` of the rim, on both sides of it, as far as it hangs together with it; with the
     same stock as anywhere. None where there is nothing to run over."""
     from manifold3d import Manifold
@@ -37,7 +39,7 @@ def grown(skin: Skin, part: Part, wanted: Wanted, overlap: float, tolerance: flo
     return band if (band.height > 0).any() else None
 
 
-def _rim(skin: Skin) -> Ints:
+def _rim(skin: SkinFaces) -> Ints:
     """(E,2) edges where skin with stock meets intact skin: those that no other skin of the damage shares."""
     border = skin.rims()
     if not len(border):

@@ -130,7 +130,7 @@ class Selector(Strict):
         return meant
 
 
-class Target(Selector):
+class StockTarget(Selector):
     """Skin that gets stock of its own."""
 
     outer: float = Field(ge=0, allow_inf_nan=False, description="stock beyond this skin, in the job's unit; 0: none")
@@ -174,7 +174,7 @@ class Wanted:
     """What a job asks for: stock of ``outer`` where no target matches, and what to keep free."""
 
     outer: float
-    targets: tuple[Target, ...]
+    targets: tuple[StockTarget, ...]
     keep_out: tuple[KeepOut, ...]
 
     @property

@@ -16,7 +16,7 @@ ON = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Skin:
+class SkinFaces:
     """``vertices`` (V,3) relative to the caller's origin, ``faces`` (F,3); ``parent`` (F,) the part's triangle below
     each, ``normal`` (F,3) that triangle's, outward; ``height`` (F,) the stock wanted on each; ``free`` (F,) those that
     must stay without."""
@@ -38,9 +38,9 @@ class Skin:
         a, b, c = np.moveaxis(self.triangles, 1, 0)
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
-    def only(self, faces: NDArray[np.bool_]) -> Skin:
+    def only(self, faces: NDArray[np.bool_]) -> SkinFaces:
         """The same skin with some of its faces."""
-        return Skin(
+        return SkinFaces(
             self.vertices, self.faces[faces], self.parent[faces], self.normal[faces], self.height[faces],
             self.free[faces],
         )  # fmt: skip
@@ -63,13 +63,13 @@ class Skin:
         return np.asarray(a * (1 - u) + b * u * (1 - v) + c * u * v), face
 
 
-def skin_of(body: Mesh, part: Part, wanted: Wanted, origin: Floats) -> Skin:
+def skin_of(body: Mesh, part: Part, wanted: Wanted, origin: Floats) -> SkinFaces:
     """The faces of a solid in the part that lie on the part's surface, cut along the planes of the selectors and told
     apart by the stock wanted on them."""
     return sorted_skin(body.vertices - origin, body.faces, part, wanted, origin)
 
 
-def sorted_skin(vertices: Floats, faces: Ints, part: Part, wanted: Wanted, origin: Floats) -> Skin:
+def sorted_skin(vertices: Floats, faces: Ints, part: Part, wanted: Wanted, origin: Floats) -> SkinFaces:
     """Of a mesh relative to ``origin``, the faces that lie on the part, cut and told apart."""
     on, parent = on_part(vertices, faces, part, origin)
     faces, parent = faces[on], parent[on]
@@ -80,7 +80,7 @@ def sorted_skin(vertices: Floats, faces: Ints, part: Part, wanted: Wanted, origi
     normal = unit(part.cross)[parent]
     middle = vertices[faces].mean(axis=1) + origin
     height = wanted.heights(middle, normal, parent, part)
-    return Skin(vertices, faces, parent, normal, height, wanted.kept_free(middle, normal, parent, part))
+    return SkinFaces(vertices, faces, parent, normal, height, wanted.kept_free(middle, normal, parent, part))
 
 
 def on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> tuple[NDArray[np.bool_], Ints]:

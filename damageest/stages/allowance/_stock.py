@@ -15,7 +15,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.stages.allowance._shells import shells
-from damageest.stages.allowance._skin import Skin, unit
+from damageest.stages.allowance._skin import SkinFaces, unit
 
 SMOOTH = 30.0
 """Degrees between neighbouring triangles up to which they may share upper corners."""
@@ -41,7 +41,7 @@ class _Edges:
     at: Ints
 
 
-def stock(skin: Skin, slack: float, roomy: bool = True, drawn_in: float = DRAWN_IN) -> Any:
+def stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: float = DRAWN_IN) -> Any:
     """A Manifold, relative to the skin's origin: stock of each face's height, and up to ``slack`` more. It reaches a
     little below the skin, for the caller to cut off. ``roomy``: no stock meets that of opposite skin; ``drawn_in``: how
     far inside the skin's border it begins, in slacks."""
@@ -71,7 +71,7 @@ def stock(skin: Skin, slack: float, roomy: bool = True, drawn_in: float = DRAWN_
     return Manifold.batch_boolean([*bodies, *(Manifold.hull_points(cloud) for cloud in clouds)], OpType.Add)
 
 
-def _drawn_in(skin: Skin, by: float) -> Skin:
+def _drawn_in(skin: SkinFaces, by: float) -> SkinFaces:
     """The skin with its border moved inward."""
     start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
     size = len(skin.vertices)
@@ -88,7 +88,7 @@ def _drawn_in(skin: Skin, by: float) -> Skin:
     return replace(skin, vertices=skin.vertices + step)
 
 
-def _edges(skin: Skin) -> _Edges:
+def _edges(skin: SkinFaces) -> _Edges:
     """Edges with exactly two faces, which run along them in opposite senses."""
     start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
     size = len(skin.vertices)
@@ -106,7 +106,7 @@ def _next(corner: Ints) -> Ints:
     return corner // 3 * 3 + (corner % 3 + 1) % 3
 
 
-def _directions(skin: Skin, height: Floats, edges: _Edges, slack: float) -> tuple[Ints, Floats]:
+def _directions(skin: SkinFaces, height: Floats, edges: _Edges, slack: float) -> tuple[Ints, Floats]:
     """The group (3F,) of each corner of each face, and the way up (G,3) from the skin to the stock's top that all
     corners of a group share: the faces' mean normal, long enough that each face has its height, none ``slack`` more."""
     from scipy.sparse import coo_array
@@ -150,7 +150,7 @@ def unit_rows(vectors: Floats) -> Floats:
 
 
 def _over_edges(
-    skin: Skin, height: Floats, edges: _Edges, group: Ints, tops: Floats
+    skin: SkinFaces, height: Floats, edges: _Edges, group: Ints, tops: Floats
 ) -> tuple[list[Floats], Ints, Floats]:
     """Point clouds of the pieces over sharp convex edges; the vertex (2E,) at either end of each, and the cloud's upper
     points (2E,K,3) there, NaN where there are fewer."""

@@ -14,7 +14,7 @@ from damageest.geometry.distance import distance_to_edges, distance_to_mesh, is_
 from damageest.geometry.solids import to_arrays
 from damageest.stages.allowance._limits import Crowd
 from damageest.stages.allowance._selectors import Mask
-from damageest.stages.allowance._skin import ON, Skin, unit
+from damageest.stages.allowance._skin import ON, SkinFaces, unit
 
 VOLUME = 1e-4
 """Share of its volume that a damage may stick out of its deposit, or a deposit into metal."""
@@ -38,11 +38,11 @@ class Worked:
     cavity: Any
     left: Any
     kept_out: Any
-    skin: Skin
-    band: Skin | None
+    skin: SkinFaces
+    band: SkinFaces | None
     origin: Floats
 
-    def skins(self) -> list[Skin]:
+    def skins(self) -> list[SkinFaces]:
         """The skin, and the band where there is one."""
         return [self.skin] if self.band is None else [self.skin, self.band]
 
@@ -105,7 +105,7 @@ class Thickness:
         return np.asarray(~self.ended & (low | (self.thick > bound)))
 
 
-def thickness(work: Worked, wanted: Skin, part: Part, crowds: Sequence[Crowd]) -> Thickness:
+def thickness(work: Worked, wanted: SkinFaces, part: Part, crowds: Sequence[Crowd]) -> Thickness:
     """Measured by rays along the normal of the skin with stock."""
     from scipy.spatial import cKDTree
 
@@ -140,7 +140,7 @@ def strayed(work: Worked, part: Part, tolerance: float) -> tuple[float, Floats]:
     near = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
     normal = unit(part.cross)[near]
     zero = np.zeros(len(near))
-    around = Skin(part.vertices - work.origin, part.faces[near], near, normal, zero, zero > 0)
+    around = SkinFaces(part.vertices - work.origin, part.faces[near], near, normal, zero, zero > 0)
     points, face = around.sampled(SAMPLES, seed=29)
     normal = normal[face]
     bare = _to_stock(work, points) > most

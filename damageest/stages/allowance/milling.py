@@ -10,7 +10,7 @@ from pydantic import Field
 from damageest.artefacts import Deposit, Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.stages.allowance import Allowance
-from damageest.stages.allowance._selectors import KeepOut, Target, Wanted
+from damageest.stages.allowance._selectors import KeepOut, StockTarget, Wanted
 
 CRUMBS = 1e-6
 """Share of the stock's volume."""
@@ -27,7 +27,7 @@ class Milling(Allowance):
         0.0, ge=0, allow_inf_nan=False,
         description="stock beyond the nominal surface, along its normal, in the job's unit, where no target matches",
     )  # fmt: skip
-    targets: tuple[Target, ...] = Field(
+    targets: tuple[StockTarget, ...] = Field(
         (),
         description="skin with an `outer` of its own, the first match wins: {outer: 1.0, ...} with one or more of "
         "box: [[x, y, z], [x, y, z]]; half_space: {point, normal}; facing: {direction, angle} (degrees); "
@@ -59,7 +59,7 @@ class Milling(Allowance):
         guarantee is not kept."""
         from manifold3d import Manifold
 
-        from damageest.geometry.solids import remainder, to_manifold
+        from damageest.geometry.solids import subtract_lost, to_manifold
         from damageest.stages.allowance._booleans import apart, joined, tidied, touching
         from damageest.stages.allowance._cut_back import cut_back
         from damageest.stages.allowance._keep_out import kept_out
@@ -73,7 +73,7 @@ class Milling(Allowance):
         wanted = Wanted(self.outer, self.targets, self.keep_out)
         cavity = cut_back(damage, part, others, self.inner, tolerance) if self.inner else damage
         filled, whole = to_manifold(cavity, origin), to_manifold(part, origin)
-        left = remainder(whole, filled)
+        left = subtract_lost(whole, filled)
         skin = skin_of(cavity, part, wanted, origin)
         reach = wanted.most + tolerance
         barred = kept_out(self.keep_out, skin, filled, part, wanted, reach, origin, tolerance)
@@ -88,7 +88,7 @@ class Milling(Allowance):
             within = proud ^ body
             # crumbs of rounding, cut off, would leave lines where the stock touches what it stands on and no more
             if within.volume() > CRUMBS * proud.volume():
-                proud = remainder(proud, within)
+                proud = subtract_lost(proud, within)
         deposit = tidied(joined(filled, touching(proud, filled, tolerance)), part.diagonal)
         thickness = check(Worked(deposit, filled, left, barred, skin, band, origin), part, tolerance, crowds)
         body = apart(deposit, origin, DRAWN_IN * tolerance)

@@ -8,7 +8,7 @@ from damageest.artefacts import Solid
 from damageest.stages.allowance import Allowance
 
 
-class Nothing(Allowance):
+class NoAllowance(Allowance):
     """Deposits the damage volume as it is, with no stock to mill back."""
 
     use: Literal["none"] = "none"

@@ -11,7 +11,7 @@ from pydantic import Field
 from damageest.artefacts import Floats, Mesh, Part, Solid, Surface
 from damageest.errors import StageError
 from damageest.geometry.distance import is_inside
-from damageest.geometry.refinement import halved
+from damageest.geometry.refinement import halve_edges
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.stages.background import Background
 
@@ -62,7 +62,7 @@ def refined(body: Any, edge: float, how: Subdivision = "linear") -> Any:
     vertices, faces = to_arrays(body)
     if how == "adaptive":
         # VTK's own adaptive subdivision leaves cracks beside slender triangles.
-        return to_manifold(halved(Mesh(vertices, faces), edge))
+        return to_manifold(halve_edges(Mesh(vertices, faces), edge))
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(vertices, faces)

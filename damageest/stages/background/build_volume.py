@@ -44,7 +44,7 @@ class BuildVolume(Background):
         self, part: Part, surface: Surface, samples: Samples, intact: Floats, tolerance: float, spacing: float
     ) -> Solid:
         """Raises StageError where the part does not fit in, or the cells round the site would not fit in memory."""
-        from damageest.geometry.contour import contour
+        from damageest.geometry.contour import extract_contour
         from damageest.geometry.distance import signed_distance
         from damageest.stages.background._generated import check_holds, check_surface
 
@@ -70,7 +70,7 @@ class BuildVolume(Background):
         def outside(points: Floats) -> Floats:
             return signed_distance(points, part)[0] - max(by, 0.6 * cell) - 0.1 * cell
 
-        solid = contour(outside, corner + cell * first, (nx, ny, nz), cell)
+        solid = extract_contour(outside, corner + cell * first, (nx, ny, nz), cell)
         inside = ((part.vertices > low) & (part.vertices < high)).all(axis=1)
         return check_holds(solid, part.vertices[inside], surface)
 

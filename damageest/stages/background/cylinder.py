@@ -12,7 +12,7 @@ from damageest.stages.background._axis import Axis, along, hull_points, segments
 from damageest.stages.background._generated import Generated
 
 
-class Cylinder(Generated):
+class CylinderBackground(Generated):
     """The cylinder round the part, somewhat larger (paper 3.2): for parts turned on a lathe."""
 
     use: Literal["cylinder"] = "cylinder"

@@ -19,7 +19,7 @@ class Minkowski(Generated):
 
     def shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
         """The level of the distance. Raises StageError where its lattice would not fit in memory."""
-        from damageest.geometry.contour import contour
+        from damageest.geometry.contour import extract_contour
         from damageest.geometry.distance import signed_distance
 
         # Two triangles to a cell: a lattice as fine as the clearance, or as the number of triangles allows.
@@ -31,4 +31,4 @@ class Minkowski(Generated):
             # Between nodes the level runs straight and cuts corners, which a coarse lattice has to be farther off for.
             return signed_distance(points, part)[0] - max(by, 0.6 * cell) - 0.1 * cell
 
-        return to_manifold(contour(outside, low, (nx, ny, nz), cell), origin)
+        return to_manifold(extract_contour(outside, low, (nx, ny, nz), cell), origin)

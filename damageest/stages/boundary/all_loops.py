@@ -22,9 +22,9 @@ class AllLoops(Boundary):
     def run(self, surface: Surface, part: Part, tolerance: float) -> Rims:
         """Raises StageError where there is no such loop."""
         from damageest.geometry.distance import signed_distance
-        from damageest.geometry.loops import rims
+        from damageest.geometry.loops import trace_rims
 
-        found = rims(surface)
+        found = trace_rims(surface)
         depth = [-signed_distance(surface.vertices[loop], part)[0] for loop in found]
         near = [loop for loop, one in zip(found, depth, strict=True) if np.quantile(one, 0.25) < DEEP * tolerance]
         return Rims(tuple(near or found[:1]))

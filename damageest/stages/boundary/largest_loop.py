@@ -15,6 +15,6 @@ class LargestLoop(Boundary):
 
     def run(self, surface: Surface) -> Rims:
         """Raises StageError where there is no loop of more than ten nodes."""
-        from damageest.geometry.loops import rims
+        from damageest.geometry.loops import trace_rims
 
-        return Rims(tuple(rims(surface)[:1]))
+        return Rims(tuple(trace_rims(surface)[:1]))

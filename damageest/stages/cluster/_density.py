@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.voxels import cubes
+from damageest.geometry.voxels import number_cubes
 
 PAIRS = 20_000_000
 """Pairs of neighbours that may be held at once, 16 bytes each; more, and points are first gathered into a grid."""
@@ -57,7 +57,7 @@ def neighbour_distances(points: Floats, neighbours: int) -> Floats:
 
 def _gathered(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
     """Mean points of the occupied cells of a grid, the cell of each point, and the number of points in each cell."""
-    _, of, count = np.unique(cubes(points, cell)[1], return_inverse=True, return_counts=True)
+    _, of, count = np.unique(number_cubes(points, cell)[1], return_inverse=True, return_counts=True)
     of = of.ravel()
     means = np.stack([np.bincount(of, points[:, axis]) for axis in range(3)], axis=1) / count[:, None]
     return means, of, count

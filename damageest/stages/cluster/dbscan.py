@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
 from damageest.artefacts import DAMAGE, Deviation, Floats, Ints, Scan, Sites
-from damageest.geometry.neighbourhoods import nearby
+from damageest.geometry.neighbourhoods import find_nearby
 from damageest.stages.cluster import Cluster
 from damageest.stages.cluster._density import dbscan, neighbour_distances
 
@@ -136,7 +136,7 @@ def _gaps(points: Floats, neighbours: int) -> tuple[float, float]:
         # Among some of the points the k-th is farther than among all, so it tells how far to look.
         some = cKDTree(points[_evenly(len(points), WHOLE)])
         reach = float(np.percentile(np.asarray(some.query(picked, k=[neighbours + 1], workers=2)[0]), 97))
-        points = points[nearby(points, picked, reach)]
+        points = points[find_nearby(points, picked, reach)]
     tree = cKDTree(points)
     distance = np.asarray(tree.query(picked, k=[neighbours + 1], distance_upper_bound=reach, workers=2)[0])[:, 0]
     return float(np.percentile(distance, 95)), float(np.median(distance))
@@ -151,7 +151,7 @@ def _supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], reach
     """(M,) whether enough of a damage point's nearest scan points are damage as well."""
     from scipy.spatial import cKDTree
 
-    here = nearby(points, points[damage], reach)
+    here = find_nearby(points, points[damage], reach)
     _, near = cKDTree(points[here]).query(points[damage], k=AROUND, distance_upper_bound=reach, workers=2)
     padded = np.append(is_damage[here], False)  # the index of a missing neighbour is one past the last
     result: NDArray[np.bool_] = padded[near].sum(axis=1) >= LIKE_IT

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Deviation, Floats, Ints, Part, Samples, Scan, Sites
-from damageest.geometry.local_fits import averaged
-from damageest.geometry.neighbourhoods import local_areas, neighbours, subset, thinned
-from damageest.geometry.orientation import toward_void
-from damageest.geometry.poisson import Field, Grid, refined
-from damageest.geometry.voxels import cubes
-from damageest.stages.enclose._skin import Flags, Skin, pushed, skin_near
+from damageest.geometry.local_fits import average_points
+from damageest.geometry.neighbourhoods import find_neighbours, measure_local_areas, pick_one_per_cube, thin_points
+from damageest.geometry.orientation import turn_toward_void
+from damageest.geometry.poisson import Grid, GridValues, refine_field
+from damageest.geometry.voxels import number_cubes
+from damageest.stages.enclose._skin import Flags, SkinSamples, pushed, skin_near
 
 APART = 0.75
 """Edge of the cubes that one averaged point each is made for, in cells of the surface."""
@@ -38,7 +38,7 @@ class Found:
     ``lost_by`` (-1: it is there, or nobody knows), ``kept`` (K,3) sound skin pushed outward with ``kept_normals``."""
 
     groups: tuple[Group, ...]
-    skin: Skin
+    skin: SkinSamples
     lost_by: Ints
     kept: Floats
     kept_normals: Floats
@@ -58,7 +58,7 @@ def gathered(
     cross = part.cross[face]
     above = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
     groups, lost_by = _groups(points, above, label, skin, free, tolerance, aligned.spacing, aligned.noise)
-    areas = local_areas(skin.points)
+    areas = measure_local_areas(skin.points)
     kept = np.flatnonzero((lost_by < 0) & ~free)
     moved = pushed(part, skin.points[kept], skin.normals[kept], push * tolerance)
     return Found(groups, skin, lost_by, moved, skin.normals[kept], areas[kept])
@@ -73,7 +73,7 @@ def oriented(found: Found, grid: Grid) -> tuple[Floats, Floats, Floats]:
     return points[inside], normals[inside], areas[inside]
 
 
-def within_reach(grid: Grid, field: Field, found: Found, number: int, slack: float) -> Field:
+def within_reach(grid: Grid, field: GridValues, found: Found, number: int, slack: float) -> GridValues:
     """The field made negative where a sound or another group's surface is nearer, by more than ``slack``, than this
     one's.
 
@@ -98,7 +98,7 @@ def within_reach(grid: Grid, field: Field, found: Found, number: int, slack: flo
     cut = (away[1] - away[0]) * np.float32(half.cell) + np.float32(slack)
     # in units of the field, whose step across a surface is about a half over two cells
     cut *= np.float32(0.25 / grid.cell)
-    return np.minimum(field, refined(cut))
+    return np.minimum(field, refine_field(cut))
 
 
 def _surface(points: Floats, above: Floats, lost: Floats, lost_normals: Floats, noise: float, cell: float) -> Surfels:
@@ -106,22 +106,29 @@ def _surface(points: Floats, above: Floats, lost: Floats, lost_normals: Floats, 
 
     ``above`` (M,3): the normal of the nominal skin nearest to each; ``lost`` (L,3): samples of the skin lost with them.
     """
-    points, counts, first = thinned(points, 0.5 * cell)
+    points, counts, first = thin_points(points, 0.5 * cell)
     # fits overlap much further than this, so more of them would say the same again
-    chosen = subset(points, APART * cell)
+    chosen = pick_one_per_cube(points, APART * cell)
     above = above[first][chosen]
-    points, normals = averaged(points, counts, noise, chosen)
+    points, normals = average_points(points, counts, noise, chosen)
     size, chosen = cell, np.arange(len(lost))
     while len(chosen) > 5000:
         size *= 1.3
-        chosen = subset(lost, size)
+        chosen = pick_one_per_cube(lost, size)
     places = lost[chosen]
-    normals = toward_void(points, normals, above, places, lost_normals[chosen], local_areas(places), cell)
-    return points, normals, local_areas(points)
+    normals = turn_toward_void(points, normals, above, places, lost_normals[chosen], measure_local_areas(places), cell)
+    return points, normals, measure_local_areas(points)
 
 
 def _groups(
-    points: Floats, above: Floats, label: Ints, skin: Skin, free: Flags, tolerance: float, spacing: float, noise: float
+    points: Floats,
+    above: Floats,
+    label: Ints,
+    skin: SkinSamples,
+    free: Flags,
+    tolerance: float,
+    spacing: float,
+    noise: float,
 ) -> tuple[tuple[Group, ...], Ints]:
     """Losses whose points or lost skin come within reach of one another are one group; and for each skin sample the
     group that lost it. Skin that shows no scan point but belongs to no damaged point is not lost: the scanner did not
@@ -134,7 +141,7 @@ def _groups(
     link = max(3 * tolerance, 1.5 * spacing, 1.2 * float(np.quantile(around, 0.9)) if len(around) else 0.0)
     gone = np.flatnonzero(skin.gone)
     every = np.concatenate([points, skin.points[gone]])
-    cell, number = cubes(every, link / 2)
+    cell, number = number_cubes(every, link / 2)
     _, first, cube = np.unique(number, return_index=True, return_inverse=True)
     pairs = cKDTree(cell[first]).query_pairs(2.5, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
@@ -169,7 +176,7 @@ def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) 
     label = sites.label.astype(np.int64)
     if len(candidates):
         reach = max(2 * tolerance, 0.7 * aligned.spacing)
-        distance, index = neighbours(aligned.points[candidates], 1, aligned.points[seeds], reach)
+        distance, index = find_neighbours(aligned.points[candidates], 1, aligned.points[seeds], reach)
         hit = np.isfinite(distance[:, 0])
         label[candidates[hit]] = label[seeds[index[hit, 0]]]
     grown = (label > 0) & (sites.label == 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Solid
-from damageest.geometry.neighbourhoods import neighbours
+from damageest.geometry.neighbourhoods import find_neighbours
 
 NEAR = 12
 """Points that a vertex is fitted to."""
@@ -20,7 +20,7 @@ def refitted(region: Solid, points: Floats, normals: Floats, most: float) -> Sol
     point into the region; no vertex moves by more than ``most``, and those with no points about do not move.
     """
     vertices = region.vertices
-    distance, index = neighbours(vertices, NEAR, points)
+    distance, index = find_neighbours(vertices, NEAR, points)
     near = np.flatnonzero(distance[:, 0] < 2 * most + np.median(distance[:, 0]))
     distance, index, at = distance[near], index[near], vertices[near]
     own = region.vertex_normals[near]

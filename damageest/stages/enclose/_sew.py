@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Rims, Surface
 from damageest.errors import StageError
-from damageest.geometry.loops import loops
+from damageest.geometry.loops import trace_loops
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ def filled(wide: Wide) -> Ints:
     """Faces with every loop closed that is no rim, by a fan from its first node (paper 3.2: small loops are closed)."""
     rim = {int(loop.min()) for loop in wide.loops}
     fans = [wide.faces]
-    for loop in loops(wide.faces):
+    for loop in trace_loops(wide.faces):
         if int(loop.min()) not in rim:
             fans.append(np.stack([np.full(len(loop) - 2, loop[0]), loop[2:], loop[1:-1]], axis=1))
     return np.concatenate(fans)

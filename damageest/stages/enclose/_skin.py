@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Samples, Scan, Sites
 from damageest.geometry.distance import signed_distance
-from damageest.geometry.neighbourhoods import neighbours, subset
+from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
 
 Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Skin:
+class SkinSamples:
     """Samples (S,3) of the part's skin round the losses, their outward ``normals``, and whether each is ``gone``: no
     sound scan point near, though the scan is dense enough there to show one. ``usual`` (S,): the gap that the scan
     leaves."""
@@ -28,7 +28,7 @@ class Skin:
 
 def skin_near(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, grown: Flags, samples: Samples, tolerance: float
-) -> Skin:
+) -> SkinSamples:
     """The skin in the neighbourhood of the sites, and as far from them as it seems to be gone."""
     from scipy.spatial import cKDTree
 
@@ -40,8 +40,8 @@ def skin_near(
     keep = np.flatnonzero(hits)
     hit = aligned.points[keep]
     if not len(hit) or not len(points):
-        return Skin(points, normals, np.ones(len(points), bool), np.full(len(points), aligned.spacing))
-    thin = subset(hit, 0.35 * tolerance)
+        return SkinSamples(points, normals, np.ones(len(points), bool), np.full(len(points), aligned.spacing))
+    thin = pick_one_per_cube(hit, 0.35 * tolerance)
     hit, face = hit[thin], deviation.face[keep][thin]
     cross = part.cross[face]
     outward = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
@@ -52,15 +52,15 @@ def skin_near(
     tree = cKDTree(np.concatenate([hit, weight * outward], axis=1))
     most = float(clear.max()) * 1.001
     gap = tree.query(np.concatenate([points, weight * normals], axis=1), distance_upper_bound=most, workers=2)[0]
-    return Skin(points, normals, gap > clear, usual)
+    return SkinSamples(points, normals, gap > clear, usual)
 
 
 def _usual(points: Floats, hit: Floats, tolerance: float) -> Floats:
     """Radius (S,) that holds six sound points on the sound surface nearest to each skin sample."""
     count = min(7, len(hit))
-    some = hit[subset(hit, 3 * tolerance)]
-    radius = neighbours(some, count, hit)[0][:, -1]
-    _, index = neighbours(points, 6, some)
+    some = hit[pick_one_per_cube(hit, 3 * tolerance)]
+    radius = find_neighbours(some, count, hit)[0][:, -1]
+    _, index = find_neighbours(points, 6, some)
     return np.asarray(np.median(radius[index], axis=1))
 
 

@@ -43,7 +43,7 @@ class Adaptive(Enclose):
     ) -> Mesh:
         """Raises StageError where paths do not close or lead through the part, or either side holds sound points, and
         NotSeparatedError where they do not split the background."""
-        from damageest.geometry.refinement import inserted, nearest, refined_at
+        from damageest.geometry.refinement import insert_points, nearest, refine_at
         from damageest.stages.enclose._close import agreed, closed
         from damageest.stages.enclose._sew import carried_on
 
@@ -56,8 +56,8 @@ class Adaptive(Enclose):
         ends = np.cumsum([len(loop) for loop in wide.loops])[:-1]
         trails = [trail(background, one, edge) for one in np.split(foot, ends)]
         more, way = nearest(background, np.concatenate(trails))
-        mesh, held = refined_at(background, np.concatenate([face, more]), np.concatenate([foot, way]), edge)
-        mesh, image = inserted(mesh, held[: len(foot)], foot)
+        mesh, held = refine_at(background, np.concatenate([face, more]), np.concatenate([foot, way]), edge)
+        mesh, image = insert_points(mesh, held[: len(foot)], foot)
         near = _along(mesh, np.concatenate([foot, way]), 3 * edge) | np.isin(mesh.faces, image).any(axis=1)
         cycles = [_cycle(mesh, near, one) for one in np.split(image, ends)]
         return closed(surface, wide, mesh, cycles, intact, part, tolerance)

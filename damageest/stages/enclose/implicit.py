@@ -30,8 +30,8 @@ class Implicit(EncloseAll):
         self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
     ) -> Enclosures:
         """Raises StageError where no closed surface comes about."""
-        from damageest.geometry.isosurface import closed_region
-        from damageest.geometry.poisson import box, solve_by_halves
+        from damageest.geometry.isosurface import extract_region
+        from damageest.geometry.poisson import make_grid, solve_coarse_to_fine
         from damageest.stages.enclose._evidence import gathered, oriented, within_reach
         from damageest.stages.enclose._refit import refitted
 
@@ -48,11 +48,11 @@ class Implicit(EncloseAll):
             notes: tuple[str, ...] = ()
             if cell > 2 * self.cell * tolerance:
                 notes = (f"a loss this large was solved in cells of {cell:.3g}, {cell / tolerance:.1f} tolerances",)
-            grid = box(low, high, cell)
+            grid = make_grid(low, high, cell)
             points, normals, areas = oriented(found, grid)
-            field = solve_by_halves(grid, points, normals, areas, self.screening)
+            field = solve_coarse_to_fine(grid, points, normals, areas, self.screening)
             field = within_reach(grid, field, found, number, 4 * tolerance)
-            region = closed_region(grid, field)
+            region = extract_region(grid, field)
             if region is not None:
                 region = refitted(region, points, normals, 0.5 * tolerance)
                 items.append(Enclosure(region, group.sites, notes))

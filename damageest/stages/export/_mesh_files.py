@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from damageest.geometry.rounding import single_precision
+from damageest.geometry.rounding import round_to_single
 from damageest.io.meshes import write_ply, write_stl
 from damageest.stages.export import Body, Written
 
@@ -13,7 +13,7 @@ from damageest.stages.export import Body, Written
 def stl(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
     """Binary STL. Its coordinates are single precision: a solid that this would open is written as PLY too."""
     (body,) = bodies
-    single = single_precision(body.solid)
+    single = round_to_single(body.solid)
     write_stl(folder / f"{stem}.stl", single or body.solid)
     if single is not None:
         return Written((f"{stem}.stl",))

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from damageest.geometry.rounding import single_precision
+from damageest.geometry.rounding import round_to_single
 from damageest.stages.export import Body, Written
 
 UNITS = {"um": "micron", "mm": "millimeter", "cm": "centimeter", "m": "meter", "in": "inch", "ft": "foot"}
@@ -56,7 +56,7 @@ def threemf(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Writt
 
 def _object(number: int, body: Body) -> str:
     # most readers round to single precision: where the solid bears that it is done here, and nine digits say all
-    single = single_precision(body.solid)
+    single = round_to_single(body.solid)
     mesh, digits = (body.solid, 17) if single is None else (single, 9)
     point = f'<vertex x="{{:.{digits}g}}" y="{{:.{digits}g}}" z="{{:.{digits}g}}"/>\n'.format
     corners = '<triangle v1="{}" v2="{}" v3="{}"/>\n'.format

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field
 
 from damageest.artefacts import Floats, Scan, Solid
 from damageest.geometry.simplification import simplify_within
-from damageest.geometry.transforms import moved, scan_from_part
+from damageest.geometry.transforms import invert_pose, move_mesh
 from damageest.io.meshes import write_ply, write_points
 from damageest.stages.export import Body, Export, Patch, Writer, Written
 from damageest.stages.export._options import Formats, spline_writer
@@ -60,7 +60,7 @@ class Files(Export):
         done: list[Written] = []
         places = {"part": [""], "scan": ["scan_frame/"], "both": ["", "scan_frame/"]}
         for place in places[self.frame]:
-            T = scan_from_part(result.pose) if place else None
+            T = invert_pose(result.pose) if place else None
             for name in self.format:
                 chosen = coarse if coarse and writers[name].costly else bodies
                 done += _solids(writers[name], folder, place, chosen, T, result.units)
@@ -78,7 +78,7 @@ class Files(Export):
         done = []
         for site in result.sites:
             path = _room(folder, f"{place}surface/site-{site.id}.ply")
-            write_ply(path, moved(site.surface, T))
+            write_ply(path, move_mesh(site.surface, T))
             done.append(Written((path.relative_to(folder).as_posix(),)))
         done.append(_scan(result, result.aligned if T is None else result.scan, folder, f"{place}scan.ply"))
         return done
@@ -114,7 +114,7 @@ def _solids(
     writer: Writer, folder: Path, place: str, bodies: Mapping[str, Body], T: Floats | None, unit: str
 ) -> list[Written]:
     """One file for each body; or one of all, where the union of the damages would only double its pieces."""
-    here = {stem: replace(body, solid=moved(body.solid, T)) for stem, body in bodies.items()}
+    here = {stem: replace(body, solid=move_mesh(body.solid, T)) for stem, body in bodies.items()}
     if writer.together:
         pieces = [body for stem, body in here.items() if stem != "damage"]
         return [_write(writer, folder, f"{place}result", pieces, unit)]

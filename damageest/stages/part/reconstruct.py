@@ -48,13 +48,13 @@ class Reconstructed(ReadPart):
     def run(self, unit: str) -> Part:
         """The part in ``unit``. ``tessellation_error`` is the 95th percentile of the distance of every 20th point,
         not used for the surface, from it: noise included. Raises InputError for a scan that does not close."""
-        from damageest.geometry.noise import measure
+        from damageest.geometry.noise import measure_noise_and_spacing
 
         paths = (self.path,) if isinstance(self.path, Path) else self.path
         scan = read_scan(paths, unit, self.unit)
         if len(scan.points) < FEWEST:
             raise InputError(f"part: {len(scan.points)} points are too few for a part; {FEWEST} at least")
-        noise, spacing = measure(scan.points)
+        noise, spacing = measure_noise_and_spacing(scan.points)
         try:
             vertices, faces, cell, error = self._surface(scan.points, noise, spacing)
             openings = _openings(vertices, faces, scan.points)
@@ -73,10 +73,10 @@ class Reconstructed(ReadPart):
 
     def _surface(self, points: Floats, noise: float, spacing: float) -> tuple[Floats, Ints, float, float]:
         """Vertices, faces, resolution and error of the closed surface through ``points`` (N,3)."""
-        from damageest.geometry.isosurface import closed_region
-        from damageest.geometry.local_fits import smoothed
-        from damageest.geometry.neighbourhoods import local_areas, thinned
-        from damageest.geometry.poisson import box, solve_by_halves
+        from damageest.geometry.isosurface import extract_region
+        from damageest.geometry.local_fits import smooth_points
+        from damageest.geometry.neighbourhoods import measure_local_areas, thin_points
+        from damageest.geometry.poisson import make_grid, solve_coarse_to_fine
 
         held = np.arange(len(points)) % HELD == 0
         span = np.ptp(points, axis=0)
@@ -86,13 +86,13 @@ class Reconstructed(ReadPart):
             raise InputError(
                 f"a resolution of {cell:.3g} needs more than most_cells ({self.most_cells}); set part.cell larger"
             )
-        cloud, *_ = thinned(points[~held], 0.8 * cell)
-        cloud, normals, _ = smoothed(cloud, noise, 24)
+        cloud, *_ = thin_points(points[~held], 0.8 * cell)
+        cloud, normals, _ = smooth_points(cloud, noise, 24)
         normals = _outward(cloud, normals, 1.25 * max(cell, spacing))
-        grid = box(points.min(axis=0) - 8 * cell, points.max(axis=0) + 8 * cell, cell)
+        grid = make_grid(points.min(axis=0) - 8 * cell, points.max(axis=0) + 8 * cell, cell)
         # The level is positive inside, hence normals inward.
-        field = solve_by_halves(grid, cloud, -normals, local_areas(cloud), self.screening)
-        region = closed_region(grid, field)
+        field = solve_coarse_to_fine(grid, cloud, -normals, measure_local_areas(cloud), self.screening)
+        region = extract_region(grid, field)
         if region is None:
             raise InputError("no closed surface came about; scan the specimen all round")
         error = _error(region.vertices, region.faces, points[held], cell, noise)

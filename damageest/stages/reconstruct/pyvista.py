@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Floats, Part, Surface
-from damageest.geometry.local_fits import smoothed
-from damageest.geometry.open_surfaces import middle, opened, thin_for_surface
+from damageest.geometry.local_fits import smooth_points
+from damageest.geometry.open_surfaces import centre_points, thin_for_surface, trim_surface
 from damageest.stages.reconstruct import Reconstruct
 
 SMOOTHED = 32
@@ -35,7 +35,7 @@ class PyVista(Reconstruct):
         """Raises StageError where the points are too few, or no surface comes about."""
         import pyvista
 
-        origin = middle(points)
+        origin = centre_points(points)
         # VTK fills the bounding box with cells; along its own axes a damage's box is a fraction of the part's.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         local = (points - origin) @ axes
@@ -43,9 +43,9 @@ class PyVista(Reconstruct):
         cell = self.spacing or max(tolerance, spacing, least)
         cloud = thin_for_surface(local, cell)
         count = min(self.neighbours, len(cloud) // 2)
-        cloud, _, _ = smoothed(cloud, noise, min(max(count, SMOOTHED), len(cloud) // 2))
+        cloud, _, _ = smooth_points(cloud, noise, min(max(count, SMOOTHED), len(cloud) // 2))
         mesh = pyvista.PolyData(cloud).reconstruct_surface(nbr_sz=count, sample_spacing=cell)
         mesh = mesh.triangulate().clean() if mesh.n_cells else mesh
         vertices, faces = np.asarray(mesh.points, np.float64), mesh.regular_faces.astype(np.int64)
         # The filter's level goes on beyond the data, and where it overshoots the part it bounds no lost material.
-        return opened(vertices @ axes.T + origin, faces, cloud @ axes.T + origin, 1.4 * cell, part, tolerance)
+        return trim_surface(vertices @ axes.T + origin, faces, cloud @ axes.T + origin, 1.4 * cell, part, tolerance)

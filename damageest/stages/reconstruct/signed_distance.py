@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Floats, Ints, Part, Surface
-from damageest.geometry.open_surfaces import middle, opened, oriented
+from damageest.geometry.open_surfaces import centre_points, orient_points, trim_surface
 from damageest.stages.reconstruct import Reconstruct
 
 MOST_CELLS = 3e6
@@ -36,17 +36,17 @@ class SignedDistance(Reconstruct):
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
         """Raises StageError where the points are too few, or no surface comes about."""
-        origin = middle(points)
+        origin = centre_points(points)
         # Along its own axes a damage's box is a fraction of that along the part's.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         local = (points - origin) @ axes
         least = float(np.prod(np.ptp(local, axis=0)) / MOST_CELLS) ** (1 / 3)
         cell = self.spacing or max(tolerance, spacing, least)
-        cloud, normals = oriented(points, part, cell, noise)
+        cloud, normals = orient_points(points, part, cell, noise)
         vertices, faces = _zero_level((cloud - origin) @ axes, normals @ axes, cell, self.radius * cell)
         if np.linalg.det(axes) < 0:
             faces = faces[:, ::-1]
-        return opened(vertices @ axes.T + origin, faces, cloud, 1.4 * cell, part, tolerance)
+        return trim_surface(vertices @ axes.T + origin, faces, cloud, 1.4 * cell, part, tolerance)
 
 
 def _zero_level(points: Floats, normals: Floats, cell: float, radius: float) -> tuple[Floats, Ints]:

@@ -9,7 +9,7 @@ from damageest.errors import StageError
 from damageest.stages.repair import Repair
 
 
-class Nothing(Repair):
+class NoRepair(Repair):
     """Passes a watertight mesh on and refuses any other. Right wherever the enclosure is closed by construction."""
 
     use: Literal["none"] = "none"

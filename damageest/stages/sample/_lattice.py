@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.voxels import cubes
+from damageest.geometry.voxels import number_cubes
 
 
 def lattice(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats, Ints]:
@@ -72,7 +72,7 @@ def _one_per_cell(points: Floats, cell: float, among: Ints | None = None) -> Int
     among = np.arange(len(points)) if among is None else among
     if not len(among):
         return among
-    _, first = np.unique(cubes(points[among], cell, points.min(axis=0))[1], return_index=True)
+    _, first = np.unique(number_cubes(points[among], cell, points.min(axis=0))[1], return_index=True)
     return among[np.sort(first)]
 
 

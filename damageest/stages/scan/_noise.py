@@ -10,7 +10,7 @@ from damageest.artefacts import Floats
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class RandomField:
     """Cosines of random direction and phase; standard deviation about 1 over space, kept within -2.5 to 2.5."""
 
     waves: Floats
@@ -18,7 +18,7 @@ class Field:
     heights: Floats
 
     @classmethod
-    def of(cls, wavelength: float, octaves: int, seed: int, waves: int = 10) -> Field:
+    def of(cls, wavelength: float, octaves: int, seed: int, waves: int = 10) -> RandomField:
         """``octaves`` bands of ``waves`` cosines each, every band half the wavelength and half the height."""
         rng = np.random.default_rng([20771, seed])
         band = np.repeat(np.arange(octaves), waves)

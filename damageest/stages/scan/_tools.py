@@ -53,7 +53,7 @@ class Tool(BaseModel, ABC):
         ``diagonal`` of it. Raises ValueError for a tool that encloses no volume."""
 
 
-class Sphere(Tool):
+class SphereTool(Tool):
     """A ball."""
 
     tool: Literal["sphere"] = "sphere"
@@ -67,7 +67,7 @@ class Sphere(Tool):
         return ball.translate(tuple(self.centre - origin))
 
 
-class Box(Tool):
+class BoxTool(Tool):
     """A box, turned about its centre; with ``roughness`` its faces are those of a fracture."""
 
     tool: Literal["box"] = "box"
@@ -84,7 +84,7 @@ class Box(Tool):
         if self.roughness:
             wave = max(min(self.size), 12 * self.roughness)
             block = block.refine_to_length(wave / 10)
-            fields = [_noise.Field.of(wave, 2, 3 * self.seed + axis) for axis in range(3)]
+            fields = [_noise.RandomField.of(wave, 2, 3 * self.seed + axis) for axis in range(3)]
 
             # each coordinate is moved by a field whose slope stays below 1, so that faces cannot cross
             def uneven(points: Floats) -> Floats:
@@ -94,7 +94,7 @@ class Box(Tool):
         return block.rotate(self.rotation).translate(tuple(self.centre - origin))
 
 
-class Cylinder(Tool):
+class CylinderTool(Tool):
     """A round bar that starts at a point and follows an axis; for bores and through holes."""
 
     tool: Literal["cylinder"] = "cylinder"
@@ -110,7 +110,7 @@ class Cylinder(Tool):
         return _placed(bar, self.axis, self.point - origin)
 
 
-class Plane(Tool):
+class PlaneTool(Tool):
     """Everything on the side of a plane that its normal points to; with ``roughness`` a break instead of a cut."""
 
     tool: Literal["plane"] = "plane"
@@ -138,7 +138,7 @@ class Plane(Tool):
         line = np.linspace(-1.2 * reach, 1.2 * reach, cells + 1)
         x, y = (a.ravel() for a in np.meshgrid(line, line, indexing="ij"))
         flat = np.column_stack([x, y, np.zeros_like(x)])
-        height = self.roughness * _noise.Field.of(grain, 3, self.seed).at(flat) if self.roughness else 0 * x
+        height = self.roughness * _noise.RandomField.of(grain, 3, self.seed).at(flat) if self.roughness else 0 * x
         tip = (0.0, 0.0, 12 * far)
         number = np.arange(len(x)).reshape(cells + 1, cells + 1)
         a, b, c, d = (n.ravel() for n in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
@@ -153,7 +153,7 @@ class Plane(Tool):
         return _placed(side, self.normal, foot)
 
 
-class Blob(Tool):
+class BlobTool(Tool):
     """An irregular lump with the surface of a fracture: a ball whose radius varies at random, smoothly."""
 
     tool: Literal["blob"] = "blob"
@@ -168,7 +168,7 @@ class Blob(Tool):
         from manifold3d import Manifold
 
         share = 0.12 if self.roughness is None else self.roughness / self.radius
-        field = _noise.Field.of(1.6, 3, self.seed)
+        field = _noise.RandomField.of(1.6, 3, self.seed)
 
         # the radius is a function of the direction alone and stays positive, so the lump cannot cut itself
         def uneven(points: Floats) -> Floats:
@@ -198,7 +198,7 @@ class MeshTool(Tool):
         return body.translate(tuple(-origin))
 
 
-AnyTool = Annotated[Sphere | Box | Cylinder | Plane | Blob | MeshTool, Field(discriminator="tool")]
+AnyTool = Annotated[SphereTool | BoxTool | CylinderTool | PlaneTool | BlobTool | MeshTool, Field(discriminator="tool")]
 
 
 def _segments(radius: float, diagonal: float) -> int:

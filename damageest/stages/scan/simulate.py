@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic import types as kinds
 
 from damageest.artefacts import Floats, Part, Scan, Solid, Truth
-from damageest.geometry.units import canonical
+from damageest.geometry.units import canonical_unit
 from damageest.stages.scan import ReadScan, _noise
 from damageest.stages.scan._scanner import sample, wear
 from damageest.stages.scan._tools import AnyTool, Direction, RigidMatrix, Vector
@@ -70,8 +70,8 @@ class Simulate(ReadScan):
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
         if not np.array_equal(pose, np.eye(4)):
             points = points @ pose[:3, :3].T + pose[:3, 3]
-        notes = (f"simulated: damage tools: {len(self.damage)}, noise {sigma:.4g} {canonical(unit)}", *notes)
-        return Scan(points, None, canonical(unit), truth=Truth(damage, inverse), notes=notes)
+        notes = (f"simulated: damage tools: {len(self.damage)}, noise {sigma:.4g} {canonical_unit(unit)}", *notes)
+        return Scan(points, None, canonical_unit(unit), truth=Truth(damage, inverse), notes=notes)
 
     def _seen(self, left: Solid, count: int, diagonal: float, rng: np.random.Generator) -> Floats:
         normal = left.cross / np.maximum(np.linalg.norm(left.cross, axis=1), 1e-300)[:, None]
@@ -83,7 +83,7 @@ class Simulate(ReadScan):
                 faces &= normal @ toward < np.cos(np.radians(item.angle))
             else:
                 planes.append((toward, float(toward @ item.beyond)))
-        field = _noise.Field.of(diagonal / 2, 1, self.seed, waves=8)
+        field = _noise.RandomField.of(diagonal / 2, 1, self.seed, waves=8)
 
         def thin(points: Floats) -> Floats:
             weights = np.exp(self.density * field.at(points)) if self.density else np.ones(len(points))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Part, Scan
-from damageest.geometry.voxels import CHUNK, cubes, faced_cubes
+from damageest.geometry.voxels import CHUNK, number_cubes, number_faced_cubes
 
 Flags = NDArray[np.bool_]
 
@@ -100,7 +100,7 @@ def worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: flo
 def _cubes(points: Floats, normals: Floats, depth: Floats, edge: float) -> tuple[Ints, Ints, Floats, Ints]:
     """Cubes (C,3) that hold points of one of six directions, the cube of each point (N,), and of each cube the mean
     ``depth`` and the number of its points (C,)."""
-    cell, key = faced_cubes(points, normals, edge)
+    cell, key = number_faced_cubes(points, normals, edge)
     _, first, group, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
     return cell[first], group, np.bincount(group, weights=depth) / count, count
 
@@ -150,7 +150,7 @@ def _in_regions(points: Floats, link: float) -> Flags:
 
     if len(points) < REGION:
         return np.zeros(len(points), bool)
-    cell, key = cubes(points, link)
+    cell, key = number_cubes(points, link)
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
     pairs = cKDTree(cell[first]).query_pairs(1.9, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from damageest.artefacts import ADDED, DAMAGE, INTACT, Deviation, Part, Scan
 from damageest.geometry.distance import signed_distance
-from damageest.geometry.distance_by_cells import by_cells
+from damageest.geometry.distance_by_cells import signed_distance_by_cells
 from damageest.stages.segment import Segment
 from damageest.stages.segment._averaged import worn
 
@@ -33,7 +33,7 @@ class MeshDistance(Segment):
         limit = self.threshold * tolerance
         if len(aligned.points) > max(MANY, 4 * len(part.faces)):
             points, near = aligned.points, 0.5 * min(limit, tolerance)
-            distance, face = by_cells(points, part, near, lambda some: signed_distance(some, part))
+            distance, face = signed_distance_by_cells(points, part, near, lambda some: signed_distance(some, part))
         else:
             distance, face = signed_distance(aligned.points, part)
         label = np.full(len(distance), INTACT, np.uint8)

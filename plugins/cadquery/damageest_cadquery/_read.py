@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from damageest.errors import InputError
-from damageest.geometry.units import MILLIMETRES, canonical
+from damageest.geometry.units import MILLIMETRES, canonical_unit
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def _brep(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
 def _unit(name: str) -> str | None:
     """A unit as STEP ('millimetre', 'INCH') or IGES ('MM', '2HIN') names it."""
     try:
-        return canonical(name.strip().lstrip("0123456789H").lower() if name[:1].isdigit() else name.strip())
+        return canonical_unit(name.strip().lstrip("0123456789H").lower() if name[:1].isdigit() else name.strip())
     except InputError:
         return None
 

@@ -9,8 +9,8 @@ from pydantic import Field
 from damageest.artefacts import Part
 from damageest.errors import InputError
 from damageest.geometry.make_part import make_part
-from damageest.geometry.units import Unit, canonical, factor
-from damageest.io.files import checked_file, file_sha256, reason
+from damageest.geometry.units import Unit, canonical_unit, unit_factor
+from damageest.io.files import check_file, file_sha256, shorten_error
 from damageest.stages import JobPath
 from damageest.stages.part import CadFace, ReadPart
 
@@ -36,7 +36,7 @@ class Brep(ReadPart):
 
     def run(self, unit: str, tolerance: float | None) -> Part:
         """The part in ``unit``. Raises InputError for a file that OpenCASCADE cannot read or that holds no solid."""
-        suffix = checked_file(self.path, self.reads, "a part")
+        suffix = check_file(self.path, self.reads, "a part")
         from damageest_cadquery._read import read
         from damageest_cadquery._tessellate import diagonal, tessellate
 
@@ -44,16 +44,16 @@ class Brep(ReadPart):
             model = read(self.path, suffix)
             source = self.unit or model.unit or unit
             # what OpenCASCADE's own lengths have to be multiplied by to be in the job's unit
-            scale = factor(source, unit) / model.length
+            scale = unit_factor(source, unit) / model.length
             chord = self.chord or (tolerance / 8 if tolerance else 5e-5 * diagonal(model.solids) * scale)
             mesh = tessellate(model.solids, chord / scale, self.angle, model.name_of)
         except InputError as error:
             raise InputError(f"{self.path}: {error}") from None
         except Exception as error:  # OpenCASCADE's exceptions share no base of their own
-            raise InputError(f"{self.path}: not a readable {suffix} file ({reason(error)})") from None
+            raise InputError(f"{self.path}: not a readable {suffix} file ({shorten_error(error)})") from None
         notes = list(model.notes)
-        if canonical(source) != canonical(unit):
-            notes.append(f"converted from {canonical(source)} to {canonical(unit)}")
+        if canonical_unit(source) != canonical_unit(unit):
+            notes.append(f"converted from {canonical_unit(source)} to {canonical_unit(unit)}")
         if mesh.error * scale > 1.5 * chord:
             notes.append(
                 f"triangles are up to {mesh.error * scale:.3g} {unit} off the CAD surface; {chord:.3g} was asked"
@@ -73,15 +73,15 @@ class Brep(ReadPart):
 
     def cad_faces(self, unit: str) -> tuple[CadFace, ...]:
         """The model's faces, in the order in which `run` numbers them."""
-        suffix = checked_file(self.path, self.reads, "a part")
+        suffix = check_file(self.path, self.reads, "a part")
         from damageest_cadquery._faces import faces
         from damageest_cadquery._read import read
 
         try:
             model = read(self.path, suffix)
             source = self.unit or model.unit or unit
-            return faces(model, factor(source, unit) / model.length)
+            return faces(model, unit_factor(source, unit) / model.length)
         except InputError as error:
             raise InputError(f"{self.path}: {error}") from None
         except Exception as error:  # OpenCASCADE's exceptions share no base of their own
-            raise InputError(f"{self.path}: not a readable {suffix} file ({reason(error)})") from None
+            raise InputError(f"{self.path}: not a readable {suffix} file ({shorten_error(error)})") from None

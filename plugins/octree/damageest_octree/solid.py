@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from damageest_octree.sides import Cube, Sides, components
 
 from damageest.artefacts import Floats, Ints, Scan, Sites, Solid
+from damageest_octree.sides import Cube, Sides, components
 
 LEAST = 8
 """Cells below which a component is noise."""
@@ -64,7 +64,7 @@ def closed(cube: Cube, sides: Sides, nodes: Ints) -> Solid | None:
     """
     from scipy.ndimage import binary_dilation, distance_transform_edt, gaussian_filter
 
-    from damageest.geometry.isosurface import closed_region
+    from damageest.geometry.isosurface import extract_region
     from damageest.geometry.poisson import Grid
 
     low, high = _box(sides, nodes)
@@ -91,4 +91,4 @@ def closed(cube: Cube, sides: Sides, nodes: Ints) -> Solid | None:
     field = np.minimum(0.5 - mean, 0.25 * (sides.reach + 2.5 - away))
     origin: Floats = cube.centres(low)
     x, y, z = (int(n) for n in shape)
-    return closed_region(Grid(origin, cube.cell, (x, y, z)), field)
+    return extract_region(Grid(origin, cube.cell, (x, y, z)), field)

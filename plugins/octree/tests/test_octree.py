@@ -17,7 +17,7 @@ from damageest_octree.octree import Octree
 import damageest
 from damageest.artefacts import INTACT, Enclosures, Part, Sites, Solid
 from damageest.errors import StageError
-from damageest.geometry.solids import iou, to_manifold, to_solid, united
+from damageest.geometry.solids import iou, to_manifold, to_solid, unite
 from tests import damaged_box
 from tests.scenes import Scene, scene
 
@@ -31,7 +31,7 @@ def enclosed(name: str, **options: Any) -> Enclosures:
 
 
 def lost(case: Scene, enclosures: Enclosures) -> Solid:
-    damage = to_solid(to_manifold(case.part) ^ united(item.solid for item in enclosures.items))
+    damage = to_solid(to_manifold(case.part) ^ unite(item.solid for item in enclosures.items))
     assert damage is not None
     return damage
 

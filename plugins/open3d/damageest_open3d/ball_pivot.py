@@ -30,13 +30,13 @@ class BallPivot(Reconstruct):
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
         """Raises StageError where the points are too few, or no surface comes about."""
-        from damageest.geometry.open_surfaces import middle, opened, oriented
+        from damageest.geometry.open_surfaces import centre_points, orient_points, trim_surface
 
         cell = self.spacing or max(tolerance, spacing)
-        origin = middle(points)
-        cloud, normals = oriented(points, part, cell, noise)
+        origin = centre_points(points)
+        cloud, normals = orient_points(points, part, cell, noise)
         faces = _pivoted(cloud - origin, normals, [radius * cell for radius in sorted(self.radii)])
-        return opened(cloud, faces, cloud, np.inf, part, tolerance)
+        return trim_surface(cloud, faces, cloud, np.inf, part, tolerance)
 
 
 def _pivoted(points: Floats, normals: Floats, radii: list[float]) -> Ints:

@@ -55,7 +55,7 @@ class PoissonSubtract(EncloseAll):
         outside it."""
         from manifold3d import Manifold
 
-        from damageest.geometry.pieces import pieces_of
+        from damageest.geometry.pieces import find_pieces
         from damageest.geometry.solids import to_manifold, to_solid
 
         if not sites.count:
@@ -89,7 +89,7 @@ class PoissonSubtract(EncloseAll):
             raise StageError("nothing of the part is outside the Poisson body", "method: implicit")
         # the rule by which the route drops pieces, so that the note counts what it will drop
         reach = max(2 * tolerance, aligned.spacing)
-        kept, dropped = pieces_of(gone, aligned.points[members], sites.label[members].astype(np.int64), reach)
+        kept, dropped = find_pieces(gone, aligned.points[members], sites.label[members].astype(np.int64), reach)
         count = _pieces(gone)
         if slivers := count - len(kept):
             notes += (
@@ -106,7 +106,7 @@ def _face_normals(part: Part) -> Floats:
 
 def _poisson(points: Floats, above: Floats, cell: float, depth: int, scale: float) -> tuple[Floats, Ints]:
     """The mesh (V,3), (F,3) of points (N,3), whose normals turn outward by ``above`` (N,3) and by one another."""
-    from damageest.geometry.orientation import toward_void
+    from damageest.geometry.orientation import turn_toward_void
     from damageest_open3d._system import check
 
     check()
@@ -115,7 +115,7 @@ def _poisson(points: Floats, above: Floats, cell: float, depth: int, scale: floa
     cloud: Any = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
     nothing = np.empty((0, 3))
-    normals = toward_void(points, np.asarray(cloud.normals), above, nothing, nothing, np.empty(0), cell)
+    normals = turn_toward_void(points, np.asarray(cloud.normals), above, nothing, nothing, np.empty(0), cell)
     cloud.normals = o3d.utility.Vector3dVector(normals)
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         try:

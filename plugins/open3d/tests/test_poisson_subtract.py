@@ -15,7 +15,7 @@ from manifold3d import Manifold
 import damageest
 from damageest.artefacts import Enclosures, Floats, Mesh, Part, Samples, Scan, Solid
 from damageest.errors import JobError, PluginError, StageError
-from damageest.geometry.solids import iou, to_arrays, to_manifold, to_solid, united
+from damageest.geometry.solids import iou, to_arrays, to_manifold, to_solid, unite
 from damageest.job import load
 from damageest.registry import Registry
 from damageest.stages.cluster.dbscan import Dbscan
@@ -71,7 +71,7 @@ def enclosed(name: str, noise: float = NOISE, depth: int = 7) -> Enclosures:
 
 
 def lost(enclosures: Enclosures) -> Any:
-    return to_manifold(box()) ^ united(item.solid for item in enclosures.items)
+    return to_manifold(box()) ^ unite(item.solid for item in enclosures.items)
 
 
 def slivers(enclosures: Enclosures) -> tuple[int, int, float]:

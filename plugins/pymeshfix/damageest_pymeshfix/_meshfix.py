@@ -59,10 +59,10 @@ def closed(pieces: Sequence[Mesh]) -> Solid | None:
 
 def assembled(solids: Sequence[Solid]) -> Any:
     """The solids as one manifold3d.Manifold. One inside an odd number of others bounds a cavity."""
-    from damageest.geometry.solids import to_manifold, united
+    from damageest.geometry.solids import to_manifold, unite
 
     depth = [sum(_inside(solid.vertices, other) for other in solids if other is not solid) for solid in solids]
-    body = united([solid for solid, level in zip(solids, depth, strict=True) if not level])
+    body = unite([solid for solid, level in zip(solids, depth, strict=True) if not level])
     for level in range(1, max(depth) + 1):
         for solid in (s for s, d in zip(solids, depth, strict=True) if d == level):
             body = body - to_manifold(solid) if level % 2 else body + to_manifold(solid)

@@ -41,18 +41,18 @@ class PyMeshLabReconstruct(Reconstruct):
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
         """Raises StageError where the points are too few, or no surface comes about."""
-        from damageest.geometry.open_surfaces import middle, opened, oriented
+        from damageest.geometry.open_surfaces import centre_points, orient_points, trim_surface
 
-        origin = middle(points)
+        origin = centre_points(points)
         # Marching cubes fills the bounding box; along its own axes a damage's box is a fraction of the part's.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # a rotation: faces keep their winding
         size = np.ptp((points - origin) @ axes, axis=0)
         least = float(np.prod(size) / MOST_CELLS) ** (1 / 3)
         cell = self.spacing or max(tolerance, spacing, least)
-        cloud, normals = oriented(points, part, cell, noise)
+        cloud, normals = orient_points(points, part, cell, noise)
         vertices, faces = _filtered((cloud - origin) @ axes, normals @ axes, *self._call(cell, float(size.max())))
-        return opened(vertices @ axes.T + origin, faces, cloud, 1.4 * cell, part, tolerance)
+        return trim_surface(vertices @ axes.T + origin, faces, cloud, 1.4 * cell, part, tolerance)
 
     def _call(self, cell: float, size: float) -> tuple[str, dict[str, Any]]:
         """PyMeshLab's name of the filter and its parameters; ``size`` is the longest side of the points' box."""

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Floats, Part, Scan, Truth
 from damageest.evaluate.parts import PARTS
-from damageest.stages.align._field import Target
+from damageest.stages.align._field import PartSurface
 from damageest.stages.align._points import surface_cloud
 
 
@@ -53,7 +53,7 @@ def error(part: Part, T: Floats, scan: Scan) -> float:
     assert scan.truth is not None
     wrong = T @ np.linalg.inv(scan.truth.T_part_scan)
     surface: NDArray[np.float64] = surface_cloud(part, 3000, np.random.default_rng(0)).points
-    distance = Target(part).closest(surface @ wrong[:3, :3].T + wrong[:3, 3])[0]
+    distance = PartSurface(part).closest(surface @ wrong[:3, :3].T + wrong[:3, 3])[0]
     return float(np.sqrt((distance**2).mean())) / scan.noise
 
 

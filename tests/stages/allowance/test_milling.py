@@ -11,8 +11,8 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from damageest.artefacts import Deposit, Floats, Part, Solid, open_edges
-from damageest.geometry.rounding import single_precision
-from damageest.geometry.solids import remainder, to_manifold
+from damageest.geometry.rounding import round_to_single
+from damageest.geometry.solids import subtract_lost, to_manifold
 from damageest.io.meshes import write_stl
 from damageest.stages.allowance.milling import Milling
 from tests.stages.allowance.shapes import (
@@ -71,7 +71,7 @@ def test_guarantees(seed: int) -> None:
     assert open_edges(deposit.faces) == 0
     cavity = deposit.cavity or lost
     body, hole, whole = to_manifold(deposit), to_manifold(cavity), to_manifold(part)
-    left = remainder(whole, hole)
+    left = subtract_lost(whole, hole)
     assert (hole - body).volume() < 1e-3 * hole.volume()
     assert (body ^ left).volume() < 1e-3 * body.volume()
     assert deposit.stock_volume == pytest.approx(deposit.volume - cavity.volume, abs=1e-9)
@@ -94,7 +94,7 @@ def test_guarantees(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(0, 16))
 def test_who_knows_vertices_by_their_place_finds_it_closed(seed: int, tmp_path: Path) -> None:
     deposit = made(seed)[3]
-    single = single_precision(deposit)
+    single = round_to_single(deposit)
     assert single is not None
     write_stl(tmp_path / "deposit.stl", single)
     again = trimesh.load_mesh(tmp_path / "deposit.stl")

@@ -12,17 +12,17 @@ from damageest.artefacts import Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays
 from damageest.stages.allowance._booleans import joined, tidied, touching
-from damageest.stages.allowance._selectors import Target, Wanted
+from damageest.stages.allowance._selectors import StockTarget, Wanted
 from damageest.stages.allowance._skin import clipped, skin_of
 from damageest.stages.allowance._verify import Worked, check
 from tests.stages.allowance.shapes import TOLERANCE, block, part_of
 
 BITE = Manifold.cube((8, 6, 4)).translate((10, 7, 8))
 """In the middle of the block's top."""
-TOP = Target(facing={"direction": (0, 0, 1)}, outer=1.0)
+TOP = StockTarget(facing={"direction": (0, 0, 1)}, outer=1.0)
 
 
-def checked(stock: Any, hole: Any = BITE, target: Target = TOP) -> tuple[float, float, float] | None:
+def checked(stock: Any, hole: Any = BITE, target: StockTarget = TOP) -> tuple[float, float, float] | None:
     """The thickness of the stock on the bite, checked against what is wanted on its top."""
     part = part_of(block())
     wanted = Wanted(0.0, (target,), ())
@@ -60,7 +60,7 @@ def test_what_is_wrong_is_refused(stock: Any, hole: Any, message: str) -> None:
 
 
 def test_stock_where_none_is_wanted_is_refused() -> None:
-    none = Target(facing={"direction": (0, 0, 1)}, outer=0.0)
+    none = StockTarget(facing={"direction": (0, 0, 1)}, outer=0.0)
     assert checked(Manifold(), target=none) is None
     with pytest.raises(StageError, match="that is to have none"):
         checked(slab(1.05), target=none)

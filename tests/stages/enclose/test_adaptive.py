@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from damageest.artefacts import Mesh, Part, Surface, open_edges
 from damageest.errors import StageError
-from damageest.geometry.refinement import halved, inserted, nearest, refined_at
+from damageest.geometry.refinement import halve_edges, insert_points, nearest, refine_at
 from damageest.geometry.solids import to_manifold
 from damageest.stages.background.bbox import BoundingBox
 from damageest.stages.background.capsule import Capsule
@@ -125,8 +125,8 @@ def test_refining_and_putting_points_in_keeps_the_shape(seed: int, edge: float) 
     box = trimesh.creation.box((40, 30, 20)) if seed % 2 else trimesh.creation.cylinder(10, 50, sections=40)
     mesh = Mesh(box.vertices, box.faces)
     face, foot = nearest(mesh, rng.normal(0, 15, (20, 3)))
-    fine, held = refined_at(mesh, face, foot, edge)
-    full, image = inserted(fine, held, foot)
+    fine, held = refine_at(mesh, face, foot, edge)
+    full, image = insert_points(fine, held, foot)
     for made in (fine, full):
         assert open_edges(made.faces) == 0
         assert trimesh.Trimesh(made.vertices, made.faces).volume == pytest.approx(box.volume)
@@ -139,7 +139,7 @@ def test_refining_and_putting_points_in_keeps_the_shape(seed: int, edge: float) 
 
 def test_halved_everywhere() -> None:
     rod = trimesh.creation.cylinder(10, 50, sections=40)
-    fine = halved(Mesh(rod.vertices, rod.faces), 1.0)
+    fine = halve_edges(Mesh(rod.vertices, rod.faces), 1.0)
     assert open_edges(fine.faces) == 0
     corners = fine.triangles
     assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() <= 1.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Enclosures, Sites
-from damageest.geometry.solids import iou, to_manifold, to_solid, united
+from damageest.geometry.solids import iou, to_manifold, to_solid, unite
 from damageest.stages.enclose.implicit import Implicit
 from tests.scenes import TOLERANCE, Scene, scene
 
@@ -38,7 +38,7 @@ def lost(case: Scene, enclosures: Enclosures) -> list[object]:
 def test_the_part_inside_it_is_the_damage(name: str, least: float) -> None:
     case = scene(name)
     pieces = lost(case, enclosed(name))
-    assert iou(to_solid(united(pieces)), case.truth) > least
+    assert iou(to_solid(unite(pieces)), case.truth) > least
 
 
 def test_every_site_is_in_an_enclosure_and_none_in_two() -> None:
@@ -55,7 +55,7 @@ def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
     assert away.sum() > 100
     partial = case.without(away)
     pieces = lost(partial, Implicit().run(**partial.inputs()))
-    assert iou(to_solid(united(pieces)), case.truth) > 0.97
+    assert iou(to_solid(unite(pieces)), case.truth) > 0.97
 
 
 def test_the_same_input_gives_the_same_bytes() -> None:

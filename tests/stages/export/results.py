@@ -10,7 +10,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Deviation, Evidence, Part, Pose, Scan, Solid, Surface
-from damageest.geometry.solids import remainder, to_manifold, to_solid, united
+from damageest.geometry.solids import subtract_lost, to_manifold, to_solid, unite
 from damageest.result import Result, Site
 
 
@@ -47,8 +47,8 @@ def make(units: str = "mm", size: float = 1.0) -> Result:
     points = np.random.default_rng(1).normal(size=(50, 3)) * size
     scan = Scan(points, unit=units)
     deviation = Deviation(np.zeros(50), np.zeros(50, int), np.zeros(50, np.uint8))
-    damage = to_solid(united(s.damage for s in sites))
-    undamaged = to_solid(remainder(whole, lost[0] + lost[1]))
+    damage = to_solid(unite(s.damage for s in sites))
+    undamaged = to_solid(subtract_lost(whole, lost[0] + lost[1]))
     label = np.zeros(50, np.int32)
     return Result(
         "two", units, 0.1 * size, part, scan, scan.moved(T), pose, deviation, label, sites, damage, undamaged,

@@ -11,7 +11,7 @@ import trimesh
 
 from damageest.artefacts import Deviation, Pose, Scan, Solid, Surface, Truth, open_edges
 from damageest.geometry.make_part import make_part
-from damageest.geometry.rounding import single_precision
+from damageest.geometry.rounding import round_to_single
 from damageest.io.meshes import read_mesh
 from damageest.registry import Registry
 from damageest.stages.export.files import Files
@@ -113,7 +113,7 @@ def test_the_same_result_gives_the_same_bytes(result, tmp_path):
 @pytest.mark.parametrize("offset", [1e3, 1e5, 1e6])
 def test_rounding_far_from_the_origin_never_opens_a_solid(offset):
     """At 1e6 single precision steps by 0.06: a sphere with edges of 0.02 loses most of its triangles."""
-    single = single_precision(sphere(1.0, (offset, offset, 0), subdivisions=5))
+    single = round_to_single(sphere(1.0, (offset, offset, 0), subdivisions=5))
     assert single is None or not open_edges(single.faces)
     if offset < 1e6:
         assert single is not None

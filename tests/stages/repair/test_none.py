@@ -8,13 +8,13 @@ import trimesh
 
 from damageest.artefacts import Mesh
 from damageest.errors import StageError
-from damageest.stages.repair.none import Nothing
+from damageest.stages.repair.none import NoRepair
 
 BOX = trimesh.creation.box((3, 2, 1))
 
 
 def test_watertight_passes_unchanged() -> None:
-    solid = Nothing().run(Mesh(BOX.vertices, BOX.faces))
+    solid = NoRepair().run(Mesh(BOX.vertices, BOX.faces))
     assert solid.volume == pytest.approx(6)
     assert np.array_equal(solid.faces, BOX.faces)
 
@@ -29,5 +29,5 @@ def test_watertight_passes_unchanged() -> None:
 )
 def test_anything_else_is_refused_with_a_remedy(faces: np.ndarray, why: str) -> None:
     with pytest.raises(StageError, match=why) as caught:
-        Nothing().run(Mesh(BOX.vertices, faces))
+        NoRepair().run(Mesh(BOX.vertices, faces))
     assert "implicit" in caught.value.remedy

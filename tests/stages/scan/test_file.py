@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from damageest.errors import InputError
-from damageest.io.points import READERS, read_cloud
+from damageest.io.points import READERS, read_points
 from damageest.io.points.pcd import _unpack_lzf
 from damageest.stages.scan.file import ScanFile
 
@@ -99,7 +99,7 @@ WRITERS = {
 def test_every_point_comes_back_to_the_last_digit(name, points, tmp_path):
     path = tmp_path / name
     path.write_bytes(WRITERS[name](points))
-    np.testing.assert_array_equal(read_cloud(path).points, points)
+    np.testing.assert_array_equal(read_points(path).points, points)
 
 
 @pytest.mark.parametrize("name", ["plain.xyz", "tabs.txt", "commas.csv", "little.ply", "mesh.stl"])
@@ -111,10 +111,10 @@ def test_single_precision_formats_keep_single_precision(name, points, tmp_path):
     if name == "mesh.stl":
         path.write_bytes(stl(single))
         expected = np.unique(single + 0.0, axis=0)
-        np.testing.assert_array_equal(np.unique(read_cloud(path).points + 0.0, axis=0), expected)
+        np.testing.assert_array_equal(np.unique(read_points(path).points + 0.0, axis=0), expected)
     else:
         path.write_bytes(ply(single, "f4") if name == "little.ply" else WRITERS[name](single))
-        np.testing.assert_array_equal(read_cloud(path).points, single)
+        np.testing.assert_array_equal(read_points(path).points, single)
 
 
 @pytest.mark.parametrize("suffix", sorted(READERS))
@@ -124,7 +124,7 @@ def test_garbage_is_refused_by_name_or_read_as_numbers(suffix, garbage, tmp_path
     path = tmp_path / f"garbage{suffix}"
     path.write_bytes(garbage)
     try:
-        cloud = read_cloud(path)
+        cloud = read_points(path)
     except InputError as error:
         assert path.name in str(error)  # noqa: PT017
     else:
@@ -147,7 +147,7 @@ def test_a_damaged_file_is_refused_or_read_but_never_a_crash(name, data, tmp_pat
     whole[at] = data.draw(st.integers(0, 255))
     path.write_bytes(bytes(whole[:cut]))
     try:
-        assert len(read_cloud(path).points)
+        assert len(read_points(path).points)
     except InputError as error:
         assert path.name in str(error)  # noqa: PT017
 
