@@ -14,7 +14,7 @@ from damageest.errors import InputError
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
-from damageest.pipeline.output import workshop, write_report
+from damageest.pipeline.output import open_workspace, write_report
 from damageest.pipeline.routes import WRITE, route_of
 from damageest.pipeline.state import JobState
 from damageest.registry import Registry
@@ -49,7 +49,7 @@ def run(
     if output is False:
         return follow(route_of(job.method), Engine(job, registry), start(job)).job.result
     target = job.output if output is True else Path(output).expanduser().resolve()
-    with workshop(target, cache) as place:
+    with open_workspace(target, cache) as place:
         engine = Engine(job, registry, place.cache)
         work = follow(route_of(job.method), engine, start(job))
         state = work.job.with_value(JobState.folder, place.folder, digest(str(target)))

@@ -221,7 +221,7 @@ class Scan(_Arrays):
         if self.normals is not None and self.normals.shape != self.points.shape:
             raise ArtefactError(f"normals: expected {self.points.shape}, got {self.normals.shape}")
 
-    def moved(self, T: Floats) -> Scan:
+    def move(self, T: Floats) -> Scan:
         """The same scan in another frame; T is 4x4, rigid."""
         # not @: on long, narrow arrays it takes several times as long
         points = np.einsum("ij,kj->ik", self.points, T[:3, :3])

@@ -50,7 +50,7 @@ class Site:
         if what == "deposit" and self.refused:
             raise ValueError(f"site {self.id} has no deposit: the stage allowance refused it; see Result.failures")
         found = {"damage": self.damage, "surface": self.surface, "deposit": self.deposit or self.damage}
-        return _chosen(found, what, f"site {self.id}")
+        return _choose_mesh(found, what, f"site {self.id}")
 
     def as_trimesh(self, what: Literal["damage", "surface", "deposit"] = "damage") -> Any:
         """A ``trimesh.Trimesh`` in the part's frame; see `mesh`."""
@@ -58,7 +58,7 @@ class Site:
 
     def as_manifold(self, what: Literal["damage", "deposit"] = "damage") -> Any:
         """A ``manifold3d.Manifold`` in the part's frame; see `mesh`."""
-        return as_manifold(_closed(self.mesh(what), what))
+        return as_manifold(_require_solid(self.mesh(what), what))
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Result:
         """Without ``site``: part, damage or undamaged; of a site: damage, surface or deposit. Raises ValueError."""
         if site is None:
             found = {"part": self.part, "damage": self.damage, "undamaged": self.undamaged}
-            return _chosen(found, what, "the result")
+            return _choose_mesh(found, what, "the result")
         own = next((each for each in self.sites if each.id == site), None)
         if own is None:
             raise ValueError(
@@ -125,20 +125,20 @@ class Result:
 
     def as_trimesh(self, what: str, site: int | None = None, frame: Literal["part", "scan"] = "part") -> Any:
         """A ``trimesh.Trimesh`` in the part's frame or the scanner's; see `mesh`."""
-        return as_trimesh(self.mesh(what, site), self._into(frame))
+        return as_trimesh(self.mesh(what, site), self._transform_to(frame))
 
     def as_manifold(self, what: str, site: int | None = None, frame: Literal["part", "scan"] = "part") -> Any:
         """A ``manifold3d.Manifold`` in the part's frame or the scanner's; see `mesh`."""
-        return as_manifold(_closed(self.mesh(what, site), what), self._into(frame))
+        return as_manifold(_require_solid(self.mesh(what, site), what), self._transform_to(frame))
 
-    def _into(self, frame: str) -> Floats | None:
+    def _transform_to(self, frame: str) -> Floats | None:
         """T (4,4) that takes a point of the part to a frame; None for the part's own."""
         if frame not in ("part", "scan"):
             raise ValueError(f"no frame '{frame}'; there are: part, scan")
         return invert_pose(self.pose) if frame == "scan" else None
 
 
-def _chosen(found: Mapping[str, Mesh | None], what: str, owner: str) -> Mesh:
+def _choose_mesh(found: Mapping[str, Mesh | None], what: str, owner: str) -> Mesh:
     if what not in found:
         raise ValueError(f"{owner} has no '{what}'; there are: {', '.join(found)}")
     mesh = found[what]
@@ -147,7 +147,7 @@ def _chosen(found: Mapping[str, Mesh | None], what: str, owner: str) -> Mesh:
     return mesh
 
 
-def _closed(mesh: Mesh, what: str) -> Solid:
+def _require_solid(mesh: Mesh, what: str) -> Solid:
     if not isinstance(mesh, Solid):
         raise ValueError(f"{what} is an open mesh, and manifold3d takes solids; take as_trimesh")
     return mesh

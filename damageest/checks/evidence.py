@@ -18,7 +18,7 @@ MOST = 20_000
 """Points looked at for each figure; more would not change its second digit."""
 
 
-def weigh(
+def weigh_evidence(
     damage: Solid, ids_points: Floats, aligned: Scan, deviation: Deviation, part: Part, tolerance: float
 ) -> Evidence:
     """Weighs one DV.
@@ -37,13 +37,13 @@ def weigh(
     inner = find_inner_faces(damage, part)
     on_ids = _spread(damage, inner, MOST // 2)
     on_skin = _spread(damage, ~inner, MOST // 2)
-    bare = _far(on_ids, points, 1.5 * reach)
+    bare = _share_far(on_ids, points, 1.5 * reach)
     # Close to the rim sound points are near any skin, so only what is away from the inner surface speaks.
     intact = points[label == INTACT]
     grain = float(np.sqrt(np.linalg.norm(damage.cross[~inner], axis=1).sum() / MOST))
     close = tolerance + 4 * grain
-    intact = intact[_gap(intact, on_skin, close) <= close]
-    intact = intact[_gap(intact, on_ids, 1.5 * reach) > 1.5 * reach]
+    intact = intact[_measure_gap(intact, on_skin, close) <= close]
+    intact = intact[_measure_gap(intact, on_ids, 1.5 * reach) > 1.5 * reach]
     if len(intact):  # against the skin's few faces first: most are beside the damage volume
         skin_only = Mesh(damage.vertices, damage.faces[~inner])
         intact = intact[distance_to_mesh(intact, skin_only) < tolerance]
@@ -52,9 +52,9 @@ def weigh(
         distance, face, _ = closest_on_mesh(intact, damage)
         taken = intact[(distance < tolerance) & ~inner[face]]
         inside = len(taken)
-        asked = on_skin[_gap(on_skin, on_ids, 1.5 * reach) > 1.5 * reach]
-        contradicted = 1 - _far(asked, taken, max(spacing, tolerance)) if len(asked) > 20 else 0.0
-    unseen = _unseen(part, damage, points, on_skin, reach)
+        asked = on_skin[_measure_gap(on_skin, on_ids, 1.5 * reach) > 1.5 * reach]
+        contradicted = 1 - _share_far(asked, taken, max(spacing, tolerance)) if len(asked) > 20 else 0.0
+    unseen = _share_unseen(part, damage, points, on_skin, reach)
 
     reasons = []
     if residual > 1.5 * tolerance + 0.25 * spacing:
@@ -70,7 +70,7 @@ def weigh(
     return Evidence(residual, inside, contradicted, unseen, not reasons, tuple(reasons))
 
 
-def _gap(places: Floats, points: Floats, most: float) -> Floats:
+def _measure_gap(places: Floats, points: Floats, most: float) -> Floats:
     """Distance (N,) from each place to the nearest of the points; inf beyond ``most``."""
     from scipy.spatial import cKDTree
 
@@ -79,12 +79,12 @@ def _gap(places: Floats, points: Floats, most: float) -> Floats:
     return np.asarray(cKDTree(points).query(places, distance_upper_bound=1.001 * most, workers=2)[0])
 
 
-def _far(places: Floats, points: Floats, distance: float) -> float:
+def _share_far(places: Floats, points: Floats, distance: float) -> float:
     """Share of the places (N,3) with none of the points within a distance."""
-    return float((_gap(places, points, distance) > distance).mean()) if len(places) else 0.0
+    return float((_measure_gap(places, points, distance) > distance).mean()) if len(places) else 0.0
 
 
-def _unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: float) -> float:
+def _share_unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: float) -> float:
     """Share of the part's skin just outside the DV that carries no scan point."""
     if not len(on_skin):
         return 0.0
@@ -93,12 +93,12 @@ def _unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: f
     near = ((corners.min(axis=1) < high) & (corners.max(axis=1) > low)).all(axis=1)
     count = int(np.clip(np.linalg.norm(part.cross[near], axis=1).sum() / 2 / (0.7 * reach) ** 2, 1000, 2 * MOST))
     skin = _spread(part, near, count)
-    skin = skin[_gap(skin, on_skin, 6 * reach) < 6 * reach]
+    skin = skin[_measure_gap(skin, on_skin, 6 * reach) < 6 * reach]
     if not len(skin):
         return 0.0
     away = distance_to_mesh(skin, damage)
     ring = skin[(away > 2 * reach) & (away < 6 * reach)]
-    return _far(ring, points, 2 * reach) if len(ring) > 20 else 0.0
+    return _share_far(ring, points, 2 * reach) if len(ring) > 20 else 0.0
 
 
 def _spread(mesh: Solid, chosen: Flags, count: int) -> Floats:

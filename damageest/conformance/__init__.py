@@ -29,7 +29,6 @@ __all__ = [
     "BooleanContract",
     "BoundaryContract",
     "ClusterContract",
-    "StageContract",
     "EncloseAllContract",
     "EncloseContract",
     "ExportContract",
@@ -39,4 +38,5 @@ __all__ = [
     "SampleContract",
     "ScanContract",
     "SegmentContract",
+    "StageContract",
 ]

@@ -123,7 +123,7 @@ class ScanContract(_Reader, PlacedContract):
 
     def test_lies_on_what_was_scanned(self) -> None:
         mesh, scan = self.mesh or _scene.prism(), self.plain()
-        at = scan if scan.truth is None else scan.moved(scan.truth.T_part_scan)
+        at = scan if scan.truth is None else scan.move(scan.truth.T_part_scan)
         far = distance_to_mesh(at.points, mesh)
         damage = scan.truth and scan.truth.damage
         if damage:

@@ -81,7 +81,7 @@ class AlignContract(PlacedContract):
     def agree(self, got: Any, plain: Any, scale: float, turn: Floats, shift: Floats) -> None:
         """Whether it puts the scan where it belongs."""
         self.rigid(got)
-        scan = _scene.place(self.scene()["scan"], scale, turn, shift).moved(got.T_part_scan)
+        scan = _scene.place(self.scene()["scan"], scale, turn, shift).move(got.T_part_scan)
         there = _scene.place(_scene.scene().aligned.points, scale, turn, shift)
         off = np.linalg.norm(scan.points - there, axis=1) / scale
         assert off.max() < 0.25 * _scene.TOLERANCE, "the pose is off"

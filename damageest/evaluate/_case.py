@@ -137,7 +137,7 @@ def run_case(case: Case) -> dict[str, Any]:
     row |= {"seconds": time.perf_counter() - start, "cpu_seconds": time.process_time() - busy}
     row["start_seconds"] = start_seconds
     row |= {"megabytes": meter.megabytes, "stage_megabytes": meter.stage_megabytes}  # before the scoring
-    row["libigl_seconds"] = libigl_seconds(scan.moved(truth.T_part_scan).points, part)
+    row["libigl_seconds"] = libigl_seconds(scan.move(truth.T_part_scan).points, part)
     row |= _scored(found, part, scan) if found else {"missed": score(part, [], lost, case.tolerance).missed}
     return {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in row.items()}
 

@@ -13,7 +13,7 @@ from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.evaluate.scores import depth, surface_points
 from damageest.geometry.solids import to_manifold
-from damageest.stages.scan._scanner import wear
+from damageest.stages.scan._scanner import apply_tools
 from damageest.stages.scan._tools import BlobTool, BoxTool, CylinderTool, PlaneTool, SphereTool, Tool
 
 SHARE = (0.002, 0.33)
@@ -252,13 +252,13 @@ def _try(site: DamagePlace, name: str, before: list[Tool]) -> tuple[list[Tool], 
     part = site.part
     try:
         more = KINDS[name](site)
-        alone = wear(part, more)[1]
+        alone = apply_tools(part, more)[1]
         if alone is None or not SHARE[0] * part.volume < alone.volume < SHARE[1] * part.volume:
             return None
         if depth(alone, part) < 0.008 * part.diagonal:
             return None
         tools = [*before, *more]
-        damage = wear(part, tools)[1] if before else alone
+        damage = apply_tools(part, tools)[1] if before else alone
     except (StageError, LookupError):
         return None
     return None if damage is None or damage.volume > SHARE[1] * part.volume else (tools, damage)

@@ -94,7 +94,7 @@ def run_one(case: dict[str, Any]) -> dict[str, Any]:
     pose = truth.T_part_scan
     if not case["own_scan"]:
         move = np.array(case["moved"])
-        given["scan"] = Scan(data["points"], unit=str(data["unit"])).moved(move)
+        given["scan"] = Scan(data["points"], unit=str(data["unit"])).move(move)
         pose = pose @ np.linalg.inv(move)
     try:
         found = damageest.run(case["job"], output=folder / "out" if case["stage"] == "export" else False, **given)

@@ -8,7 +8,7 @@ from damageest.artefacts import Part
 from damageest.errors import StageError
 from damageest.evaluate.damages import KINDS, Damaged, DamagePlace
 from damageest.evaluate.scores import depth
-from damageest.stages.scan._scanner import wear
+from damageest.stages.scan._scanner import apply_tools
 
 SIZED = ("chip", "pit", "cut", "groove")
 """Kinds whose depth goes with their size; how deep the others go, the part decides."""
@@ -40,7 +40,7 @@ def _scaled(site: DamagePlace, name: str, deep: float) -> Damaged | None:
         for _ in range(12):
             site.rng.bit_generator.state = state
             tools = KINDS[name](site)
-            lost = wear(site.part, tools)[1]
+            lost = apply_tools(site.part, tools)[1]
             reached = depth(lost, site.part) if lost else 0.0
             if lost is not None and abs(reached / deep - 1) < CLOSE:
                 return Damaged(tuple(tools), (name,), lost)

@@ -12,7 +12,7 @@ from damageest.errors import InputError
 _PAIRS = 5000
 
 
-def _neighbours(faces: Ints) -> tuple[Ints, Ints, Ints]:
+def _pair_neighbours(faces: Ints) -> tuple[Ints, Ints, Ints]:
     """Pairs of triangles over edges that exactly two share, and whether their windings disagree there (0 or 1)."""
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     owner = np.tile(np.arange(len(faces)), 3)
@@ -26,7 +26,7 @@ def _neighbours(faces: Ints) -> tuple[Ints, Ints, Ints]:
     return owner[two], owner[two + 1], (forward[two] == forward[two + 1]).astype(np.int64)
 
 
-def _labels(a: Ints, b: Ints, count: int) -> tuple[Ints, int]:
+def _label(a: Ints, b: Ints, count: int) -> tuple[Ints, int]:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -38,8 +38,8 @@ def _labels(a: Ints, b: Ints, count: int) -> tuple[Ints, int]:
 
 def label_bodies(faces: Ints) -> tuple[Ints, int]:
     """Per triangle (F,) the number of its body, joined over shared edges, and how many bodies there are."""
-    a, b, _ = _neighbours(faces)
-    return _labels(a, b, len(faces))
+    a, b, _ = _pair_neighbours(faces)
+    return _label(a, b, len(faces))
 
 
 def orient_faces(faces: Ints) -> tuple[Ints, int | None]:
@@ -48,9 +48,9 @@ def orient_faces(faces: Ints) -> tuple[Ints, int | None]:
     Works on the two-sheeted cover of the triangles' adjacency: triangle f stands twice, as read and turned, and an edge
     joins the copies that agree. One component then is one consistent choice. In each body the lesser number is turned.
     """
-    a, b, differ = _neighbours(faces)
+    a, b, differ = _pair_neighbours(faces)
     n = len(faces)
-    label, _ = _labels(np.concatenate([a, a + n]), np.concatenate([b + n * differ, b + n * (1 - differ)]), 2 * n)
+    label, _ = _label(np.concatenate([a, a + n]), np.concatenate([b + n * differ, b + n * (1 - differ)]), 2 * n)
     as_read, turned = label[:n], label[n:]
     if (as_read == turned).any():
         return faces, None
@@ -113,7 +113,7 @@ def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Flo
         faces = faces[~flat[label]]
         label, count = label_bodies(faces)
         volumes = signed_volumes(vertices, faces, label, count)
-    depth, crossing = _nesting(vertices, faces, label, count)
+    depth, crossing = _find_nesting(vertices, faces, label, count)
     if not crossing:
         top = depth == 0
         if (volumes[top] < 0).all():
@@ -148,7 +148,7 @@ def _compact(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
     return vertices[used], index[faces]
 
 
-def _nesting(vertices: Floats, faces: Ints, label: Ints, count: int) -> tuple[Ints, bool]:
+def _find_nesting(vertices: Floats, faces: Ints, label: Ints, count: int) -> tuple[Ints, bool]:
     """In how many others each body lies (count,), and whether any two cross or touch."""
     depth = np.zeros(count, np.int64)
     if count == 1:

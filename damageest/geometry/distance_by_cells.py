@@ -43,13 +43,13 @@ def signed_distance_by_cells(points: Floats, part: Mesh, near: float, exact: Exa
     low, high = part.bounds
     size = max(2 * near, np.sqrt(PER_CELL * part.area / len(points)), float((high - low).max()) / MOST_ALONG)
     lattice = VoxelGrid(low - PAD * size, size, np.ceil((high - low) / size).astype(np.int64) + 2 * PAD)
-    sharp, bent = (_along(part, edges, size / 4) for edges in _creases(part, near / size))
-    beside = lattice.around(sharp, 1)
+    sharp, bent = (_place_along(part, edges, size / 4) for edges in _find_creases(part, near / size))
+    beside = lattice.mark_around(sharp, 1)
     # any two points of a cell are 1.74 of its edges apart
-    plane = ~lattice.around(np.concatenate([sharp, bent]), 2)
+    plane = ~lattice.mark_around(np.concatenate([sharp, bent]), 2)
 
-    frames, centre = _frames(part), part.bounds.mean(axis=0)
-    cell = np.concatenate([lattice.cells(points[i : i + CHUNK]) for i in range(0, len(points), CHUNK)])
+    frames, centre = _build_frames(part), part.bounds.mean(axis=0)
+    cell = np.concatenate([lattice.number_cells(points[i : i + CHUNK]) for i in range(0, len(points), CHUNK)])
     signed, face = np.full(len(points), np.nan), np.zeros(len(points), np.int64)
     first = np.zeros(len(beside), np.int64)
     open_ = np.arange(len(points))
@@ -65,7 +65,7 @@ def signed_distance_by_cells(points: Floats, part: Mesh, near: float, exact: Exa
         rest = []
         for start in range(0, len(open_), CHUNK):
             some, over = open_[start : start + CHUNK], face[seen[start : start + CHUNK]]
-            height, inside = _heights(points[some] - centre, frames[over])
+            height, inside = _measure_heights(points[some] - centre, frames[over])
             # beside a sharp edge the other face is farther where that is true of the edge
             over_it = inside >= np.where(beside[cell[some]], CLEAR * np.abs(height), 0)
             good = (np.abs(height) <= near) & (over_it | plane[cell[some]])
@@ -79,7 +79,7 @@ def signed_distance_by_cells(points: Floats, part: Mesh, near: float, exact: Exa
     return signed, face
 
 
-def _creases(part: Mesh, slope: float) -> tuple[Ints, Ints]:
+def _find_creases(part: Mesh, slope: float) -> tuple[Ints, Ints]:
     """Edges (E,2) that are sharp or belong to other than two faces, and those that only bend."""
     edges = np.sort(part.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     code = edges[:, 0] * len(part.vertices) + edges[:, 1]
@@ -94,7 +94,7 @@ def _creases(part: Mesh, slope: float) -> tuple[Ints, Ints]:
     return np.concatenate([odd, flush[turn > SHARP]]), flush[(turn <= SHARP) & (turn > 1e-3 * slope)]
 
 
-def _along(part: Mesh, edges: Ints, step: float) -> Floats:
+def _place_along(part: Mesh, edges: Ints, step: float) -> Floats:
     """Points (M,3) along edges (E,2), their ends among them, no more than ``step`` apart."""
     a, b = part.vertices[edges[:, 0]], part.vertices[edges[:, 1]]
     count = np.ceil(np.linalg.norm(b - a, axis=1) / step).astype(np.int64) + 1
@@ -103,7 +103,7 @@ def _along(part: Mesh, edges: Ints, step: float) -> Floats:
     return np.asarray(a[of] + share[:, None] * (b - a)[of])
 
 
-def _frames(part: Mesh) -> Floats:
+def _build_frames(part: Mesh) -> Floats:
     """(F,4,4) per triangle four planes, about the middle of the bounds: its own, and those through its edges on it."""
     corners = part.triangles - part.bounds.mean(axis=0)
     normal = part.cross / np.maximum(np.linalg.norm(part.cross, axis=1), 1e-300)[:, None]
@@ -115,7 +115,7 @@ def _frames(part: Mesh) -> Floats:
     return result
 
 
-def _heights(points: Floats, frames: Floats) -> tuple[Floats, Floats]:
+def _measure_heights(points: Floats, frames: Floats) -> tuple[Floats, Floats]:
     """Height (N,) of points (N,3) over the plane of a triangle each, (N,4,4), and how far they are from its edges (N,)
     measured in that plane, negative beside the triangle."""
     value = np.einsum("nij,nj->ni", frames[:, :, :3], points) + frames[:, :, 3]

@@ -37,7 +37,7 @@ def heal(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, tuple[str, ...]]:
         faces = _fill(vertices, faces, notes)
         vertices, faces = split_pinches(vertices, faces, notes)
     if open_edges(faces):
-        raise InputError(_what_is_open(vertices, faces))
+        raise InputError(_describe_open(vertices, faces))
     vertices, faces = resolve_bodies(vertices, faces, notes)
     return vertices, faces, tuple(notes)
 
@@ -53,7 +53,7 @@ def _merge(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Int
     if len(vertices) < before and not soup:
         notes.append(f"merged {before - len(vertices)} duplicate vertices")
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    best = _odd_edges(faces)
+    best = _count_odd_edges(faces)
     for reach in (1e-7, 1e-6, 1e-5):
         if not best:
             break
@@ -68,7 +68,7 @@ def _merge(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Int
         label = connected_components(graph, directed=False)[1].astype(np.int64)
         _, first = np.unique(label, return_index=True)
         merged = label[faces]
-        open_now = _odd_edges(merged[_proper(merged)])
+        open_now = _count_odd_edges(merged[_is_proper(merged)])
         if open_now < best:
             best = open_now
             notes.append(
@@ -78,13 +78,13 @@ def _merge(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Int
     return vertices, faces
 
 
-def _proper(faces: Ints) -> NDArray[np.bool_]:
+def _is_proper(faces: Ints) -> NDArray[np.bool_]:
     a, b, c = faces.T
     proper: NDArray[np.bool_] = (a != b) & (b != c) & (c != a)
     return proper
 
 
-def _edges(faces: Ints) -> tuple[Ints, Ints, Ints]:
+def _list_edges(faces: Ints) -> tuple[Ints, Ints, Ints]:
     """Undirected edges (E,2), which of them each of the 3F directed ones is, and how many triangles each has."""
     directed = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     size = int(faces.max()) + 1
@@ -92,13 +92,13 @@ def _edges(faces: Ints) -> tuple[Ints, Ints, Ints]:
     return np.column_stack([codes // size, codes % size]), inverse.reshape(-1), counts
 
 
-def _odd_edges(faces: Ints) -> int:
-    return int((_edges(faces)[2] % 2).sum()) if len(faces) else 0
+def _count_odd_edges(faces: Ints) -> int:
+    return int((_list_edges(faces)[2] % 2).sum()) if len(faces) else 0
 
 
 def _tidy(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
     """Drops triangles with a repeated corner and vertices that no triangle uses."""
-    proper = _proper(faces)
+    proper = _is_proper(faces)
     if not proper.all():
         notes.append(f"dropped {int((~proper).sum())} triangles with a repeated corner")
         faces = faces[proper]
@@ -119,7 +119,7 @@ def _drop_doubles(faces: Ints, notes: list[str]) -> Ints:
     none = faces[np.sort(first[counts % 2 == 1])]
 
     def defects(mesh: Ints) -> int:
-        return int((_edges(mesh)[2] != 2).sum()) if len(mesh) else 3 * len(faces)
+        return int((_list_edges(mesh)[2] != 2).sum()) if len(mesh) else 3 * len(faces)
 
     kept = one if defects(one) <= defects(none) else none
     notes.append(f"dropped {len(faces) - len(kept)} triangles lying exactly on another")
@@ -138,10 +138,10 @@ def _wind(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
     return turned
 
 
-def _loops(faces: Ints) -> list[Ints]:
+def _trace_loops(faces: Ints) -> list[Ints]:
     """The boundary's simple closed loops of vertices, against the triangles' sense; parted where they touch."""
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, inverse, counts = _edges(faces)
+    _, inverse, counts = _list_edges(faces)
     follow: dict[int, list[int]] = {}
     for start, end in directed[counts[inverse] == 1].tolist():
         follow.setdefault(end, []).append(start)
@@ -170,7 +170,7 @@ def _fill(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
     corners = vertices[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
     patches: list[Ints] = []
-    for loop in _loops(faces):
+    for loop in _trace_loops(faces):
         if len(loop) > _HOLE_EDGES:
             continue
         patch = _patch(vertices, loop)
@@ -212,9 +212,9 @@ def _patch(vertices: Floats, loop: Ints) -> Ints:
     return np.array(triangles, dtype=np.int64)
 
 
-def _what_is_open(vertices: Floats, faces: Ints) -> str:
+def _describe_open(vertices: Floats, faces: Ints) -> str:
     """What keeps the mesh from being a solid, where, and what to do."""
-    edges, _, counts = _edges(faces)
+    edges, _, counts = _list_edges(faces)
     parts = []
     for which, name in (
         (counts == 1, "open edges (a triangle on one side only)"),
@@ -223,7 +223,7 @@ def _what_is_open(vertices: Floats, faces: Ints) -> str:
         if which.any():
             at = vertices[edges[which]].mean(1)
             places = "; ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in at[:3])
-            box = f", all between {_point(at.min(0))} and {_point(at.max(0))}" if len(at) > 3 else ""
+            box = f", all between {_format_point(at.min(0))} and {_format_point(at.max(0))}" if len(at) > 3 else ""
             parts.append(f"{int(which.sum())} {name}, the first at {places}{box}")
     _, bodies = label_bodies(faces)
     if not parts:
@@ -234,5 +234,5 @@ def _what_is_open(vertices: Floats, faces: Ints) -> str:
     )
 
 
-def _point(p: Floats) -> str:
+def _format_point(p: Floats) -> str:
     return "({:.6g}, {:.6g}, {:.6g})".format(*p)

@@ -25,8 +25,8 @@ def smooth_points(points: Floats, noise: float, count: int = 32) -> tuple[Floats
     along its normal only, by three times the noise at most.
     """
     distance, index = find_neighbours(points, count)
-    normals, weights = _planes(points, index, distance, noise)
-    move, tilted, _ = _quadric(points, normals, points[index], weights, distance[:, -1])
+    normals, weights = _fit_planes(points, index, distance, noise)
+    move, tilted, _ = _fit_quadric(points, normals, points[index], weights, distance[:, -1])
     return points + np.clip(move, -3 * noise, 3 * noise)[:, None] * normals, tilted, distance[:, -1]
 
 
@@ -41,16 +41,18 @@ def average_points(points: Floats, counts: Ints, noise: float, chosen: Ints) -> 
     from scipy.spatial import cKDTree
 
     distance, index = find_neighbours(points, SCALES[0])
-    normals, _ = _planes(points, index, distance, noise)
+    normals, _ = _fit_planes(points, index, distance, noise)
     out, tilted = points[chosen], normals[chosen]
     tree = cKDTree(points)
     for start in range(0, len(chosen), CHUNK):
         own = slice(start, start + CHUNK)
-        out[own], tilted[own] = _widest(tree, points, counts, noise, normals, chosen[own])
+        out[own], tilted[own] = _choose_widest(tree, points, counts, noise, normals, chosen[own])
     return out, tilted
 
 
-def _widest(tree: Any, points: Floats, counts: Ints, noise: float, normals: Floats, own: Ints) -> tuple[Floats, Floats]:
+def _choose_widest(
+    tree: Any, points: Floats, counts: Ints, noise: float, normals: Floats, own: Ints
+) -> tuple[Floats, Floats]:
     """The fits of the points ``own``, of each the widest that noise explains."""
     at, way = points[own], normals[own]
     distance, index = tree.query(at, k=min(SCALES[-1], len(points)), workers=2)
@@ -62,8 +64,8 @@ def _widest(tree: Any, points: Floats, counts: Ints, noise: float, normals: Floa
     for scale in SCALES:
         near = slice(0, scale)
         far = distance[:, near]
-        weights = share[:, near] * _bilateral(at, way, around[:, near], their_normals[:, near], far, noise)
-        move, tilted, row = _quadric(at, way, around[:, near], weights, np.maximum(far[:, -1], 1e-12))
+        weights = share[:, near] * _weigh_bilateral(at, way, around[:, near], their_normals[:, near], far, noise)
+        move, tilted, row = _fit_quadric(at, way, around[:, near], weights, np.maximum(far[:, -1], 1e-12))
         spread = noise**2 * (row**2 / share[:, near]).sum(axis=1)
         for other, wide in narrower:
             explained &= (move - other) ** 2 <= KAPPA**2 * np.maximum(wide - spread, 1e-3 * wide)
@@ -73,18 +75,18 @@ def _widest(tree: Any, points: Floats, counts: Ints, noise: float, normals: Floa
     return best, turned
 
 
-def _planes(points: Floats, index: Ints, distance: Floats, noise: float) -> tuple[Floats, Floats]:
+def _fit_planes(points: Floats, index: Ints, distance: Floats, noise: float) -> tuple[Floats, Floats]:
     """Normals (N,3) of planes through the neighbours that agree, and the neighbours' weights (N,K)."""
     around = points[index]
     weights = np.exp(-2.0 * (distance / np.maximum(distance[:, -1:], 1e-12)) ** 2)
-    normals = _least_spread(around, weights)
+    normals = _find_least_spread(around, weights)
     for _ in range(ROUNDS):
-        weights = _bilateral(points, normals, around, normals[index], distance, noise)
-        normals = _least_spread(around, weights)
+        weights = _weigh_bilateral(points, normals, around, normals[index], distance, noise)
+        normals = _find_least_spread(around, weights)
     return normals, weights
 
 
-def _bilateral(
+def _weigh_bilateral(
     at: Floats, normals: Floats, around: Floats, their_normals: Floats, distance: Floats, noise: float
 ) -> Floats:
     """Weights (N,K) of neighbours (N,K,3): near, of the same direction, in the point's own tangent plane."""
@@ -95,14 +97,14 @@ def _bilateral(
     return np.asarray(np.exp(-2.0 * (distance / reach) ** 2 - (1 - agree) / 0.12 - off**2) + 1e-9)
 
 
-def _least_spread(around: Floats, weights: Floats) -> Floats:
+def _find_least_spread(around: Floats, weights: Floats) -> Floats:
     """The direction (N,3) in which weighted points (N,K,3) spread least."""
     mean = np.einsum("ik,ikj->ij", weights, around) / weights.sum(axis=1)[:, None]
     off = around - mean[:, None]
     return np.asarray(np.linalg.eigh(np.matmul((weights[:, :, None] * off).transpose(0, 2, 1), off))[1][:, :, 0])
 
 
-def _quadric(
+def _fit_quadric(
     at: Floats, normals: Floats, around: Floats, weights: Floats, reach: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Height (N,) over each point of the quadric through its neighbours (N,K,3), the quadric's normal there (N,3), and

@@ -22,10 +22,10 @@ def find_nearby(points: Floats, places: Floats, reach: float) -> Ints:
     low = low - 2 * size
     shape = np.floor((high - low) / size).astype(np.int64) + 3
     lattice = VoxelGrid(low, size, shape)
-    taken = lattice.around(places, 1)
+    taken = lattice.mark_around(places, 1)
     found = []
     for start in range(0, len(points), CHUNK):
-        found.append(start + np.flatnonzero(taken[lattice.cells(points[start : start + CHUNK])]))
+        found.append(start + np.flatnonzero(taken[lattice.number_cells(points[start : start + CHUNK])]))
     return np.concatenate(found)
 
 

@@ -48,24 +48,24 @@ def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, flo
     for k in sorted({min(k, len(points)) for k in _LEVELS}):
         if k > held:  # 64 mostly do
             held = max(k, 64) if dense else len(points)
-            near = (_around(points, centres + middle, held, rng) if dense else points) - middle
+            near = (_gather_around(points, centres + middle, held, rng) if dense else points) - middle
             tree = cKDTree(near, balanced_tree=False, compact_nodes=False)
         some = centres[: max(500, 400_000 // k)]  # wide patches average more points each: fewer of them will do
         far, index = (np.asarray(a) for a in tree.query(some, k=k))
-        local, roundness = _local(near[index])
+        local, roundness = _to_local(near[index])
         if k <= 64:
-            spacing = _spacing(local[:, :, :2] - local[:, :1, :2]) or spacing
+            spacing = _measure_spacing(local[:, :, :2] - local[:, :1, :2]) or spacing
         even = roundness > 0.15
         # rows of points: the patch must span several before it shows the surface
         if not settled and even.sum() >= 0.3 * len(even):
-            noise = _clean_level(_residual_variance(local[even]), k - 6)
+            noise = _find_clean_level(_measure_residual_variance(local[even]), k - 6)
             settled = bool(np.median(far[:, -1]) >= _WIDE * noise)
         if settled and k >= 64:
             break
     return noise, spacing
 
 
-def _around(points: Floats, centres: Floats, count: int, rng: np.random.Generator) -> Floats:
+def _gather_around(points: Floats, centres: Floats, count: int, rng: np.random.Generator) -> Floats:
     """The points round the centres (M,3), among them the ``count`` nearest of nearly each.
 
     Density must not be thinned, but a tree over all of very many points would cost seconds.
@@ -78,7 +78,7 @@ def _around(points: Floats, centres: Floats, count: int, rng: np.random.Generato
     return points[find_nearby(points, centres, float(np.percentile(reach, 95)))]
 
 
-def _local(patches: Floats) -> tuple[Floats, Floats]:
+def _to_local(patches: Floats) -> tuple[Floats, Floats]:
     """Patches (m,k,3) in their principal axes, widest first, and how round each is, from 0 to 1."""
     centred = patches - patches.mean(1, keepdims=True)
     spread, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", centred, centred))
@@ -87,7 +87,7 @@ def _local(patches: Floats) -> tuple[Floats, Floats]:
     return local, spread[:, 1] / np.maximum(spread[:, 2], 1e-300)
 
 
-def _residual_variance(local: Floats) -> Floats:
+def _measure_residual_variance(local: Floats) -> Floats:
     """(m,) variance of each patch's heights over the quadric fitted to them, by k - 6 degrees of freedom."""
     size = np.maximum(np.abs(local[:, :, :2]).max(axis=(1, 2), keepdims=True), 1e-300)
     u, v = np.moveaxis(local[:, :, :2] / size, 2, 0)
@@ -98,7 +98,7 @@ def _residual_variance(local: Floats) -> Floats:
     return variance
 
 
-def _clean_level(variances: Floats, freedom: int) -> float:
+def _find_clean_level(variances: Floats, freedom: int) -> float:
     """The standard deviation that the lower, agreeing part of the patches' variances has in common.
 
     Under noise alone they follow sigma^2 chi^2(f) / f. Starts low in the distribution, then takes the median of all
@@ -123,7 +123,7 @@ def _clean_level(variances: Floats, freedom: int) -> float:
     return float(np.sqrt(level))
 
 
-def _spacing(around: Floats) -> float:
+def _measure_spacing(around: Floats) -> float:
     """The area-weighted median gap, from neighbours (m,k,2) in the plane, each patch's sample point at the origin."""
     distance = np.hypot(around[:, 1:, 0], around[:, 1:, 1])
     angle = np.arctan2(around[:, 1:, 1], around[:, 1:, 0])

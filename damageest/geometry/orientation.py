@@ -31,13 +31,13 @@ def turn_toward_void(
     from scipy.spatial import cKDTree
 
     eyes = points[pick_one_per_cube(points, 2 * cell)] if len(points) > 1500 else points
-    pull = _pull(eyes, lost, lost_normals, areas, cell) + _overhead(eyes, lost, lost_normals, areas, cell)
+    pull = _pull(eyes, lost, lost_normals, areas, cell) + _pull_overhead(eyes, lost, lost_normals, areas, cell)
     nearest = cKDTree(eyes).query(points, workers=2)[1]
     vote = np.einsum("ij,ij->i", normals, pull[nearest] / np.pi + 0.01 * above)
-    return _signs(points, normals, vote)[:, None] * normals
+    return _find_signs(points, normals, vote)[:, None] * normals
 
 
-def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
+def _find_signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     """Sign (N,) of each normal, from the neighbours' and the votes."""
     distance, index = find_neighbours(points, 11)
     first = np.repeat(np.arange(len(points)), index.shape[1] - 1)
@@ -53,18 +53,18 @@ def _signs(points: Floats, normals: Floats, vote: Floats) -> Floats:
     # Small patches, so that the few wrong agreements (across a thin fin, a narrow slot) are outvoted along borders.
     block = number_cubes(points, max(3 * float(np.median(distance[:, -1])), 1e-9 * float(np.ptp(points)), 1e-300))[1]
     firm = (np.abs(agree) > SMOOTH) & (block[first] == block[second])
-    sign, patch = _spanned(len(points), first[firm], second[firm], agree[firm])
+    sign, patch = _span_trees(len(points), first[firm], second[firm], agree[firm])
     strength = near * agree * np.abs(agree)
     a, b = patch[first], patch[second]
     size = int(patch.max()) + 1
-    total = _summed(size, a, b, strength * sign[first] * sign[second])
+    total = _sum_couplings(size, a, b, strength * sign[first] * sign[second])
     patch_vote = np.bincount(patch, vote * sign, size)
-    patch_sign = _relaxed(total.tocsr(), np.asarray(patch_vote, np.float64))
-    links = _summed(len(points), first, second, strength).tocsr()
-    return _settled(sign * patch_sign[patch], links, np.zeros(len(points)), 5 * len(points) // 100)
+    patch_sign = _relax_signs(total.tocsr(), np.asarray(patch_vote, np.float64))
+    links = _sum_couplings(len(points), first, second, strength).tocsr()
+    return _flip_worst(sign * patch_sign[patch], links, np.zeros(len(points)), 5 * len(points) // 100)
 
 
-def _relaxed(links: Any, vote: Floats) -> Floats:
+def _relax_signs(links: Any, vote: Floats) -> Floats:
     """Signs (P,) that agree with links and votes as well as they can: least squares, relaxed, then single flips."""
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import spsolve
@@ -72,10 +72,10 @@ def _relaxed(links: Any, vote: Floats) -> Floats:
     strength = np.asarray(abs(links).sum(axis=1)).ravel()
     system = diags_array(strength + np.abs(vote) + 1e-6 * (1 + strength.max(initial=0))) - links
     value = np.atleast_1d(spsolve(system.tocsc(), vote))
-    return _settled(np.where(value < 0, -1.0, 1.0), links, vote, 200)
+    return _flip_worst(np.where(value < 0, -1.0, 1.0), links, vote, 200)
 
 
-def _settled(sign: Floats, links: Any, vote: Floats, most: int) -> Floats:
+def _flip_worst(sign: Floats, links: Any, vote: Floats, most: int) -> Floats:
     """Flips, worst first, the signs that neighbours and vote contradict; ``most`` flips."""
     sign = sign.copy()
     field = 0.5 * (links @ sign) + vote
@@ -89,7 +89,7 @@ def _settled(sign: Floats, links: Any, vote: Floats, most: int) -> Floats:
     return sign
 
 
-def _summed(size: int, a: Ints, b: Ints, strength: Floats) -> Any:
+def _sum_couplings(size: int, a: Ints, b: Ints, strength: Floats) -> Any:
     """Symmetric couplings between patches, those of one pair added up."""
     from scipy.sparse import coo_array, csr_array
 
@@ -98,7 +98,7 @@ def _summed(size: int, a: Ints, b: Ints, strength: Floats) -> Any:
     return (one + one.T).tocoo()
 
 
-def _spanned(size: int, first: Ints, second: Ints, agree: Floats) -> tuple[Floats, Ints]:
+def _span_trees(size: int, first: Ints, second: Ints, agree: Floats) -> tuple[Floats, Ints]:
     """Signs along the spanning trees of the firmest agreements, 1 at each root, and the tree of each node."""
     from scipy.sparse import coo_array, csr_array
     from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
@@ -131,7 +131,7 @@ def _softness(areas: Floats, cell: float) -> float:
     return float(areas.mean() + (0.5 * cell) ** 2)
 
 
-def _overhead(eyes: Floats, skin: Floats, normals: Floats, areas: Floats, cell: float) -> Floats:
+def _pull_overhead(eyes: Floats, skin: Floats, normals: Floats, areas: Floats, cell: float) -> Floats:
     """What `_pull` leaves out (E,3) of skin so close overhead that its samples do not resolve it.
 
     Under a disc of skin at height h the softened sum falls short of the whole, pi, by pi soft / (h^2 + soft): a shallow

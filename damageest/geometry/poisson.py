@@ -29,17 +29,17 @@ class Grid:
     def size(self) -> int:
         return int(np.prod(self.shape))
 
-    def coarser(self) -> Grid:
+    def coarsen(self) -> Grid:
         """Half the resolution, each node in the middle of eight; the shape has to be even."""
         nx, ny, nz = (n // 2 for n in self.shape)
         return Grid(self.origin + self.cell / 2, 2 * self.cell, (nx, ny, nz))
 
-    def inside(self, points: Floats) -> NDArray[np.bool_]:
+    def contains(self, points: Floats) -> NDArray[np.bool_]:
         """Which points (N,3) lie within the grid."""
         at = (points - self.origin) / self.cell
         return np.asarray(((at >= 0) & (at <= np.array(self.shape) - 1.001)).all(axis=1))
 
-    def corners(self, points: Floats, shift: Floats | None = None) -> tuple[NDArray[np.int64], Floats]:
+    def find_corners(self, points: Floats, shift: Floats | None = None) -> tuple[NDArray[np.int64], Floats]:
         """Flat node indices (N,8) round each point and trilinear weights (N,8); ``shift`` moves the nodes, in cells."""
         at = (points - self.origin) / self.cell - (0 if shift is None else shift)
         at = np.clip(at, 0, np.array(self.shape) - 1.001)
@@ -82,7 +82,7 @@ def solve_poisson(
 
     share = areas / grid.cell**2
     right = _divergence(grid, points, normals * share[:, None])
-    nodes, weights = grid.corners(points)
+    nodes, weights = grid.find_corners(points)
     rows = np.arange(0, 8 * len(points) + 1, 8)
     look = csr_array((weights.ravel().astype(np.float32), nodes.ravel(), rows), shape=(len(points), grid.size))
     pull = (screening * share).astype(np.float32)
@@ -116,8 +116,8 @@ def solve_coarse_to_fine(grid: Grid, points: Floats, normals: Floats, areas: Flo
     """As `solve`, from the solution at half the resolution: a few fine steps do what took many."""
     if grid.size < 300_000:
         return solve_poisson(grid, points, normals, areas, screening)
-    half = grid.coarser()
-    inside = half.inside(points)
+    half = grid.coarsen()
+    inside = half.contains(points)
     start = solve_coarse_to_fine(half, points[inside], normals[inside], areas[inside], screening)
     # The coarse field rises over twice the length: the same step across the surface, so no scaling is due.
     return solve_poisson(grid, points, normals, areas, screening, refine_field(start), 1e-2, 8)
@@ -140,7 +140,7 @@ def _divergence(grid: Grid, points: Floats, vectors: Floats) -> GridValues:
     for axis in range(3):
         shift = np.zeros(3)
         shift[axis] = 0.5
-        nodes, weights = grid.corners(points, shift)
+        nodes, weights = grid.find_corners(points, shift)
         flow = np.bincount(nodes.ravel(), (weights * vectors[:, axis, None]).ravel(), grid.size)
         along: GridValues = np.moveaxis(flow.reshape(grid.shape).astype(np.float32), axis, 0)
         out = np.moveaxis(total, axis, 0)

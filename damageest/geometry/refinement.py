@@ -10,7 +10,7 @@ from damageest.geometry.distance import closest_on_mesh
 MOST_ROUNDS = 60
 
 
-def nearest(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
+def find_nearest(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
     """(faces (N,), places (N,3)): where on the mesh lies what is nearest to the points (N,3)."""
     _, face, place = closest_on_mesh(points, mesh)
     return face, place
@@ -30,7 +30,7 @@ def refine_at(mesh: Mesh, face: Ints, foot: Floats, edge: float) -> tuple[Mesh, 
         if (length <= edge).all():
             break
         vertices, faces, parent = _split(vertices, faces, held[(length > edge).any(axis=1)])
-        face = _held(vertices, faces, parent, face, foot)
+        face = _find_holding(vertices, faces, parent, face, foot)
     return Mesh(vertices, faces), face
 
 
@@ -87,10 +87,10 @@ def _split(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, I
     return vertices, np.concatenate([p for p, _ in pieces]), np.concatenate([p for _, p in pieces])
 
 
-def _held(vertices: Floats, faces: Ints, parent: Ints, face: Ints, foot: Floats) -> Ints:
+def _find_holding(vertices: Floats, faces: Ints, parent: Ints, face: Ints, foot: Floats) -> Ints:
     """The faces that hold points whose faces were split: one of those that came from it."""
     children = np.flatnonzero(np.isin(parent, face))
-    found, _ = nearest(Mesh(vertices, faces[children]), foot)
+    found, _ = find_nearest(Mesh(vertices, faces[children]), foot)
     return np.asarray(children[found])
 
 
@@ -106,7 +106,7 @@ def insert_points(mesh: Mesh, face: Ints, foot: Floats) -> tuple[Mesh, Ints]:
         waiting = np.flatnonzero(image < 0)
         if not len(waiting):
             break
-        share = _shares(vertices[faces[face[waiting]]], foot[waiting])
+        share = _find_shares(vertices[faces[face[waiting]]], foot[waiting])
         snapped = share.max(axis=1) > 0.8
         corner = faces[face[waiting], share.argmax(axis=1)]
         image[waiting[snapped]] = corner[snapped]
@@ -123,14 +123,14 @@ def insert_points(mesh: Mesh, face: Ints, foot: Floats) -> tuple[Mesh, Ints]:
         faces = np.concatenate([faces, np.stack([b, c, new], axis=1), np.stack([c, a, new], axis=1)])
         image[chosen] = new
         if (image < 0).any():
-            face = _held(vertices, faces, parent, face, foot)
+            face = _find_holding(vertices, faces, parent, face, foot)
     rest = np.flatnonzero(image < 0)
     if len(rest):
-        image[rest] = faces[face[rest], _shares(vertices[faces[face[rest]]], foot[rest]).argmax(axis=1)]
+        image[rest] = faces[face[rest], _find_shares(vertices[faces[face[rest]]], foot[rest]).argmax(axis=1)]
     return Mesh(vertices, faces), image
 
 
-def _shares(corners: Floats, points: Floats) -> Floats:
+def _find_shares(corners: Floats, points: Floats) -> Floats:
     """Barycentric coordinates (N,3) of points (N,3) in triangles (N,3,3), clipped to the triangle."""
     import trimesh
 

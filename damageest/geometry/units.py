@@ -40,18 +40,18 @@ def unit_factor(source: str, target: str) -> float:
     return 1.0 if source == target else MILLIMETRES[source] / MILLIMETRES[target]
 
 
-def _checked(name: str) -> str:
+def _check_unit(name: str) -> str:
     try:
         return canonical_unit(name)
     except InputError as error:  # pydantic collects ValueErrors, so that a job's faults are all named at once
         raise ValueError(str(error)) from None
 
 
-Unit = Annotated[str, AfterValidator(_checked), Field(examples=list(MILLIMETRES))]
+Unit = Annotated[str, AfterValidator(_check_unit), Field(examples=list(MILLIMETRES))]
 """A unit as an option of a stage: checked with the job, and brought to its short name."""
 
 
-def _directions(count: int = 200) -> Floats:
+def _spread_directions(count: int = 200) -> Floats:
     """(count,3) unit vectors, evenly over the half sphere (a Fibonacci spiral)."""
     i = np.arange(count) + 0.5
     z, turn = i / count, np.pi * (1 + 5**0.5) * i
@@ -59,10 +59,10 @@ def _directions(count: int = 200) -> Floats:
     return np.column_stack([r * np.cos(turn), r * np.sin(turn), z])
 
 
-def _size(points: Floats, clip: float) -> float:
+def _measure_size(points: Floats, clip: float) -> float:
     """The largest width of the points over all directions, leaving out the share ``clip`` at either end of each."""
     points = points[:: max(1, len(points) // 5000)]
-    along = (points - points.mean(0)) @ _directions().T
+    along = (points - points.mean(0)) @ _spread_directions().T
     low, high = np.quantile(along, [clip, 1 - clip], axis=0) if clip else (along.min(axis=0), along.max(axis=0))
     return float((high - low).max())
 
@@ -81,14 +81,14 @@ def diagnose_scale(
     ``smallest`` times (metal lost, surface unseen) to ``largest`` times (a fixture around it) the part's size passes.
     Otherwise a factor between two units is looked for that leaves a plausible ratio; the likelier mistakes first.
     """
-    scan, part = _size(scan_points, 0.01), _size(part_vertices, 0.0)
+    scan, part = _measure_size(scan_points, 0.01), _measure_size(part_vertices, 0.0)
     if not scan > 0 or not part > 0:
         return None
     ratio = scan / part
     if smallest <= ratio <= largest:
         return None
     here = canonical_unit(unit)
-    apart = f"{_times(ratio)} the part's ({scan:.4g} against {part:.4g} {here})"
+    apart = f"{_format_ratio(ratio)} the part's ({scan:.4g} against {part:.4g} {here})"
 
     best: tuple[float, float, str] | None = None
     for culprit, sign in (("scan", 1), ("part", -1)):
@@ -112,10 +112,10 @@ def diagnose_scale(
         )
     return (
         f"the scan's size is {apart}: it looks as if one of the two were read in the wrong unit, "
-        f"{_times(best[1])} off; {best[2]}"
+        f"{_format_ratio(best[1])} off; {best[2]}"
     )
 
 
-def _times(ratio: float) -> str:
+def _format_ratio(ratio: float) -> str:
     """A ratio in words: '25.4 times' or '1/25.4 of'."""
     return f"{ratio:.4g} times" if ratio >= 1 else f"1/{1 / ratio:.4g} of"

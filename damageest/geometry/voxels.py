@@ -23,7 +23,7 @@ class VoxelGrid(NamedTuple):
     size: float
     shape: Ints
 
-    def cells(self, points: Floats) -> Ints:
+    def number_cells(self, points: Floats) -> Ints:
         """The number (N,) of each point's cube; beyond the lattice, of the outermost."""
         number = np.zeros(len(points), np.int64)
         for axis in range(3):
@@ -32,10 +32,10 @@ class VoxelGrid(NamedTuple):
             number += np.clip(along, 0, self.shape[axis] - 1, out=along).astype(np.int64)
         return number
 
-    def around(self, points: Floats, layers: int) -> NDArray[np.bool_]:
+    def mark_around(self, points: Floats, layers: int) -> NDArray[np.bool_]:
         """(cubes,) whether a cube holds one of the points or is at most ``layers`` from one that does."""
         taken = np.zeros(int(np.prod(self.shape)), bool)
-        taken[self.cells(points)] = True
+        taken[self.number_cells(points)] = True
         steps = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
         for step in steps:  # one axis after the other
             held = np.flatnonzero(taken)

@@ -58,17 +58,17 @@ class _Check:
     given: Mapping[Contract, Any]
     faults: list[Fault] = field(default_factory=list)
 
-    def fault(self, message: str, *path: str | int) -> None:
+    def add_fault(self, message: str, *path: str | int) -> None:
         place: tuple[str | int, ...] = path
         while place and place not in self.positions:
             place = place[:-1]
         line, column = self.positions.get(place, (1, 1) if self.positions else (0, 0))
         self.faults.append(Fault(message, ".".join(map(str, path)), line, column))
 
-    def said(self, told: list[tuple[tuple[str | int, ...], str]]) -> None:
+    def add_faults(self, told: list[tuple[tuple[str | int, ...], str]]) -> None:
         """Notes faults found by pydantic; what an option with several valid kinds says of each is one fault."""
         for place in dict.fromkeys(place for place, _ in told):
-            self.fault("; or ".join(dict.fromkeys(text for where, text in told if where == place)), *place)
+            self.add_fault("; or ".join(dict.fromkeys(text for where, text in told if where == place)), *place)
 
     def job(self, settings: Sequence[str], stem: str) -> Job:
         for setting in settings:
@@ -76,17 +76,17 @@ class _Check:
         known = [*Header.model_fields, *STAGES]
         for key in self.tree:
             if key not in known:
-                self.fault(f"unknown stage or field{suggest(key, known)}; valid are: {', '.join(known)}", key)
-        header = self.header()
-        named = {key: self.named(key) for key in STAGES if key in self.tree}
+                self.add_fault(f"unknown stage or field{suggest(key, known)}; valid are: {', '.join(known)}", key)
+        header = self.check_header()
+        named = {key: self.find_named(key) for key in STAGES if key in self.tree}
         for contract in (ReadPart, ReadScan):
             if contract.stage not in named and contract not in self.given:
-                self.fault(f"missing: give  {contract.stage}: path/to/file", contract.stage)
+                self.add_fault(f"missing: give  {contract.stage}: path/to/file", contract.stage)
         chosen = {item.contract: (item, options) for item, options in filter(None, named.values())}
         method: str = header.method if header else "auto"
-        contracts, method = self.route(method, chosen)
-        pairs = {c: chosen.get(c) or self.default(c, method) for c in contracts if c not in self.given}
-        stages = {c: self.stage(pair[0], pair[1]) for c, pair in pairs.items() if pair}
+        contracts, method = self.find_route(method, chosen)
+        pairs = {c: chosen.get(c) or self.find_default(c, method) for c in contracts if c not in self.given}
+        stages = {c: self.check_stage(pair[0], pair[1]) for c, pair in pairs.items() if pair}
         if self.faults or header is None:
             raise JobError(sorted(self.faults, key=lambda f: (f.line, f.column)), self.source)
         name = header.name or stem
@@ -108,46 +108,48 @@ class _Check:
         name, equals, text = setting.partition("=")
         keys = name.strip().split(".")
         if not equals or not all(keys) or len(keys) > 2:
-            self.fault(f"--set takes stage.option=value or field=value, not '{setting}'")
+            self.add_fault(f"--set takes stage.option=value or field=value, not '{setting}'")
             return
         value, _ = yamlfile.parse(text, f"--set {name}")
         if len(keys) == 1:
             self.tree[keys[0]] = value
         elif keys[0] not in STAGES:
-            self.fault(f"--set {setting}: unknown stage{suggest(keys[0], STAGES)}; the stages are: {', '.join(STAGES)}")
+            self.add_fault(
+                f"--set {setting}: unknown stage{suggest(keys[0], STAGES)}; the stages are: {', '.join(STAGES)}"
+            )
         else:
             old = self.tree.get(keys[0], {})
-            old = old if isinstance(old, dict) else _spelled_out(keys[0], old, self.registry)
+            old = old if isinstance(old, dict) else _spell_out(keys[0], old, self.registry)
             self.tree[keys[0]] = {**old, keys[1]: value}
 
-    def header(self) -> Header | None:
+    def check_header(self) -> Header | None:
         values = {key: value for key, value in self.tree.items() if key in Header.model_fields}
         if "version" not in values:
-            self.fault("missing: give  version: 1", "version")
+            self.add_fault("missing: give  version: 1", "version")
             values["version"] = 1
         try:
             return Header.model_validate(values)
         except ValidationError as error:
-            self.said([((str(item["loc"][0]),), describe_fault(item, values)) for item in error.errors()])
+            self.add_faults([((str(item["loc"][0]),), describe_fault(item, values)) for item in error.errors()])
             return None
 
-    def named(self, key: str) -> Chosen | None:
+    def find_named(self, key: str) -> Chosen | None:
         """The implementation a stage's value names, and its options still unchecked; None where that is at fault."""
         value = self.tree[key]
         if value is None or not isinstance(value, (str, list, dict)) or (isinstance(value, list) and key != "scan"):
-            self.fault(f"give a name, or a mapping with  use: <name>  and options; not {value!r}", key)
+            self.add_fault(f"give a name, or a mapping with  use: <name>  and options; not {value!r}", key)
             return None
-        value = dict(value) if isinstance(value, dict) else _spelled_out(key, value, self.registry)
-        name = value.pop("use", self.usual(key))
+        value = dict(value) if isinstance(value, dict) else _spell_out(key, value, self.registry)
+        name = value.pop("use", self.usual_name(key))
         if name == "file" and "path" in value:
-            name = self.reader(key, value["path"]) or name
+            name = self.find_reader(key, value["path"]) or name
         try:
             return self.registry.get(key, str(name)), value
         except (KeyError, PluginError) as error:
-            self.fault(str(error.args[0]), key, "use")
+            self.add_fault(str(error.args[0]), key, "use")
             return None
 
-    def usual(self, key: str) -> str:
+    def usual_name(self, key: str) -> str:
         """The implementation meant where a stage is given options and no name."""
         method = self.tree.get("method")
         if key == EncloseAll.stage and method in self.registry.methods(EncloseAll):
@@ -156,21 +158,21 @@ class _Check:
         contracts = [c for c in DEFAULTS if c.stage == key and not (by_site and c is EncloseAll)]
         return DEFAULTS[contracts[0] if by_site else contracts[-1]]
 
-    def reader(self, key: str, paths: Any) -> str | None:
+    def find_reader(self, key: str, paths: Any) -> str | None:
         """The implementation that reads such a file; None leaves it to `file`, which says what it can read."""
         suffix = Path(str(paths[0] if isinstance(paths, list) and paths else paths)).suffix.lower()
         readers = [item for item in self.registry.of(key) if suffix in item.cls.reads]
         if not readers and suffix in (".step", ".stp", ".iges", ".igs", ".brep") and key == "part":
             plugin = "the plugin damageest-cadquery, which is not usable here"
-            self.fault(
+            self.add_fault(
                 f"'{suffix}' needs {plugin}: pip install damageest-cadquery{self.registry.missing()}", key, "path"
             )
         elif not readers:
             valid = sorted({s for item in self.registry.of(key) for s in item.cls.reads})
-            self.fault(f"no reader for '{suffix}' files; valid are: {', '.join(valid)}", key, "path")
+            self.add_fault(f"no reader for '{suffix}' files; valid are: {', '.join(valid)}", key, "path")
         return readers[0].name if readers else None
 
-    def route(self, method: str, chosen: Mapping[Contract, Chosen]) -> tuple[list[Contract], str]:
+    def find_route(self, method: str, chosen: Mapping[Contract, Chosen]) -> tuple[list[Contract], str]:
         """The contracts that the job's route needs, and the method in full: `auto` is `surface` where the job names one
         of its stages, and the method of the implementation of `enclose` where the job names one that has its own."""
         if method not in self.registry.methods():
@@ -178,7 +180,7 @@ class _Check:
             text = (
                 f"no method '{method}'{suggest(method, valid)}; there are: {', '.join(valid)}{self.registry.missing()}"
             )
-            self.fault(text, "method")
+            self.add_fault(text, "method")
             return [], method
         surface = [contract for contract in SURFACE_ONLY if contract in chosen]
         whole_job = chosen.get(EncloseAll)
@@ -188,25 +190,25 @@ class _Check:
         if method == "auto" and whole_job and whole_job[0].name != DEFAULTS[EncloseAll]:
             method = own
         if whole_job and method not in ("auto", own):
-            self.fault(
+            self.add_fault(
                 f"this implementation takes all sites at once; it belongs to  method: {own}", EncloseAll.stage, "use"
             )
         if method in self.registry.methods(EncloseAll):
             for contract in surface:
-                self.fault(f"not a stage of  method: {method}; remove it, or use  method: surface", contract.stage)
+                self.add_fault(f"not a stage of  method: {method}; remove it, or use  method: surface", contract.stage)
         unused: dict[str, tuple[Contract, ...]] = {"surface": (EncloseAll,), "auto": ()}
         return [contract for contract in DEFAULTS if contract not in unused.get(method, SURFACE_ONLY)], method
 
-    def default(self, contract: Contract, method: str) -> Chosen | None:
+    def find_default(self, contract: Contract, method: str) -> Chosen | None:
         if contract.stage in ("part", "scan"):
             return None
         try:
             return self.registry.get(contract.stage, self.registry.usual(contract, method)), {}
         except (KeyError, PluginError) as error:
-            self.fault(str(error.args[0]), contract.stage)
+            self.add_fault(str(error.args[0]), contract.stage)
             return None
 
-    def stage(self, item: Implementation, options: dict[str, Any]) -> Stage | None:
+    def check_stage(self, item: Implementation, options: dict[str, Any]) -> Stage | None:
         """The implementation with its options checked, files that it names included."""
         key = item.contract.stage
         try:
@@ -221,23 +223,23 @@ class _Check:
                     if (key, *place, step) in self.positions or not isinstance(step, str) or step in valid:
                         place = (*place, step)
                 told.append(((key, *(place or fault["loc"])), describe_fault(fault, options, valid, item.name)))
-            self.said(told)
+            self.add_faults(told)
             return None
-        for path in _paths(stage.model_dump()):
+        for path in _find_paths(stage.model_dump()):
             if not path.is_file():
                 what = "is a folder, not a file" if path.is_dir() else "there is no such file"
-                self.fault(f"{path}: {what}", key, "path")
+                self.add_fault(f"{path}: {what}", key, "path")
         return stage
 
 
-def _spelled_out(key: str, value: str | list[Any], registry: Registry) -> dict[str, Any]:
+def _spell_out(key: str, value: str | list[Any], registry: Registry) -> dict[str, Any]:
     """The mapping that a bare value is short for: a name, or for part and scan a path (or paths)."""
     is_file = key in ("part", "scan") and value not in [item.name for item in registry.of(key)]
     return {"use": "file", "path": value} if is_file else {"use": value}
 
 
-def _paths(value: Any) -> list[Path]:
+def _find_paths(value: Any) -> list[Path]:
     if isinstance(value, Path):
         return [value]
     items = value.values() if isinstance(value, Mapping) else value if isinstance(value, (list, tuple)) else ()
-    return [path for item in items for path in _paths(item)]
+    return [path for item in items for path in _find_paths(item)]

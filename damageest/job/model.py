@@ -51,22 +51,22 @@ class Job:
     source: str
     given: Mapping[Contract, Any] = field(default_factory=dict)
 
-    def written(self, beside: Path) -> dict[str, Any]:
+    def to_values(self, beside: Path) -> dict[str, Any]:
         """The job as plain values with every default, its paths relative to the folder ``beside``."""
         head = {"version": 1, "name": self.name, "units": self.units, "tolerance": self.tolerance or "auto"}
         head |= {"method": self.method}
         whole_job = EncloseAll in self.stages
         used = [c for c in DEFAULTS if c in self.stages and not (whole_job and c in SURFACE_ONLY)]
-        body = {c.stage: plain(self.stages[c].model_dump(), beside) for c in used}
+        body = {c.stage: to_plain(self.stages[c].model_dump(), beside) for c in used}
         return head | body
 
 
-def plain(value: Any, beside: Path) -> Any:
+def to_plain(value: Any, beside: Path) -> Any:
     """Options as YAML and JSON values; absolute paths become relative to ``beside``."""
     if isinstance(value, Path):
         return Path(os.path.relpath(value, beside)).as_posix() if value.is_absolute() else value.as_posix()
     if isinstance(value, Mapping):
-        return {key: plain(item, beside) for key, item in value.items()}
+        return {key: to_plain(item, beside) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item, beside) for item in value]
+        return [to_plain(item, beside) for item in value]
     return value

@@ -42,20 +42,20 @@ def parse(text: str, source: str) -> tuple[Any, Positions]:
     except (YAMLError, ValueError, RecursionError) as error:
         raise JobError([Fault(f"not valid YAML: {str(error).splitlines()[0]}")], source) from None
     positions: Positions = {}
-    return _plain(tree, (), positions), positions
+    return _to_plain(tree, (), positions), positions
 
 
-def _plain(node: Any, path: tuple[str | int, ...], positions: Positions) -> Any:
+def _to_plain(node: Any, path: tuple[str | int, ...], positions: Positions) -> Any:
     if isinstance(node, Mapping):
         for key in node:
             line, column = node.lc.key(key)  # type: ignore[attr-defined]
             positions[(*path, str(key))] = (line + 1, column + 1)
-        return {str(key): _plain(value, (*path, str(key)), positions) for key, value in node.items()}
+        return {str(key): _to_plain(value, (*path, str(key)), positions) for key, value in node.items()}
     if isinstance(node, list):
         for index in range(len(node)):
             line, column = node.lc.item(index)  # type: ignore[attr-defined]
             positions[(*path, index)] = (line + 1, column + 1)
-        return [_plain(value, (*path, index), positions) for index, value in enumerate(node)]
+        return [_to_plain(value, (*path, index), positions) for index, value in enumerate(node)]
     for kind in (bool, int, float, str):
         if isinstance(node, kind):
             return kind(node)

@@ -49,14 +49,14 @@ def separate_deposits(engine: Engine, work: Work) -> Work:
         deposit = site.deposit
         if isinstance(deposit, Deposit):
             for earlier in done:
-                deposit = _without(deposit, earlier, site.damage)
+                deposit = _subtract_earlier(deposit, earlier, site.damage)
             key = digest("separate", site.key("deposit"), [earlier.key("deposit") for earlier in done])
             site = site.with_value(FoundSite.deposit, deposit, key)
         done.append(site)
     return replace(work, sites=tuple(done))
 
 
-def _without(deposit: Deposit, earlier: FoundSite, damage: Solid) -> Deposit:
+def _subtract_earlier(deposit: Deposit, earlier: FoundSite, damage: Solid) -> Deposit:
     """A deposit minus the one of an earlier site, for the same damage volume."""
     other = earlier.deposit or earlier.damage
     if (deposit.bounds[0] > other.bounds[1]).any() or (other.bounds[0] > deposit.bounds[1]).any():
@@ -72,7 +72,7 @@ def _without(deposit: Deposit, earlier: FoundSite, damage: Solid) -> Deposit:
     left = to_solid(body - taken, origin)
     cavity, cut_back = deposit.cavity, deposit.cut_back_volume
     if cavity is not None:
-        cavity = _shortened(cavity, taken, origin)
+        cavity = _shorten(cavity, taken, origin)
         cut_back = max(cavity.volume - damage.volume, 0.0)
     if left is None:
         return deposit
@@ -93,7 +93,7 @@ def _without(deposit: Deposit, earlier: FoundSite, damage: Solid) -> Deposit:
     )
 
 
-def _shortened(cavity: Solid, taken: Any, origin: Floats) -> Solid:
+def _shorten(cavity: Solid, taken: Any, origin: Floats) -> Solid:
     return to_solid(to_manifold(cavity, origin) - taken, origin) or cavity
 
 

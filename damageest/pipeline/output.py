@@ -17,9 +17,9 @@ from pathlib import Path
 
 from damageest.errors import Fault, JobError
 from damageest.job import yamlfile
-from damageest.job.model import Job, plain
+from damageest.job.model import Job, to_plain
 from damageest.pipeline.cache import Cache
-from damageest.report.result_json import report
+from damageest.report.result_json import build_report
 from damageest.result import Result
 from damageest.stages.export import Written
 
@@ -32,7 +32,7 @@ old result.json names it as a file of its own, as where a plugin wrote another f
 
 
 @dataclass(frozen=True)
-class Workshop:
+class Workspace:
     """Where one run works: ``folder`` takes the files, ``cache`` the stages' outputs; ``target`` is the final place."""
 
     target: Path
@@ -44,7 +44,7 @@ class Workshop:
         """Moves the result into place; anything in the old output that is not damageest's own moves along."""
         self.cache.keep_only(stems)
         os.replace(self.cache.folder, self.folder / "stages")
-        old = _old(self.target)
+        old = _old_path(self.target)
         if self.target.exists():
             os.replace(self.target, old)
         os.replace(self.folder, self.target)
@@ -53,7 +53,7 @@ class Workshop:
 
 
 @contextmanager
-def workshop(target: Path, use_cache: bool = True) -> Iterator[Workshop]:
+def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
     """Opens the hidden sibling of ``target``. Raises JobError where the target is someone else's, or in use."""
     hidden = target.parent / f".{target.name}.partial"
     _refuse_strangers(target)
@@ -62,10 +62,10 @@ def workshop(target: Path, use_cache: bool = True) -> Iterator[Workshop]:
         hidden.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise JobError([Fault(f"{target}: cannot be written: {error.strerror}", "output")]) from None
-    with _locked(hidden, target):
-        if _old(target).exists() and not target.exists():
-            os.replace(_old(target), target)
-        _hand_over(_old(target), target)  # left where a run was killed in the middle of finishing
+    with _lock(hidden, target):
+        if _old_path(target).exists() and not target.exists():
+            os.replace(_old_path(target), target)
+        _hand_over(_old_path(target), target)  # left where a run was killed in the middle of finishing
         stages, folder = hidden / "stages", hidden / "result"
         shutil.rmtree(folder, ignore_errors=True)
         if not use_cache:
@@ -74,7 +74,7 @@ def workshop(target: Path, use_cache: bool = True) -> Iterator[Workshop]:
         folder.mkdir()
         older = (target / "stages",) if use_cache else ()
         try:
-            yield Workshop(target, hidden, folder, Cache(stages, older))
+            yield Workspace(target, hidden, folder, Cache(stages, older))
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             if made and stages.is_dir() and not any(stages.iterdir()):
@@ -83,12 +83,12 @@ def workshop(target: Path, use_cache: bool = True) -> Iterator[Workshop]:
 
 def write_report(result: Result, job: Job, folder: Path, target: Path, written: Written) -> None:
     """Writes result.json and job.yaml into ``folder``, their paths relative to ``target``, where they will stand."""
-    content = report(result, written, lambda path: plain(Path(path), target))
+    content = build_report(result, written, lambda path: to_plain(Path(path), target))
     (folder / "result.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
-    (folder / "job.yaml").write_text(yamlfile.write(job.written(target)))
+    (folder / "job.yaml").write_text(yamlfile.write(job.to_values(target)))
 
 
-def _old(target: Path) -> Path:
+def _old_path(target: Path) -> Path:
     return target.parent / f".{target.name}.old"
 
 
@@ -96,7 +96,7 @@ def _hand_over(old: Path, target: Path) -> None:
     """Moves the user's own files from the earlier output to the new one, and drops the rest of it."""
     if not old.exists():
         return
-    named = _named(old)
+    named = _read_named(old)
     for path in sorted(old.rglob("*")):
         name = path.relative_to(old)
         ours = _OURS.fullmatch(name.as_posix()) or name.as_posix() in named
@@ -107,7 +107,7 @@ def _hand_over(old: Path, target: Path) -> None:
     shutil.rmtree(old)
 
 
-def _named(old: Path) -> set[str]:
+def _read_named(old: Path) -> set[str]:
     """The files that an earlier result.json lists; none where there is none that can be read."""
     try:
         return set(json.loads((old / "result.json").read_text())["export"]["files"])
@@ -125,7 +125,7 @@ def _refuse_strangers(target: Path) -> None:
 
 
 @contextmanager
-def _locked(hidden: Path, target: Path) -> Iterator[None]:
+def _lock(hidden: Path, target: Path) -> Iterator[None]:
     """Holds the folder for one run; the lock goes with the process, however it ends."""
     try:
         import fcntl

@@ -38,7 +38,7 @@ def place_scan(engine: Engine, work: Work) -> Work:
     """Brings the scan into the part's frame."""
     state = work.job
     pose, scan = state.pose, state.scan
-    state = state.derive(JobState.aligned, scan.moved(pose.T_part_scan), JobState.scan, JobState.pose)
+    state = state.derive(JobState.aligned, scan.move(pose.T_part_scan), JobState.scan, JobState.pose)
     state = state.derive(JobState.noise, scan.noise, JobState.scan)
     state = state.derive(JobState.spacing, scan.spacing, JobState.scan)
     return replace(work, job=state, warnings=(*work.warnings, *pose.notes))

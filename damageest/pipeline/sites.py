@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.checks.evidence import weigh
+from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
 from damageest.pipeline.cache import digest
@@ -68,7 +68,7 @@ def gather_sites(engine: Engine, work: Work) -> Work:
     out = []
     for item in join_pieces(pieces):
         members = np.flatnonzero(np.isin(sites.label, item.clusters))
-        evidence = weigh(item.damage, aligned.points[members], aligned, state.deviation, state.part, tolerance)
+        evidence = weigh_evidence(item.damage, aligned.points[members], aligned, state.deviation, state.part, tolerance)
         notes = [
             note
             for candidate in work.candidates

@@ -59,7 +59,11 @@ def damageest_stages() -> list[type[Stage]]:
 def damageest_writers() -> Mapping[str, Writer]:
     """The formats that need no plugin."""
     from damageest.stages.export import Writer
-    from damageest.stages.export._mesh_files import ply, stl
-    from damageest.stages.export._threemf import threemf
+    from damageest.stages.export._mesh_files import write_ply_bodies, write_stl_bodies
+    from damageest.stages.export._threemf import write_threemf
 
-    return {"stl": Writer(stl), "ply": Writer(ply), "3mf": Writer(threemf, together=True)}
+    return {
+        "stl": Writer(write_stl_bodies),
+        "ply": Writer(write_ply_bodies),
+        "3mf": Writer(write_threemf, together=True),
+    }

@@ -63,13 +63,13 @@ def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[t
     loaded: list[tuple[Any, Provider]] = []
     broken: list[Broken] = []
     own = EntryPoint("builtins", "damageest.registry.builtins", GROUP)
-    for point, provider in [(own, _own_provider()), *_installed()]:
+    for point, provider in [(own, _describe_own()), *_list_installed()]:
         try:
-            with unwarned():
+            with ignore_shadow_warnings():
                 plugin = point.load()
             manager.register(plugin, f"{provider.name}:{point.name}")
         except (Exception, SystemExit) as error:
-            broken.append(fault_of(error, provider))
+            broken.append(describe_broken(error, provider))
         else:
             loaded.append((plugin, provider))
     for observer in observers:
@@ -78,23 +78,23 @@ def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[t
 
 
 @contextmanager
-def unwarned() -> Iterator[None]:
+def ignore_shadow_warnings() -> Iterator[None]:
     """Without pydantic's warning on options that shadow an attribute: the registry refuses those with its own words."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Field name .* shadows an attribute", category=UserWarning)
         yield
 
 
-def _own_provider() -> Provider:
+def _describe_own() -> Provider:
     return Provider("damageest", damageest.__version__, "Apache-2.0", "damageest.registry.builtins")
 
 
-def _installed() -> list[tuple[EntryPoint, Provider]]:
+def _list_installed() -> list[tuple[EntryPoint, Provider]]:
     points = sorted(entry_points(group=GROUP), key=lambda p: (p.dist.name if p.dist else "", p.name))
-    return [(point, _provider(point, point.dist)) for point in points]
+    return [(point, _describe_provider(point, point.dist)) for point in points]
 
 
-def _provider(point: EntryPoint, dist: Distribution | None) -> Provider:
+def _describe_provider(point: EntryPoint, dist: Distribution | None) -> Provider:
     if dist is None:
         return Provider(point.name, "?", "?", point.module)
     meta = dist.metadata
@@ -102,19 +102,21 @@ def _provider(point: EntryPoint, dist: Distribution | None) -> Provider:
     return Provider(dist.name, dist.version, licence.splitlines()[0], point.module)
 
 
-def fault_of(error: BaseException, provider: Provider) -> Broken:
+def describe_broken(error: BaseException, provider: Provider) -> Broken:
     """The plugin as broken by an error, with what to do about it."""
-    return Broken(provider, f"{type(error).__name__}: {error}{_place(error, provider)}", _remedy(error, provider))
+    return Broken(
+        provider, f"{type(error).__name__}: {error}{_locate(error, provider)}", _suggest_remedy(error, provider)
+    )
 
 
-def _place(error: BaseException, provider: Provider) -> str:
+def _locate(error: BaseException, provider: Provider) -> str:
     """Where in the plugin's own files an error arose; nothing for one that its author wrote for the user."""
     root = provider.module.split(".")[0]
     own = [f for f in traceback.extract_tb(error.__traceback__) if root in Path(f.filename).with_suffix("").parts]
     return f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own and type(error) is not PluginError else ""
 
 
-def _remedy(error: BaseException, provider: Provider) -> str:
+def _suggest_remedy(error: BaseException, provider: Provider) -> str:
     if isinstance(error, PluginError) and error.remedy:
         return error.remedy
     if isinstance(error, ModuleNotFoundError) and error.name:

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from damageest.errors import PluginError, suggest
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
-from damageest.registry.loading import Broken, Provider, fault_of, load, unwarned
+from damageest.registry.loading import Broken, Provider, describe_broken, ignore_shadow_warnings, load
 from damageest.stages import Stage
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.export import Writer
@@ -59,19 +59,19 @@ class Registry:
         writers: dict[str, Writer] = {}
         for plugin, provider in loaded:
             try:
-                with unwarned():
-                    classes = _offered(plugin)
-                    writers |= _writers(plugin, writers)
+                with ignore_shadow_warnings():
+                    classes = _read_offered(plugin)
+                    writers |= _read_writers(plugin, writers)
             except (Exception, SystemExit) as error:
-                broken.append(fault_of(error, provider))
+                broken.append(describe_broken(error, provider))
                 continue
             for stage in classes:
                 try:
-                    found.append(_implementation(stage, provider))
+                    found.append(_check_implementation(stage, provider))
                 except PluginError as error:
                     broken.append(Broken(provider, str(error), f"update or uninstall {provider.name}"))
                 except Exception as error:
-                    broken.append(fault_of(error, provider))
+                    broken.append(describe_broken(error, provider))
         names = [(item.contract.stage, item.name) for item in found]
         groups = {key: tuple(i for i, n in zip(found, names, strict=True) if n == key) for key in dict.fromkeys(names)}
         single = tuple(group[0] for group in groups.values() if len(group) == 1)
@@ -120,7 +120,7 @@ class Registry:
         return f"; {'; '.join(parts)}" if parts else ""
 
 
-def _implementation(cls: Any, provider: Provider) -> Implementation:
+def _check_implementation(cls: Any, provider: Provider) -> Implementation:
     """Checks a class against its contract when it is registered, not when it runs."""
     contract = contract_of(cls) if isinstance(cls, type) else None
     if contract is None:
@@ -132,12 +132,12 @@ def _implementation(cls: Any, provider: Provider) -> Implementation:
     if changed:
         raise PluginError(f"{cls.__qualname__} changes {', '.join(map(repr, changed))}, which its contract fixes")
     cls.needs()
-    name = _name(cls)
+    name = _read_name(cls)
     _check_defaults(cls)
     return Implementation(name, cls, contract, provider)
 
 
-def _offered(plugin: Any) -> list[Any]:
+def _read_offered(plugin: Any) -> list[Any]:
     """What a plugin's hook gives. A module without that hook may have others, and then gives no stages."""
     classes = plugin.damageest_stages() if hasattr(plugin, "damageest_stages") else []
     if not isinstance(classes, list | tuple):
@@ -145,7 +145,7 @@ def _offered(plugin: Any) -> list[Any]:
     return list(classes)
 
 
-def _writers(plugin: Any, known: Mapping[str, Writer]) -> dict[str, Writer]:
+def _read_writers(plugin: Any, known: Mapping[str, Writer]) -> dict[str, Writer]:
     """The formats that a plugin can write. Raises PluginError for what is no writer, or of a format known already."""
     found = plugin.damageest_writers() if hasattr(plugin, "damageest_writers") else {}
     if not isinstance(found, Mapping) or not all(isinstance(writer, Writer) for writer in found.values()):
@@ -168,7 +168,7 @@ def _check_defaults(cls: type[Stage]) -> None:
             raise PluginError(f"{cls.__qualname__}: the default of an option is not valid: {text}") from error
 
 
-def _name(cls: type[Stage]) -> str:
+def _read_name(cls: type[Stage]) -> str:
     choices = typing.get_args(cls.model_fields["use"].annotation)
     if len(choices) != 1 or not isinstance(choices[0], str):
         raise PluginError(f"{cls.__qualname__}: declare its name as  use: Literal['name']")

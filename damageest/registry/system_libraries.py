@@ -13,7 +13,7 @@ def load(library: str) -> None:
     ctypes.CDLL(library)
 
 
-def loads(library: str, load: Callable[[str], None] = load) -> bool:
+def can_load(library: str, load: Callable[[str], None] = load) -> bool:
     """Whether a shared library can be loaded; it then is."""
     try:
         load(library)
@@ -27,7 +27,7 @@ def require(owner: str, packages: Mapping[str, str], load: Callable[[str], None]
 
     Raises PluginError that names what ``owner`` needs, but is missing, and how to install it.
     """
-    missing = [library for library in packages if not loads(library, load)]
+    missing = [library for library in packages if not can_load(library, load)]
     if missing:
         raise PluginError(
             f"{owner} needs {', '.join(missing)} from the system, and does not find it here",

@@ -160,14 +160,14 @@ def result_schema() -> dict[str, Any]:
     return {"$schema": DIALECT, **Report.model_json_schema(mode="serialization"), "title": "damageest result"}
 
 
-def report(result: Result, written: Written = _NOTHING, relative: Any = str) -> dict[str, Any]:
+def build_report(result: Result, written: Written = _NOTHING, relative: Any = str) -> dict[str, Any]:
     """The content of result.json as plain values. ``relative`` turns an absolute input path into the one to write."""
     import platform
 
     import damageest
 
     part, scan, pose = result.part, result.scan, result.pose
-    sites = [_site(site, written) for site in result.sites]
+    sites = [_report_site(site, written) for site in result.sites]
     filled = Report(
         status=result.status,
         name=result.name,
@@ -190,7 +190,7 @@ def report(result: Result, written: Written = _NOTHING, relative: Any = str) -> 
         ),
         alignment=AlignmentReport(
             transform=pose.T_part_scan.tolist(),
-            quaternion=_quaternion(pose.T_part_scan),
+            quaternion=_to_quaternion(pose.T_part_scan),
             translation=tuple(pose.T_part_scan[:3, 3].tolist()),
             rms=pose.rms,
             inliers=pose.inliers,
@@ -201,8 +201,8 @@ def report(result: Result, written: Written = _NOTHING, relative: Any = str) -> 
         export=ExportReport(files=list(written.files), notes=list(written.notes)),
         damage_volume=result.damage_volume,
         undamaged_volume=result.undamaged_volume,
-        material=_material([site.deposit for site in sites if site.deposit]),
-        truth=_truth(result),
+        material=_sum_material([site.deposit for site in sites if site.deposit]),
+        truth=_report_truth(result),
         stages=[StageReport(**vars(record)) for record in result.stages],
         failures=list(result.failures),
         warnings=list(result.warnings),
@@ -211,14 +211,14 @@ def report(result: Result, written: Written = _NOTHING, relative: Any = str) -> 
     return filled.model_dump(mode="json", by_alias=True)
 
 
-def _quaternion(T: Floats) -> tuple[float, float, float, float]:
+def _to_quaternion(T: Floats) -> tuple[float, float, float, float]:
     from scipy.spatial.transform import Rotation
 
     x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True).tolist()
     return w, x, y, z
 
 
-def _site(site: Site, written: Written) -> SiteReport:
+def _report_site(site: Site, written: Written) -> SiteReport:
     kinds = ("damage", "surface", "deposit")
     own = {
         kind: [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"{kind}/site-{site.id}.")]
@@ -237,7 +237,7 @@ def _site(site: Site, written: Written) -> SiteReport:
         centroid=tuple(site.centroid.tolist()),
         bounds=(tuple(low), tuple(high)),
         method=site.method,
-        deposit=_deposit(site),
+        deposit=_report_deposit(site),
         evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
         files=FilesReport(
             **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
@@ -247,7 +247,7 @@ def _site(site: Site, written: Written) -> SiteReport:
     )
 
 
-def _deposit(site: Site) -> DepositReport | None:
+def _report_deposit(site: Site) -> DepositReport | None:
     if site.refused:
         return None
     deposit = site.deposit or site.damage
@@ -264,7 +264,7 @@ def _deposit(site: Site) -> DepositReport | None:
     )
 
 
-def _material(deposits: list[DepositReport]) -> MaterialReport:
+def _sum_material(deposits: list[DepositReport]) -> MaterialReport:
     return MaterialReport(
         deposit_volume=sum(deposit.volume for deposit in deposits),
         stock_volume=sum(deposit.stock_volume for deposit in deposits),
@@ -272,7 +272,7 @@ def _material(deposits: list[DepositReport]) -> MaterialReport:
     )
 
 
-def _truth(result: Result) -> TruthReport | None:
+def _report_truth(result: Result) -> TruthReport | None:
     truth = result.scan.truth
     if truth is None or result.truth is None:
         return None

@@ -9,13 +9,13 @@ import pytest
 from manifold3d import Manifold
 
 from damageest.artefacts import Evidence, Solid
-from damageest.checks.evidence import weigh
+from damageest.checks.evidence import weigh_evidence
 from damageest.geometry.solids import iou, to_manifold, to_solid
 from tests.scenes import TOOLS, Scene, scene
 
 
 def evidence(case: Scene, damage: Solid) -> Evidence:
-    return weigh(damage, case.of_sites(), case.aligned, case.deviation, case.part, case.tolerance)
+    return weigh_evidence(damage, case.of_sites(), case.aligned, case.deviation, case.part, case.tolerance)
 
 
 def middle(body: Manifold) -> list[float]:

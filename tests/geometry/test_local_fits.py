@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from damageest.artefacts import Solid
 from damageest.geometry.local_fits import average_points, smooth_points
 from damageest.geometry.neighbourhoods import thin_points
-from damageest.stages.enclose._refit import refitted
+from damageest.stages.enclose._refit import refit_region
 
 SIGMA = 0.05
 
@@ -72,7 +72,7 @@ def test_a_mesh_comes_onto_its_points_and_stays_closed() -> None:
     region = Solid(wavy, true.faces)
     points = trimesh.creation.icosphere(4, 6.0).vertices
     half = points[points[:, 2] > 0]
-    fitted = refitted(region, half, -half / 6, 0.2)
+    fitted = refit_region(region, half, -half / 6, 0.2)
     radius = np.linalg.norm(fitted.vertices, axis=1)
     above, below = true.vertices[:, 2] > 0.6, true.vertices[:, 2] < -0.8
     assert np.abs(radius[above] - 6).max() < 0.006

@@ -149,7 +149,7 @@ def test_written_job_gives_the_same_job(job_file: JobFile, registry: Registry, t
     first = load(job_file("cluster: {neighbours: 12}\ntolerance: 0.25\n"), registry)
     again = tmp_path / "deep" / "job.yaml"
     again.parent.mkdir()
-    again.write_text(yamlfile.write(first.written(again.parent)))
+    again.write_text(yamlfile.write(first.to_values(again.parent)))
     second = load(again, registry)
     assert second.stages == first.stages
     assert second.tolerance == first.tolerance

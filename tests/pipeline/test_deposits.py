@@ -21,7 +21,7 @@ from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.registry import Registry
-from damageest.report.result_json import report, result_schema
+from damageest.report.result_json import build_report, result_schema
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance.milling import Milling
 from damageest.stages.allowance.none import NoAllowance
@@ -84,7 +84,7 @@ def test_a_cut_back_enlarges_the_cavity_and_not_the_damage_that_was_found(folder
     assert after.surface.area > 1.1 * before.surface.area
     assert isinstance(after.deposit, Deposit)
     assert after.deposit.cut_back_volume == pytest.approx(after.damage.volume - before.damage.volume)
-    assert report(cut)["material"]["cut_back_volume"] == after.deposit.cut_back_volume
+    assert build_report(cut)["material"]["cut_back_volume"] == after.deposit.cut_back_volume
 
 
 def test_a_refused_site_keeps_its_damage(folder: Path) -> None:

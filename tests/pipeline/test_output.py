@@ -9,12 +9,12 @@ import pytest
 
 from damageest.artefacts import Pose
 from damageest.errors import JobError
-from damageest.pipeline.output import workshop
+from damageest.pipeline.output import open_workspace
 
 
 def make(target: Path, body: str) -> None:
     """One finished output, its damage file holding ``body``."""
-    with workshop(target) as place:
+    with open_workspace(target) as place:
         place.cache.put("align", "k", Pose([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]))
         (place.folder / "result.json").write_text("{}")
         (place.folder / "damage.stl").write_text(body)
@@ -32,7 +32,7 @@ def files(folder: Path) -> dict[str, str]:
 def test_a_new_output_replaces_the_old_and_nothing_else(tmp_path: Path) -> None:
     target = tmp_path / "out/x"
     make(target, "first")
-    with workshop(target) as place:
+    with open_workspace(target) as place:
         (place.folder / "result.json").write_text("{}")
         place.finish([])
     assert files(target) == {"result.json": "{}"}, "a site that is gone leaves no file behind"
@@ -62,7 +62,7 @@ def test_killed_while_finishing(moved: bool, tmp_path: Path) -> None:
     if moved:
         make(tmp_path / "other", "second")
         os.replace(tmp_path / "other", target)
-    with pytest.raises(RuntimeError), workshop(target):
+    with pytest.raises(RuntimeError), open_workspace(target):
         raise RuntimeError
     assert files(target)["damage.stl"] == ("second" if moved else "first")
     assert files(target)["notes.txt"] == "mine"
@@ -73,21 +73,21 @@ def test_a_failure_leaves_the_old_and_keeps_finished_stages(tmp_path: Path) -> N
     target = tmp_path / "out"
     make(target, "first")
     before = files(target)
-    with pytest.raises(RuntimeError), workshop(target) as place:  # noqa: PT012 - what fails is the block itself
+    with pytest.raises(RuntimeError), open_workspace(target) as place:  # noqa: PT012 - what fails is the block itself
         place.cache.put("align", "later", Pose(place.cache.get("align", "k")[1].T_part_scan))
         (place.folder / "damage.stl").write_text("half")
         raise RuntimeError
     assert files(target) == before
-    with workshop(target) as place:
+    with open_workspace(target) as place:
         assert place.cache.get("align", "later")[0]
         assert os.listdir(place.folder) == []
-    with workshop(target, use_cache=False) as place:
+    with open_workspace(target, use_cache=False) as place:
         assert not place.cache.get("align", "later")[0]
         assert not place.cache.get("align", "k")[0]
 
 
 def test_a_failure_without_a_finished_stage_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError), workshop(tmp_path / "out"):
+    with pytest.raises(RuntimeError), open_workspace(tmp_path / "out"):
         raise RuntimeError
     assert os.listdir(tmp_path) == []
 
@@ -95,12 +95,12 @@ def test_a_failure_without_a_finished_stage_leaves_nothing(tmp_path: Path) -> No
 def test_only_one_run_at_a_time(tmp_path: Path) -> None:
     pytest.importorskip("fcntl")
     with (
-        workshop(tmp_path / "out"),
+        open_workspace(tmp_path / "out"),
         pytest.raises(JobError, match="another run is writing"),
-        workshop(tmp_path / "out"),
+        open_workspace(tmp_path / "out"),
     ):
         pass
-    with workshop(tmp_path / "out"):
+    with open_workspace(tmp_path / "out"):
         pass
 
 
@@ -110,7 +110,7 @@ def test_what_is_someone_elses_is_refused(tmp_path: Path) -> None:
     (tmp_path / "folder/a").write_text("mine")
     (tmp_path / "empty").mkdir()
     for name, why in {"file": "is a file", "folder": "not an earlier output"}.items():
-        with pytest.raises(JobError, match=why), workshop(tmp_path / name):
+        with pytest.raises(JobError, match=why), open_workspace(tmp_path / name):
             pass
     make(tmp_path / "empty", "first")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["empty", "file", "folder"]

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
 from damageest.stages.align._field import PartSurface, PlaneGrid
-from damageest.stages.align._fine import fit, loss, moved
-from damageest.stages.align._points import OrientedPoints, surface_cloud
-from damageest.stages.align._search import distinct, motion, refine, score
-from damageest.stages.align._turns import Axis, common_axis, families
+from damageest.stages.align._fine import fit, move_points, robust_cost
+from damageest.stages.align._points import OrientedPoints, orient_surface
+from damageest.stages.align._search import make_motion, refine, score, select_distinct
+from damageest.stages.align._turns import Axis, find_common_axis, group_turns
 
 TRIED = 40
 """Poses fitted exactly at most: all those of a gear of twenty teeth, either way up."""
@@ -45,88 +45,92 @@ def choose(
 
     ``points`` (N,3) well spread and in random order, for the exact fit; ``scan`` for the lookups; lengths in diagonals.
     """
-    poses, axis = _counterparts(poses, field, scan)
-    fits = [fit(target, _close(field, points[:FEW], pose), pose, COARSE, noise, 12) for pose in poses]
+    poses, axis = _add_counterparts(poses, field, scan)
+    fits = [fit(target, _keep_close(field, points[:FEW], pose), pose, COARSE, noise, 12) for pose in poses]
     poses = np.array([one.pose for one in fits])
-    few = [_distance(target, field, points[:FEW], pose) for pose in poses]
-    band = fits[int(np.argmin([loss(distance, 0.75 * COARSE).sum() for distance in few]))].band
-    poses = poses[_equal([loss(distance, band) for distance in few])]
-    poses = poses[_equal([loss(_distance(target, field, points[:SOME], pose), band) for pose in poses])]
-    poses = poses[distinct(poses, np.zeros(len(poses)), 0.25 * COARSE, TRIED)]
+    few = [_measure_distance(target, field, points[:FEW], pose) for pose in poses]
+    band = fits[int(np.argmin([robust_cost(distance, 0.75 * COARSE).sum() for distance in few]))].band
+    poses = poses[_select_equal([robust_cost(distance, band) for distance in few])]
+    poses = poses[
+        _select_equal([robust_cost(_measure_distance(target, field, points[:SOME], pose), band) for pose in poses])
+    ]
+    poses = poses[select_distinct(poses, np.zeros(len(poses)), 0.25 * COARSE, TRIED)]
 
-    costs = [loss(_distance(target, field, points, pose), band) for pose in poses]
+    costs = [robust_cost(_measure_distance(target, field, points, pose), band) for pose in poses]
     best = int(np.argmin([cost.sum() for cost in costs]))
-    equal = np.array([not worse(cost, costs[best]) for cost in costs])
+    equal = np.array([not is_worse(cost, costs[best]) for cost in costs])
     equal[best] = False
     pose, others = poses[best], poses[equal]
     if axis is not None:
         # Fitted again, since the axis is known no better than the candidates were.
         turned = axis.turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose
         turned = np.array(
-            [fit(target, _close(field, points[:FEW], one), one, 2 * band, noise, 6).pose for one in turned]
+            [fit(target, _keep_close(field, points[:FEW], one), one, 2 * band, noise, 6).pose for one in turned]
         )
-        if any(worse(loss(_distance(target, field, points, one), band), costs[best]) for one in turned):
+        if any(
+            is_worse(robust_cost(_measure_distance(target, field, points, one), band), costs[best]) for one in turned
+        ):
             axis = None
     if axis is not None:
         # One of each set of turns, then a quarter turn of each: endlessly many cannot be listed.
         every = np.concatenate([pose[None], others])
-        heads = every[families(every, axis, 8)]
+        heads = every[group_turns(every, axis, 8)]
         quarter = axis.turns(np.radians([0, 90.0, 180.0, 270.0]))
         others = (quarter[:, None] @ heads[None]).reshape(-1, 4, 4)[1:]
     return Choice(pose, others, axis, band)
 
 
-def _close(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
+def _keep_close(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
     """Those of the points that a pose puts near the surface; exact queries of the others are slow and of no use."""
-    return points[np.abs(field.distance[field.index(moved(pose, points).astype(np.float32))]) < FAR]
+    return points[np.abs(field.distance[field.index(move_points(pose, points).astype(np.float32))]) < FAR]
 
 
-def _distance(target: PartSurface, field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
+def _measure_distance(target: PartSurface, field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
     """Signed distances (N,) of the moved points: exact near the surface, by the grid far from it."""
-    at = moved(pose, points)
+    at = move_points(pose, points)
     distance = field.distance[field.index(at.astype(np.float32))].astype(np.float64)
     near = np.abs(distance) < FAR
     distance[near] = target.closest(at[near])[0]
     return distance
 
 
-def _counterparts(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Axis | None]:
+def _add_counterparts(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Axis | None]:
     """The promising poses, joined by those turned about the axis by which they differ, and the axis.
 
     A pose one tooth off differs from the right one only at a keyway, and a shaft's keyway is a few degrees wide: the
     search would have to be lucky, steps of a degree need not be.
     """
-    poses, scores = _ranked(poses, field, scan)
-    poses = poses[_good(scores)]
-    axis = common_axis(poses)
+    poses, scores = _rank(poses, field, scan)
+    poses = poses[_select_good(scores)]
+    axis = find_common_axis(poses)
     if axis is not None:
-        heads = poses[families(poses, axis, 4)]
+        heads = poses[group_turns(poses, axis, 4)]
         turned = (axis.turns(np.radians(np.arange(360)))[None] @ heads[:, None]).reshape(-1, 4, 4)
-        turned = turned[distinct(turned, score(turned, scan, field, COARSE), 2 * COARSE, 2 * TRIED)]
+        turned = turned[select_distinct(turned, score(turned, scan, field, COARSE), 2 * COARSE, 2 * TRIED)]
         turned = refine(turned, scan, field, np.geomspace(1.5 * COARSE, 0.75 * COARSE, 5))
-        poses, scores = _ranked(np.concatenate([poses, turned]), field, scan)
-        poses = poses[_good(scores)]
+        poses, scores = _rank(np.concatenate([poses, turned]), field, scan)
+        poses = poses[_select_good(scores)]
     return poses[:TRIED], axis
 
 
-def _ranked(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Floats]:
+def _rank(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Floats]:
     scores = score(poses, scan, field, COARSE)
-    order = distinct(poses, scores, 0.5 * COARSE, len(poses))
+    order = select_distinct(poses, scores, 0.5 * COARSE, len(poses))
     return poses[order], scores[order]
 
 
-def _good(scores: Floats) -> NDArray[np.bool_]:
+def _select_good(scores: Floats) -> NDArray[np.bool_]:
     best = float(scores.max())
     return np.asarray(scores >= best - max(0.06, 0.2 * best))
 
 
-def _equal(costs: list[Floats]) -> NDArray[np.bool_]:
+def _select_equal(costs: list[Floats]) -> NDArray[np.bool_]:
     """Which of the poses, by what each point costs, are not decidedly worse than the best."""
     best = costs[int(np.argmin([cost.sum() for cost in costs]))]
-    return np.array([not worse(cost, best) for cost in costs])
+    return np.array([not is_worse(cost, best) for cost in costs])
 
 
-def worse(cost: Floats, best: Floats) -> bool:
+def is_worse(cost: Floats, best: Floats) -> bool:
     """Whether points (N,) costing ``cost`` are explained decidedly worse than at ``best``, compared point by point.
 
     Decidedly: by more than chance (five standard errors) and by more than what fitting and tessellation leave, which
@@ -137,20 +141,22 @@ def worse(cost: Floats, best: Floats) -> bool:
     return total > 0.0005 * len(more) and total > 5 * float(np.sqrt((more**2).sum()))
 
 
-def unfixed(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[str, ...]:
+def note_unfixed(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[str, ...]:
     """A note where the scan leaves the part free to slide: a bar of which both ends are missing or unseen fits anywhere
     along itself. Every slide or turn that the points' planes hardly resist is tried, a few bands far, either way."""
-    at = moved(pose, points)
+    at = move_points(pose, points)
     distance, _, face = target.closest(at)
     on = np.abs(distance) < band
     jacobian = np.column_stack([np.cross(at[on], target.normals[face[on]]), target.normals[face[on]]])
     stiffness, motions = np.linalg.eigh(jacobian.T @ jacobian / max(int(on.sum()), 1))
-    surface = surface_cloud(target.mesh, 5000, np.random.default_rng(0)).points
-    here = loss(distance, band)
+    surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
+    here = robust_cost(distance, band)
     for twist in motions.T[stiffness < 0.01]:
-        for D in motion(np.stack([twist, -twist]) * 6 * band):
-            differs = float((np.abs(target.closest(moved(D, surface))[0]) > band).mean())
-            if differs > 0.002 and not worse(loss(target.closest(moved(D @ pose, points))[0], band), here):
+        for D in make_motion(np.stack([twist, -twist]) * 6 * band):
+            differs = float((np.abs(target.closest(move_points(D, surface))[0]) > band).mean())
+            if differs > 0.002 and not is_worse(
+                robust_cost(target.closest(move_points(D @ pose, points))[0], band), here
+            ):
                 return (
                     "the scan does not fix the pose: the part can be slid or turned a little and fit as well: "
                     "what would hold it is missing or was not seen; where the pose is known, give it to align: none",
@@ -158,7 +164,7 @@ def unfixed(pose: Floats, target: PartSurface, points: Floats, band: float) -> t
     return ()
 
 
-def in_words(choice: Choice, target: PartSurface) -> tuple[str, ...]:
+def describe_choice(choice: Choice, target: PartSurface) -> tuple[str, ...]:
     """What a user should know about the other poses; nothing where there are none."""
     notes: list[str] = []
     if choice.axis is not None:
@@ -173,9 +179,9 @@ def in_words(choice: Choice, target: PartSurface) -> tuple[str, ...]:
             "listed as alternatives"
         )
     if len(choice.others):
-        surface = surface_cloud(target.mesh, 5000, np.random.default_rng(0)).points
+        surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
         motions = choice.others @ np.linalg.inv(choice.pose)
-        apart = max(float((np.abs(target.closest(moved(D, surface))[0]) > choice.band).mean()) for D in motions)
+        apart = max(float((np.abs(target.closest(move_points(D, surface))[0]) > choice.band).mean()) for D in motions)
         if apart > 0.002:
             notes.append(
                 f"these ways are not all symmetries of the part (up to {apart:.1%} of its surface differs): "

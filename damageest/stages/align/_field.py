@@ -58,7 +58,7 @@ class PlaneGrid:
     distance: Singles
 
     @classmethod
-    def of(cls, target: PartSurface, margin: float = 0.12) -> PlaneGrid:
+    def build(cls, target: PartSurface, margin: float = 0.12) -> PlaneGrid:
         low, high = target.mesh.bounds + np.array([[-margin], [margin]])
         cell = float(np.prod(high - low) / CELLS) ** (1 / 3)
         shape = np.ceil((high - low) / cell).astype(int)

@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.stages.align._field import PartSurface
-from damageest.stages.align._search import motion
+from damageest.stages.align._search import make_motion
 
 REACH = 3.5
 """Where the kernel ends, in standard deviations of the points off the surface."""
@@ -28,7 +28,7 @@ class Fit:
     residue: float
 
 
-def moved(pose: Floats, points: Floats) -> Floats:
+def move_points(pose: Floats, points: Floats) -> Floats:
     return points @ pose[:3, :3].T + pose[:3, 3]
 
 
@@ -42,7 +42,7 @@ def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: f
     narrowest = max(REACH * noise, 2e-5)
     step = residue = drift = np.inf
     for turn in range(rounds):
-        at = moved(pose, points)
+        at = move_points(pose, points)
         if drift > STALE * band:
             distance, foot, face = target.closest(at)
             if turn == 0:  # the pose will not move by more than a few bands: what is farther off need not be seen again
@@ -59,8 +59,8 @@ def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: f
         deviation = 1.4826 * float(np.median(np.abs(distance[within])))
         normal = normals[within]
         weight = (1 - (distance[within] / band) ** 2) ** 2
-        twist, jacobian = gauss_newton(at[within], normal, weight, offset[within])
-        pose = motion(twist[None])[0] @ pose
+        twist, jacobian = solve_gauss_newton(at[within], normal, weight, offset[within])
+        pose = make_motion(twist[None])[0] @ pose
         step = float(np.hypot(np.linalg.norm(twist[:3]) / 2, np.linalg.norm(twist[3:])))
         drift += step
         residue = float(np.sqrt(np.average((jacobian @ twist) ** 2, weights=weight + 1e-12)))
@@ -71,7 +71,7 @@ def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: f
     return Fit(pose, max(band, narrowest), residue)
 
 
-def gauss_newton(at: Floats, normals: Floats, weight: Floats, offset: Floats) -> tuple[Floats, Floats]:
+def solve_gauss_newton(at: Floats, normals: Floats, weight: Floats, offset: Floats) -> tuple[Floats, Floats]:
     """The twist (6,) that brings points (N,3) nearest to planes, from whose ``normals`` (N,3) and ``offset`` (N,) of
     the points, each with its ``weight`` (N,); and what each point's offset gains by it (N,6)."""
     jacobian = np.column_stack([np.cross(at, normals), normals])
@@ -81,7 +81,7 @@ def gauss_newton(at: Floats, normals: Floats, weight: Floats, offset: Floats) ->
     return np.asarray(-np.linalg.solve(hessian, jacobian.T @ (weight * offset))), jacobian
 
 
-def loss(distance: Floats, band: float) -> Floats:
+def robust_cost(distance: Floats, band: float) -> Floats:
     """What each point of signed ``distance`` costs: 0 on the surface, 1 beyond the band inside (damage explains it),
     up to 2 outside (nothing does)."""
     return np.minimum((distance / band) ** 2, 1) + np.clip((distance - band) / (2 * band), 0, 1)

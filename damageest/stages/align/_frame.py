@@ -18,7 +18,7 @@ FEWEST = 200
 Rows = tuple[float, float, float, float]
 
 
-def _rigid(rows: tuple[Rows, Rows, Rows, Rows]) -> tuple[Rows, Rows, Rows, Rows]:
+def _check_rigid(rows: tuple[Rows, Rows, Rows, Rows]) -> tuple[Rows, Rows, Rows, Rows]:
     T = np.array(rows)
     if not np.isfinite(T).all() or np.abs(T[3] - [0, 0, 0, 1]).max() > 1e-9:
         raise ValueError("not a pose: its numbers must be finite and its last row 0, 0, 0, 1")
@@ -29,7 +29,7 @@ def _rigid(rows: tuple[Rows, Rows, Rows, Rows]) -> tuple[Rows, Rows, Rows, Rows]
     return rows
 
 
-Rigid = Annotated[tuple[Rows, Rows, Rows, Rows], AfterValidator(_rigid)]
+Rigid = Annotated[tuple[Rows, Rows, Rows, Rows], AfterValidator(_check_rigid)]
 """A 4x4 pose as an option: four rows of four numbers, checked to be rigid."""
 
 
@@ -44,7 +44,7 @@ class Frame:
     middle: Floats
 
     @classmethod
-    def of(cls, scan: Scan, part: Part) -> Frame:
+    def build(cls, scan: Scan, part: Part) -> Frame:
         """Raises StageError for a scan of too few or non-finite points, or of a size that cannot be the part's."""
         from damageest.geometry.units import diagnose_scale
 
@@ -61,18 +61,18 @@ class Frame:
         middle = np.median(scan.points[:: max(1, len(scan.points) // 100_000)], axis=0)
         return cls(PartSurface(Mesh((part.vertices - centre) / size, part.faces)), size, centre, middle)
 
-    def points(self, scan: Scan) -> Floats:
+    def scale_points(self, scan: Scan) -> Floats:
         return (scan.points - self.middle) / self.size
 
-    def given(self, T: Floats) -> Floats:
+    def scale_pose(self, T: Floats) -> Floats:
         """A pose (4,4) of the job's frames as one of the scaled ones."""
         pose = np.eye(4)
         pose[:3, :3] = T[:3, :3]
         pose[:3, 3] = (T[:3, 3] + T[:3, :3] @ self.middle - self.centre) / self.size
         return pose
 
-    def result(self, pose: Floats) -> Floats:
-        """The reverse of `given`, with the rotation made exactly one (products of many steps drift)."""
+    def unscale_pose(self, pose: Floats) -> Floats:
+        """The reverse of `scale_pose`, with the rotation made exactly one (products of many steps drift)."""
         u, _, v = np.linalg.svd(pose[:3, :3])
         T = np.eye(4)
         T[:3, :3] = u @ v

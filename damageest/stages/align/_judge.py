@@ -9,8 +9,8 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.errors import StageError
 from damageest.stages.align._field import PartSurface
-from damageest.stages.align._fine import Fit, moved
-from damageest.stages.align._points import strided, surface_cloud
+from damageest.stages.align._fine import Fit, move_points
+from damageest.stages.align._points import draw_strided, orient_surface
 
 LEAST, LEAST_WITH_COVER, COVER = 0.38, 0.15, 0.45
 """The share of the scanned area that must lie on the part; less will do where that much of the part's surface is
@@ -33,7 +33,7 @@ class Verdict:
     inliers: float
 
     @property
-    def sound(self) -> bool:
+    def is_acceptable(self) -> bool:
         return self.on >= LEAST or (self.on >= LEAST_WITH_COVER and self.cover >= COVER)
 
     def refuse(self, remedy: str) -> StageError:
@@ -54,16 +54,16 @@ def judge(target: PartSurface, best: Fit, even: Floats, raw: Floats, tolerance: 
 
     band = max(tolerance, min(best.band, 0.004))
     rng = np.random.default_rng(0)
-    even, raw = (points[strided(len(points), COUNTED, rng)] for points in (even, raw))
-    at = moved(best.pose, even)
+    even, raw = (points[draw_strided(len(points), COUNTED, rng)] for points in (even, raw))
+    at = move_points(best.pose, even)
     distance = target.closest(at)[0]
     on = np.abs(distance) <= band
-    surface = surface_cloud(target.mesh, 5000, np.random.default_rng(0)).points
+    surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
     cover = 0.0
     if on.sum() > 10:
         gap = 3 * float(np.sqrt(target.mesh.area / len(even)))
         cover = float(np.isfinite(cKDTree(at[on]).query(surface, distance_upper_bound=max(gap, 0.02))[0]).mean())
-    loose = target.closest(moved(best.pose, raw))[0]
+    loose = target.closest(move_points(best.pose, raw))[0]
     hit = np.abs(loose) <= band
     rms = float(np.sqrt((loose[hit] ** 2).mean())) if hit.any() else float("inf")
     return Verdict(

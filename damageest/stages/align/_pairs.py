@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
-from damageest.stages.align._points import OrientedPoints, by_direction
+from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
 MODEL_POINTS, MODEL_PAIRS = 1600, 1_600_000
 SCAN_POINTS, SCAN_PAIRS, KEPT_PAIRS = 1200, 40_000, 6000
@@ -21,15 +21,15 @@ BINS = (26, 18, 18, 24)
 """Of the distance (0 to 1, in diagonals), the two angles with the line, the angle round the line."""
 
 
-def candidates(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: np.random.Generator) -> Floats:
+def propose_poses(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: np.random.Generator) -> Floats:
     """About ``wanted`` poses (H,4,4) from scan to part, of which some are near the true one.
 
     Where the scan's normals have no sign, every pair is tried with both signs at either end.
     """
-    part_points = by_direction(part, MODEL_POINTS, rng)
-    scan_points = by_direction(scan, SCAN_POINTS, rng)
+    part_points = draw_by_direction(part, MODEL_POINTS, rng)
+    scan_points = draw_by_direction(scan, SCAN_POINTS, rng)
     i, j = rng.integers(0, len(part_points.points), (2, MODEL_PAIRS))
-    key, good = _keys(part_points, i, j, np.ones(MODEL_PAIRS), np.ones(MODEL_PAIRS))
+    key, good = _hash_pairs(part_points, i, j, np.ones(MODEL_PAIRS), np.ones(MODEL_PAIRS))
     i, j, key = i[good], j[good], key[good]
     # sorted together with its number, which is much faster than sorting numbers by key
     order = np.sort(key * MODEL_PAIRS + np.arange(len(key))) % MODEL_PAIRS
@@ -38,7 +38,7 @@ def candidates(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: np.
     p, q = rng.integers(0, len(scan_points.points), (2, SCAN_PAIRS))
     ones = np.ones(SCAN_PAIRS)
     signs = [(1, 1)] if scan.signed else [(1, 1), (1, -1), (-1, 1), (-1, -1)]
-    tried = [(p, q, ones * a, ones * b, *_keys(scan_points, p, q, ones * a, ones * b)) for a, b in signs]
+    tried = [(p, q, ones * a, ones * b, *_hash_pairs(scan_points, p, q, ones * a, ones * b)) for a, b in signs]
     p, q, a, b, wish, good = (np.concatenate(column) for column in zip(*tried, strict=True))
     first, last = np.searchsorted(key, wish, "left"), np.searchsorted(key, wish, "right")
     count = np.where(good, last - first, 0)
@@ -55,15 +55,15 @@ def candidates(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: np.
 
     ones, ends = np.ones(len(match)), (p[chosen], q[chosen], a[chosen], b[chosen])
     cosine = np.einsum("ij,ij->i", scan_points.normals[ends[0]], scan_points.normals[ends[1]]) * ends[2] * ends[3]
-    scan_frame, scan_origin = _frames(scan_points, *ends, cosine)
-    part_frame, part_origin = _frames(part_points, i[match], j[match], ones, ones, cosine)
+    scan_frame, scan_origin = _build_frames(scan_points, *ends, cosine)
+    part_frame, part_origin = _build_frames(part_points, i[match], j[match], ones, ones, cosine)
     poses = np.tile(np.eye(4), (len(chosen), 1, 1))
     poses[:, :3, :3] = part_frame @ np.swapaxes(scan_frame, 1, 2)
     poses[:, :3, 3] = part_origin - np.einsum("hij,hj->hi", poses[:, :3, :3], scan_origin)
     return poses
 
 
-def _keys(cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, NDArray[np.bool_]]:
+def _hash_pairs(cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, NDArray[np.bool_]]:
     """The hash (M,) of each pair's four figures, and whether they are well defined. ``a``, ``b``: signs of normals."""
     points, normals = cloud.points.astype(np.float32), cloud.normals.astype(np.float32)
     line = points[j] - points[i]
@@ -95,7 +95,9 @@ def _keys(cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats) -> tupl
     return every, good
 
 
-def _frames(cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats, cosine: Floats) -> tuple[Floats, Floats]:
+def _build_frames(
+    cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats, cosine: Floats
+) -> tuple[Floats, Floats]:
     """A right-handed frame (M,3,3), columns the axes, and an origin (M,3) that move with the pair.
 
     From the two normals where they differ enough by ``cosine`` (M,), since they are better known than the line; else
@@ -105,12 +107,12 @@ def _frames(cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats, cosin
     line = cloud.points[j] - cloud.points[i]
     alike = np.abs(cosine) > 0.85
     parallel = n + np.where(cosine < 0, -1.0, 1.0)[:, None] * m
-    x = _unit(np.where(alike[:, None], parallel, n + m))
+    x = _normalise(np.where(alike[:, None], parallel, n + m))
     y = np.where(alike[:, None], line, n - m)
-    y = _unit(y - np.einsum("ij,ij->i", x, y)[:, None] * x)
+    y = _normalise(y - np.einsum("ij,ij->i", x, y)[:, None] * x)
     return np.stack([x, y, np.cross(x, y)], axis=2), (cloud.points[i] + cloud.points[j]) / 2
 
 
-def _unit(v: Floats) -> Floats:
+def _normalise(v: Floats) -> Floats:
     unit: Floats = v / np.maximum(np.linalg.norm(v, axis=1), 1e-12)[:, None]
     return unit

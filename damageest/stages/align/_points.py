@@ -26,7 +26,7 @@ class OrientedPoints:
         return OrientedPoints(self.points[index], self.normals[index], self.signed)
 
 
-def strided(count: int, wanted: int, rng: np.random.Generator) -> Ints:
+def draw_strided(count: int, wanted: int, rng: np.random.Generator) -> Ints:
     """About ``wanted`` of ``count`` indices, one drawn from each of as many equal stretches."""
     if wanted >= count:
         return np.arange(count)
@@ -34,7 +34,7 @@ def strided(count: int, wanted: int, rng: np.random.Generator) -> Ints:
     return np.minimum((edges[:-1] + rng.random(wanted) * np.diff(edges)).astype(np.int64), count - 1)
 
 
-def spread(points: Floats, weights: Floats, wanted: int, rng: np.random.Generator) -> Ints:
+def draw_spread(points: Floats, weights: Floats, wanted: int, rng: np.random.Generator) -> Ints:
     """Draws about ``wanted`` indices with chance proportional to ``weights`` (N,), evenly in space.
 
     Systematic sampling along a Morton curve: neighbours in the curve are neighbours in space, so equal steps of the
@@ -54,7 +54,7 @@ def spread(points: Floats, weights: Floats, wanted: int, rng: np.random.Generato
     return np.unique(order[np.minimum(np.searchsorted(total, at), len(order) - 1)])
 
 
-def scan_cloud(
+def orient_scan(
     points: Floats, normals: Floats | None, noise: float, wanted: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats, OrientedPoints]:
     """The dense subset (D,3), the weight of each of its points (D,), and about ``wanted`` oriented points.
@@ -66,7 +66,7 @@ def scan_cloud(
     """
     from scipy.spatial import cKDTree
 
-    index = strided(len(points), DENSE, rng)
+    index = draw_strided(len(points), DENSE, rng)
     every = points[index]
     tree = cKDTree(every)
     # neighbours among all of them, but of every second only where they are many
@@ -76,7 +76,7 @@ def scan_cloud(
     typical = float(np.median(reach))
     weights = np.where(reach < 5 * typical, np.minimum(reach, 2.5 * typical) ** 2, 0.0)
 
-    chosen = spread(dense, weights, wanted, rng)
+    chosen = draw_spread(dense, weights, wanted, rng)
     radius = float(np.clip(max(8 * noise, 2.5 * typical), 0.006, 0.03))
     near = np.asarray(tree.query(dense[chosen], k=min(64, len(every)), distance_upper_bound=radius, workers=-1)[1])
     there = near < len(every)
@@ -94,14 +94,14 @@ def scan_cloud(
     return dense, weights, OrientedPoints(dense[chosen][keep], direction[keep], normals is not None)
 
 
-def surface_cloud(part: Mesh, wanted: int, rng: np.random.Generator) -> OrientedPoints:
+def orient_surface(part: Mesh, wanted: int, rng: np.random.Generator) -> OrientedPoints:
     """``wanted`` points spread over a mesh by area, with the normals of their faces."""
     points, face = sample_by_area(part, wanted, rng)
     normal = part.cross[face]
     return OrientedPoints(points, normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None], True)
 
 
-def by_direction(cloud: OrientedPoints, wanted: int, rng: np.random.Generator) -> OrientedPoints:
+def draw_by_direction(cloud: OrientedPoints, wanted: int, rng: np.random.Generator) -> OrientedPoints:
     """``wanted`` points of a cloud, rare directions of the normal over-represented: a plate's rim says more about its
     pose than another thousand points on its faces."""
     count = 128
@@ -111,4 +111,4 @@ def by_direction(cloud: OrientedPoints, wanted: int, rng: np.random.Generator) -
     match = cloud.normals @ compass.T
     nearest = np.argmax(match if cloud.signed else np.abs(match), axis=1)
     weights = 1 / np.sqrt(np.bincount(nearest, minlength=count)[nearest])
-    return cloud.take(spread(cloud.points, weights, wanted, rng))
+    return cloud.take(draw_spread(cloud.points, weights, wanted, rng))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
 from damageest.stages.align._field import PlaneGrid, Singles
-from damageest.stages.align._points import OrientedPoints, by_direction
+from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
 CHUNK = 2_000_000
 """Points looked up at a time, for the memory's sake."""
@@ -25,7 +25,7 @@ def score(poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float) ->
     step = max(1, CHUNK // len(scan.points))
     for start in range(0, len(poses), step):
         part = slice(start, start + step)
-        _, offset, near, agree, distance = _look(poses[part], scan, field, band)
+        _, offset, near, agree, distance = _look_up(poses[part], scan, field, band)
         good = np.maximum(1 - (offset / band) ** 2, 0) * agree * near
         bad = np.clip((distance - band) / (2 * band), 0, 1)
         result[part] = (good - 0.7 * bad).mean(1, dtype=np.float64)
@@ -42,7 +42,7 @@ def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats)
     for band in bands:
         for start in range(0, len(poses), step):
             part = slice(start, start + step)
-            moved, offset, near, agree, index = _look(poses[part], scan, field, float(band), planes=True)
+            moved, offset, near, agree, index = _look_up(poses[part], scan, field, float(band), planes=True)
             weight = np.maximum(1 - (offset / np.float32(band)) ** 2, 0) ** 2 * agree * near
             normal = field.plane[index][..., :3]
             jacobian = np.concatenate([np.cross(moved, normal), normal], axis=2)
@@ -50,11 +50,11 @@ def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats)
             hessian = (np.swapaxes(weighted, 1, 2) @ jacobian).astype(np.float64)
             gradient = (np.swapaxes(weighted, 1, 2) @ offset[..., None]).astype(np.float64)
             damping = 1e-3 * len(scan.points) * np.diag([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
-            poses[part] = motion(-np.linalg.solve(hessian + damping, gradient)[..., 0]) @ poses[part]
+            poses[part] = make_motion(-np.linalg.solve(hessian + damping, gradient)[..., 0]) @ poses[part]
     return poses
 
 
-def motion(twist: Floats) -> Floats:
+def make_motion(twist: Floats) -> Floats:
     """Rigid motions (H,4,4) by rotation vectors and translations (H,6)."""
     from scipy.spatial.transform import Rotation
 
@@ -64,7 +64,7 @@ def motion(twist: Floats) -> Floats:
     return result
 
 
-def distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:
+def select_distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:
     """Indices of the best ``wanted`` poses, none within ``apart`` of a better one, best first.
 
     The distance of two poses is the rms over the corners of a cube as large as the part.
@@ -83,7 +83,7 @@ def distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:
     return np.array(chosen, np.int64)
 
 
-def _look(
+def _look_up(
     poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float, planes: bool = False
 ) -> tuple[Singles, Singles, NDArray[np.bool_], Singles, NDArray[Any]]:
     """Moved points (H,M,3), their offsets from the nearest plane, whether that plane is near, how well the normals
@@ -102,11 +102,11 @@ def _look(
 
 def search(poses: Floats, scan: OrientedPoints, field: PlaneGrid, rng: np.random.Generator) -> Floats:
     """The at most 80 poses (K,4,4), best first, that are left of the rough ones (H,4,4) after refining."""
-    few, some, many = (by_direction(scan, count, rng) for count in (100, 250, 600))
+    few, some, many = (draw_by_direction(scan, count, rng) for count in (100, 250, 600))
     poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:3000]]
     poses = refine(poses, few, field, np.array([0.06, 0.05, 0.04, 0.03]))
-    poses = poses[distinct(poses, score(poses, some, field, 0.03), 0.03, 400)]
+    poses = poses[select_distinct(poses, score(poses, some, field, 0.03), 0.03, 400)]
     poses = refine(poses, some, field, np.geomspace(0.04, 0.012, 5))
-    poses = poses[distinct(poses, score(poses, many, field, 0.012), 0.015, 80)]
+    poses = poses[select_distinct(poses, score(poses, many, field, 0.012), 0.015, 80)]
     poses = refine(poses, many, field, np.geomspace(0.015, 0.006, 5))
     return poses[np.argsort(-score(poses, many, field, 0.008), kind="stable")]

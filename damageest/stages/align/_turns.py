@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
-from damageest.stages.align._search import motion
+from damageest.stages.align._search import make_motion
 
 PARALLEL, NEAR = 0.995, 0.02
 
@@ -22,22 +22,24 @@ class Axis:
 
     def turns(self, angles: Floats) -> Floats:
         """Rotations (K,4,4) about the axis by angles (K,) in radians."""
-        result = motion(np.column_stack([angles[:, None] * self.direction, np.zeros((len(angles), 3))]))
+        result = make_motion(np.column_stack([angles[:, None] * self.direction, np.zeros((len(angles), 3))]))
         result[:, :3, 3] = self.point - np.einsum("kij,j->ki", result[:, :3, :3], self.point)
         return result
 
     def fixes(self, motions: Floats) -> NDArray[np.bool_]:
         """Which of the rigid motions (K,4,4) are turns about this axis, nearly (K,)."""
-        direction, angle, point, slide = _screw(motions)
-        same = (np.abs(direction @ self.direction) > PARALLEL) & (_gap(point, self.point, self.direction) < NEAR)
+        direction, angle, point, slide = _find_screw(motions)
+        same = (np.abs(direction @ self.direction) > PARALLEL) & (
+            _measure_gap(point, self.point, self.direction) < NEAR
+        )
         still = (angle < 0.05) & (np.linalg.norm(motions[:, :3, 3], axis=1) < NEAR)
         return np.asarray((same & (np.abs(slide) < NEAR) & (angle > 0.05)) | still)
 
 
-def common_axis(poses: Floats) -> Axis | None:
+def find_common_axis(poses: Floats) -> Axis | None:
     """The axis about which most of the poses (K,4,4) differ from the first by a turn; None where fewer than two do."""
     motions = poses[1:] @ np.linalg.inv(poses[0])
-    direction, angle, point, slide = _screw(motions)
+    direction, angle, point, slide = _find_screw(motions)
     turn = (angle > 0.1) & (np.abs(slide) < NEAR)
     direction, angle, point = direction[turn], angle[turn], point[turn]
     if len(direction) < 2:
@@ -54,7 +56,7 @@ def common_axis(poses: Floats) -> Axis | None:
     return Axis(scatter, middle - (middle @ scatter) * scatter)
 
 
-def families(poses: Floats, axis: Axis, wanted: int) -> list[int]:
+def group_turns(poses: Floats, axis: Axis, wanted: int) -> list[int]:
     """Indices of at most ``wanted`` poses, one of each set that turns about ``axis`` carry into one another."""
     heads: list[int] = []
     for index in range(len(poses)):
@@ -66,7 +68,7 @@ def families(poses: Floats, axis: Axis, wanted: int) -> list[int]:
     return heads
 
 
-def _screw(motions: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def _find_screw(motions: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Direction (K,3), angle (K,) in radians, the axis' point (K,3) nearest to the origin, slide (K,) along it."""
     from scipy.spatial.transform import Rotation
 
@@ -80,6 +82,6 @@ def _screw(motions: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return direction, angle, point, slide
 
 
-def _gap(point: Floats, other: Floats, direction: Floats) -> Floats:
+def _measure_gap(point: Floats, other: Floats, direction: Floats) -> Floats:
     across = point - other
     return np.asarray(np.linalg.norm(across - (across @ direction)[:, None] * direction, axis=1))

@@ -38,18 +38,18 @@ class Icp(Align):
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import Frame
         from damageest.stages.align._judge import judge
-        from damageest.stages.align._points import scan_cloud, spread
+        from damageest.stages.align._points import draw_spread, orient_scan
 
-        frame = Frame.of(scan, part)
+        frame = Frame.build(scan, part)
         noise = scan.noise / frame.size
         rng = np.random.default_rng(self.seed)
-        dense, weights, _ = scan_cloud(frame.points(scan), scan.normals, noise, 100, rng)
-        points = rng.permutation(dense[spread(dense, weights, 30_000, rng)])
-        start = frame.given(np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan))
+        dense, weights, _ = orient_scan(frame.scale_points(scan), scan.normals, noise, 100, rng)
+        points = rng.permutation(dense[draw_spread(dense, weights, 30_000, rng)])
+        start = frame.scale_pose(np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan))
         band = 0.03 if self.max_distance is None else self.max_distance / frame.size
         best = fit(frame.target, points, start, band, noise, self.iterations)
         verdict = judge(frame.target, best, points, dense, tolerance / frame.size)
-        if not verdict.sound:
+        if not verdict.is_acceptable:
             raise verdict.refuse(
                 "align: register needs no initial pose; or give a closer T_part_scan, or a larger max_distance "
                 f"(now {band * frame.size:.4g} {part.unit})"
@@ -61,4 +61,4 @@ class Icp(Align):
                 f"by {best.residue * frame.size:.3g} {part.unit} off the surface",
                 "raise iterations, or use align: register",
             )
-        return Pose(frame.result(best.pose), verdict.rms * frame.size, verdict.inliers)
+        return Pose(frame.unscale_pose(best.pose), verdict.rms * frame.size, verdict.inliers)

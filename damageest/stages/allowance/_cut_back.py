@@ -12,7 +12,7 @@ from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import BALANCE, subtract_lost, to_manifold, to_solid
-from damageest.stages.allowance._booleans import tidied
+from damageest.stages.allowance._booleans import tidy
 
 FINE, COARSE, COARSEST = 0.5, 0.75, 1.0
 """Edge of a lattice cell, in tolerances: for a cut-back of less than two tolerances, for a larger one, and as far as
@@ -29,7 +29,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
     inside = find_inner_faces(damage, part)
     if not inside.any():
         return damage
-    round_it = to_manifold(_within(damage, damage.faces[inside], part, inner, tolerance), origin)
+    round_it = to_manifold(_grow_within(damage, damage.faces[inside], part, inner, tolerance), origin)
     round_it = round_it.simplify(tolerance / 16)
     if others is not None:
         round_it -= to_manifold(others, origin)
@@ -48,7 +48,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
         if missing <= BALANCE * whole.volume():
             break
     missing, cavity = min(tried, key=lambda item: item[0])
-    solid = to_solid(tidied(cavity, part.diagonal), origin)
+    solid = to_solid(tidy(cavity, part.diagonal), origin)
     if solid is None or missing > 1e-3 * lost.volume():
         raise StageError(
             f"the cut-back does not add up: {missing:.3g} in volume is lost or counted twice",
@@ -57,7 +57,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
     return solid
 
 
-def _within(damage: Solid, faces: Any, part: Part, inner: float, tolerance: float) -> Solid:
+def _grow_within(damage: Solid, faces: Any, part: Part, inner: float, tolerance: float) -> Solid:
     """Everything within ``inner`` and a quarter of a tolerance of some faces of the damage volume, near the part."""
     from damageest.geometry.contour import MOST_NODES, extract_contour
 

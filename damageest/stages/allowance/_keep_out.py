@@ -12,8 +12,8 @@ import numpy as np
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import DamageestError, StageError
 from damageest.stages.allowance._selectors import Bar, KeepOut, Wanted
-from damageest.stages.allowance._skin import SkinFaces, sorted_skin
-from damageest.stages.allowance._stock import stock
+from damageest.stages.allowance._skin import SkinFaces, sort_skin
+from damageest.stages.allowance._stock import build_stock
 
 MOST_ENTERED = 1e-3
 """Share of a damage volume that may lie in a solid to keep free."""
@@ -21,7 +21,7 @@ SIDES = 256
 """Of a round bar: it is drawn around the true one, 0.01 % wider at its corners."""
 
 
-def kept_out(
+def build_keep_out(
     items: Sequence[KeepOut],
     skin: SkinFaces,
     filled: Any,
@@ -41,7 +41,7 @@ def kept_out(
     for number, item in enumerate(items):
         if not item.is_solid():
             continue
-        body = _body(item, part, origin)
+        body = _build_body(item, part, origin)
         entered = (body ^ filled).volume() / filled.volume()
         if entered > MOST_ENTERED:
             raise StageError(
@@ -51,34 +51,34 @@ def kept_out(
             )
         bodies.append(body)
     if wanted.free_skin():
-        bodies.append(stock(replace(skin, height=np.where(skin.free, reach, 0.0)), tolerance, drawn_in=0))
-        around = _around(skin, part, wanted, reach, origin)
+        bodies.append(build_stock(replace(skin, height=np.where(skin.free, reach, 0.0)), tolerance, drawn_in=0))
+        around = _take_skin_around(skin, part, wanted, reach, origin)
         if around is not None:
-            bodies.append(stock(replace(around, height=np.where(around.free, reach, 0.0)), tolerance, drawn_in=0))
+            bodies.append(build_stock(replace(around, height=np.where(around.free, reach, 0.0)), tolerance, drawn_in=0))
     return Manifold.batch_boolean(bodies, OpType.Add) if bodies else Manifold()
 
 
-def _around(skin: SkinFaces, part: Part, wanted: Wanted, reach: float, origin: Floats) -> SkinFaces | None:
+def _take_skin_around(skin: SkinFaces, part: Part, wanted: Wanted, reach: float, origin: Floats) -> SkinFaces | None:
     """The part's own skin near the damage."""
     corners = part.triangles - origin
     low, high = skin.vertices.min(axis=0) - 2 * reach, skin.vertices.max(axis=0) + 2 * reach
     near = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
-    return sorted_skin(part.vertices - origin, part.faces[near], part, wanted, origin) if near.any() else None
+    return sort_skin(part.vertices - origin, part.faces[near], part, wanted, origin) if near.any() else None
 
 
-def _body(item: KeepOut, part: Part, origin: Floats) -> Any:
+def _build_body(item: KeepOut, part: Part, origin: Floats) -> Any:
     from manifold3d import Manifold
 
     if item.box is not None:
         low, high = np.array(item.box) - origin
         return Manifold.cube(tuple(high - low)).translate(tuple(low))
     if item.cylinder is not None:
-        return _bar(item.cylinder, origin)
+        return _build_bar(item.cylinder, origin)
     assert item.mesh is not None
-    return _read(item.mesh, part, origin)
+    return _read_mesh(item.mesh, part, origin)
 
 
-def _bar(bar: Bar, origin: Floats) -> Any:
+def _build_bar(bar: Bar, origin: Floats) -> Any:
     from manifold3d import Manifold
 
     start, axis = np.array(bar.start) - origin, np.subtract(bar.end, bar.start)
@@ -91,7 +91,7 @@ def _bar(bar: Bar, origin: Floats) -> Any:
     return Manifold.cylinder(length, radius, radius, SIDES).transform(frame)
 
 
-def _read(path: Path, part: Part, origin: Floats) -> Any:
+def _read_mesh(path: Path, part: Part, origin: Floats) -> Any:
     from damageest.geometry.solids import to_manifold
     from damageest.io.parts import read_part
 

@@ -39,28 +39,28 @@ class Crowd:
         )
 
 
-def probes(skin: SkinFaces, seed: int = 11) -> tuple[Floats, NDArray[np.int64]]:
+def place_probes(skin: SkinFaces, seed: int = 11) -> tuple[Floats, NDArray[np.int64]]:
     """Points (N,3) spread over the skin and in the middle of its triangles, and the face of each."""
-    points, face = skin.sampled(SAMPLES, seed)
+    points, face = skin.sample(SAMPLES, seed)
     large = np.argsort(-skin.areas, kind="stable")[:SAMPLES]
     return np.concatenate([points, skin.triangles[large].mean(axis=1)]), np.concatenate([face, large])
 
 
-def crowded(skin: SkinFaces, part: Part, tolerance: float, origin: Floats) -> Crowd | None:
+def find_crowded(skin: SkinFaces, part: Part, tolerance: float, origin: Floats) -> Crowd | None:
     """Places where the stock meets an opposite wall of the part, or that wall's own stock; None where it has room.
     ``skin`` with what is wanted on it, relative to ``origin`` (3,)."""
 
-    wanted = skin.only(skin.height > 0)
+    wanted = skin.select(skin.height > 0)
     if not len(wanted.faces):
         return None
-    points, face = probes(wanted)
+    points, face = place_probes(wanted)
     normal, height = wanted.normal[face], wanted.height[face]
     most = float(height.max())
     away = 10 * ON * part.diagonal
     body = to_manifold(part, origin)
-    free, place, facing = _way(body, points + away * normal, normal, height + most)
+    free, place, facing = _measure_free_way(body, points + away * normal, normal, height + most)
     hit = np.flatnonzero(np.isfinite(free))
-    hit = hit[~_corner(points[hit], normal[hit], place[hit], facing[hit], part, tolerance, origin)]
+    hit = hit[~_is_corner(points[hit], normal[hit], place[hit], facing[hit], part, tolerance, origin)]
     if not len(hit):
         return None
     distance, opposite, _ = closest_on_mesh(place[hit], Mesh(wanted.vertices, wanted.faces))
@@ -72,7 +72,7 @@ def crowded(skin: SkinFaces, part: Part, tolerance: float, origin: Floats) -> Cr
     return Crowd(points[some] + origin, free[some] + away, height[some], other[short])
 
 
-def _corner(
+def _is_corner(
     points: Floats, normal: Floats, place: Floats, facing: Floats, part: Part, tolerance: float, origin: Floats
 ) -> NDArray[np.bool_]:
     """(N,) whether skin and wall are those of one concave corner: their planes meet on the part's surface. Between the
@@ -87,7 +87,7 @@ def _corner(
     return np.asarray(wide & (distance_to_mesh(meeting + origin, part) <= tolerance))
 
 
-def _way(body: Any, start: Floats, direction: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:
+def _measure_free_way(body: Any, start: Floats, direction: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:
     """The free way (N,) from each start to the first wall that faces it, inf where that is beyond reach or the first
     wall does not face it; the place (N,3) where it ends, and the wall's normal (N,3)."""
     free, place, facing = np.full(len(start), np.inf), np.zeros((len(start), 3)), np.zeros((len(start), 3))

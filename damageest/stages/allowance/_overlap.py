@@ -8,17 +8,17 @@ from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh, distance_to_edges
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.allowance._selectors import Wanted
-from damageest.stages.allowance._skin import ON, SkinFaces, clipped, sorted_skin
+from damageest.stages.allowance._skin import ON, SkinFaces, clip, sort_skin
 
 
-def grown(
+def grow_over_rim(
     skin: SkinFaces, part: Part, wanted: Wanted, overlap: float, tolerance: float, origin: Floats
 ) -> SkinFaces | None:
     """The part's skin within ``overlap`` of the rim, on both sides of it, as far as it hangs together with it; with the
     same stock as anywhere. None where there is nothing to run over."""
     from manifold3d import Manifold
 
-    rim = _rim(skin)
+    rim = _find_rim(skin)
     if not overlap or not len(rim):
         return None
     ends = skin.vertices[rim]
@@ -30,18 +30,18 @@ def grown(
     vertices, faces = to_arrays(near)
     value = overlap - distance_to_edges(vertices, skin.vertices, rim)
     close = (value[faces] > 0).any(axis=1)
-    vertices, faces, _, inside = clipped(vertices, faces[close], value)
+    vertices, faces, _, inside = clip(vertices, faces[close], value)
     faces = faces[inside]
     if not len(faces):
         return None
-    faces = _joined(vertices, faces, ends.mean(axis=1), part)
-    band = sorted_skin(vertices, faces, part, wanted, origin)
+    faces = _take_joined(vertices, faces, ends.mean(axis=1), part)
+    band = sort_skin(vertices, faces, part, wanted, origin)
     return band if (band.height > 0).any() else None
 
 
-def _rim(skin: SkinFaces) -> Ints:
+def _find_rim(skin: SkinFaces) -> Ints:
     """(E,2) edges where skin with stock meets intact skin: those that no other skin of the damage shares."""
-    border = skin.rims()
+    border = skin.find_rims()
     if not len(border):
         return border
     edges = np.sort(skin.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
@@ -50,7 +50,7 @@ def _rim(skin: SkinFaces) -> Ints:
     return np.asarray(border[np.isin(border @ [size, 1], tall @ [size, 1])])
 
 
-def _joined(vertices: Floats, faces: Ints, places: Floats, part: Part) -> Ints:
+def _take_joined(vertices: Floats, faces: Ints, places: Floats, part: Part) -> Ints:
     """Those faces that hang together, by their corners, with one that one of the places (M,3) lies on."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

@@ -29,14 +29,14 @@ def _has_length(value: Vector) -> Vector:
     return value
 
 
-def _ordered(value: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
+def _check_order(value: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
     if not (np.array(value[0]) < np.array(value[1])).all():
         raise ValueError("give the lowest corner first, then the highest; each coordinate of the second is larger")
     return value
 
 
 Direction = Annotated[Vector, AfterValidator(_has_length)]
-Corners = Annotated[tuple[Vector, Vector], AfterValidator(_ordered)]
+Corners = Annotated[tuple[Vector, Vector], AfterValidator(_check_order)]
 
 
 class Strict(BaseModel):
@@ -46,7 +46,7 @@ class Strict(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known(cls, value: Any) -> Any:
+    def _check_known(cls, value: Any) -> Any:
         keys = [field.alias or name for name, field in cls.model_fields.items()]
         if not isinstance(value, (dict, BaseModel)):
             raise ValueError(f"give a mapping with one or more of: {', '.join(keys)}")
@@ -122,9 +122,9 @@ class Selector(Strict):
             direction = np.array(self.facing.direction) / np.linalg.norm(self.facing.direction)
             meant &= normals @ direction >= np.cos(np.radians(self.facing.angle)) - 1e-12
         if self.faces:
-            meant &= np.isin(_brep(part, "faces")[parents], [_number(part, face) for face in self.faces])
+            meant &= np.isin(_require_brep(part, "faces")[parents], [_find_number(part, face) for face in self.faces])
         if self.kind is not None:
-            numbers = _brep(part, "kind")
+            numbers = _require_brep(part, "kind")
             kinds = np.array([kind if kind in ("plane", "cylinder") else "other" for kind in part.face_kinds])
             meant &= (kinds == self.kind)[numbers[parents]]
         return meant
@@ -205,7 +205,7 @@ class Wanted:
         return height
 
 
-def _brep(part: Part, option: str) -> Ints:
+def _require_brep(part: Part, option: str) -> Ints:
     if part.faces_brep is None:
         raise StageError(
             f"'{option}' picks CAD faces, and the part is a mesh, which has none",
@@ -214,7 +214,7 @@ def _brep(part: Part, option: str) -> Ints:
     return part.faces_brep
 
 
-def _number(part: Part, face: int | str) -> int:
+def _find_number(part: Part, face: int | str) -> int:
     """The number of a CAD face given by number or name."""
     assert part.faces_brep is not None
     count = max(int(part.faces_brep.max()) + 1, len(part.face_kinds))

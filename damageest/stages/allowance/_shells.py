@@ -13,7 +13,9 @@ SLIVER = 1e-9
 """Area of a triangle, in squares of the skin's extent, below which it does not matter which way it faces."""
 
 
-def shells(lows: Floats, tops: Floats, group: Ints, pairs: Ints, shared: NDArray[np.bool_]) -> tuple[list[Any], Ints]:
+def build_shells(
+    lows: Floats, tops: Floats, group: Ints, pairs: Ints, shared: NDArray[np.bool_]
+) -> tuple[list[Any], Ints]:
     """Manifolds between the skin and the top of its stock, one for each patch where that does not fold.
 
     Args:
@@ -32,7 +34,7 @@ def shells(lows: Floats, tops: Floats, group: Ints, pairs: Ints, shared: NDArray
     links = coo_array((np.ones(int(shared.sum())), (pairs[shared, 0], pairs[shared, 1])), shape=(count, count))
     size, patch = connected_components(links, directed=False)
     folded = np.zeros(size, bool)
-    folded[patch[_turned(lows, tops)]] = True
+    folded[patch[_turn(lows, tops)]] = True
     creases = pairs[~shared]
     folded[patch[creases[patch[creases[:, 0]] == patch[creases[:, 1]], 0]]] = True
     made, rest = [], [np.flatnonzero(folded[patch])]
@@ -43,7 +45,7 @@ def shells(lows: Floats, tops: Floats, group: Ints, pairs: Ints, shared: NDArray
         _, first, corner = np.unique(group.reshape(-1, 3)[faces], return_index=True, return_inverse=True)
         corner, used = corner.reshape(-1, 3), len(first)
         points = np.concatenate([lows[faces].reshape(-1, 3)[first], tops[faces].reshape(-1, 3)[first]])
-        a, b = _border(corner)
+        a, b = _find_border(corner)
         sides = [np.stack([a, b, b + used], 1), np.stack([a, b + used, a + used], 1)]
         triangles = np.concatenate([corner[:, ::-1], corner + used, *sides])
         body = Manifold(Mesh64(np.ascontiguousarray(points), np.ascontiguousarray(triangles, dtype=np.uint64)))
@@ -54,7 +56,7 @@ def shells(lows: Floats, tops: Floats, group: Ints, pairs: Ints, shared: NDArray
     return made, np.sort(np.concatenate(rest))
 
 
-def _turned(lows: Floats, tops: Floats) -> NDArray[np.bool_]:
+def _turn(lows: Floats, tops: Floats) -> NDArray[np.bool_]:
     """(F,) whether the upper triangle faces another way than the lower one, or is less than a tenth of it: the skin
     bends about as sharply as the stock is high."""
 
@@ -69,7 +71,7 @@ def _turned(lows: Floats, tops: Floats) -> NDArray[np.bool_]:
     return np.asarray(~sliver & (np.einsum("ij,ij->i", below, above) < 0.1 * size))
 
 
-def _border(corner: Ints) -> tuple[Ints, Ints]:
+def _find_border(corner: Ints) -> tuple[Ints, Ints]:
     """Start and end (B,) of the edges that only one triangle has, in its sense."""
     start, stop = corner.ravel(), corner[:, [1, 2, 0]].ravel()
     size = int(corner.max()) + 1

@@ -38,20 +38,20 @@ class SkinFaces:
         a, b, c = np.moveaxis(self.triangles, 1, 0)
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
-    def only(self, faces: NDArray[np.bool_]) -> SkinFaces:
+    def select(self, faces: NDArray[np.bool_]) -> SkinFaces:
         """The same skin with some of its faces."""
         return SkinFaces(
             self.vertices, self.faces[faces], self.parent[faces], self.normal[faces], self.height[faces],
             self.free[faces],
         )  # fmt: skip
 
-    def rims(self) -> Ints:
+    def find_rims(self) -> Ints:
         """(E,2) edges that only one face has."""
         edges = np.sort(np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]]), axis=1)
         unique, count = np.unique(edges, axis=0, return_counts=True)
         return np.asarray(unique[count == 1])
 
-    def sampled(self, count: int, seed: int) -> tuple[Floats, Ints]:
+    def sample(self, count: int, seed: int) -> tuple[Floats, Ints]:
         """``count`` random points (N,3), even by area, and the face (N,) of each."""
         rng = np.random.default_rng(seed)
         total = np.cumsum(self.areas)
@@ -63,27 +63,27 @@ class SkinFaces:
         return np.asarray(a * (1 - u) + b * u * (1 - v) + c * u * v), face
 
 
-def skin_of(body: Mesh, part: Part, wanted: Wanted, origin: Floats) -> SkinFaces:
+def take_skin(body: Mesh, part: Part, wanted: Wanted, origin: Floats) -> SkinFaces:
     """The faces of a solid in the part that lie on the part's surface, cut along the planes of the selectors and told
     apart by the stock wanted on them."""
-    return sorted_skin(body.vertices - origin, body.faces, part, wanted, origin)
+    return sort_skin(body.vertices - origin, body.faces, part, wanted, origin)
 
 
-def sorted_skin(vertices: Floats, faces: Ints, part: Part, wanted: Wanted, origin: Floats) -> SkinFaces:
+def sort_skin(vertices: Floats, faces: Ints, part: Part, wanted: Wanted, origin: Floats) -> SkinFaces:
     """Of a mesh relative to ``origin``, the faces that lie on the part, cut and told apart."""
-    on, parent = on_part(vertices, faces, part, origin)
+    on, parent = find_on_part(vertices, faces, part, origin)
     faces, parent = faces[on], parent[on]
     for normal, offset in wanted.planes(origin):
         value = vertices @ normal - offset
-        vertices, faces, kept, _ = clipped(vertices, faces, np.where(np.abs(value) < ON * part.diagonal, 0.0, value))
+        vertices, faces, kept, _ = clip(vertices, faces, np.where(np.abs(value) < ON * part.diagonal, 0.0, value))
         parent = parent[kept]
-    normal = unit(part.cross)[parent]
+    normal = normalise(part.cross)[parent]
     middle = vertices[faces].mean(axis=1) + origin
     height = wanted.heights(middle, normal, parent, part)
     return SkinFaces(vertices, faces, parent, normal, height, wanted.kept_free(middle, normal, parent, part))
 
 
-def on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> tuple[NDArray[np.bool_], Ints]:
+def find_on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> tuple[NDArray[np.bool_], Ints]:
     """Which faces (F,) lie on the part and face the same way, and the part's triangle (F,) below the middle of each."""
     # three points near the corners and the middle: a face of a cut may touch the skin along an edge
     weights = np.array([[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [1 / 3, 1 / 3, 1 / 3]])
@@ -98,7 +98,7 @@ def on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> tuple[
     return near & (sliver | (np.einsum("ij,ij->i", cross, part.cross[parent]) > 0)), parent
 
 
-def clipped(vertices: Floats, faces: Ints, value: Floats) -> tuple[Floats, Ints, Ints, NDArray[np.bool_]]:
+def clip(vertices: Floats, faces: Ints, value: Floats) -> tuple[Floats, Ints, Ints, NDArray[np.bool_]]:
     """Cuts triangles where a field (V,), linear on each, changes its sign. Neighbours stay joined.
 
     Returns:
@@ -138,6 +138,6 @@ def clipped(vertices: Floats, faces: Ints, value: Floats) -> tuple[Floats, Ints,
     return np.concatenate([vertices, fresh]), out, parent, positive
 
 
-def unit(vectors: Floats) -> Floats:
+def normalise(vectors: Floats) -> Floats:
     """(N,3) of length 1; 0 where there is none."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.stages.allowance._shells import shells
-from damageest.stages.allowance._skin import SkinFaces, unit
+from damageest.stages.allowance._shells import build_shells
+from damageest.stages.allowance._skin import SkinFaces, normalise
 
 SMOOTH = 30.0
 """Degrees between neighbouring triangles up to which they may share upper corners."""
@@ -41,29 +41,29 @@ class _Edges:
     at: Ints
 
 
-def stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: float = DRAWN_IN) -> Any:
+def build_stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: float = DRAWN_IN) -> Any:
     """A Manifold, relative to the skin's origin: stock of each face's height, and up to ``slack`` more. It reaches a
     little below the skin, for the caller to cut off. ``roomy``: no stock meets that of opposite skin; ``drawn_in``: how
     far inside the skin's border it begins, in slacks."""
     from manifold3d import Manifold, OpType
 
-    skin = _drawn_in(skin.only(skin.height > 0), drawn_in * slack)
+    skin = _draw_in(skin.select(skin.height > 0), drawn_in * slack)
     if not len(skin.faces):
         return Manifold()
-    edges = _edges(skin)
+    edges = _find_edges(skin)
     height = skin.height + slack / 2
     group, up = _directions(skin, height, edges, slack / 2)
     sink = 1e-3 * slack
     corner = skin.triangles
     tops = corner + up[group].reshape(-1, 3, 3)
-    lows = corner - sink * unit(up)[group].reshape(-1, 3, 3)
+    lows = corner - sink * normalise(up)[group].reshape(-1, 3, 3)
     bodies: list[Any] = []
     rest = np.arange(len(corner))
     if roomy:
         shared = (group[edges.at[:, 0]] == group[edges.at[:, 1]]).all(axis=1)
-        bodies, rest = shells(lows, tops, group, np.stack([edges.first, edges.second], 1), shared)
+        bodies, rest = build_shells(lows, tops, group, np.stack([edges.first, edges.second], 1), shared)
     clouds = list(np.concatenate([lows, tops], axis=1)[rest])
-    over_edges, ends, heads = _over_edges(skin, height, edges, group, tops)
+    over_edges, ends, heads = _build_over_edges(skin, height, edges, group, tops)
     clouds += over_edges
     for vertex in np.flatnonzero(np.bincount(ends, minlength=len(skin.vertices)) >= 2):
         mine = heads[ends == vertex].reshape(-1, 3)
@@ -71,13 +71,13 @@ def stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: float = D
     return Manifold.batch_boolean([*bodies, *(Manifold.hull_points(cloud) for cloud in clouds)], OpType.Add)
 
 
-def _drawn_in(skin: SkinFaces, by: float) -> SkinFaces:
+def _draw_in(skin: SkinFaces, by: float) -> SkinFaces:
     """The skin with its border moved inward."""
     start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
     size = len(skin.vertices)
     lone = np.flatnonzero(~np.isin(start * size + stop, stop * size + start))
     a, b = start[lone], stop[lone]
-    inward = unit(np.cross(skin.normal[lone // 3], skin.vertices[b] - skin.vertices[a]))
+    inward = normalise(np.cross(skin.normal[lone // 3], skin.vertices[b] - skin.vertices[a]))
     total, count = np.zeros_like(skin.vertices), np.zeros(size)
     for end in (a, b):
         np.add.at(total, end, inward)
@@ -88,7 +88,7 @@ def _drawn_in(skin: SkinFaces, by: float) -> SkinFaces:
     return replace(skin, vertices=skin.vertices + step)
 
 
-def _edges(skin: SkinFaces) -> _Edges:
+def _find_edges(skin: SkinFaces) -> _Edges:
     """Edges with exactly two faces, which run along them in opposite senses."""
     start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
     size = len(skin.vertices)
@@ -124,7 +124,7 @@ def _directions(skin: SkinFaces, height: Floats, edges: _Edges, slack: float) ->
         size, group = connected_components(links, directed=False)
         mean = np.zeros((size, 3))
         np.add.at(mean, group, (angle + 1e-9)[:, None] * skin.normal[owner])
-        mean = unit(mean)
+        mean = normalise(mean)
         least = np.ones(size)
         np.minimum.at(least, group, np.einsum("ij,ij->i", mean[group], skin.normal[owner]))
         return group.astype(np.int64), mean, least
@@ -149,17 +149,19 @@ def unit_rows(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
 
 
-def _over_edges(
+def _build_over_edges(
     skin: SkinFaces, height: Floats, edges: _Edges, group: Ints, tops: Floats
 ) -> tuple[list[Floats], Ints, Floats]:
     """Point clouds of the pieces over sharp convex edges; the vertex (2E,) at either end of each, and the cloud's upper
     points (2E,K,3) there, NaN where there are fewer."""
     n, m = skin.normal[edges.first], skin.normal[edges.second]
     outward = np.cross(skin.vertices[edges.b] - skin.vertices[edges.a], n)
-    turn = np.arctan2(np.einsum("ij,ij->i", m, unit(outward)), np.einsum("ij,ij->i", m, n))
+    turn = np.arctan2(np.einsum("ij,ij->i", m, normalise(outward)), np.einsum("ij,ij->i", m, n))
     parted = (group[edges.at[:, 0]] != group[edges.at[:, 1]]).any(axis=1)
     some = np.flatnonzero(parted & (turn > 1e-6))
-    mitres = _mitres(n[some], unit(outward)[some], turn[some], height[edges.first[some]], height[edges.second[some]])
+    mitres = _build_mitres(
+        n[some], normalise(outward)[some], turn[some], height[edges.first[some]], height[edges.second[some]]
+    )
     flat = tops.reshape(-1, 3)
     heads = []
     for end, vertex in enumerate((edges.a[some], edges.b[some])):
@@ -173,7 +175,7 @@ def _over_edges(
     return clouds, np.concatenate([edges.a[some], edges.b[some]]), np.concatenate(heads)
 
 
-def _mitres(n: Floats, outward: Floats, turn: Floats, tall: Floats, other: Floats) -> Floats:
+def _build_mitres(n: Floats, outward: Floats, turn: Floats, tall: Floats, other: Floats) -> Floats:
     """(E,ROUNDS,3) from an edge to the points of its mitres, NaN where there are fewer.
 
     ``n`` (E,3): normal of the first face; ``outward`` (E,3): from it across the edge; ``turn`` (E,): angle to the

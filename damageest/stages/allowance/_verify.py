@@ -14,7 +14,7 @@ from damageest.geometry.distance import distance_to_edges, distance_to_mesh, is_
 from damageest.geometry.solids import to_arrays
 from damageest.stages.allowance._limits import Crowd
 from damageest.stages.allowance._selectors import Mask
-from damageest.stages.allowance._skin import ON, SkinFaces, unit
+from damageest.stages.allowance._skin import ON, SkinFaces, normalise
 
 VOLUME = 1e-4
 """Share of its volume that a damage may stick out of its deposit, or a deposit into metal."""
@@ -57,18 +57,18 @@ def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -
     entered = (work.deposit ^ work.left).volume() / work.deposit.volume()
     if entered > VOLUME:
         raise StageError(f"{entered:.2%} of the deposit would lie in metal that is left", CLIPPED)
-    over, place = strayed(work, part, tolerance)
+    over, place = find_strayed(work, part, tolerance)
     if over > MISSED:
         near = ", ".join(f"{value:.4g}" for value in place)
         raise StageError(
             f"stock would stand over {over:.1%} of the skin round it that is to have none, as at ({near})",
             "a smaller outer there by targets, or keep_out",
         )
-    wanted = work.skin.only(work.skin.height > 0)
+    wanted = work.skin.select(work.skin.height > 0)
     if not len(wanted.faces):
         return None
-    found = thickness(work, wanted, part, crowds)
-    wrong = found.wrong(tolerance, ON * part.diagonal)
+    found = measure_thickness(work, wanted, part, crowds)
+    wrong = found.is_wrong(tolerance, ON * part.diagonal)
     if wrong.mean() > MISSED:
         worst = float(np.abs(found.thick - found.height)[wrong].max())
         raise StageError(
@@ -76,7 +76,7 @@ def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -
             "a larger tolerance, or a smaller outer",
         )
     # at the very border the way along the normal may lead out of the wall, which is no thickness of the stock
-    rims = wanted.rims()
+    rims = wanted.find_rims()
     inner = np.ones(len(found.thick), bool)
     if len(rims):
         inner = distance_to_edges(found.points, wanted.vertices, rims) > tolerance / 2
@@ -97,7 +97,7 @@ class Thickness:
     covered: Mask
     ended: Mask
 
-    def wrong(self, tolerance: float, rounding: float) -> Mask:
+    def is_wrong(self, tolerance: float, rounding: float) -> Mask:
         """(N,) where the stock is thinner than wanted, or more than a tolerance thicker; covered by other stock, it may
         be as thick as that one's mitre."""
         low = ~self.covered & (self.thick < self.height * (1 - 1e-6) - rounding)
@@ -105,12 +105,12 @@ class Thickness:
         return np.asarray(~self.ended & (low | (self.thick > bound)))
 
 
-def thickness(work: Worked, wanted: SkinFaces, part: Part, crowds: Sequence[Crowd]) -> Thickness:
+def measure_thickness(work: Worked, wanted: SkinFaces, part: Part, crowds: Sequence[Crowd]) -> Thickness:
     """Measured by rays along the normal of the skin with stock."""
     from scipy.spatial import cKDTree
 
     rounding = 10 * ON * part.diagonal
-    points, face = wanted.sampled(SAMPLES, seed=23)
+    points, face = wanted.sample(SAMPLES, seed=23)
     normal, height = wanted.normal[face], wanted.height[face]
     reach = 4 * float(height.max()) + part.diagonal
     far = np.zeros(len(points))
@@ -120,17 +120,17 @@ def thickness(work: Worked, wanted: SkinFaces, part: Part, crowds: Sequence[Crow
         # a feather edge may be left at once, before the stock begins
         far[k] = next((hit - rounding for hit in hits if hit > 2 * rounding), 0.0)
     ends = points + far[:, None] * normal
-    nearest = _to_stock(work, ends)
+    nearest = _measure_to_stock(work, ends)
     covered = nearest < far - rounding
-    ended = _near(ends, work.left, 10 * rounding) | _near(ends, work.kept_out, 10 * rounding)
-    ended |= _inside(ends, work.kept_out)
+    ended = _is_near(ends, work.left, 10 * rounding) | _is_near(ends, work.kept_out, 10 * rounding)
+    ended |= _is_inside(ends, work.kept_out)
     for crowd in crowds:
         away = np.asarray(cKDTree(crowd.points - work.origin).query(points, workers=2)[0])
         ended |= away <= 2 * height
     return Thickness(points, height, np.where(covered, nearest, far), covered, ended)
 
 
-def strayed(work: Worked, part: Part, tolerance: float) -> tuple[float, Floats]:
+def find_strayed(work: Worked, part: Part, tolerance: float) -> tuple[float, Floats]:
     """The share of sampled skin without stock, of the damage and of the part round it, that the deposit stands over all
     the same, and one such place (3,) in the part's frame. Skin nearer to skin with stock than that is high does not
     count: in a concave corner the stock leans on it."""
@@ -138,38 +138,38 @@ def strayed(work: Worked, part: Part, tolerance: float) -> tuple[float, Floats]:
     corners = part.triangles - work.origin
     low, high = work.skin.vertices.min(axis=0) - 2 * most, work.skin.vertices.max(axis=0) + 2 * most
     near = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
-    normal = unit(part.cross)[near]
+    normal = normalise(part.cross)[near]
     zero = np.zeros(len(near))
     around = SkinFaces(part.vertices - work.origin, part.faces[near], near, normal, zero, zero > 0)
-    points, face = around.sampled(SAMPLES, seed=29)
+    points, face = around.sample(SAMPLES, seed=29)
     normal = normal[face]
-    bare = _to_stock(work, points) > most
+    bare = _measure_to_stock(work, points) > most
     points, normal = points[bare], normal[bare]
     if not len(points):
         return 0.0, work.origin
     places = np.concatenate([points + share * most * normal for share in (0.05, 0.3, 0.8)])
-    over = _inside(places, work.deposit).reshape(3, -1).any(axis=0)
+    over = _is_inside(places, work.deposit).reshape(3, -1).any(axis=0)
     return float(over.mean()), work.origin + points[over.argmax()]
 
 
-def _to_stock(work: Worked, points: Floats) -> Floats:
+def _measure_to_stock(work: Worked, points: Floats) -> Floats:
     """(N,) distance to the nearest skin with stock."""
     found = np.full(len(points), np.inf)
     for skin in work.skins():
-        tall = skin.only(skin.height > 0)
+        tall = skin.select(skin.height > 0)
         if len(tall.faces):
             found = np.minimum(found, distance_to_mesh(points, Mesh(tall.vertices, tall.faces)))
     return found
 
 
-def _inside(points: Floats, body: Any) -> Mask:
+def _is_inside(points: Floats, body: Any) -> Mask:
     """(N,) by winding number."""
     if body.is_empty() or not len(points):
         return np.zeros(len(points), bool)
     return is_inside(points, Mesh(*to_arrays(body)))
 
 
-def _near(points: Floats, body: Any, reach: float) -> Mask:
+def _is_near(points: Floats, body: Any, reach: float) -> Mask:
     if body.is_empty():
         return np.zeros(len(points), bool)
     return distance_to_mesh(points, Mesh(*to_arrays(body))) <= reach

@@ -60,13 +60,13 @@ class Milling(Allowance):
         from manifold3d import Manifold
 
         from damageest.geometry.solids import subtract_lost, to_manifold
-        from damageest.stages.allowance._booleans import apart, joined, tidied, touching
+        from damageest.stages.allowance._booleans import draw_apart, join, take_touching, tidy
         from damageest.stages.allowance._cut_back import cut_back
-        from damageest.stages.allowance._keep_out import kept_out
-        from damageest.stages.allowance._limits import crowded
-        from damageest.stages.allowance._overlap import grown
-        from damageest.stages.allowance._skin import skin_of
-        from damageest.stages.allowance._stock import stock
+        from damageest.stages.allowance._keep_out import build_keep_out
+        from damageest.stages.allowance._limits import find_crowded
+        from damageest.stages.allowance._overlap import grow_over_rim
+        from damageest.stages.allowance._skin import take_skin
+        from damageest.stages.allowance._stock import build_stock
         from damageest.stages.allowance._verify import Worked, check
 
         origin: Floats = part.bounds.mean(axis=0)
@@ -74,24 +74,24 @@ class Milling(Allowance):
         cavity = cut_back(damage, part, others, self.inner, tolerance) if self.inner else damage
         filled, whole = to_manifold(cavity, origin), to_manifold(part, origin)
         left = subtract_lost(whole, filled)
-        skin = skin_of(cavity, part, wanted, origin)
+        skin = take_skin(cavity, part, wanted, origin)
         reach = wanted.most + tolerance
-        barred = kept_out(self.keep_out, skin, filled, part, wanted, reach, origin, tolerance)
-        band = grown(skin, part, wanted, self.overlap, tolerance, origin)
+        barred = build_keep_out(self.keep_out, skin, filled, part, wanted, reach, origin, tolerance)
+        band = grow_over_rim(skin, part, wanted, self.overlap, tolerance, origin)
         skins = [skin] if band is None else [skin, band]
-        crowds = [crowd for each in skins if (crowd := crowded(each, part, tolerance, origin)) is not None]
+        crowds = [crowd for each in skins if (crowd := find_crowded(each, part, tolerance, origin)) is not None]
         if crowds and self.crowded == "refuse":
             raise StageError(str(crowds[0]), "a smaller outer there by targets, keep_out, or crowded: clip")
-        proud = sum((stock(each, tolerance / 2, roomy=not crowds) for each in skins), Manifold())
-        proud = tidied(proud, part.diagonal)
+        proud = sum((build_stock(each, tolerance / 2, roomy=not crowds) for each in skins), Manifold())
+        proud = tidy(proud, part.diagonal)
         for body in (left, barred):
             within = proud ^ body
             # crumbs of rounding, cut off, would leave lines where the stock touches what it stands on and no more
             if within.volume() > CRUMBS * proud.volume():
                 proud = subtract_lost(proud, within)
-        deposit = tidied(joined(filled, touching(proud, filled, tolerance)), part.diagonal)
+        deposit = tidy(join(filled, take_touching(proud, filled, tolerance)), part.diagonal)
         thickness = check(Worked(deposit, filled, left, barred, skin, band, origin), part, tolerance, crowds)
-        body = apart(deposit, origin, DRAWN_IN * tolerance)
+        body = draw_apart(deposit, origin, DRAWN_IN * tolerance)
         if body is None:
             raise StageError("the deposit came out empty", "a slightly different outer")
         notes = [f"{crowd}; clipped there" for crowd in crowds[:1]]
@@ -104,12 +104,12 @@ class Milling(Allowance):
             stock_volume=max(body.volume - cavity.volume, 0.0),
             cut_back_volume=max(cavity.volume - damage.volume, 0.0),
             thickness=thickness,
-            touched=() if part.faces_brep is None else _touched(part, skins),
+            touched=() if part.faces_brep is None else _find_touched(part, skins),
             notes=tuple(notes),
         )
 
 
-def _touched(part: Part, skins: list[Any]) -> tuple[int, ...]:
+def _find_touched(part: Part, skins: list[Any]) -> tuple[int, ...]:
     """The CAD faces that stock stands on."""
     assert part.faces_brep is not None
     parents = np.concatenate([skin.parent[skin.height > 0] for skin in skins])

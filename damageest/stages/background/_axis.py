@@ -12,16 +12,16 @@ from damageest.artefacts import Floats
 Vector = tuple[float, float, float]
 
 
-def _not_zero(value: Vector | str) -> Vector | str:
+def _check_not_zero(value: Vector | str) -> Vector | str:
     if not isinstance(value, str) and not any(value):
         raise ValueError("an axis needs a direction: not all three numbers may be 0")
     return value
 
 
-Axis = Annotated[Literal["auto", "x", "y", "z"] | Vector, AfterValidator(_not_zero)]
+Axis = Annotated[Literal["auto", "x", "y", "z"] | Vector, AfterValidator(_check_not_zero)]
 
 
-def along(points: Floats, axis: Axis) -> tuple[Floats, Floats, float]:
+def fit_axis(points: Floats, axis: Axis) -> tuple[Floats, Floats, float]:
     """(frame, centre, radius): the rows of ``frame`` (3,3) are two cross directions and the axis, ``centre`` (2,) and
     ``radius`` the smallest circle round the points (N,3) seen along it. ``auto``: of the coordinate and principal axes
     the one whose cylinder round the points is smallest."""
@@ -52,7 +52,7 @@ def along(points: Floats, axis: Axis) -> tuple[Floats, Floats, float]:
     return best[1:]
 
 
-def hull_points(*sets: Floats) -> Floats:
+def take_hull_points(*sets: Floats) -> Floats:
     """The corners of the convex hull of several point sets."""
     from scipy.spatial import ConvexHull
 
@@ -60,6 +60,6 @@ def hull_points(*sets: Floats) -> Floats:
     return points[np.sort(ConvexHull(points).vertices)]
 
 
-def segments(radius: float, by: float) -> int:
+def count_segments(radius: float, by: float) -> int:
     """Divisions of a circle whose chords stay within a tenth of ``by``."""
     return int(np.clip(8 * np.ceil(np.pi / np.arccos(max(1 - 0.1 * by / radius, 0.5)) / 8), 16, 512))

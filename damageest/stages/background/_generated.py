@@ -40,25 +40,25 @@ class Generated(Background, ABC):
         check_surface(surface)
         by = max(self.clearance * tolerance, 1.5 * spacing)
         origin = (part.bounds[0] + part.bounds[1]) / 2
-        body = self.shape(part, surface, by, origin)
+        body = self.build_shape(part, surface, by, origin)
         if fine:
-            body = refined(body, self.edge * max(tolerance, 0.5 * spacing), self.subdivide)
+            body = refine_body(body, self.edge * max(tolerance, 0.5 * spacing), self.subdivide)
         solid = to_solid(body, origin)
         if solid is None:
             raise StageError("the background came out empty", "background: minkowski, or method: implicit")
         return check_holds(solid, np.concatenate([part.vertices, part.triangles.mean(axis=1)]), surface)
 
     @abstractmethod
-    def shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
+    def build_shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
         """A closed shape as a ``manifold3d.Manifold`` relative to ``origin`` (3,), at least ``by`` from the part."""
 
 
-def refined(body: Any, edge: float, how: Subdivision = "linear") -> Any:
+def refine_body(body: Any, edge: float, how: Subdivision = "linear") -> Any:
     """A Manifold with no edge longer than ``edge``, or than what some 400,000 triangles allow."""
     least = float(np.sqrt(8 * body.surface_area() / np.sqrt(3) / MOST_FACES))
     edge = max(edge, least)
     if how == "linear":
-        return _divided(body, edge)
+        return _divide(body, edge)
     vertices, faces = to_arrays(body)
     if how == "adaptive":
         # VTK's own adaptive subdivision leaves cracks beside slender triangles.
@@ -66,7 +66,7 @@ def refined(body: Any, edge: float, how: Subdivision = "linear") -> Any:
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(vertices, faces)
-    passes = int(np.ceil(np.log2(max(_longest(vertices[faces]) / edge, 1))))
+    passes = int(np.ceil(np.log2(max(_measure_longest(vertices[faces]) / edge, 1))))
     passes = min(passes, int(np.log(max(MOST_FACES / len(faces), 1)) / np.log(4)))
     mesh = mesh.subdivide(passes, subfilter=how) if passes else mesh
     try:
@@ -76,20 +76,20 @@ def refined(body: Any, edge: float, how: Subdivision = "linear") -> Any:
             f"subdivide: {how} does not leave this background closed ({error})", "subdivide: linear"
         ) from error
     # The smoothing kinds quarter all triangles alike: what is still too long on uneven ones is divided evenly.
-    return _divided(fine, edge)
+    return _divide(fine, edge)
 
 
-def _divided(body: Any, edge: float) -> Any:
+def _divide(body: Any, edge: float) -> Any:
     """A Manifold with its edges in equal parts. What lies across a slender triangle is divided by another pass."""
     for _ in range(PASSES):
         vertices, faces = to_arrays(body)
-        if _longest(vertices[faces]) <= edge:
+        if _measure_longest(vertices[faces]) <= edge:
             break
         body = body.refine_to_length(edge)
     return body
 
 
-def _longest(corners: Floats) -> float:
+def _measure_longest(corners: Floats) -> float:
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
 
 

@@ -19,7 +19,7 @@ class BoundingBox(Generated):
         2.0, gt=0, le=100, description="spacing of its vertices, in tolerances; more where that would make too many"
     )
 
-    def shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
+    def build_shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
         """The box."""
         from manifold3d import Manifold
 

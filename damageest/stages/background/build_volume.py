@@ -61,7 +61,7 @@ class BuildVolume(Background):
                 "another corner or size, in the part's frame",
             )
         reach = self.margin * max(tolerance, spacing)
-        low, high = _neighbourhood(surface, samples, intact, max(3 * tolerance, 3 * spacing), samples.spacing)
+        low, high = _find_neighbourhood(surface, samples, intact, max(3 * tolerance, 3 * spacing), samples.spacing)
         limit = np.round(size / cell).astype(np.int64)
         first = np.clip(np.floor((low - reach - corner) / cell).astype(np.int64), 0, limit)
         last = np.clip(np.ceil((high + reach - corner) / cell).astype(np.int64), 0, limit)
@@ -75,7 +75,7 @@ class BuildVolume(Background):
         return check_holds(solid, part.vertices[inside], surface)
 
 
-def _neighbourhood(
+def _find_neighbourhood(
     surface: Surface, samples: Samples, intact: Floats, reach: float, gap: float
 ) -> tuple[Floats, Floats]:
     """Lowest and highest corner of the damage surface and of the skin that is lost with it: all that hangs together

@@ -17,7 +17,7 @@ class Minkowski(Generated):
 
     use: Literal["minkowski"] = "minkowski"
 
-    def shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
+    def build_shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
         """The level of the distance. Raises StageError where its lattice would not fit in memory."""
         from damageest.geometry.contour import extract_contour
         from damageest.geometry.distance import signed_distance

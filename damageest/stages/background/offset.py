@@ -17,7 +17,7 @@ class Offset(Generated):
 
     use: Literal["offset"] = "offset"
 
-    def shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
+    def build_shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
         """The part with its vertices moved."""
         normals = part.cross / np.maximum(np.linalg.norm(part.cross, axis=1), 1e-300)[:, None]
         # Each vertex moves so that all planes through it move by the same: least squares over the distinct planes.

@@ -11,7 +11,7 @@ PAIRS = 20_000_000
 """Pairs of neighbours that may be held at once, 16 bytes each; more, and points are first gathered into a grid."""
 
 
-def dbscan(points: Floats, eps: float, neighbours: int) -> Ints:
+def run_dbscan(points: Floats, eps: float, neighbours: int) -> Ints:
     """Cluster number (M,) per point, -1 for noise (Ester et al. 1996); border points join their nearest dense point.
 
     Where points lie so close that their pairs would not fit in memory, those within one cell of a grid of eps/4 count
@@ -25,7 +25,7 @@ def dbscan(points: Floats, eps: float, neighbours: int) -> Ints:
     weight = np.ones(len(points), np.int64)
     tree = cKDTree(points)
     if len(points) > 1000 and tree.count_neighbors(tree, eps) / 2 > PAIRS:
-        points, of, weight = _gathered(points, eps / 4)
+        points, of, weight = _gather_in_cells(points, eps / 4)
         tree = cKDTree(points)
     pairs = tree.query_pairs(eps, output_type="ndarray")
     count = weight + np.bincount(pairs[:, 0], weight[pairs[:, 1]], len(points)).astype(np.int64)
@@ -46,7 +46,7 @@ def dbscan(points: Floats, eps: float, neighbours: int) -> Ints:
     return result
 
 
-def neighbour_distances(points: Floats, neighbours: int) -> Floats:
+def measure_neighbour_distances(points: Floats, neighbours: int) -> Floats:
     """Average distance (M,) of each of ``points`` (M,3) to its ``neighbours`` nearest; inf where there are fewer."""
     from scipy.spatial import cKDTree
 
@@ -55,7 +55,7 @@ def neighbour_distances(points: Floats, neighbours: int) -> Floats:
     return result
 
 
-def _gathered(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
+def _gather_in_cells(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
     """Mean points of the occupied cells of a grid, the cell of each point, and the number of points in each cell."""
     _, of, count = np.unique(number_cubes(points, cell)[1], return_inverse=True, return_counts=True)
     of = of.ravel()

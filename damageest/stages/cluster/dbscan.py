@@ -11,7 +11,7 @@ from pydantic import Field, PositiveFloat
 from damageest.artefacts import DAMAGE, Deviation, Floats, Ints, Scan, Sites
 from damageest.geometry.neighbourhoods import find_nearby
 from damageest.stages.cluster import Cluster
-from damageest.stages.cluster._density import dbscan, neighbour_distances
+from damageest.stages.cluster._density import measure_neighbour_distances, run_dbscan
 
 AROUND = 12
 """Nearest scan points, itself included, among which a damage point looks for others like it."""
@@ -51,16 +51,16 @@ class Dbscan(Cluster):
         if not len(damage):
             return Sites(label, 0)
         points = aligned.points[damage]
-        gap, typical = _gaps(aligned.points, self.neighbours)
+        gap, typical = _measure_gaps(aligned.points, self.neighbours)
         bridging = max(tolerance, 1.25 * gap)
-        eps, why = self._eps(points, tolerance, bridging)
+        eps, why = self._choose_eps(points, tolerance, bridging)
         # A sparse scan puts fewer than k points on a damage of four tolerances across, which must not go unseen.
         expected = self.neighbours * (1.5 * tolerance / typical) ** 2 if typical else np.inf
         dense = int(np.clip(expected / 2, 4, self.neighbours))
 
-        cluster = dbscan(points, eps, dense)
-        supported = _supported(aligned.points, damage, deviation.label == DAMAGE, bridging)
-        cluster = self._without_chance(points, cluster, supported, tolerance)
+        cluster = run_dbscan(points, eps, dense)
+        supported = _is_supported(aligned.points, damage, deviation.label == DAMAGE, bridging)
+        cluster = self._drop_chance(points, cluster, supported, tolerance)
         found, first, inverse, count = np.unique(cluster, return_index=True, return_inverse=True, return_counts=True)
         order = [i for i in np.lexsort((first, -count)) if found[i] >= 0]
         number = np.zeros(len(found), np.int32)
@@ -76,11 +76,11 @@ class Dbscan(Cluster):
             notes.append(f"the scan is sparse for its tolerance: {dense} neighbours instead of {self.neighbours}")
         return Sites(label, len(order), tuple(notes))
 
-    def _eps(self, points: Floats, tolerance: float, bridging: float) -> tuple[float, str]:
+    def _choose_eps(self, points: Floats, tolerance: float, bridging: float) -> tuple[float, str]:
         if self.eps == "tolerance":
             return tolerance, "the tolerance"
         if self.eps == "auto":
-            bend = sharpest_bend(neighbour_distances(points, self.neighbours))
+            bend = find_sharpest_bend(measure_neighbour_distances(points, self.neighbours))
             # On a scan without damage the curve is that of strays, metres apart; it says nothing then.
             eps = float(np.clip(bend, bridging / 2, 4 * bridging)) if np.isfinite(bend) else bridging
             return eps, f"sharpest bend of the k-distance curve at {bend:.4g}"
@@ -88,7 +88,7 @@ class Dbscan(Cluster):
             return bridging, "the tolerance" if bridging == tolerance else "the scan's spacing"
         return self.eps, "set"
 
-    def _without_chance(self, points: Floats, cluster: Ints, supported: NDArray[np.bool_], tolerance: float) -> Ints:
+    def _drop_chance(self, points: Floats, cluster: Ints, supported: NDArray[np.bool_], tolerance: float) -> Ints:
         """``cluster`` (M,) with -1 for the members of clusters too small, too short or too scattered to be damage."""
         inside = cluster >= 0
         if not inside.any():
@@ -106,7 +106,7 @@ class Dbscan(Cluster):
         return result
 
 
-def sharpest_bend(average: Floats) -> float:
+def find_sharpest_bend(average: Floats) -> float:
     """Where the sorted curve of ``average`` (M,) neighbour distances has its largest second difference (paper 3.3).
 
     Of 200 quantiles, not of single points: between neighbours in a sorted sample the differences are chance. And of the
@@ -122,7 +122,7 @@ def sharpest_bend(average: Floats) -> float:
     return float(curve[1 + np.argmax(log[:-2] - 2 * log[1:-1] + log[2:])])
 
 
-def _gaps(points: Floats, neighbours: int) -> tuple[float, float]:
+def _measure_gaps(points: Floats, neighbours: int) -> tuple[float, float]:
     """95th percentile and median of the distance to the k-th nearest scan point, of points evenly picked: 5,000 or, of
     a dense scan, 600."""
     from scipy.spatial import cKDTree
@@ -130,11 +130,11 @@ def _gaps(points: Floats, neighbours: int) -> tuple[float, float]:
     if len(points) <= neighbours:
         return 0.0, 0.0
     dense = len(points) > WHOLE
-    picked = points[_evenly(len(points), 600 if dense else 5000)]
+    picked = points[_draw_evenly(len(points), 600 if dense else 5000)]
     reach = np.inf
     if dense:
         # Among some of the points the k-th is farther than among all, so it tells how far to look.
-        some = cKDTree(points[_evenly(len(points), WHOLE)])
+        some = cKDTree(points[_draw_evenly(len(points), WHOLE)])
         reach = float(np.percentile(np.asarray(some.query(picked, k=[neighbours + 1], workers=2)[0]), 97))
         points = points[find_nearby(points, picked, reach)]
     tree = cKDTree(points)
@@ -142,12 +142,12 @@ def _gaps(points: Floats, neighbours: int) -> tuple[float, float]:
     return float(np.percentile(distance, 95)), float(np.median(distance))
 
 
-def _evenly(count: int, wanted: int) -> Ints:
+def _draw_evenly(count: int, wanted: int) -> Ints:
     """At most ``wanted`` of ``count`` indices, evenly over all."""
     return np.linspace(0, count - 1, min(count, wanted)).round().astype(np.int64)
 
 
-def _supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:
+def _is_supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:
     """(M,) whether enough of a damage point's nearest scan points are damage as well."""
     from scipy.spatial import cKDTree
 

@@ -8,7 +8,7 @@ from damageest.artefacts import Floats, Ints, Mesh, Part, Rims, Surface
 from damageest.errors import StageError
 from damageest.geometry.distance import is_inside, winding_number
 from damageest.stages.enclose import NotSeparatedError
-from damageest.stages.enclose._sew import Cycle, Wide, cut_off, filled, strip
+from damageest.stages.enclose._sew import Cycle, Wide, build_strip, cut_off, fill_loops
 
 BESIDE = 32
 """Sound points about each rim node that are asked on which side of the damage surface they lie."""
@@ -22,7 +22,7 @@ rim, the straight way out is as good as any."""
 INSTEAD = "method: implicit"
 
 
-def closed(
+def close_enclosure(
     surface: Surface, wide: Wide, background: Mesh, cycles: list[Cycle], intact: Floats, part: Part, tolerance: float
 ) -> Mesh:
     """Sews ``wide``, which carries ``surface`` on, to what the ``cycles``, one for each of its rims, cut off the
@@ -35,13 +35,13 @@ def closed(
 
     start = len(wide.vertices)
     vertices = np.concatenate([wide.vertices, background.vertices])
-    strips = [strip(loop, other, start) for loop, other in zip(wide.loops, cycles, strict=True)]
-    if (share := _through(Mesh(vertices, np.concatenate(strips)), part, tolerance) / surface.area) > THROUGH:
+    strips = [build_strip(loop, other, start) for loop, other in zip(wide.loops, cycles, strict=True)]
+    if (share := _measure_through(Mesh(vertices, np.concatenate(strips)), part, tolerance) / surface.area) > THROUGH:
         raise StageError(
             f"the way from the rim to the background leads through the part ({share:.0%} of the damage surface's area)",
             "background: minkowski, which keeps close to the part, or method: implicit",
         )
-    body = np.concatenate([filled(wide), *strips])
+    body = np.concatenate([fill_loops(wide), *strips])
     found = []
     for turned in (True, False):
         side = cut_off(background.faces, [other.path for other in cycles], against=turned)
@@ -66,12 +66,12 @@ def closed(
         raise StageError(
             f"the sound points do not tell which side is lost: {kept[0]:.0%} and {kept[1]:.0%} of them inside", INSTEAD
         )
-    if (wrong := _wrongly_sided(found[best], len(surface.faces), tolerance)) > WRONG:
+    if (wrong := _measure_wrong_side(found[best], len(surface.faces), tolerance)) > WRONG:
         raise StageError(f"the strip to the background runs through {wrong:.0%} of the damage surface", INSTEAD)
     return found[best]
 
 
-def agreed(surface: Surface, rims: Rims, intact: Floats) -> tuple[Surface, Rims]:
+def orient_by_intact(surface: Surface, rims: Rims, intact: Floats) -> tuple[Surface, Rims]:
     """The surface, each piece of it turned so that its normals point away from the sound points beside its rim; and the
     rims, turned with it.
 
@@ -81,7 +81,7 @@ def agreed(surface: Surface, rims: Rims, intact: Floats) -> tuple[Surface, Rims]
 
     if not len(intact) or not rims.loops:
         return surface, rims
-    label = _pieces(surface)
+    label = _label_pieces(surface)
     nodes = np.concatenate(rims.loops)
     count = min(BESIDE, len(intact))
     beside = np.asarray(cKDTree(intact).query(surface.vertices[nodes], count, workers=2)[1]).reshape(len(nodes), count)
@@ -98,7 +98,7 @@ def agreed(surface: Surface, rims: Rims, intact: Floats) -> tuple[Surface, Rims]
     return Surface(surface.vertices, faces), Rims(loops)
 
 
-def _pieces(surface: Surface) -> Ints:
+def _label_pieces(surface: Surface) -> Ints:
     """(F,) which piece each face belongs to."""
     import trimesh
 
@@ -106,7 +106,7 @@ def _pieces(surface: Surface) -> Ints:
     return np.asarray(trimesh.graph.connected_component_labels(pairs, node_count=len(surface.faces)), dtype=np.int64)
 
 
-def _through(strips: Mesh, part: Part, tolerance: float) -> float:
+def _measure_through(strips: Mesh, part: Part, tolerance: float) -> float:
     """Area of the strips that lies inside the part, farther from its skin than the rim has to be."""
     from damageest.geometry.distance import signed_distance
 
@@ -119,7 +119,7 @@ def _through(strips: Mesh, part: Part, tolerance: float) -> float:
     return float((area * (depth > 2 * tolerance).mean(axis=1)).sum())
 
 
-def _wrongly_sided(mesh: Mesh, count: int, tolerance: float) -> float:
+def _measure_wrong_side(mesh: Mesh, count: int, tolerance: float) -> float:
     """Share of the first ``count`` faces (a thousand of them) that do not have the inside behind and the outside
     before.
 

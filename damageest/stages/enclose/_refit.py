@@ -11,7 +11,7 @@ NEAR = 12
 """Points that a vertex is fitted to."""
 
 
-def refitted(region: Solid, points: Floats, normals: Floats, most: float) -> Solid:
+def refit_region(region: Solid, points: Floats, normals: Floats, most: float) -> Solid:
     """The region with its vertices moved along the points' normals onto the surface through the points (N,3).
 
     A grid of cells resolves the field's zero to a fraction of a cell, and the screened solve trades the points against

@@ -20,7 +20,7 @@ class Wide:
     loops: tuple[Ints, ...]
 
 
-def carried_on(surface: Surface, rims: Rims, by: float) -> Wide:
+def extend_rims(surface: Surface, rims: Rims, by: float) -> Wide:
     """Adds a strip of width ``by`` along each rim, in the direction in which the surface leaves it.
 
     Raises StageError where there is no rim.
@@ -48,7 +48,7 @@ def carried_on(surface: Surface, rims: Rims, by: float) -> Wide:
     return Wide(np.concatenate(vertices), np.concatenate(faces), tuple(ends))
 
 
-def filled(wide: Wide) -> Ints:
+def fill_loops(wide: Wide) -> Ints:
     """Faces with every loop closed that is no rim, by a fan from its first node (paper 3.2: small loops are closed)."""
     rim = {int(loop.min()) for loop in wide.loops}
     fans = [wide.faces]
@@ -67,7 +67,7 @@ class Cycle:
     station: Floats
 
 
-def cycle(vertices: Floats, faces: Ints, image: Ints) -> Cycle:
+def trace_cycle(vertices: Floats, faces: Ints, image: Ints) -> Cycle:
     """The closed path on a mesh that joins the images (N,) of the rim's nodes, in their order, by shortest paths.
 
     Raises StageError where it collapses or finds no way.
@@ -101,14 +101,14 @@ def cycle(vertices: Floats, faces: Ints, image: Ints) -> Cycle:
         while path[-1] != here:
             path.append(int(before[path[-1]]))
         walk += [(step, node + k / (len(path) - 1)) for k, step in enumerate(path[:0:-1])]
-    walk = _simple(walk)
+    walk = _simplify_walk(walk)
     return Cycle(used[[step for step, _ in walk]], np.array([station for _, station in walk]))
 
 
 _FLAT = "the rim falls together on the background"
 
 
-def _simple(walk: list[tuple[int, float]]) -> list[tuple[int, float]]:
+def _simplify_walk(walk: list[tuple[int, float]]) -> list[tuple[int, float]]:
     """The closed walk without its detours: of two loops that meet in a vertex the longer one stays."""
     while True:
         seen: dict[int, int] = {}
@@ -126,7 +126,7 @@ def _simple(walk: list[tuple[int, float]]) -> list[tuple[int, float]]:
     return walk
 
 
-def strip(loop: Ints, other: Cycle, start: int) -> Ints:
+def build_strip(loop: Ints, other: Cycle, start: int) -> Ints:
     """Triangles between a rim and the cycle that follows it, whose vertices count from ``start`` on: each rim node is
     joined to its image and to what lies nearer to it on the paths than to the next (paper 3.2)."""
     n, m = len(loop), len(other.path)

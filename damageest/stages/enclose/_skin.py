@@ -26,7 +26,7 @@ class SkinSamples:
     usual: Floats
 
 
-def skin_near(
+def sample_skin_near(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, grown: Flags, samples: Samples, tolerance: float
 ) -> SkinSamples:
     """The skin in the neighbourhood of the sites, and as far from them as it seems to be gone."""
@@ -35,7 +35,7 @@ def skin_near(
     sound = (deviation.label == INTACT) & ~grown
     flat = samples.kind == 0
     points, normals = samples.points[flat], samples.normals[flat]
-    skin, hits = _lattice(aligned.points, sites.label > 0, sound, points, 40 * tolerance)
+    skin, hits = _select_cubes(aligned.points, sites.label > 0, sound, points, 40 * tolerance)
     points, normals = points[skin], normals[skin]
     keep = np.flatnonzero(hits)
     hit = aligned.points[keep]
@@ -45,7 +45,7 @@ def skin_near(
     hit, face = hit[thin], deviation.face[keep][thin]
     cross = part.cross[face]
     outward = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
-    usual = _usual(points, hit, tolerance)
+    usual = _measure_usual_gap(points, hit, tolerance)
     clear = np.maximum(1.5 * usual, 2 * tolerance)
     # Direction counts as a fourth to sixth coordinate: the far side of a thin wall does not vouch for the near one.
     weight = 1.5 * tolerance
@@ -55,7 +55,7 @@ def skin_near(
     return SkinSamples(points, normals, gap > clear, usual)
 
 
-def _usual(points: Floats, hit: Floats, tolerance: float) -> Floats:
+def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:
     """Radius (S,) that holds six sound points on the sound surface nearest to each skin sample."""
     count = min(7, len(hit))
     some = hit[pick_one_per_cube(hit, 3 * tolerance)]
@@ -64,7 +64,7 @@ def _usual(points: Floats, hit: Floats, tolerance: float) -> Floats:
     return np.asarray(np.median(radius[index], axis=1))
 
 
-def _lattice(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size: float) -> tuple[Flags, Flags]:
+def _select_cubes(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size: float) -> tuple[Flags, Flags]:
     """Which skin samples and which sound points matter, by the cubes of a coarse lattice that they lie in.
 
     Cubes with damage count, cubes joined to them whose skin is poor in sound points, and the cubes round both.
@@ -89,7 +89,7 @@ def _lattice(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size: flo
     return wide.ravel()[flat[1]], sound & wider.ravel()[flat[0]]
 
 
-def pushed(part: Part, skin: Floats, outward: Floats, push: float) -> Floats:
+def push_outward(part: Part, skin: Floats, outward: Floats, push: float) -> Floats:
     """The samples moved outward by ``push``, or by less where another wall stands in the way."""
     if not len(skin):
         return skin

@@ -43,30 +43,30 @@ class Adaptive(Enclose):
     ) -> Mesh:
         """Raises StageError where paths do not close or lead through the part, or either side holds sound points, and
         NotSeparatedError where they do not split the background."""
-        from damageest.geometry.refinement import insert_points, nearest, refine_at
-        from damageest.stages.enclose._close import agreed, closed
-        from damageest.stages.enclose._sew import carried_on
+        from damageest.geometry.refinement import find_nearest, insert_points, refine_at
+        from damageest.stages.enclose._close import close_enclosure, orient_by_intact
+        from damageest.stages.enclose._sew import extend_rims
 
-        surface, rims = agreed(surface, rims, intact)
-        wide = carried_on(surface, rims, self.overhang * tolerance)
+        surface, rims = orient_by_intact(surface, rims, intact)
+        wide = extend_rims(surface, rims, self.overhang * tolerance)
         nodes = np.concatenate([wide.vertices[loop] for loop in wide.loops])
         steps = [np.linalg.norm(np.diff(wide.vertices[loop], axis=0), axis=1) for loop in wide.loops]
         edge = max(self.edge * tolerance, float(np.median(np.concatenate(steps))))
-        face, foot = nearest(background, nodes)
+        face, foot = find_nearest(background, nodes)
         ends = np.cumsum([len(loop) for loop in wide.loops])[:-1]
-        trails = [trail(background, one, edge) for one in np.split(foot, ends)]
-        more, way = nearest(background, np.concatenate(trails))
+        trails = [trace_trail(background, one, edge) for one in np.split(foot, ends)]
+        more, way = find_nearest(background, np.concatenate(trails))
         mesh, held = refine_at(background, np.concatenate([face, more]), np.concatenate([foot, way]), edge)
         mesh, image = insert_points(mesh, held[: len(foot)], foot)
-        near = _along(mesh, np.concatenate([foot, way]), 3 * edge) | np.isin(mesh.faces, image).any(axis=1)
-        cycles = [_cycle(mesh, near, one) for one in np.split(image, ends)]
-        return closed(surface, wide, mesh, cycles, intact, part, tolerance)
+        near = _find_along(mesh, np.concatenate([foot, way]), 3 * edge) | np.isin(mesh.faces, image).any(axis=1)
+        cycles = [_trace_cycle(mesh, near, one) for one in np.split(image, ends)]
+        return close_enclosure(surface, wide, mesh, cycles, intact, part, tolerance)
 
 
-def trail(background: Mesh, foot: Floats, edge: float) -> Floats:
+def trace_trail(background: Mesh, foot: Floats, edge: float) -> Floats:
     """Points (K,3) on a background where the closed path through its points ``foot`` (N,3) will run, none farther than
     an edge from the next unless the background has no surface between them."""
-    from damageest.geometry.refinement import nearest
+    from damageest.geometry.refinement import find_nearest
 
     at = foot
     for _ in range(ROUNDS):
@@ -77,13 +77,13 @@ def trail(background: Mesh, foot: Floats, edge: float) -> Floats:
         which = np.repeat(np.arange(len(at)), count)
         place = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 1) / (count[which] + 1)
         # The straight way leaves the surface at an edge; what is nearest to it leaves a smaller gap each time.
-        _, between = nearest(background, at[which] + place[:, None] * (after - at)[which])
+        _, between = find_nearest(background, at[which] + place[:, None] * (after - at)[which])
         order = np.argsort(np.concatenate([np.arange(len(at)), which + place]), kind="stable")
         at = np.concatenate([at, between])[order]
     return at
 
 
-def _along(mesh: Mesh, places: Floats, reach: float) -> NDArray[np.bool_]:
+def _find_along(mesh: Mesh, places: Floats, reach: float) -> NDArray[np.bool_]:
     """(F,) which faces have a corner within ``reach`` of places (K,3)."""
     from scipy.spatial import cKDTree
 
@@ -91,11 +91,11 @@ def _along(mesh: Mesh, places: Floats, reach: float) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(far)[mesh.faces].any(axis=1))
 
 
-def _cycle(mesh: Mesh, near: NDArray[np.bool_], image: Ints) -> Cycle:
+def _trace_cycle(mesh: Mesh, near: NDArray[np.bool_], image: Ints) -> Cycle:
     """The cycle within the ``near`` faces, where the mesh is fine; on all of it where they do not hang together."""
-    from damageest.stages.enclose._sew import cycle
+    from damageest.stages.enclose._sew import trace_cycle
 
     try:
-        return cycle(mesh.vertices, mesh.faces[near], image)
+        return trace_cycle(mesh.vertices, mesh.faces[near], image)
     except StageError:
-        return cycle(mesh.vertices, mesh.faces, image)
+        return trace_cycle(mesh.vertices, mesh.faces, image)

@@ -32,12 +32,12 @@ class Implicit(EncloseAll):
         """Raises StageError where no closed surface comes about."""
         from damageest.geometry.isosurface import extract_region
         from damageest.geometry.poisson import make_grid, solve_coarse_to_fine
-        from damageest.stages.enclose._evidence import gathered, oriented, within_reach
-        from damageest.stages.enclose._refit import refitted
+        from damageest.stages.enclose._gather import cut_beyond_reach, gather_groups, select_oriented
+        from damageest.stages.enclose._refit import refit_region
 
         if not sites.count:
             return Enclosures(())
-        found = gathered(part, aligned, deviation, sites, samples, tolerance, self.band, self.push)
+        found = gather_groups(part, aligned, deviation, sites, samples, tolerance, self.band, self.push)
         items = []
         for number, group in enumerate(found.groups):
             low = np.minimum(group.points.min(axis=0), group.lost.min(axis=0, initial=np.inf)) - self.margin * tolerance
@@ -49,12 +49,12 @@ class Implicit(EncloseAll):
             if cell > 2 * self.cell * tolerance:
                 notes = (f"a loss this large was solved in cells of {cell:.3g}, {cell / tolerance:.1f} tolerances",)
             grid = make_grid(low, high, cell)
-            points, normals, areas = oriented(found, grid)
+            points, normals, areas = select_oriented(found, grid)
             field = solve_coarse_to_fine(grid, points, normals, areas, self.screening)
-            field = within_reach(grid, field, found, number, 4 * tolerance)
+            field = cut_beyond_reach(grid, field, found, number, 4 * tolerance)
             region = extract_region(grid, field)
             if region is not None:
-                region = refitted(region, points, normals, 0.5 * tolerance)
+                region = refit_region(region, points, normals, 0.5 * tolerance)
                 items.append(Enclosure(region, group.sites, notes))
         if not items:
             raise StageError("no closed surface came about", "method: surface, or a larger tolerance")

@@ -27,12 +27,12 @@ class ShortestPath(Enclose):
         NotSeparatedError where they do not split the background."""
         from scipy.spatial import cKDTree
 
-        from damageest.stages.enclose._close import agreed, closed
-        from damageest.stages.enclose._sew import carried_on, cycle
+        from damageest.stages.enclose._close import close_enclosure, orient_by_intact
+        from damageest.stages.enclose._sew import extend_rims, trace_cycle
 
-        surface, rims = agreed(surface, rims, intact)
-        wide = carried_on(surface, rims, self.overhang * tolerance)
+        surface, rims = orient_by_intact(surface, rims, intact)
+        wide = extend_rims(surface, rims, self.overhang * tolerance)
         tree = cKDTree(background.vertices)
         images = [np.asarray(tree.query(wide.vertices[loop], workers=2)[1], np.int64) for loop in wide.loops]
-        cycles = [cycle(background.vertices, background.faces, image) for image in images]
-        return closed(surface, wide, background, cycles, intact, part, tolerance)
+        cycles = [trace_cycle(background.vertices, background.faces, image) for image in images]
+        return close_enclosure(surface, wide, background, cycles, intact, part, tolerance)

@@ -10,7 +10,7 @@ from damageest.io.meshes import write_ply, write_stl
 from damageest.stages.export import Body, Written
 
 
-def stl(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
+def write_stl_bodies(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
     """Binary STL. Its coordinates are single precision: a solid that this would open is written as PLY too."""
     (body,) = bodies
     single = round_to_single(body.solid)
@@ -22,7 +22,7 @@ def stl(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
     return Written((f"{stem}.ply", f"{stem}.stl"), (note,))
 
 
-def ply(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
+def write_ply_bodies(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
     """Binary PLY in double precision."""
     (body,) = bodies
     write_ply(folder / f"{stem}.ply", body.solid)

@@ -13,30 +13,34 @@ PLUGINS = {"step": "damageest-cadquery"}
 """The plugin that has a format, for whoever lacks it."""
 
 
-def _known(name: str, info: ValidationInfo) -> str:
+def _check_known(name: str, info: ValidationInfo) -> str:
     registry = (info.context or {}).get("registry")
     if registry is None or name in registry.writers:
         return name
     if plugin := PLUGINS.get(name):
-        raise _fault(f"'{name}' needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry)
+        raise _find_fault(
+            f"'{name}' needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry
+        )
     names = sorted(registry.writers)
-    raise _fault(f"no format '{name}'{suggest(name, names)}; there are: {', '.join(names)}", registry)
+    raise _find_fault(f"no format '{name}'{suggest(name, names)}; there are: {', '.join(names)}", registry)
 
 
-def _fault(text: str, registry: Any) -> PydanticCustomError:
+def _find_fault(text: str, registry: Any) -> PydanticCustomError:
     return PydanticCustomError("format", "{text}", {"text": text + registry.missing()})
 
 
-def spline_writer(wanted: bool, info: ValidationInfo) -> bool:
+def find_spline_writer(wanted: bool, info: ValidationInfo) -> bool:
     """Refuses a spline where nothing here can write one."""
     registry = (info.context or {}).get("registry")
     if wanted and registry is not None and not any(writer.patch for writer in registry.writers.values()):
         plugin = PLUGINS["step"]
-        raise _fault(f"a spline needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry)
+        raise _find_fault(
+            f"a spline needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry
+        )
     return wanted
 
 
-Format = Annotated[str, AfterValidator(_known), Field(examples=["stl", "ply", "3mf", "step"])]
+Format = Annotated[str, AfterValidator(_check_known), Field(examples=["stl", "ply", "3mf", "step"])]
 Formats = Annotated[
     tuple[Format, ...],
     BeforeValidator(

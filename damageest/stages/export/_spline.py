@@ -22,27 +22,27 @@ _MARGIN = 0.03
 _SAMPLES = 400
 
 
-def fitted(surface: Surface, tolerance: float) -> tuple[Patch | None, Spline]:
+def fit_spline(surface: Surface, tolerance: float) -> tuple[Patch | None, Spline]:
     """The coarsest spline within half of ``tolerance`` of the surface, else the nearest within it; or why none is.
 
     Its parameters are lengths in the plane that the surface is a height field over.
     """
-    axes, overhang = _plane(surface)
+    axes, overhang = _fit_plane(surface)
     if overhang > _OVERHANG:
         return None, Spline(reason=f"no height field over any plane: {overhang:.1%} of its area overhangs")
     origin = surface.bounds.mean(axis=0)
     points = (surface.vertices - origin) @ axes.T
     corners = points[surface.faces]
     data = np.concatenate([points, corners.mean(axis=1)])
-    rims = _rims(corners[..., :2], tolerance)
+    rims = _trace_outlines(corners[..., :2], tolerance)
     upright = np.abs(surface.vertex_normals @ axes[2])
     best: tuple[float, Patch] | None = None
     for spans in _SPANS:
-        knots, poles = _least_squares(data, spans)
+        knots, poles = _solve_least_squares(data, spans)
         along = np.abs(NdBSpline(knots, poles[..., 2], DEGREE)(points[:, :2]) - points[:, 2]) * upright
         if along.max() > 2 * tolerance and spans != _SPANS[-1]:
             continue  # far off, and quick to tell
-        off = _deviation(points, surface, knots, poles)
+        off = _measure_deviation(points, surface, knots, poles)
         if best is None or off < best[0]:
             best = off, Patch(DEGREE, knots, origin + poles @ axes, tuple(rims))
         if off <= tolerance / 2:
@@ -53,7 +53,7 @@ def fitted(surface: Surface, tolerance: float) -> tuple[Patch | None, Spline]:
     return best[1], Spline(best[0], bool(rims))
 
 
-def _plane(surface: Surface) -> tuple[Floats, float]:
+def _fit_plane(surface: Surface) -> tuple[Floats, float]:
     """(3,3) two directions of a plane and its normal, so that little of the surface faces away; and that share."""
     area = np.linalg.norm(surface.cross, axis=1)
     unit = surface.cross / np.maximum(area, 1e-300)[:, None]
@@ -74,7 +74,7 @@ def _plane(surface: Surface) -> tuple[Floats, float]:
     return np.array([first, np.cross(best, first), best]), least
 
 
-def _least_squares(data: Floats, spans: int) -> tuple[tuple[Floats, Floats], Floats]:
+def _solve_least_squares(data: Floats, spans: int) -> tuple[tuple[Floats, Floats], Floats]:
     """Knots of both directions and poles (U,V,3) of the surface nearest to points (N,3), over all of their extent."""
     low, high = data[:, :2].min(axis=0), data[:, :2].max(axis=0)
     edge = _MARGIN * (high - low).max()
@@ -102,24 +102,24 @@ def _least_squares(data: Floats, spans: int) -> tuple[tuple[Floats, Floats], Flo
     return (knots[0], knots[1]), poles
 
 
-def _rims(triangles: Floats, tolerance: float) -> list[Floats]:
+def _trace_outlines(triangles: Floats, tolerance: float) -> list[Floats]:
     """The outlines (K,2) of the region that triangles (F,3,2) cover, the outer one first, straightened by a tenth of
     ``tolerance``; none where it falls into several. Holes and islands of less than a hundredth of it are left out."""
     from manifold3d import CrossSection, FillRule
 
     region = CrossSection(list(np.ascontiguousarray(triangles)), FillRule.NonZero)
     outlines = [np.asarray(loop, dtype=np.float64) for loop in region.simplify(tolerance / 10).to_polygons()]
-    areas = np.array([_area(loop) for loop in outlines])
+    areas = np.array([_measure_area(loop) for loop in outlines])
     kept = [k for k in np.argsort(-areas) if abs(areas[k]) > _SPECK * np.abs(areas).max()] if len(areas) else []
     return [outlines[k] for k in kept] if sum(areas[k] > 0 for k in kept) == 1 else []
 
 
-def _area(loop: Floats) -> float:
+def _measure_area(loop: Floats) -> float:
     x, y = loop.T
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
 
 
-def _deviation(points: Floats, surface: Surface, knots: tuple[Floats, Floats], poles: Floats) -> float:
+def _measure_deviation(points: Floats, surface: Surface, knots: tuple[Floats, Floats], poles: Floats) -> float:
     """The largest distance from the surface's vertices (V,3) to the spline, and back from the spline where it lies over
     the surface; in the plane's coordinates."""
 

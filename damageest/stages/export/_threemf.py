@@ -31,14 +31,14 @@ _RELATIONS = (
 _NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 
 
-def threemf(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
+def write_threemf(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
     """All bodies as objects of one 3MF file, each with a material of its name and colour, and an item of the build."""
     if not bodies:
         return Written()
     materials = "".join(
         f'<base name={quoteattr(body.name)} displaycolor="#{bytes(body.colour).hex().upper()}FF"/>' for body in bodies
     )
-    objects = "".join(_object(number, body) for number, body in enumerate(bodies))
+    objects = "".join(_build_object(number, body) for number, body in enumerate(bodies))
     items = "".join(f'<item objectid="{number + 2}"/>' for number in range(len(bodies)))
     model = (
         f'<?xml version="1.0" encoding="UTF-8"?>\n<model unit="{UNITS[unit]}" xml:lang="en-US" xmlns="{_NAMESPACE}">\n'
@@ -54,7 +54,7 @@ def threemf(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Writt
     return Written((f"{stem}.3mf",))
 
 
-def _object(number: int, body: Body) -> str:
+def _build_object(number: int, body: Body) -> str:
     # most readers round to single precision: where the solid bears that it is done here, and nine digits say all
     single = round_to_single(body.solid)
     mesh, digits = (body.solid, 17) if single is None else (single, 9)

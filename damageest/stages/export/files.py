@@ -16,8 +16,8 @@ from damageest.geometry.simplification import simplify_within
 from damageest.geometry.transforms import invert_pose, move_mesh
 from damageest.io.meshes import write_ply, write_points
 from damageest.stages.export import Body, Export, Patch, Writer, Written
-from damageest.stages.export._options import Formats, spline_writer
-from damageest.stages.export._spline import fitted
+from damageest.stages.export._options import Formats, find_spline_writer
+from damageest.stages.export._spline import fit_spline
 
 if TYPE_CHECKING:
     from damageest.result import Result
@@ -44,7 +44,7 @@ class Files(Export):
         description="how far facets of STEP solids may lie off the surface, so that there are fewer of them, in the "
         "job's unit; default: a tenth of the tolerance",
     )
-    spline: Annotated[bool, AfterValidator(spline_writer)] = Field(
+    spline: Annotated[bool, AfterValidator(find_spline_writer)] = Field(
         False,
         description="each inner damage surface as B-spline in STEP too, where one fits within the tolerance (plugin "
         "cadquery)",
@@ -52,9 +52,9 @@ class Files(Export):
 
     def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> Written:
         """Writes into ``folder`` and gives the paths relative to it. The same result gives the same bytes."""
-        splines = {s.id: fitted(s.surface, result.tolerance) for s in result.sites} if self.spline else {}
+        splines = {s.id: fit_spline(s.surface, result.tolerance) for s in result.sites} if self.spline else {}
         detail = result.tolerance / 10 if self.detail is None else self.detail
-        bodies, coarse = _bodies(result), {}
+        bodies, coarse = _collect_bodies(result), {}
         if detail and any(writers[name].costly for name in self.format):
             coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}
         done: list[Written] = []
@@ -63,11 +63,11 @@ class Files(Export):
             T = invert_pose(result.pose) if place else None
             for name in self.format:
                 chosen = coarse if coarse and writers[name].costly else bodies
-                done += _solids(writers[name], folder, place, chosen, T, result.units)
+                done += _write_solids(writers[name], folder, place, chosen, T, result.units)
             done += self._others(result, folder, place, T)
             if splines:
                 patches = {number: patch for number, (patch, _) in splines.items() if patch}
-                done += _patches(writers, folder, place, patches, T, result.units)
+                done += _write_patches(writers, folder, place, patches, T, result.units)
         done.append(self._truth(result, folder, writers))
         files = dict.fromkeys(f for one in done for f in one.files)  # STL may have written a PLY already
         notes = tuple(n for one in done for n in one.notes)
@@ -77,10 +77,10 @@ class Files(Export):
         """Surfaces and scan, below ``place``; ``T`` takes a point of the part to their frame."""
         done = []
         for site in result.sites:
-            path = _room(folder, f"{place}surface/site-{site.id}.ply")
+            path = _make_room(folder, f"{place}surface/site-{site.id}.ply")
             write_ply(path, move_mesh(site.surface, T))
             done.append(Written((path.relative_to(folder).as_posix(),)))
-        done.append(_scan(result, result.aligned if T is None else result.scan, folder, f"{place}scan.ply"))
+        done.append(_write_scan(result, result.aligned if T is None else result.scan, folder, f"{place}scan.ply"))
         return done
 
     def _truth(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> Written:
@@ -89,7 +89,7 @@ class Files(Export):
         if truth is None:
             return Written()
         pose = {"units": result.units, "T_part_scan": truth.T_part_scan.tolist()}
-        _room(folder, "truth/pose.json").write_text(json.dumps(pose, indent=1) + "\n")
+        _make_room(folder, "truth/pose.json").write_text(json.dumps(pose, indent=1) + "\n")
         if truth.damage is None:
             return Written(("truth/pose.json",))
         body = Body("true damage", truth.damage, DAMAGE)
@@ -98,7 +98,7 @@ class Files(Export):
         return Written((*done.files, "truth/pose.json"), done.notes)
 
 
-def _bodies(result: Result) -> dict[str, Body]:
+def _collect_bodies(result: Result) -> dict[str, Body]:
     """Stem of the file to body, in the part's frame."""
     wanted: list[tuple[str, str, Solid | None, tuple[int, int, int]]] = [
         ("damage", "damage", result.damage, DAMAGE),
@@ -110,7 +110,7 @@ def _bodies(result: Result) -> dict[str, Body]:
     return {stem: Body(name, solid, colour) for stem, name, solid, colour in wanted if solid is not None}
 
 
-def _solids(
+def _write_solids(
     writer: Writer, folder: Path, place: str, bodies: Mapping[str, Body], T: Floats | None, unit: str
 ) -> list[Written]:
     """One file for each body; or one of all, where the union of the damages would only double its pieces."""
@@ -121,7 +121,7 @@ def _solids(
     return [_write(writer, folder, f"{place}{stem}", [body], unit) for stem, body in here.items()]
 
 
-def _patches(
+def _write_patches(
     writers: Mapping[str, Writer], folder: Path, place: str, patches: Mapping[int, Patch], T: Floats | None, unit: str
 ) -> list[Written]:
     """The splines of the sites, by the first format that has such a thing."""
@@ -130,22 +130,22 @@ def _patches(
     for number, patch in patches.items():
         name = f"{place}surface/site-{number}.{suffix}"
         here = patch if T is None else replace(patch, poles=patch.poles @ T[:3, :3].T + T[:3, 3])
-        write(_room(folder, name), f"damage surface site-{number}", here, unit)
+        write(_make_room(folder, name), f"damage surface site-{number}", here, unit)
         done.append(Written((name,)))
     return done
 
 
 def _write(writer: Writer, folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
-    _room(folder, stem)
+    _make_room(folder, stem)
     return writer.write(folder, stem, bodies, unit)
 
 
-def _room(folder: Path, name: str) -> Path:
+def _make_room(folder: Path, name: str) -> Path:
     (folder / name).parent.mkdir(parents=True, exist_ok=True)
     return folder / name
 
 
-def _scan(result: Result, scan: Scan, folder: Path, name: str) -> Written:
+def _write_scan(result: Result, scan: Scan, folder: Path, name: str) -> Written:
     x, y, z = scan.points.T
     columns = {
         "x": x,
@@ -155,5 +155,5 @@ def _scan(result: Result, scan: Scan, folder: Path, name: str) -> Written:
         "label": result.deviation.label.astype(np.uint8),
         "site": result.site_label.astype(np.int32),
     }
-    write_points(_room(folder, name), columns)
+    write_points(_make_room(folder, name), columns)
     return Written((name,))

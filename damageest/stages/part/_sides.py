@@ -11,7 +11,7 @@ from damageest.geometry.poisson import Grid
 MOST_VOXELS = 60_000_000
 
 
-def outward(points: Floats, normals: Floats, voxel: float) -> Floats:
+def turn_outward(points: Floats, normals: Floats, voxel: float) -> Floats:
     """Turns normals (N,3) of either sign out of the body whose whole surface the points (N,3) lie on.
 
     Voxels that hold a point, and those beside them, make a shell of some three voxels; air that reaches the box's

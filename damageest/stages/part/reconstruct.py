@@ -56,8 +56,8 @@ class Reconstructed(ReadPart):
             raise InputError(f"part: {len(scan.points)} points are too few for a part; {FEWEST} at least")
         noise, spacing = measure_noise_and_spacing(scan.points)
         try:
-            vertices, faces, cell, error = self._surface(scan.points, noise, spacing)
-            openings = _openings(vertices, faces, scan.points)
+            vertices, faces, cell, error = self._build_surface(scan.points, noise, spacing)
+            openings = _note_openings(vertices, faces, scan.points)
         except InputError as fault:
             raise InputError(f"{', '.join(map(str, paths))}: {fault}") from None
         digest = hashlib.sha256("".join(map(file_sha256, paths)).encode()).hexdigest()
@@ -71,7 +71,7 @@ class Reconstructed(ReadPart):
             notes=(*scan.notes, note, *openings),
         )  # fmt: skip
 
-    def _surface(self, points: Floats, noise: float, spacing: float) -> tuple[Floats, Ints, float, float]:
+    def _build_surface(self, points: Floats, noise: float, spacing: float) -> tuple[Floats, Ints, float, float]:
         """Vertices, faces, resolution and error of the closed surface through ``points`` (N,3)."""
         from damageest.geometry.isosurface import extract_region
         from damageest.geometry.local_fits import smooth_points
@@ -88,32 +88,32 @@ class Reconstructed(ReadPart):
             )
         cloud, *_ = thin_points(points[~held], 0.8 * cell)
         cloud, normals, _ = smooth_points(cloud, noise, 24)
-        normals = _outward(cloud, normals, 1.25 * max(cell, spacing))
+        normals = _turn_outward(cloud, normals, 1.25 * max(cell, spacing))
         grid = make_grid(points.min(axis=0) - 8 * cell, points.max(axis=0) + 8 * cell, cell)
         # The level is positive inside, hence normals inward.
         field = solve_coarse_to_fine(grid, cloud, -normals, measure_local_areas(cloud), self.screening)
         region = extract_region(grid, field)
         if region is None:
             raise InputError("no closed surface came about; scan the specimen all round")
-        error = _error(region.vertices, region.faces, points[held], cell, noise)
+        error = _measure_error(region.vertices, region.faces, points[held], cell, noise)
         return region.vertices, region.faces, cell, error
 
 
-def _outward(cloud: Floats, normals: Floats, voxel: float) -> Floats:
+def _turn_outward(cloud: Floats, normals: Floats, voxel: float) -> Floats:
     """Normals turned out, by the finest voxels that close the points' shell."""
-    from damageest.stages.part._sides import outward
+    from damageest.stages.part._sides import turn_outward
 
     first: InputError | None = None
     for factor in VOXELS:
         try:
-            return outward(cloud, normals, factor * voxel)
+            return turn_outward(cloud, normals, factor * voxel)
         except InputError as fault:
             first = first or fault
     assert first is not None
     raise first
 
 
-def _error(vertices: Floats, faces: Ints, held: Floats, cell: float, noise: float) -> float:
+def _measure_error(vertices: Floats, faces: Ints, held: Floats, cell: float, noise: float) -> float:
     """The 95th percentile of the held points' (H,3) distance to the surface; refuses one that misses its points."""
     error = float(np.percentile(distance_to_mesh(held, Mesh(vertices, faces)), 95))
     if error > 3 * noise + cell:
@@ -121,7 +121,7 @@ def _error(vertices: Floats, faces: Ints, held: Floats, cell: float, noise: floa
     return error
 
 
-def _openings(vertices: Floats, faces: Ints, points: Floats) -> tuple[str, ...]:
+def _note_openings(vertices: Floats, faces: Ints, points: Floats) -> tuple[str, ...]:
     """What is to be said of gaps between the points (N,3) that the surface closes over; refuses wide ones.
 
     A gap is measured by the circle that holds the nearest point's seven neighbours, so that uneven density is none:

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
-from damageest.stages.sample._lattice import thin
+from damageest.stages.sample._spread import thin
 
 ON_EDGE, ON_CORNER = 1, 2
 
 
-def sharp_edges(mesh: Mesh, angle: float) -> tuple[Ints, Ints]:
+def find_sharp_edges(mesh: Mesh, angle: float) -> tuple[Ints, Ints]:
     """Vertex pairs (E,2) of edges at which the surface turns by more than ``angle`` degrees, and their faces (E,2)."""
     faces = mesh.faces
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
@@ -20,25 +20,25 @@ def sharp_edges(mesh: Mesh, angle: float) -> tuple[Ints, Ints]:
     edges, face = edges[order], face[order]
     twin = np.flatnonzero((edges[1:, 0] == edges[:-1, 0]) & (edges[1:, 1] == edges[:-1, 1]))
     pairs, sides = edges[twin], np.stack([face[twin], face[twin + 1]], axis=1)
-    normals = _unit(mesh.cross)
+    normals = _normalise(mesh.cross)
     flat: NDArray[np.bool_] = np.asarray(~normals.any(axis=1))  # a face without area says nothing about sharpness
     turn = np.einsum("ij,ij->i", normals[sides[:, 0]], normals[sides[:, 1]])
     sharp: NDArray[np.bool_] = (turn < np.cos(np.radians(angle))) & ~flat[sides].any(axis=1)
     return pairs[np.flatnonzero(sharp)], sides[np.flatnonzero(sharp)]
 
 
-def sharp_points(mesh: Mesh, spacing: float, angle: float) -> tuple[Floats, Floats, Ints, NDArray[np.uint8]]:
+def place_sharp_points(mesh: Mesh, spacing: float, angle: float) -> tuple[Floats, Floats, Ints, NDArray[np.uint8]]:
     """Points (N,3) on sharp edges and corners, no farther than ``spacing`` apart along an edge; their bisecting normals
     (N,3), a face (N,) that each lies on, and their kind (N,)."""
-    pairs, sides = sharp_edges(mesh, angle)
+    pairs, sides = find_sharp_edges(mesh, angle)
     if not len(pairs):
         return np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64), np.empty(0, np.uint8)
-    normals = _unit(mesh.cross)
-    bisector = _unit(normals[sides].sum(axis=1))
+    normals = _normalise(mesh.cross)
+    bisector = _normalise(normals[sides].sum(axis=1))
     start, end = mesh.vertices[pairs[:, 0]], mesh.vertices[pairs[:, 1]]
     length = np.linalg.norm(end - start, axis=1)
 
-    corner = _corners(mesh, pairs, angle)
+    corner = _find_corners(mesh, pairs, angle)
     step = np.where(length > spacing, spacing, 0.4 * spacing)
     count = np.maximum(np.ceil(length / step).astype(np.int64), 1)
     of = np.repeat(np.arange(len(pairs)), count)
@@ -59,16 +59,16 @@ def sharp_points(mesh: Mesh, spacing: float, angle: float) -> tuple[Floats, Floa
     is_corner = corner[vertex]
     return (
         np.concatenate([points, mesh.vertices[vertex[is_corner]]]),
-        np.concatenate([bisector[of], _unit(sums[is_corner])]),
+        np.concatenate([bisector[of], _normalise(sums[is_corner])]),
         np.concatenate([sides[of, 0], a_face[is_corner]]),
         np.concatenate([np.full(len(of), ON_EDGE), np.full(int(is_corner.sum()), ON_CORNER)]).astype(np.uint8),
     )
 
 
-def _corners(mesh: Mesh, pairs: Ints, angle: float) -> NDArray[np.bool_]:
+def _find_corners(mesh: Mesh, pairs: Ints, angle: float) -> NDArray[np.bool_]:
     """(V,) whether sharp edges end, branch or turn by more than ``angle`` degrees at a vertex."""
     count = np.bincount(pairs.ravel(), minlength=len(mesh.vertices))
-    outward = _unit(mesh.vertices[pairs[:, 1]] - mesh.vertices[pairs[:, 0]])
+    outward = _normalise(mesh.vertices[pairs[:, 1]] - mesh.vertices[pairs[:, 0]])
     sums = np.zeros((len(mesh.vertices), 3))
     np.add.at(sums, pairs[:, 0], outward)
     np.add.at(sums, pairs[:, 1], -outward)
@@ -78,7 +78,7 @@ def _corners(mesh: Mesh, pairs: Ints, angle: float) -> NDArray[np.bool_]:
     return result
 
 
-def _unit(vectors: Floats) -> Floats:
+def _normalise(vectors: Floats) -> Floats:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     result: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
     return result

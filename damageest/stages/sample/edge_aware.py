@@ -10,8 +10,8 @@ from pydantic import Field
 from damageest.artefacts import Floats, Mesh, Part, Samples
 from damageest.errors import InputError
 from damageest.stages.sample import Sample
-from damageest.stages.sample._edges import sharp_points
-from damageest.stages.sample._lattice import lattice, thin
+from damageest.stages.sample._edges import place_sharp_points
+from damageest.stages.sample._spread import spread_points, thin
 
 FINE = 0.4
 """Step of the candidates on faces too small for a lattice of their own, in units of the spacing."""
@@ -58,10 +58,10 @@ def _sample(part: Mesh, spacing: float, angle: float) -> Samples:
     sound = double_area > 1e-12 * part.diagonal * longest
     # One lattice per triangle wastes points where triangles are small or thin: those share a thinned set of candidates.
     roomy = sound & (double_area > 0.5 * spacing * longest) & (longest > spacing)
-    points, face = lattice(triangles, np.flatnonzero(roomy), spacing)
-    fine, fine_face = lattice(triangles, np.flatnonzero(sound & ~roomy), FINE * spacing)
+    points, face = spread_points(triangles, np.flatnonzero(roomy), spacing)
+    fine, fine_face = spread_points(triangles, np.flatnonzero(sound & ~roomy), FINE * spacing)
     kept = thin(fine, 0.5 * spacing, (1 - FINE) * spacing)
-    edge_points, edge_normals, edge_face, edge_kind = sharp_points(part, spacing, angle)
+    edge_points, edge_normals, edge_face, edge_kind = place_sharp_points(part, spacing, angle)
     faces = np.concatenate([face, fine_face[kept]])
     normals: Floats = cross[faces] / double_area[faces, None]
     return Samples(

@@ -10,7 +10,7 @@ from pydantic import Field
 from damageest.artefacts import Floats, Part, Samples
 from damageest.errors import InputError
 from damageest.stages.sample import Sample
-from damageest.stages.sample._lattice import lattice, thin
+from damageest.stages.sample._spread import spread_points, thin
 
 FINE = 0.3
 """Step of the candidates, in units of the spacing: the surface is within it of one of them."""
@@ -44,7 +44,7 @@ class Uniform(Sample):
         longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
         sound = np.flatnonzero(double_area > 1e-12 * part.diagonal * longest)
         while True:
-            candidates, of = lattice(triangles, sound, FINE * spacing)
+            candidates, of = spread_points(triangles, sound, FINE * spacing)
             kept = thin(candidates, (1 - FINE) * spacing, (1 - FINE) * spacing)
             excess = len(kept) / self.max_points
             if excess <= 1:

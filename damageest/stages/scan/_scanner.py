@@ -17,7 +17,7 @@ DUST = 1e-9
 """Share of the part's volume below which a piece is a rounding error of the Booleans."""
 
 
-def wear(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None, tuple[str, ...]]:
+def apply_tools(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None, tuple[str, ...]]:
     """The damaged part, the damage and notes; both solids in the part's frame.
 
     Pieces that the tools cut loose from a body of the part fall off and count as damage, since a scan shows only what
@@ -32,22 +32,22 @@ def wear(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None, tuple[
     whole = to_manifold(part, origin)
     cuts = []
     for number, tool in enumerate(tools, 1):
-        cut = _cut(tool, number, origin, part.diagonal)
+        cut = _build_cut(tool, number, origin, part.diagonal)
         if (whole ^ cut).volume() < DUST * part.volume:
             raise StageError(
                 f"damage tool {number} ({tool.tool}) misses the part, which reaches from "
-                f"{_text(part.bounds[0])} to {_text(part.bounds[1])} {part.unit}",
+                f"{_format_point(part.bounds[0])} to {_format_point(part.bounds[1])} {part.unit}",
                 remedy="move the tool; its coordinates are in the part's frame and the job's unit",
             )
         cuts.append(cut)
     cutter = Manifold.batch_boolean(cuts, OpType.Add)
     kept, lost, fallen, cavities = [], [], [], 0
-    for body in _bodies(whole):
+    for body in _split_bodies(whole):
         inside, outside = body.split(cutter)
         lost.append(inside)
         cavities -= sum(piece.volume() < 0 for piece in body.decompose())
         cavities += sum(piece.volume() < -DUST * part.volume for piece in outside.decompose())
-        pieces = [p for p in _bodies(outside) if p.volume() > DUST * part.volume]
+        pieces = [p for p in _split_bodies(outside) if p.volume() > DUST * part.volume]
         if pieces:
             pieces.sort(key=lambda p: p.volume(), reverse=True)
             kept.append(pieces[0])
@@ -63,15 +63,15 @@ def wear(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None, tuple[
     if fallen:
         share = 100 * sum(p.volume() for p in fallen) / part.volume
         notes.append(f"cut loose and counted as damage: {share:.2g} % of the part, in {len(fallen)} piece(s)")
-    damage = _solid(Manifold.batch_boolean([*lost, *fallen], OpType.Add), origin, part.volume)
-    return _solid(Manifold.compose(kept), origin, part.volume), damage, tuple(notes)
+    damage = _drop_specks(Manifold.batch_boolean([*lost, *fallen], OpType.Add), origin, part.volume)
+    return _drop_specks(Manifold.compose(kept), origin, part.volume), damage, tuple(notes)
 
 
-def _cut(tool: Tool, number: int, origin: Floats, diagonal: float) -> Any:
+def _build_cut(tool: Tool, number: int, origin: Floats, diagonal: float) -> Any:
     from manifold3d import Error
 
     try:
-        body = tool.body(origin, diagonal)
+        body = tool.build(origin, diagonal)
         fault = "" if body.status() == Error.NoError else body.status().name
         fault = fault or ("it encloses no volume" if body.volume() <= 0 else "")
     except ValueError as error:
@@ -81,11 +81,11 @@ def _cut(tool: Tool, number: int, origin: Floats, diagonal: float) -> Any:
     return body
 
 
-def _text(point: Floats) -> str:
+def _format_point(point: Floats) -> str:
     return "(" + ", ".join(f"{value:.4g}" for value in point) + ")"
 
 
-def _bodies(solid: Any) -> list[Any]:
+def _split_bodies(solid: Any) -> list[Any]:
     """The solid's connected bodies, each with the cavities inside it."""
     from manifold3d import Manifold
 
@@ -104,7 +104,7 @@ def _bodies(solid: Any) -> list[Any]:
     return [Manifold.compose(group) if len(group) > 1 else group[0] for group in owned]
 
 
-def _solid(body: Any, origin: Floats, volume: float) -> Solid:
+def _drop_specks(body: Any, origin: Floats, volume: float) -> Solid:
     """A Solid without the specks that rounding leaves."""
     from manifold3d import Manifold
 
@@ -119,7 +119,7 @@ Thin = Callable[[Floats], Floats]
 """Points (N,3) to weights (N,): how likely each is kept, 0 for never."""
 
 
-def sample(
+def sample_seen(
     mesh: Mesh, faces: NDArray[np.bool_], count: int, rng: np.random.Generator, thin: Thin | None, spare: float
 ) -> Floats:
     """(count,3) random points on the triangles that ``faces`` (F,) admits, uniform by area or as ``thin`` weighs them.
@@ -128,14 +128,14 @@ def sample(
     """
     area = np.linalg.norm(mesh.cross, axis=1) * faces
     if not area.any():
-        raise _blind()
+        raise _nothing_seen()
     if thin is None:
-        return _on(mesh, area, count, rng)
+        return _sample_on(mesh, area, count, rng)
     drawn: list[Floats] = []
     keys: list[Floats] = []
     have, tried = 0, 0
     while have < spare * count:
-        points = _on(mesh, area, int(spare * count), rng)
+        points = _sample_on(mesh, area, int(spare * count), rng)
         weights = thin(points)
         seen = weights > 0
         drawn.append(points[seen])
@@ -143,19 +143,19 @@ def sample(
         keys.append(rng.exponential(size=int(seen.sum())) / weights[seen])
         have, tried = have + int(seen.sum()), tried + 1
         if have < 1e-3 * tried * count:
-            raise _blind()
+            raise _nothing_seen()
     key = np.concatenate(keys)
     chosen = np.argpartition(key, count - 1)[:count]
     return np.asarray(np.concatenate(drawn)[chosen])
 
 
-def _blind() -> StageError:
+def _nothing_seen() -> StageError:
     return StageError(
         "the virtual scanner sees nothing of the part: 'unseen' covers all of it", remedy="narrow 'unseen'"
     )
 
 
-def _on(mesh: Mesh, area: Floats, count: int, rng: np.random.Generator) -> Floats:
+def _sample_on(mesh: Mesh, area: Floats, count: int, rng: np.random.Generator) -> Floats:
     """(count,3) points, uniform over triangles of the given areas (F,)."""
     total = np.cumsum(area)
     face = np.searchsorted(total, rng.random(count) * total[-1], side="right")

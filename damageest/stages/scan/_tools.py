@@ -11,23 +11,23 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 
 from damageest.artefacts import Floats
 from damageest.stages import JobPath
-from damageest.stages.scan import _noise
+from damageest.stages.scan import _random_field
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Row = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
 Matrix = tuple[Row, Row, Row, Row]
 
 
-def _not_zero(value: Vector) -> Vector:
+def _check_not_zero(value: Vector) -> Vector:
     if math.hypot(*value) < 1e-12:
         raise ValueError("a direction must have a length")
     return value
 
 
-Direction = Annotated[Vector, AfterValidator(_not_zero)]
+Direction = Annotated[Vector, AfterValidator(_check_not_zero)]
 
 
-def _rigid(value: Matrix) -> Matrix:
+def _check_rigid(value: Matrix) -> Matrix:
     T = np.array(value)
     turn = T[:3, :3]
     if not (np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0):
@@ -37,7 +37,7 @@ def _rigid(value: Matrix) -> Matrix:
     return value
 
 
-RigidMatrix = Annotated[Matrix, AfterValidator(_rigid)]
+RigidMatrix = Annotated[Matrix, AfterValidator(_check_rigid)]
 Seed = Annotated[int, Field(ge=0, description="of the random shape; the same seed gives the same shape")]
 
 
@@ -48,7 +48,7 @@ class Tool(BaseModel, ABC):
     tool: str
 
     @abstractmethod
-    def body(self, origin: Floats, diagonal: float) -> Any:
+    def build(self, origin: Floats, diagonal: float) -> Any:
         """The tool as a ``manifold3d.Manifold``, coordinates relative to ``origin`` (3,); the part lies within
         ``diagonal`` of it. Raises ValueError for a tool that encloses no volume."""
 
@@ -60,10 +60,10 @@ class SphereTool(Tool):
     centre: Vector = Field(description="in the part's frame")
     radius: PositiveFloat = Field(description="in the job's unit")
 
-    def body(self, origin: Floats, diagonal: float) -> Any:
+    def build(self, origin: Floats, diagonal: float) -> Any:
         from manifold3d import Manifold
 
-        ball = Manifold.sphere(self.radius, _segments(self.radius, diagonal))
+        ball = Manifold.sphere(self.radius, _count_segments(self.radius, diagonal))
         return ball.translate(tuple(self.centre - origin))
 
 
@@ -77,14 +77,14 @@ class BoxTool(Tool):
     roughness: float = Field(0.0, ge=0, description="rms height of the faces' unevenness, in the job's unit")
     seed: Seed = 0
 
-    def body(self, origin: Floats, diagonal: float) -> Any:
+    def build(self, origin: Floats, diagonal: float) -> Any:
         from manifold3d import Manifold
 
         block = Manifold.cube(self.size, True)
         if self.roughness:
             wave = max(min(self.size), 12 * self.roughness)
             block = block.refine_to_length(wave / 10)
-            fields = [_noise.RandomField.of(wave, 2, 3 * self.seed + axis) for axis in range(3)]
+            fields = [_random_field.RandomField.build(wave, 2, 3 * self.seed + axis) for axis in range(3)]
 
             # each coordinate is moved by a field whose slope stays below 1, so that faces cannot cross
             def uneven(points: Floats) -> Floats:
@@ -103,11 +103,11 @@ class CylinderTool(Tool):
     radius: PositiveFloat = Field(description="in the job's unit")
     length: PositiveFloat = Field(description="in the job's unit")
 
-    def body(self, origin: Floats, diagonal: float) -> Any:
+    def build(self, origin: Floats, diagonal: float) -> Any:
         from manifold3d import Manifold
 
-        bar = Manifold.cylinder(self.length, self.radius, self.radius, _segments(self.radius, diagonal))
-        return _placed(bar, self.axis, self.point - origin)
+        bar = Manifold.cylinder(self.length, self.radius, self.radius, _count_segments(self.radius, diagonal))
+        return _place(bar, self.axis, self.point - origin)
 
 
 class PlaneTool(Tool):
@@ -125,7 +125,7 @@ class PlaneTool(Tool):
     )
     seed: Seed = 0
 
-    def body(self, origin: Floats, diagonal: float) -> Any:
+    def build(self, origin: Floats, diagonal: float) -> Any:
         from manifold3d import Manifold, Mesh64
 
         foot = self.point - origin
@@ -138,7 +138,9 @@ class PlaneTool(Tool):
         line = np.linspace(-1.2 * reach, 1.2 * reach, cells + 1)
         x, y = (a.ravel() for a in np.meshgrid(line, line, indexing="ij"))
         flat = np.column_stack([x, y, np.zeros_like(x)])
-        height = self.roughness * _noise.RandomField.of(grain, 3, self.seed).at(flat) if self.roughness else 0 * x
+        height = (
+            self.roughness * _random_field.RandomField.build(grain, 3, self.seed).at(flat) if self.roughness else 0 * x
+        )
         tip = (0.0, 0.0, 12 * far)
         number = np.arange(len(x)).reshape(cells + 1, cells + 1)
         a, b, c, d = (n.ravel() for n in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
@@ -148,9 +150,9 @@ class PlaneTool(Tool):
         vertices = np.concatenate([np.column_stack([x, y, height]), [tip]])
         side = Manifold(Mesh64(np.ascontiguousarray(vertices), faces.astype(np.uint64)))
         if self.within:
-            bar = Manifold.cylinder(2 * far, self.within, self.within, _segments(self.within, diagonal), True)
+            bar = Manifold.cylinder(2 * far, self.within, self.within, _count_segments(self.within, diagonal), True)
             side ^= bar
-        return _placed(side, self.normal, foot)
+        return _place(side, self.normal, foot)
 
 
 class BlobTool(Tool):
@@ -164,18 +166,18 @@ class BlobTool(Tool):
     )
     seed: Seed = 0
 
-    def body(self, origin: Floats, diagonal: float) -> Any:
+    def build(self, origin: Floats, diagonal: float) -> Any:
         from manifold3d import Manifold
 
         share = 0.12 if self.roughness is None else self.roughness / self.radius
-        field = _noise.RandomField.of(1.6, 3, self.seed)
+        field = _random_field.RandomField.build(1.6, 3, self.seed)
 
         # the radius is a function of the direction alone and stays positive, so the lump cannot cut itself
         def uneven(points: Floats) -> Floats:
             out = points / np.linalg.norm(points, axis=1, keepdims=True)
             return np.asarray(out * (self.radius * np.maximum(1 + share * field.at(out), 0.2))[:, None])
 
-        segments = max(96, _segments(self.radius, diagonal))
+        segments = max(96, _count_segments(self.radius, diagonal))
         return Manifold.sphere(1.0, segments).warp_batch(uneven).translate(tuple(self.centre - origin))
 
 
@@ -186,7 +188,7 @@ class MeshTool(Tool):
     path: JobPath = Field(description="STL, PLY, OBJ, OFF or 3MF, relative to the job's folder")
     transform: RigidMatrix | None = Field(None, description="4x4, rigid, to the part's frame; default: as it is")
 
-    def body(self, origin: Floats, diagonal: float) -> Any:
+    def build(self, origin: Floats, diagonal: float) -> Any:
         from damageest.geometry.make_part import make_part
         from damageest.geometry.solids import to_manifold
         from damageest.io.meshes import read_mesh
@@ -201,13 +203,13 @@ class MeshTool(Tool):
 AnyTool = Annotated[SphereTool | BoxTool | CylinderTool | PlaneTool | BlobTool | MeshTool, Field(discriminator="tool")]
 
 
-def _segments(radius: float, diagonal: float) -> int:
+def _count_segments(radius: float, diagonal: float) -> int:
     """Divisions of a circle so that chords stay within 0.00005 of the part's diagonal."""
     step = math.acos(max(0.0, 1 - 5e-5 * diagonal / radius))
     return 4 * min(150, max(8, math.ceil(math.pi / step / 4)))
 
 
-def _placed(body: Any, axis: Vector, foot: Floats) -> Any:
+def _place(body: Any, axis: Vector, foot: Floats) -> Any:
     """The body, made along z, turned to ``axis`` and moved to ``foot``."""
     z = np.array(axis) / np.linalg.norm(axis)
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)

@@ -10,8 +10,8 @@ from pydantic import types as kinds
 
 from damageest.artefacts import Floats, Part, Scan, Solid, Truth
 from damageest.geometry.units import canonical_unit
-from damageest.stages.scan import ReadScan, _noise
-from damageest.stages.scan._scanner import sample, wear
+from damageest.stages.scan import ReadScan, _random_field
+from damageest.stages.scan._scanner import apply_tools, sample_seen
 from damageest.stages.scan._tools import AnyTool, Direction, RigidMatrix, Vector
 
 
@@ -55,11 +55,11 @@ class Simulate(ReadScan):
         """The scan in the scanner's frame. Raises StageError for a tool that misses the part or is no solid, and for
         damage that leaves nothing or nothing to be seen."""
         rng = np.random.default_rng([4409, self.seed])
-        pose = self._pose(part, rng)
-        left, damage, notes = wear(part, self.damage)
+        pose = self._choose_pose(part, rng)
+        left, damage, notes = apply_tools(part, self.damage)
         sigma = 0.0005 * part.diagonal if self.noise is None else self.noise
         stray = round(self.outliers * self.points)
-        points = self._seen(left, self.points - stray, part.diagonal, rng)
+        points = self._sample_seen(left, self.points - stray, part.diagonal, rng)
         points += rng.normal(scale=sigma, size=points.shape) if sigma else 0.0
         if stray:
             margin = 0.1 * (part.bounds[1] - part.bounds[0])
@@ -73,7 +73,7 @@ class Simulate(ReadScan):
         notes = (f"simulated: damage tools: {len(self.damage)}, noise {sigma:.4g} {canonical_unit(unit)}", *notes)
         return Scan(points, None, canonical_unit(unit), truth=Truth(damage, inverse), notes=notes)
 
-    def _seen(self, left: Solid, count: int, diagonal: float, rng: np.random.Generator) -> Floats:
+    def _sample_seen(self, left: Solid, count: int, diagonal: float, rng: np.random.Generator) -> Floats:
         normal = left.cross / np.maximum(np.linalg.norm(left.cross, axis=1), 1e-300)[:, None]
         faces = np.ones(len(left.faces), dtype=bool)
         planes = []
@@ -83,7 +83,7 @@ class Simulate(ReadScan):
                 faces &= normal @ toward < np.cos(np.radians(item.angle))
             else:
                 planes.append((toward, float(toward @ item.beyond)))
-        field = _noise.RandomField.of(diagonal / 2, 1, self.seed, waves=8)
+        field = _random_field.RandomField.build(diagonal / 2, 1, self.seed, waves=8)
 
         def thin(points: Floats) -> Floats:
             weights = np.exp(self.density * field.at(points)) if self.density else np.ones(len(points))
@@ -92,9 +92,9 @@ class Simulate(ReadScan):
             return weights
 
         uneven = bool(self.density or planes)
-        return sample(left, faces, count, rng, thin if uneven else None, 2.5 if self.density else 1.0)
+        return sample_seen(left, faces, count, rng, thin if uneven else None, 2.5 if self.density else 1.0)
 
-    def _pose(self, part: Part, rng: np.random.Generator) -> Floats:
+    def _choose_pose(self, part: Part, rng: np.random.Generator) -> Floats:
         if self.pose == "identity":
             return np.eye(4)
         if self.pose != "random":

@@ -52,7 +52,7 @@ class Wear:
     notes: tuple[str, ...] = ()
 
 
-def worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: float) -> Wear:
+def find_worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: float) -> Wear:
     """Which points lie in a region whose averaged distance shows it worn.
 
     Args:
@@ -71,8 +71,8 @@ def worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: flo
     noise = NOISE * aligned.noise
     points = points - np.clip(depth, -noise, noise)[:, None] * normals
 
-    cube, group, mean, count = _cubes(points, normals, depth, CUBE * aligned.spacing)
-    left = _left(mean[count >= FEWEST], count[count >= FEWEST], aligned.noise)
+    cube, group, mean, count = _average_cubes(points, normals, depth, CUBE * aligned.spacing)
+    left = _measure_remaining(mean[count >= FEWEST], count[count >= FEWEST], aligned.noise)
     usual = max(tolerance - BY_NOISE * aligned.noise, LEAST * tolerance, 1.5 * part.tessellation_error)
     threshold = max(usual, CLEAR * left)
     notes: tuple[str, ...] = ()
@@ -87,17 +87,17 @@ def worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: flo
     low = (count >= FEWEST // 2) & (mean < -np.maximum(0.6 * threshold, SELDOM * aligned.noise / np.sqrt(count)))
     if not low.any():
         return Wear(none, threshold, notes)
-    far = _cubes_away(cube, low)[group]
+    far = _count_cubes_away(cube, low)[group]
     asked, around = np.flatnonzero(far < 1.9), np.flatnonzero(far < 3.6)
-    average, number = _averages(points, normals, depth, asked, around, REACH * aligned.spacing)
+    average, number = _average_neighbours(points, normals, depth, asked, around, REACH * aligned.spacing)
     below = average < -np.maximum(threshold, 4 * aligned.noise / np.sqrt(number))
     found = asked[below & (number >= FEWEST)]
     result = none.copy()
-    result[some[found[_in_regions(points[found], 2 * aligned.spacing)]]] = True
+    result[some[found[_is_in_region(points[found], 2 * aligned.spacing)]]] = True
     return Wear(result, threshold, notes)
 
 
-def _cubes(points: Floats, normals: Floats, depth: Floats, edge: float) -> tuple[Ints, Ints, Floats, Ints]:
+def _average_cubes(points: Floats, normals: Floats, depth: Floats, edge: float) -> tuple[Ints, Ints, Floats, Ints]:
     """Cubes (C,3) that hold points of one of six directions, the cube of each point (N,), and of each cube the mean
     ``depth`` and the number of its points (C,)."""
     cell, key = number_faced_cubes(points, normals, edge)
@@ -105,7 +105,7 @@ def _cubes(points: Floats, normals: Floats, depth: Floats, edge: float) -> tuple
     return cell[first], group, np.bincount(group, weights=depth) / count, count
 
 
-def _left(mean: Floats, count: Ints, noise: float) -> float:
+def _measure_remaining(mean: Floats, count: Ints, noise: float) -> float:
     """How far sound surface deviates outward over whole cubes, where nothing is worn: what the fit leaves."""
     outward = mean > 0
     if outward.sum() < 10:
@@ -115,14 +115,14 @@ def _left(mean: Floats, count: Ints, noise: float) -> float:
     return float(np.sqrt(max(high**2 - by_chance**2, 0.0)))
 
 
-def _cubes_away(cube: Ints, low: Flags) -> Floats:
+def _count_cubes_away(cube: Ints, low: Flags) -> Floats:
     """(C,) how many cubes the nearest ``low`` one is away, centre to centre."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(cube[low]).query(cube, distance_upper_bound=4.0, workers=2)[0])
 
 
-def _averages(
+def _average_neighbours(
     points: Floats, normals: Floats, depth: Floats, asked: Ints, around: Ints, reach: float
 ) -> tuple[Floats, Ints]:
     """Mean depth (A,) of the nearest points ``around`` the ``asked`` ones on the same face, and how many they are."""
@@ -142,7 +142,7 @@ def _averages(
     return mean, number
 
 
-def _in_regions(points: Floats, link: float) -> Flags:
+def _is_in_region(points: Floats, link: float) -> Flags:
     """(M,) which of the points lie in a region, with the gaps that a ``link`` bridges, that has enough of them."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

@@ -72,7 +72,7 @@ def cloud_distance(points: Floats, samples: Samples, plain: bool = False) -> tup
     for start in range(0, len(points), 200_000):  # so that the neighbours of a scan of millions fit in memory
         part = slice(start, start + 200_000)
         far, index = (np.reshape(a, (-1, count)) for a in tree.query(points[part], k=count, workers=2))
-        distance[part], face[part] = _signed(points[part], samples, far, flat[index], plain)
+        distance[part], face[part] = _sign_distance(points[part], samples, far, flat[index], plain)
     if len(flat) < len(samples.points):
         # An edge's own points bound the distance from above.
         edge, _ = cKDTree(samples.points[samples.kind > 0]).query(points, workers=2)
@@ -80,7 +80,7 @@ def cloud_distance(points: Floats, samples: Samples, plain: bool = False) -> tup
     return distance, face
 
 
-def _signed(points: Floats, samples: Samples, far: Floats, index: Ints, plain: bool) -> tuple[Floats, Ints]:
+def _sign_distance(points: Floats, samples: Samples, far: Floats, index: Ints, plain: bool) -> tuple[Floats, Ints]:
     """As `cloud_distance`, from the distances ``far`` and indices (N,K) of the nearest CAD points, nearest first."""
     height = np.einsum("ikj,ikj->ik", points[:, None] - samples.points[index], samples.normals[index])
     # The foot on the true surface has a CAD point within the spacing: one of these, for a face that is flat.

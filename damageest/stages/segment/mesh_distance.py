@@ -11,7 +11,7 @@ from damageest.artefacts import ADDED, DAMAGE, INTACT, Deviation, Part, Scan
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.distance_by_cells import signed_distance_by_cells
 from damageest.stages.segment import Segment
-from damageest.stages.segment._averaged import worn
+from damageest.stages.segment._averaged import find_worn
 
 MANY = 100_000
 """Scan points beyond which not each of them is searched for."""
@@ -41,7 +41,7 @@ class MeshDistance(Segment):
         label[distance > limit] = ADDED
         notes: tuple[str, ...] = ()
         if self.wear:
-            found = worn(aligned, part, distance, face, limit)
+            found = find_worn(aligned, part, distance, face, limit)
             label[found.worn] = DAMAGE
             notes = found.notes
         return Deviation(distance=distance, face=face, label=label, notes=notes)

@@ -12,7 +12,7 @@ from damageest_cadquery._patch import step_patch
 from damageest.artefacts import Surface
 from damageest.geometry.units import MILLIMETRES
 from damageest.stages.export import Patch
-from damageest.stages.export._spline import fitted
+from damageest.stages.export._spline import fit_spline
 
 cq: Any = pytest.importorskip("cadquery")
 
@@ -38,7 +38,7 @@ def bowl(count: int = 60, hole: float = 0.0, noise: float = 0.0) -> Surface:
 
 
 def patch_of(surface: Surface, tolerance: float) -> Patch:
-    patch, said = fitted(surface, tolerance)
+    patch, said = fit_spline(surface, tolerance)
     assert patch is not None, said.reason
     assert said.reason == ""
     assert said.deviation is not None
@@ -70,7 +70,7 @@ def test_the_face_is_where_the_surface_is(hole: float, unit: str, tmp_path: Path
 
 
 def test_noise_is_smoothed_within_the_tolerance() -> None:
-    patch, said = fitted(bowl(noise=0.01), 0.1)
+    patch, said = fit_spline(bowl(noise=0.01), 0.1)
     assert patch is not None
     assert said.deviation is not None
     assert said.deviation < 0.06
@@ -82,15 +82,15 @@ def test_the_deviation_is_the_true_one_both_ways() -> None:
     from damageest.stages.export import _spline
 
     surface = bowl()
-    axes, _ = _spline._plane(surface)
+    axes, _ = _spline._fit_plane(surface)
     origin = surface.bounds.mean(axis=0)
     points = (surface.vertices - origin) @ axes.T
-    knots, poles = _spline._least_squares(points, 16)
-    near = _spline._deviation(points, surface, knots, poles)
+    knots, poles = _spline._solve_least_squares(points, 16)
+    near = _spline._measure_deviation(points, surface, knots, poles)
     dented = points.copy()
     dented[np.linalg.norm(points[:, :2] - points[:, :2].mean(0), axis=1) < 1, 2] -= 0.5
     assert near < 0.02
-    assert _spline._deviation(dented, surface, knots, poles) == pytest.approx(0.5, abs=0.03)
+    assert _spline._measure_deviation(dented, surface, knots, poles) == pytest.approx(0.5, abs=0.03)
 
 
 def test_what_is_no_height_field_or_too_sharp_says_so() -> None:
@@ -98,7 +98,7 @@ def test_what_is_no_height_field_or_too_sharp_says_so() -> None:
 
     ball = trimesh.creation.icosphere(4, radius=5)
     kept = ball.triangles_center[:, 2] < 3.5
-    patch, said = fitted(Surface(ball.vertices, ball.faces[kept]), 0.1)
+    patch, said = fit_spline(Surface(ball.vertices, ball.faces[kept]), 0.1)
     assert patch is None
     assert "no height field over any plane" in said.reason
     assert said.deviation is None
@@ -107,7 +107,7 @@ def test_what_is_no_height_field_or_too_sharp_says_so() -> None:
     a, b, c, d = (x.ravel() for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
     faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     step = Surface(np.column_stack([grid, np.where(grid[:, 0] + 0.3 * grid[:, 1] > 6, 4.0, 0.0)]), faces)
-    patch, said = fitted(step, 0.02)
+    patch, said = fit_spline(step, 0.02)
     assert patch is None
     assert said.deviation is not None
     assert said.deviation > 0.02

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from damageest.errors import PluginError
-from damageest.registry.system_libraries import load, loads, require
+from damageest.registry.system_libraries import can_load, load, require
 
 __all__ = ["PACKAGES", "check", "load"]
 
@@ -24,7 +24,7 @@ def check() -> None:
     """
     require("Open3D", PACKAGES, load)
     # By its name the dynamic linker takes it for the one Open3D asks for, wherever it was loaded from.
-    if not loads("libusb-1.0.so.0", load) and not loads(_bundled_usb(), load):
+    if not can_load("libusb-1.0.so.0", load) and not can_load(_bundled_usb(), load):
         raise PluginError(
             "Open3D needs libusb-1.0.so.0, which neither the system nor the package libusb-package has here",
             "pip install libusb-package, or apt-get install libusb-1.0-0",

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from damageest.artefacts import Floats, Part, Scan, Truth
 from damageest.evaluate.parts import PARTS
 from damageest.stages.align._field import PartSurface
-from damageest.stages.align._points import surface_cloud
+from damageest.stages.align._points import orient_surface
 
 
 def scene(
@@ -33,7 +33,7 @@ def scene(
             low, high = (level, high) if solid.volume() < (1 - missing) * whole.volume() else (low, level)
     mesh = solid.to_mesh64()
     skin = Part(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
-    cloud = surface_cloud(skin, points, rng)
+    cloud = orient_surface(skin, points, rng)
     facing = cloud.normals @ _unit(rng)
     seen = cloud.points[facing >= np.quantile(facing + 1e-6 * rng.random(points), unseen)]
     noise = 0.0005 * part.diagonal
@@ -44,7 +44,7 @@ def scene(
     T[:3, :3] = Rotation.random(random_state=seed).as_matrix()
     T[:3, 3] = rng.normal(0, 3 * part.diagonal, 3)
     scan = Scan(rng.permutation(np.concatenate([seen, dirt])), noise=noise, truth=Truth(None, T))
-    return part, scan.moved(np.linalg.inv(T))
+    return part, scan.move(np.linalg.inv(T))
 
 
 def error(part: Part, T: Floats, scan: Scan) -> float:
@@ -52,7 +52,7 @@ def error(part: Part, T: Floats, scan: Scan) -> float:
     its own surface, moved by what the pose is wrong by."""
     assert scan.truth is not None
     wrong = T @ np.linalg.inv(scan.truth.T_part_scan)
-    surface: NDArray[np.float64] = surface_cloud(part, 3000, np.random.default_rng(0)).points
+    surface: NDArray[np.float64] = orient_surface(part, 3000, np.random.default_rng(0)).points
     distance = PartSurface(part).closest(surface @ wrong[:3, :3].T + wrong[:3, 3])[0]
     return float(np.sqrt((distance**2).mean())) / scan.noise
 

@@ -34,7 +34,7 @@ def test_damage_does_not_draw_the_fit(name: str) -> None:
 def test_no_pose_given_and_scan_in_place() -> None:
     part, scan = scene("block", seed=2)
     assert scan.truth is not None
-    pose = Icp().run(scan.moved(scan.truth.T_part_scan), part, 4 * scan.noise)
+    pose = Icp().run(scan.move(scan.truth.T_part_scan), part, 4 * scan.noise)
     assert np.abs(pose.T_part_scan - np.eye(4)).max() < scan.noise
 
 

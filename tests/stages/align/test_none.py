@@ -13,7 +13,7 @@ from damageest.stages.align.none import Unaligned
 def test_identity_on_a_scan_in_place() -> None:
     part, scan = scene("block", seed=1, clutter=0.0)
     assert scan.truth is not None
-    pose = Unaligned().run(scan.moved(scan.truth.T_part_scan), part, 4 * scan.noise)
+    pose = Unaligned().run(scan.move(scan.truth.T_part_scan), part, 4 * scan.noise)
     assert (pose.T_part_scan == np.eye(4)).all()
     assert pose.inliers > 0.99
     assert pose.rms == pytest.approx(scan.noise, rel=0.1)

@@ -43,9 +43,9 @@ def test_continuous_symmetry_is_said_and_all_alternatives_are_right() -> None:
 def test_a_scan_that_leaves_the_part_free_to_slide_says_so() -> None:
     part, scan = scene("cylinder", seed=6, clutter=0.0)
     assert scan.truth is not None
-    height = (scan.moved(scan.truth.T_part_scan).points - part.bounds.mean(0))[:, 2] / (
-        part.bounds[1] - part.bounds[0]
-    )[2]
+    height = (scan.move(scan.truth.T_part_scan).points - part.bounds.mean(0))[:, 2] / (part.bounds[1] - part.bounds[0])[
+        2
+    ]
     ends_unseen = Scan(scan.points[np.abs(height) < 0.4], noise=scan.noise)
     pose = Register().run(ends_unseen, part, 4 * scan.noise)
     assert any("does not fix the pose" in note for note in pose.notes)

@@ -11,9 +11,9 @@ from manifold3d import Manifold
 from damageest.artefacts import Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays
-from damageest.stages.allowance._booleans import joined, tidied, touching
+from damageest.stages.allowance._booleans import join, take_touching, tidy
 from damageest.stages.allowance._selectors import StockTarget, Wanted
-from damageest.stages.allowance._skin import clipped, skin_of
+from damageest.stages.allowance._skin import clip, take_skin
 from damageest.stages.allowance._verify import Worked, check
 from tests.stages.allowance.shapes import TOLERANCE, block, part_of
 
@@ -26,7 +26,7 @@ def checked(stock: Any, hole: Any = BITE, target: StockTarget = TOP) -> tuple[fl
     """The thickness of the stock on the bite, checked against what is wanted on its top."""
     part = part_of(block())
     wanted = Wanted(0.0, (target,), ())
-    skin = skin_of(Solid(*to_arrays(BITE)), part, wanted, np.zeros(3))
+    skin = take_skin(Solid(*to_arrays(BITE)), part, wanted, np.zeros(3))
     work = Worked(hole + stock, BITE, block() - BITE, Manifold(), skin, None, np.zeros(3))
     return check(work, part, TOLERANCE, [])
 
@@ -68,12 +68,12 @@ def test_stock_where_none_is_wanted_is_refused() -> None:
 
 def test_pieces_that_do_not_touch_are_dropped() -> None:
     apart = Manifold.cube((2, 2, 2)).translate((40, 0, 0))
-    kept = touching(slab(1.0) + apart, BITE, TOLERANCE)
+    kept = take_touching(slab(1.0) + apart, BITE, TOLERANCE)
     assert kept.volume() == pytest.approx(48)
 
 
 def test_a_union_adds_up() -> None:
-    whole = tidied(joined(BITE, slab(1.0, -0.01)), 30.0)
+    whole = tidy(join(BITE, slab(1.0, -0.01)), 30.0)
     assert whole.volume() == pytest.approx(8 * 6 * 5)
     assert whole.num_tri() == 12
 
@@ -86,7 +86,7 @@ def test_skin_is_cut_without_gaps() -> None:
     normal = rng.normal(size=3)
     value = vertices @ (normal / np.linalg.norm(normal)) - 0.21
     value[np.abs(value) < 0.02] = 0  # some of the vertices on the plane
-    cut_vertices, cut_faces, parent, positive = clipped(vertices, faces, value)
+    cut_vertices, cut_faces, parent, positive = clip(vertices, faces, value)
     corners = cut_vertices[cut_faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     before = vertices[faces]

@@ -40,8 +40,8 @@ def test_a_sound_job(tmp_path: Path) -> None:
     assert stage.keep_out[1].mesh == tmp_path / "box.stl"
     schema = jsonschema.Draft202012Validator(job_schema(Registry.discover()))
     schema.validate(yamlfile.read(path)[0])
-    schema.validate(job.written(tmp_path))
-    (tmp_path / "again.yaml").write_text(yamlfile.write(job.written(tmp_path)))
+    schema.validate(job.to_values(tmp_path))
+    (tmp_path / "again.yaml").write_text(yamlfile.write(job.to_values(tmp_path)))
     assert load(tmp_path / "again.yaml", Registry.discover()).stages[Allowance] == stage
 
 

@@ -8,8 +8,8 @@ from sklearn.cluster import DBSCAN
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Scan
 from damageest.stages.cluster import _density
-from damageest.stages.cluster._density import dbscan
-from damageest.stages.cluster.dbscan import Dbscan, sharpest_bend
+from damageest.stages.cluster._density import run_dbscan
+from damageest.stages.cluster.dbscan import Dbscan, find_sharpest_bend
 
 SIZE = 60.0
 SIGMA = 0.04
@@ -88,16 +88,16 @@ def test_auto_finds_both_damages_among_strays() -> None:
 
 def test_sharpest_bend() -> None:
     flat, steep = np.linspace(1, 2, 900), np.linspace(2, 30, 101)[1:]
-    assert sharpest_bend(np.random.default_rng(0).permutation(np.concatenate([flat, steep]))) == pytest.approx(
+    assert find_sharpest_bend(np.random.default_rng(0).permutation(np.concatenate([flat, steep]))) == pytest.approx(
         2, abs=0.2
     )
-    assert sharpest_bend(np.array([1.0])) == np.inf
+    assert find_sharpest_bend(np.array([1.0])) == np.inf
 
 
 def test_same_clusters_as_scikit_learn() -> None:
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(c, 0.5, (300, 3)) for c in (0, 4, 8)] + [rng.uniform(-5, 12, (200, 3))])
-    ours, theirs = dbscan(points, 0.5, 8), DBSCAN(eps=0.5, min_samples=8, algorithm="kd_tree").fit(points)
+    ours, theirs = run_dbscan(points, 0.5, 8), DBSCAN(eps=0.5, min_samples=8, algorithm="kd_tree").fit(points)
     assert np.array_equal(ours < 0, theirs.labels_ < 0)
     core = theirs.core_sample_indices_
     assert len(np.unique(np.stack([ours[core], theirs.labels_[core]]), axis=1).T) == len(
@@ -108,9 +108,9 @@ def test_same_clusters_as_scikit_learn() -> None:
 def test_gathering_dense_points_keeps_the_clusters(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(c, 0.5, (3000, 3)) for c in (0, 9)])
-    whole = dbscan(points, 0.8, 10)
+    whole = run_dbscan(points, 0.8, 10)
     monkeypatch.setattr(_density, "PAIRS", 1000)
-    gathered = dbscan(points, 0.8, 10)
+    gathered = run_dbscan(points, 0.8, 10)
     same = (whole >= 0) & (gathered >= 0)
     assert same.mean() > 0.99
     assert len(np.unique(np.stack([whole[same], gathered[same]]), axis=1).T) == 2
@@ -132,7 +132,7 @@ def test_the_bend_parts_clusters_from_noise(share: float, uneven: int) -> None:
     flat = np.concatenate(squares)
     points = np.column_stack([flat, np.zeros(len(flat))])
     noise = rng.uniform([-10, -10, -15], [45, 20, 15], (int(share * len(points)), 3))
-    average = _density.neighbour_distances(np.concatenate([points, noise]), 10)
-    eps = sharpest_bend(average)
+    average = _density.measure_neighbour_distances(np.concatenate([points, noise]), 10)
+    eps = find_sharpest_bend(average)
     assert (average[: len(points)] <= eps).mean() > 0.95
     assert (average[len(points) :] <= eps).mean() < 0.1

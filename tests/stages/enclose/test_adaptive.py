@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from damageest.artefacts import Mesh, Part, Surface, open_edges
 from damageest.errors import StageError
-from damageest.geometry.refinement import halve_edges, insert_points, nearest, refine_at
+from damageest.geometry.refinement import find_nearest, halve_edges, insert_points, refine_at
 from damageest.geometry.solids import to_manifold
 from damageest.stages.background.bbox import BoundingBox
 from damageest.stages.background.capsule import Capsule
@@ -124,7 +124,7 @@ def test_refining_and_putting_points_in_keeps_the_shape(seed: int, edge: float) 
     rng = np.random.default_rng(seed)
     box = trimesh.creation.box((40, 30, 20)) if seed % 2 else trimesh.creation.cylinder(10, 50, sections=40)
     mesh = Mesh(box.vertices, box.faces)
-    face, foot = nearest(mesh, rng.normal(0, 15, (20, 3)))
+    face, foot = find_nearest(mesh, rng.normal(0, 15, (20, 3)))
     fine, held = refine_at(mesh, face, foot, edge)
     full, image = insert_points(fine, held, foot)
     for made in (fine, full):
@@ -134,7 +134,7 @@ def test_refining_and_putting_points_in_keeps_the_shape(seed: int, edge: float) 
     assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() <= edge
     # a point near a vertex is that vertex
     assert np.linalg.norm(full.vertices[image] - foot, axis=1).max() <= 0.5 * edge + 1e-9
-    assert np.abs(nearest(mesh, full.vertices)[1] - full.vertices).max() < 1e-9
+    assert np.abs(find_nearest(mesh, full.vertices)[1] - full.vertices).max() < 1e-9
 
 
 def test_halved_everywhere() -> None:

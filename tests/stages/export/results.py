@@ -51,7 +51,7 @@ def make(units: str = "mm", size: float = 1.0) -> Result:
     undamaged = to_solid(subtract_lost(whole, lost[0] + lost[1]))
     label = np.zeros(50, np.int32)
     return Result(
-        "two", units, 0.1 * size, part, scan, scan.moved(T), pose, deviation, label, sites, damage, undamaged,
+        "two", units, 0.1 * size, part, scan, scan.move(T), pose, deviation, label, sites, damage, undamaged,
         (), (), None,
     )  # fmt: skip
 

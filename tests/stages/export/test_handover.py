@@ -16,7 +16,7 @@ from damageest.errors import JobError
 from damageest.geometry.units import MILLIMETRES
 from damageest.job import load
 from damageest.registry import Registry
-from damageest.report.result_json import report
+from damageest.report.result_json import build_report
 from damageest.result import Result
 from damageest.stages.export.files import DAMAGE, DEPOSIT, UNDAMAGED, Files
 from tests.stages.export import results
@@ -87,10 +87,10 @@ def test_lib3mf_and_trimesh_read_solids_names_colours_and_unit(
 
 def test_names_that_xml_would_trip_over(tmp_path: Path) -> None:
     from damageest.stages.export import Body
-    from damageest.stages.export._threemf import threemf
+    from damageest.stages.export._threemf import write_threemf
 
     body = Body('<a & "b">', results.make().part, (1, 2, 3))
-    threemf(tmp_path, "odd", [body], "mm")
+    write_threemf(tmp_path, "odd", [body], "mm")
     assert list(opened(tmp_path / "odd.3mf")[1]) == ['<a & "b">']
 
 
@@ -128,7 +128,7 @@ def test_the_scans_frame_alone(tmp_path: Path, registry: Registry) -> None:
     result = results.make()
     written = write(result, tmp_path, registry, frame="scan")
     assert {name.split("/")[0] for name in written.files} == {"scan_frame"}
-    files = report(result, written)["sites"][1]["files"]
+    files = build_report(result, written)["sites"][1]["files"]
     assert files["damage"] == "scan_frame/damage/site-2.stl"
     assert files["deposit"] == "scan_frame/deposit/site-2.stl"
 
@@ -136,7 +136,7 @@ def test_the_scans_frame_alone(tmp_path: Path, registry: Registry) -> None:
 def test_result_json_lists_files_and_gives_the_pose_both_ways(tmp_path: Path, registry: Registry) -> None:
     result = results.make()
     written = write(result, tmp_path, registry, format=["stl", "ply"], frame="both")
-    said = report(result, written)
+    said = build_report(result, written)
     assert said["export"] == {"files": list(written.files), "notes": []}
     assert said["sites"][0]["files"]["damage"] == "damage/site-1.stl"
     assert len(said["sites"][0]["files"]["every"]) == 2 * 3
@@ -189,4 +189,4 @@ def test_a_format_of_a_plugin_that_is_not_there_names_it(job_file: Any, registry
 def test_one_name_and_a_list_are_written_out_alike(job_file: Any, registry: Registry, tmp_path: Path) -> None:
     for text in ("stl", "[stl]", "[stl, stl]"):
         job = load(job_file(f"export: {{format: {text}}}\n"), registry)
-        assert job.written(tmp_path)["export"]["format"] == ["stl"]
+        assert job.to_values(tmp_path)["export"]["format"] == ["stl"]

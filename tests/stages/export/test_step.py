@@ -12,7 +12,7 @@ import pytest
 from damageest.artefacts import Surface
 from damageest.geometry.units import MILLIMETRES
 from damageest.registry import Registry
-from damageest.report.result_json import report
+from damageest.report.result_json import build_report
 from damageest.stages.export.files import Files
 from tests.stages.export import results
 
@@ -59,7 +59,7 @@ def test_inner_damage_surfaces_as_splines(units: str, tmp_path: Path, registry: 
         "surface/site-1.step",
         "scan_frame/surface/site-1.step",
     }
-    said = report(result, written)["sites"]
+    said = build_report(result, written)["sites"]
     assert said[0]["spline"]["reason"] == ""
     assert said[0]["spline"]["trimmed"]
     assert 0 < said[0]["spline"]["deviation"] <= result.tolerance
@@ -76,4 +76,4 @@ def test_inner_damage_surfaces_as_splines(units: str, tmp_path: Path, registry: 
         (tmp_path / str(k)).mkdir()
         stage.run(result, tmp_path / str(k), registry.writers)
     assert (tmp_path / "0/surface/site-1.step").read_bytes() == (tmp_path / "1/surface/site-1.step").read_bytes()
-    assert report(result)["sites"][0]["spline"] is None
+    assert build_report(result)["sites"][0]["spline"] is None

@@ -125,7 +125,7 @@ def test_a_random_pose_is_rigid_and_undone_by_the_truth(cuboid: Part) -> None:
     turn = scan.truth.T_part_scan[:3, :3]
     assert np.allclose(turn @ turn.T, np.eye(3))
     assert np.linalg.det(turn) == pytest.approx(1)
-    back = scan.moved(scan.truth.T_part_scan).points
+    back = scan.move(scan.truth.T_part_scan).points
     assert distance(back, cuboid).max() < 1e-9
     assert distance(scan.points, cuboid).max() > 1
 

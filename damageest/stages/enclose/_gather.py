@@ -12,7 +12,7 @@ from damageest.geometry.neighbourhoods import find_neighbours, measure_local_are
 from damageest.geometry.orientation import turn_toward_void
 from damageest.geometry.poisson import Grid, GridValues, refine_field
 from damageest.geometry.voxels import number_cubes
-from damageest.stages.enclose._skin import Flags, SkinSamples, pushed, skin_near
+from damageest.stages.enclose._skin import Flags, SkinSamples, push_outward, sample_skin_near
 
 APART = 0.75
 """Edge of the cubes that one averaged point each is made for, in cells of the surface."""
@@ -45,35 +45,35 @@ class Found:
     kept_areas: Floats
 
 
-def gathered(
+def gather_groups(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float,
     band: float, push: float,
 ) -> Found:  # fmt: skip
     """Sorts scan and skin into damaged, lost and sound; ``band`` and ``push`` in tolerances."""
     from scipy.spatial import cKDTree
 
-    points, label, grown, face = _grown(aligned, deviation, sites, tolerance)
-    skin = skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
+    points, label, grown, face = _grow_to_rim(aligned, deviation, sites, tolerance)
+    skin = sample_skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
     free = cKDTree(points).query(skin.points, workers=2)[0] < np.maximum(band * tolerance, 1.6 * skin.usual)
     cross = part.cross[face]
     above = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
-    groups, lost_by = _groups(points, above, label, skin, free, tolerance, aligned.spacing, aligned.noise)
+    groups, lost_by = _group_losses(points, above, label, skin, free, tolerance, aligned.spacing, aligned.noise)
     areas = measure_local_areas(skin.points)
     kept = np.flatnonzero((lost_by < 0) & ~free)
-    moved = pushed(part, skin.points[kept], skin.normals[kept], push * tolerance)
+    moved = push_outward(part, skin.points[kept], skin.normals[kept], push * tolerance)
     return Found(groups, skin, lost_by, moved, skin.normals[kept], areas[kept])
 
 
-def oriented(found: Found, grid: Grid) -> tuple[Floats, Floats, Floats]:
+def select_oriented(found: Found, grid: Grid) -> tuple[Floats, Floats, Floats]:
     """Points (N,3), normals (N,3) toward the lost side or the void, and areas (N,) for a solve on a grid."""
     points = np.concatenate([*(group.points for group in found.groups), found.kept])
     normals = np.concatenate([*(group.normals for group in found.groups), found.kept_normals])
     areas = np.concatenate([*(group.areas for group in found.groups), found.kept_areas])
-    inside = grid.inside(points)
+    inside = grid.contains(points)
     return points[inside], normals[inside], areas[inside]
 
 
-def within_reach(grid: Grid, field: GridValues, found: Found, number: int, slack: float) -> GridValues:
+def cut_beyond_reach(grid: Grid, field: GridValues, found: Found, number: int, slack: float) -> GridValues:
     """The field made negative where a sound or another group's surface is nearer, by more than ``slack``, than this
     one's.
 
@@ -86,10 +86,10 @@ def within_reach(grid: Grid, field: GridValues, found: Found, number: int, slack
     ours = np.concatenate([group.points, group.lost])
     rest = [np.concatenate([other.points, other.lost]) for k, other in enumerate(found.groups) if k != number]
     theirs = np.concatenate([found.kept, *rest])
-    half = grid.coarser()
+    half = grid.coarsen()
     away = []
     for points in (ours, theirs):
-        points = points[half.inside(points)]
+        points = points[half.contains(points)]
         if not len(points):
             return field
         free = np.ones(half.shape, bool)
@@ -101,7 +101,9 @@ def within_reach(grid: Grid, field: GridValues, found: Found, number: int, slack
     return np.minimum(field, refine_field(cut))
 
 
-def _surface(points: Floats, above: Floats, lost: Floats, lost_normals: Floats, noise: float, cell: float) -> Surfels:
+def _build_surface(
+    points: Floats, above: Floats, lost: Floats, lost_normals: Floats, noise: float, cell: float
+) -> Surfels:
     """The points (M,3) of one group smoothed, thinned and turned toward the lost side, with the area of each.
 
     ``above`` (M,3): the normal of the nominal skin nearest to each; ``lost`` (L,3): samples of the skin lost with them.
@@ -120,7 +122,7 @@ def _surface(points: Floats, above: Floats, lost: Floats, lost_normals: Floats, 
     return points, normals, measure_local_areas(points)
 
 
-def _groups(
+def _group_losses(
     points: Floats,
     above: Floats,
     label: Ints,
@@ -159,14 +161,16 @@ def _groups(
             continue
         lost = gone[of_gone == number]
         lost_by[lost] = len(found)
-        surface = _surface(
+        surface = _build_surface(
             points[members], above[members], skin.points[lost], skin.normals[lost], noise, 0.8 * tolerance
         )
         found.append(Group(*surface, skin.points[lost], labels))
     return tuple(found), lost_by
 
 
-def _grown(aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) -> tuple[Floats, Ints, Flags, Ints]:
+def _grow_to_rim(
+    aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float
+) -> tuple[Floats, Ints, Flags, Ints]:
     """The sites' points and their neighbours that are deeper than the noise makes likely: the rim, where the damage is
     still shallower than the tolerance."""
     deep = (sites.label == 0) & (deviation.distance < -max(2 * aligned.noise, 0.1 * tolerance))

@@ -18,7 +18,7 @@ class RandomField:
     heights: Floats
 
     @classmethod
-    def of(cls, wavelength: float, octaves: int, seed: int, waves: int = 10) -> RandomField:
+    def build(cls, wavelength: float, octaves: int, seed: int, waves: int = 10) -> RandomField:
         """``octaves`` bands of ``waves`` cosines each, every band half the wavelength and half the height."""
         rng = np.random.default_rng([20771, seed])
         band = np.repeat(np.arange(octaves), waves)

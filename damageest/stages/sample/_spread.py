@@ -8,7 +8,7 @@ from damageest.artefacts import Floats, Ints
 from damageest.geometry.voxels import number_cubes
 
 
-def lattice(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats, Ints]:
+def spread_points(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats, Ints]:
     """Points (N,3) on the ``chosen`` of ``triangles`` (F,3,3) and the triangle (N,) of each; gaps up to ``step``.
 
     The triangle is cut into bands along its longest edge and the bands into columns; each column has its point in the
@@ -59,16 +59,16 @@ def thin(points: Floats, apart: float, reach: float) -> Ints:
     if not len(points):
         return np.empty(0, np.int64)
     # Very fine meshes are first brought down to a few points per disc, else the pairs of points fill the memory.
-    todo = _one_per_cell(points, 0.4 * apart)
+    todo = _pick_one_per_cell(points, 0.4 * apart)
     kept = np.empty(0, np.int64)
     while len(todo):
-        kept = np.concatenate([kept, todo[_apart(points[todo], apart)]])
+        kept = np.concatenate([kept, todo[_pick_apart(points[todo], apart)]])
         far, _ = cKDTree(points[kept]).query(points, workers=-1)
-        todo = _one_per_cell(points, 0.2 * apart, np.flatnonzero(far > reach))
+        todo = _pick_one_per_cell(points, 0.2 * apart, np.flatnonzero(far > reach))
     return np.sort(kept)
 
 
-def _one_per_cell(points: Floats, cell: float, among: Ints | None = None) -> Ints:
+def _pick_one_per_cell(points: Floats, cell: float, among: Ints | None = None) -> Ints:
     among = np.arange(len(points)) if among is None else among
     if not len(among):
         return among
@@ -76,7 +76,7 @@ def _one_per_cell(points: Floats, cell: float, among: Ints | None = None) -> Int
     return among[np.sort(first)]
 
 
-def _apart(points: Floats, distance: float) -> Ints:
+def _pick_apart(points: Floats, distance: float) -> Ints:
     """A maximal set of points no two of which are closer than ``distance``: rounds in which local minima of a random
     rank win and their neighbours leave (Luby 1986)."""
     from scipy.spatial import cKDTree
