@@ -14,11 +14,12 @@ from damageest.errors import InputError
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
-from damageest.pipeline.output import open_workspace, write_report
 from damageest.pipeline.routes import WRITE, route_of
 from damageest.pipeline.state import JobState
+from damageest.pipeline.workspace import open_workspace
 from damageest.registry import Registry
 from damageest.registry.contracts import Contract
+from damageest.report.files import write_report
 from damageest.result import Result
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan

@@ -10,13 +10,12 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import Distribution, EntryPoint, entry_points
+from importlib.metadata import Distribution, EntryPoint, entry_points, version
 from pathlib import Path
 from typing import Any
 
 import pluggy
 
-import damageest
 from damageest.errors import PluginError
 from damageest.registry import hookspecs
 
@@ -86,7 +85,7 @@ def ignore_shadow_warnings() -> Iterator[None]:
 
 
 def _describe_own() -> Provider:
-    return Provider("damageest", damageest.__version__, "Apache-2.0", "damageest.registry.builtins")
+    return Provider("damageest", version("damageest"), "Apache-2.0", "damageest.registry.builtins")
 
 
 def _list_installed() -> list[tuple[EntryPoint, Provider]]:

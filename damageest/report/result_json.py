@@ -163,8 +163,7 @@ def result_schema() -> dict[str, Any]:
 def build_report(result: Result, written: Written = _NOTHING, relative: Any = str) -> dict[str, Any]:
     """The content of result.json as plain values. ``relative`` turns an absolute input path into the one to write."""
     import platform
-
-    import damageest
+    from importlib.metadata import version
 
     part, scan, pose = result.part, result.scan, result.pose
     sites = [_report_site(site, written) for site in result.sites]
@@ -206,7 +205,7 @@ def build_report(result: Result, written: Written = _NOTHING, relative: Any = st
         stages=[StageReport(**vars(record)) for record in result.stages],
         failures=list(result.failures),
         warnings=list(result.warnings),
-        versions={"damageest": damageest.__version__, "python": platform.python_version()},
+        versions={"damageest": version("damageest"), "python": platform.python_version()},
     )
     return filled.model_dump(mode="json", by_alias=True)
 

@@ -15,13 +15,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
 from damageest.errors import Fault, JobError
-from damageest.job import yamlfile
-from damageest.job.model import Job, to_plain
 from damageest.pipeline.cache import Cache
-from damageest.report.result_json import build_report
-from damageest.result import Result
-from damageest.stages.export import Written
 
 _OURS = re.compile(
     r"result\.json|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?(scan\.ply|result\.3mf"
@@ -36,7 +33,6 @@ class Workspace:
     """Where one run works: ``folder`` takes the files, ``cache`` the stages' outputs; ``target`` is the final place."""
 
     target: Path
-    hidden: Path
     folder: Path
     cache: Cache
 
@@ -48,16 +44,14 @@ class Workspace:
         if self.target.exists():
             os.replace(self.target, old)
         os.replace(self.folder, self.target)
-        _hand_over(old, self.target)
-        shutil.rmtree(self.hidden)
+        _keep_own_files(old, self.target)
 
 
 @contextmanager
 def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
-    """Opens the hidden sibling of ``target``. Raises JobError where the target is someone else's, or in use."""
+    """Opens the hidden sibling of ``target``. Raises JobError where the target is not an output folder, or in use."""
     hidden = target.parent / f".{target.name}.partial"
-    _refuse_strangers(target)
-    made = not hidden.exists()
+    _refuse_other_folder(target)
     try:
         hidden.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -65,7 +59,7 @@ def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
     with _lock(hidden, target):
         if _old_path(target).exists() and not target.exists():
             os.replace(_old_path(target), target)
-        _hand_over(_old_path(target), target)  # left where a run was killed in the middle of finishing
+        _keep_own_files(_old_path(target), target)  # left where a run was killed in the middle of finishing
         stages, folder = hidden / "stages", hidden / "result"
         shutil.rmtree(folder, ignore_errors=True)
         if not use_cache:
@@ -74,25 +68,18 @@ def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
         folder.mkdir()
         older = (target / "stages",) if use_cache else ()
         try:
-            yield Workspace(target, hidden, folder, Cache(stages, older))
+            yield Workspace(target, folder, Cache(stages, older))
         finally:
             shutil.rmtree(folder, ignore_errors=True)
-            if made and stages.is_dir() and not any(stages.iterdir()):
-                shutil.rmtree(hidden)
-
-
-def write_report(result: Result, job: Job, folder: Path, target: Path, written: Written) -> None:
-    """Writes result.json and job.yaml into ``folder``, their paths relative to ``target``, where they will stand."""
-    content = build_report(result, written, lambda path: to_plain(Path(path), target))
-    (folder / "result.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
-    (folder / "job.yaml").write_text(yamlfile.write(job.to_values(target)))
+            if not stages.is_dir() or not any(stages.iterdir()):
+                shutil.rmtree(hidden, ignore_errors=True)  # where the system keeps an open lock file, it stays
 
 
 def _old_path(target: Path) -> Path:
     return target.parent / f".{target.name}.old"
 
 
-def _hand_over(old: Path, target: Path) -> None:
+def _keep_own_files(old: Path, target: Path) -> None:
     """Moves the user's own files from the earlier output to the new one, and drops the rest of it."""
     if not old.exists():
         return
@@ -115,7 +102,7 @@ def _read_named(old: Path) -> set[str]:
         return set()
 
 
-def _refuse_strangers(target: Path) -> None:
+def _refuse_other_folder(target: Path) -> None:
     """A folder that damageest did not write is never replaced."""
     if target.is_file():
         raise JobError([Fault(f"{target} is a file; name a folder", "output")])
@@ -126,18 +113,13 @@ def _refuse_strangers(target: Path) -> None:
 
 @contextmanager
 def _lock(hidden: Path, target: Path) -> Iterator[None]:
-    """Holds the folder for one run; the lock goes with the process, however it ends."""
+    """Keeps other runs out of the folder. The lock ends with the process, however the process ends."""
+    lock = FileLock(hidden / "lock", timeout=0)
     try:
-        import fcntl
-    except ImportError:  # no such lock on this system
-        yield
-        return
-    handle = os.open(hidden, os.O_RDONLY)
+        lock.acquire()
+    except Timeout:
+        raise JobError([Fault(f"another run is writing to {target}; wait, or choose another folder")]) from None
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise JobError([Fault(f"another run is writing to {target}; wait, or choose another folder")]) from None
         yield
     finally:
-        os.close(handle)
+        lock.release()

@@ -9,7 +9,7 @@ import pytest
 
 from damageest.artefacts import Pose
 from damageest.errors import JobError
-from damageest.pipeline.output import open_workspace
+from damageest.pipeline.workspace import open_workspace
 
 
 def make(target: Path, body: str) -> None:
