@@ -13,8 +13,8 @@ from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.evaluate.scores import depth, surface_points
 from damageest.geometry.solids import to_manifold
-from damageest.stages.scan._scanner import apply_tools
-from damageest.stages.scan._tools import BlobTool, BoxTool, CylinderTool, PlaneTool, SphereTool, Tool
+from damageest.stages.scan.scanner import apply_tools
+from damageest.stages.scan.tools import BlobTool, BoxTool, CylinderTool, PlaneTool, SphereTool, Tool
 
 SHARE = (0.002, 0.33)
 """Least and largest share of the part's volume that a damage takes."""

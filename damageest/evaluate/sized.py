@@ -8,7 +8,7 @@ from damageest.artefacts import Part
 from damageest.errors import StageError
 from damageest.evaluate.damages import KINDS, Damaged, DamagePlace
 from damageest.evaluate.scores import depth
-from damageest.stages.scan._scanner import apply_tools
+from damageest.stages.scan.scanner import apply_tools
 
 SIZED = ("chip", "pit", "cut", "groove")
 """Kinds whose depth goes with their size; how deep the others go, the part decides."""

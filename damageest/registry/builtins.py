@@ -59,8 +59,8 @@ def damageest_stages() -> list[type[Stage]]:
 def damageest_writers() -> Mapping[str, Writer]:
     """The formats that need no plugin."""
     from damageest.stages.export import Writer
-    from damageest.stages.export._mesh_files import write_ply_bodies, write_stl_bodies
-    from damageest.stages.export._threemf import write_threemf
+    from damageest.stages.export.mesh_files import write_ply_bodies, write_stl_bodies
+    from damageest.stages.export.threemf import write_threemf
 
     return {
         "stl": Writer(write_stl_bodies),

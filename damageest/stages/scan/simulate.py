@@ -11,8 +11,8 @@ from pydantic import types as kinds
 from damageest.artefacts import Floats, Part, Scan, Solid, Truth
 from damageest.geometry.units import canonical_unit
 from damageest.stages.scan import ReadScan, _random_field
-from damageest.stages.scan._scanner import apply_tools, sample_seen
-from damageest.stages.scan._tools import AnyTool, Direction, RigidMatrix, Vector
+from damageest.stages.scan.scanner import apply_tools, sample_seen
+from damageest.stages.scan.tools import AnyTool, Direction, RigidMatrix, Vector
 
 
 class Unseen(BaseModel):

@@ -87,7 +87,7 @@ def test_lib3mf_and_trimesh_read_solids_names_colours_and_unit(
 
 def test_names_that_xml_would_trip_over(tmp_path: Path) -> None:
     from damageest.stages.export import Body
-    from damageest.stages.export._threemf import write_threemf
+    from damageest.stages.export.threemf import write_threemf
 
     body = Body('<a & "b">', results.make().part, (1, 2, 3))
     write_threemf(tmp_path, "odd", [body], "mm")

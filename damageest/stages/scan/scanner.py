@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Mesh, Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays, to_manifold
-from damageest.stages.scan._tools import Tool
+from damageest.stages.scan.tools import Tool
 
 DUST = 1e-9
 """Share of the part's volume below which a piece is a rounding error of the Booleans."""

@@ -1,0 +1,51 @@
+"""The structure of the package, where import contracts do not reach: underscores, and what lies at the top."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted([*(ROOT / "damageest").rglob("*.py"), *(ROOT / "plugins").glob("*/damageest_*/**/*.py")])
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Every module and every name that a file imports, in full."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_no_folder_imports_another_folders_underscore(path: Path) -> None:
+    parts = path.parent.parts
+    own = ".".join(
+        parts[max(k for k, part in enumerate(parts) if part == "damageest" or part.startswith("damageest_")) :]
+    )
+    for name in imported(path):
+        if not name.startswith("damageest"):
+            continue
+        parts = name.split(".")
+        hidden = next((k for k, part in enumerate(parts) if part.startswith("_") and not part.endswith("__")), None)
+        if hidden is not None:
+            assert ".".join(parts[:hidden]).startswith(own), f"{name} is private to its folder"
+
+
+def test_few_modules_lie_at_the_top() -> None:
+    top = {path.name for path in (ROOT / "damageest").glob("*.py")}
+    assert top == {"__init__.py", "api.py", "artefacts.py", "errors.py", "result.py"}
+
+
+def test_the_package_is_typed() -> None:
+    assert (ROOT / "damageest" / "py.typed").is_file()
+
+
+def test_architecture_names_each_folder() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text()
+    folders = {path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "damageest").glob("*/__init__.py")}
+    assert not [folder for folder in folders if f"{folder.split('/')[1]}/" not in text]
