@@ -38,8 +38,8 @@ def run(
     """Runs a job and gives its result; writes nothing unless ``output`` says where (True: where the job says).
 
     ``job``: a path, a mapping of the same shape, or a checked Job. ``part`` (a Part, a trimesh.Trimesh, or vertices and
-    faces) and ``scan`` (a Scan, an (N,3) array, a trimesh mesh or point cloud) stand in for the job's files; both may
-    also stand in the mapping. ``settings`` are overrides such as ``"cluster.eps=0.4"``. Lengths are in the job's unit.
+    faces) and ``scan`` (a Scan, an (N,3) array, a trimesh mesh or point cloud) replace the job's files; both may
+    also be in the mapping. ``settings`` are overrides such as ``"cluster.eps=0.4"``. Lengths are in the job's unit.
 
     Raises JobError or InputError (job or input at fault) and StageError (a stage failed or refused).
     """
@@ -65,7 +65,7 @@ def run(
 def _split(
     job: str | Path | Mapping[str, Any], part: Any, scan: Any
 ) -> tuple[str | Path | Mapping[str, Any], dict[Contract, Any]]:
-    """The job without the arrays in it, and the artefacts made of them."""
+    """The job without its arrays, and the artefacts made from them."""
     source: Any = dict(job) if isinstance(job, Mapping) else job
     units = str(source.get("units", "mm")) if isinstance(source, dict) else "mm"
     if isinstance(source, dict):

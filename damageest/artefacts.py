@@ -1,4 +1,4 @@
-"""The values that stages hand to one another.
+"""The values that stages give to each other.
 
 All are frozen and their arrays are read-only: a stage gives a new value, it never edits one. Lengths are in the job's
 unit, coordinates float64 (N,3), faces int64 (F,3). Frames: a `Scan` as read is in the scanner's frame; everything
@@ -23,7 +23,7 @@ tolerance (weld bead, dirt, fixture); deviating, but in no site (noise)."""
 
 
 class ArtefactError(ValueError):
-    """What was to become an artefact does not fit its type: wrong shapes, indices out of range, a solid not closed."""
+    """The data do not fit the artefact's type: wrong shapes, indices out of range, a solid that is not closed."""
 
 
 def _frozen(value: Any, dtype: Any) -> Any:
@@ -35,7 +35,7 @@ def _frozen(value: Any, dtype: Any) -> Any:
 
 
 class _Arrays:
-    """Converts and locks the array fields named in ``_dtypes`` when the dataclass is made."""
+    """Converts the array fields named in ``_dtypes`` and makes them read-only when the dataclass is made."""
 
     _dtypes: ClassVar[dict[str, Any]] = {}
 
@@ -113,7 +113,7 @@ def open_edges(faces: Ints) -> int:
     size = int(faces.max()) + 1
     forward = edges[:, 0] * size + edges[:, 1]
     backward = edges[:, 1] * size + edges[:, 0]
-    # most often all is well, and two sorts show it
+    # most meshes are closed, and two sorts show it
     ordered = np.sort(forward)
     if (np.diff(ordered) > 0).all() and (edges[:, 0] != edges[:, 1]).all() and (ordered == np.sort(backward)).all():
         return 0
@@ -124,7 +124,7 @@ def open_edges(faces: Ints) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Solid(Mesh):
-    """A watertight mesh bounding positive volume, of one or more components. The constructor refuses anything else."""
+    """A watertight mesh bounding positive volume, of one or more components. The constructor raises ArtefactError for anything else."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -145,10 +145,10 @@ class Solid(Mesh):
 
 @dataclass(frozen=True, eq=False)
 class Deposit(Solid):
-    """What is to be deposited for one damage, stock to be milled off again included.
+    """What is to be deposited for one damage, including stock to be milled off.
 
-    ``cavity`` is the damage volume (DV) enlarged by the cut-back into sound metal, None where the DV stays as it was;
-    ``cut_back_volume`` what that takes more. ``stock_volume``: of what stands proud of the nominal surface;
+    ``cavity`` is the damage volume (DV) enlarged by the cut-back into intact metal, None without a cut-back;
+    ``cut_back_volume`` the volume that this removes in addition. ``stock_volume``: of what is above the nominal surface;
     ``thickness``: its least, mean and largest height over the skin where stock was asked for, None without any;
     ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`, empty where the part has
     none. ``notes`` are warnings.
@@ -189,7 +189,7 @@ class Part(Solid):
 
 @dataclass(frozen=True, eq=False)
 class Truth(_Arrays):
-    """What a virtual scanner knows: the true ``damage`` in the part's frame (None if there is none), and the pose."""
+    """The truth of a virtual scan: the true ``damage`` in the part's frame (None if there is none), and the pose."""
 
     damage: Solid | None
     T_part_scan: Floats
@@ -201,7 +201,7 @@ class Scan(_Arrays):
     """Points (N,3) on the damaged part; ``normals`` (N,3) outward, or None.
 
     ``noise`` is the measured standard deviation of the points off the local surface and ``spacing`` the median distance
-    to the nearest neighbours that a surface reconstruction has to bridge; both 0 until measured.
+    to the nearest neighbours that a reconstructed surface has to bridge; both 0 until measured.
     """
 
     points: Floats
@@ -253,8 +253,8 @@ class Samples(_Arrays):
 class Pose(_Arrays):
     """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
 
-    ``alternatives`` (K,4,4) are other poses that fit the scan as well, as on a symmetric part: where there are any, the
-    pose is one of several right ones and nothing more. ``notes`` say so in words.
+    ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is one of
+    several right ones. ``notes`` say so in words.
     """
 
     T_part_scan: Floats
@@ -268,8 +268,8 @@ class Pose(_Arrays):
 @dataclass(frozen=True, eq=False)
 class Deviation(_Arrays):
     """Per scan point, in the part's frame: ``distance`` (N,) signed to the part's surface, positive outside; ``face``
-    (N,) the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER. ``notes`` say what the scan could
-    not tell."""
+    (N,) the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER. ``notes`` say what the scan
+    does not show."""
 
     distance: Floats
     face: Ints
@@ -301,7 +301,7 @@ class Rims:
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """A solid that holds the damage of ``sites`` and, of the part, only damage; ``notes`` for what the maker doubts."""
+    """A solid that contains the damage of ``sites`` and no intact metal; ``notes`` say what is doubtful about it."""
 
     solid: Solid
     sites: tuple[int, ...]
@@ -310,7 +310,7 @@ class Enclosure:
 
 @dataclass(frozen=True, eq=False)
 class Enclosures:
-    """What a job-wide `enclose` gives: disjoint enclosures that together cover the sites."""
+    """The enclosures of all sites of a job: disjoint, each site in one of them."""
 
     items: tuple[Enclosure, ...]
 
@@ -320,10 +320,10 @@ class Evidence:
     """The check of one damage volume (DV) against the scan.
 
     ``ids_residual``: 95th percentile of the distance from the site's IDS points to the DV's boundary.
-    ``intact_points_inside``: intact scan points deeper than the tolerance inside the DV.
+    ``intact_points_inside``: intact scan points on the skin that the DV removes.
     ``skin_contradicted``: share of the part's skin that the DV removes which intact scan points lie on.
-    ``skin_unseen``: share of the part's skin beside the DV that carries no scan point: no evidence either way.
-    ``consistent``: whether the scan bears the DV out. ``reasons`` say why not.
+    ``skin_unseen``: share of the part's skin beside the DV that has no scan point: no evidence either way.
+    ``consistent``: whether the scan agrees with the DV. ``reasons`` say why not.
     """
 
     ids_residual: float = 0.0

@@ -1,7 +1,7 @@
-"""What can go wrong, sorted by who can mend it.
+"""What can go wrong, sorted by who can correct it.
 
 Every error says what is at fault, what would be valid and what to do, and carries the exit status of the command
-line: 2 where the job or an input is at fault, 1 where a sound job met a stage that failed or refused.
+line: 2 where the job or an input is at fault, 1 where the job is right but a stage failed or refused.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ class JobError(DamageestError):
 
 
 class InputError(DamageestError):
-    """A file or array handed in is at fault: unreadable, empty, not a solid, in another unit."""
+    """An input file or array is at fault: unreadable, empty, not a solid, in another unit."""
 
     exit_status = 2
 
 
 class PluginError(DamageestError):
-    """A stage implementation does not keep its contract, two packages provide the same name, or a plugin's hook finds
-    that what it needs is not there: it then says with ``remedy`` what to do."""
+    """A stage implementation does not keep its contract, two packages provide the same name, or a plugin needs
+    something that is not installed: ``remedy`` then says what to do."""
 
     exit_status = 2
 
@@ -64,7 +64,7 @@ class PluginError(DamageestError):
 
 
 class StageError(DamageestError):
-    """A stage failed or refused on sound input.
+    """A stage failed, or refused an input that is valid.
 
     Raise it with what is wrong and, as ``remedy``, what the user may try. The engine adds stage and site.
     """

@@ -1,7 +1,7 @@
-"""The check of a damage volume (DV) against the scan it came from, whatever method made it.
+"""The check of a damage volume (DV) against the scan, independent of the method that made the DV.
 
-A right DV has its IDS points on its boundary, no sound point inside it or on the skin it takes away, and scan points
-all over its inner surface. A wrong side, a swallowed neighbour, a flat cap each break one of these.
+A right DV has its IDS points on its boundary, no intact point inside it or on the skin that it removes, and scan points
+all over its inner surface. The wrong side, a second site enclosed by mistake, a flat cap each break one of these.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
 
 MOST = 20_000
-"""Points looked at for each figure; more would not change its second digit."""
+"""Points looked at for each figure; more points do not change its second digit."""
 
 
 def weigh_evidence(
     damage: Solid, ids_points: Floats, aligned: Scan, deviation: Deviation, part: Part, tolerance: float
 ) -> Evidence:
-    """Weighs one DV.
+    """Compares one DV with the scan.
 
     Args:
         ids_points: (M,3) the site's IDS points. aligned, deviation: the whole scan, in the part's frame.
@@ -38,13 +38,13 @@ def weigh_evidence(
     on_ids = _spread(damage, inner, MOST // 2)
     on_skin = _spread(damage, ~inner, MOST // 2)
     bare = _share_far(on_ids, points, 1.5 * reach)
-    # Close to the rim sound points are near any skin, so only what is away from the inner surface speaks.
+    # Close to the rim, intact points are near any skin. So only skin away from the inner surface is compared.
     intact = points[label == INTACT]
     grain = float(np.sqrt(np.linalg.norm(damage.cross[~inner], axis=1).sum() / MOST))
     close = tolerance + 4 * grain
     intact = intact[_measure_gap(intact, on_skin, close) <= close]
     intact = intact[_measure_gap(intact, on_ids, 1.5 * reach) > 1.5 * reach]
-    if len(intact):  # against the skin's few faces first: most are beside the damage volume
+    if len(intact):  # against the skin's few faces first: most points are beside the damage volume
         skin_only = Mesh(damage.vertices, damage.faces[~inner])
         intact = intact[distance_to_mesh(intact, skin_only) < tolerance]
     inside, contradicted = 0, 0.0
@@ -58,15 +58,15 @@ def weigh_evidence(
 
     reasons = []
     if residual > 1.5 * tolerance + 0.25 * spacing:
-        reasons.append(f"its boundary misses the damaged points (95 % within {residual:.3g})")
+        reasons.append(f"its boundary is off the damaged points (95 % within {residual:.3g})")
     if inside > max(10, 0.02 * len(ids_points)):
-        reasons.append(f"{inside} sound points lie on what it takes away")
+        reasons.append(f"{inside} intact points lie on the skin that it removes")
     if contradicted > 0.1:
-        reasons.append(f"sound points lie on {contradicted:.0%} of the skin it takes away")
+        reasons.append(f"intact points lie on {contradicted:.0%} of the skin that it removes")
     if bare > 0.1:
-        reasons.append(f"{bare:.0%} of its inner surface has no scan point near")
+        reasons.append(f"{bare:.0%} of its inner surface has no scan point nearby")
     if unseen > 0.25:
-        reasons.append(f"{unseen:.0%} of the skin beside it shows no scan point: the damage may go on there")
+        reasons.append(f"{unseen:.0%} of the skin beside it has no scan point: the damage may extend there")
     return Evidence(residual, inside, contradicted, unseen, not reasons, tuple(reasons))
 
 
@@ -80,12 +80,12 @@ def _measure_gap(places: Floats, points: Floats, most: float) -> Floats:
 
 
 def _share_far(places: Floats, points: Floats, distance: float) -> float:
-    """Share of the places (N,3) with none of the points within a distance."""
+    """Share of the places (N,3) that have no point within a distance."""
     return float((_measure_gap(places, points, distance) > distance).mean()) if len(places) else 0.0
 
 
 def _share_unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: float) -> float:
-    """Share of the part's skin just outside the DV that carries no scan point."""
+    """Share of the part's skin just outside the DV that has no scan point."""
     if not len(on_skin):
         return 0.0
     low, high = damage.bounds[0] - 6 * reach, damage.bounds[1] + 6 * reach

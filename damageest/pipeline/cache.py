@@ -1,7 +1,7 @@
 """What each stage gave, kept as .npz (arrays) and .json (the rest), never pickle.
 
 An entry's key is made of the implementation, its provider's version and source, all its options, and the keys of what
-it took; so an entry is valid for ever, and a run that was stopped goes on where it was.
+it took; so an entry never becomes invalid, and a run that was stopped continues from there.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def _encode(value: Any, arrays: dict[str, Any]) -> Any:
         return {"tuple": [_encode(item, arrays) for item in value]}
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
-    raise TypeError(f"a stage gave a {type(value).__name__}, which is no artefact")
+    raise TypeError(f"a stage gave a {type(value).__name__}, which is not an artefact")
 
 
 def _decode(value: Any, arrays: Mapping[str, Any]) -> Any:
@@ -80,7 +80,7 @@ def _decode(value: Any, arrays: Mapping[str, Any]) -> Any:
 
 @dataclass(frozen=True)
 class Cache:
-    """Entries in ``folder``; ``older`` folders are looked into as well, and a hit there is carried over."""
+    """Entries in ``folder``; ``older`` folders are searched too, and an entry found there is copied."""
 
     folder: Path
     older: tuple[Path, ...] = ()
@@ -102,7 +102,7 @@ class Cache:
         return False, None
 
     def put(self, name: str, key: str, value: Any) -> None:
-        """Keeps a value; a reader never sees half an entry, since the .json that makes it valid is moved in last."""
+        """Writes a value. A reader never sees half an entry: the .json that makes it valid is moved in last."""
         self.folder.mkdir(parents=True, exist_ok=True)
         arrays: dict[str, Any] = {}
         meta = _encode(value, arrays)

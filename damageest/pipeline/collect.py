@@ -64,11 +64,11 @@ def _describe_site(found: FoundSite) -> Site:
     evidence, members, warnings = found.evidence, found.members, found.notes
     if len(members) < FEW:
         warnings = (
-            f"only {len(members)} scan points lie on it; for a volume to rely on, scan it more densely",
+            f"only {len(members)} scan points lie on it; scan it more densely for a reliable volume",
             *warnings,
         )
     if not evidence.consistent:
-        warnings = (f"the scan does not bear this damage volume out: {'; '.join(evidence.reasons)}", *warnings)
+        warnings = (f"the scan contradicts this damage volume: {'; '.join(evidence.reasons)}", *warnings)
     deposit, damage = found.deposit, found.damage
     if isinstance(deposit, Deposit):
         damage = deposit.cavity or damage

@@ -61,7 +61,7 @@ class Engine:
         return state.with_named(contract.gives, value, key)
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
-        """(was it there, value): from this run's memory, else from the cache, else computed and kept."""
+        """(was it known, value): from this run's memory, else from the cache, else computed and kept."""
         if key in self.memo:
             return True, self.memo[key]
         found, value = self.cache.get(name, key) if self.cache and keep else (False, None)
@@ -147,7 +147,7 @@ def _locate(error: Exception, item: Implementation, site: int) -> DamageestError
 
 
 def _explain(error: Exception, provider: str) -> StageError:
-    """An error that a stage did not raise on purpose, in words for whoever uses or mends it."""
+    """An error that a stage did not raise on purpose, in words for the user and the author."""
     first = str(error).splitlines()[0][:400] if str(error) else ""
     if isinstance(error, MemoryError):
         return StageError("ran out of memory", "a larger tolerance, or fewer scan points")

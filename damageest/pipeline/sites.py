@@ -52,7 +52,7 @@ def take_enclosures(engine: Engine, work: Work) -> Work:
 
 
 def gather_sites(engine: Engine, work: Work) -> Work:
-    """Turns damage volumes into sites, each weighed against the scan. Clusters left without a volume are failures."""
+    """Turns damage volumes into sites, each compared with the scan. Clusters left without a volume are failures."""
     if not work.candidates:
         return work
     state, method = work.job, work.candidates[0].method
@@ -83,7 +83,7 @@ def gather_sites(engine: Engine, work: Work) -> Work:
     covered = {cluster for site in out for cluster in site.clusters}
     failures = []
     for cluster in sorted({c for candidate in work.candidates for c in candidate.clusters} - covered):
-        error = StageError("its points bound no volume of the part", "the other method, or a smaller tolerance")
+        error = StageError("no damage volume could be computed from its points", "the other method, or a smaller tolerance")
         error.stage, error.use, error.site = "boolean", method, cluster
         failures.append(error)
     warnings = []

@@ -24,20 +24,20 @@ _OURS = re.compile(
     r"result\.json|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?(scan\.ply|result\.3mf"
     r"|(damage|undamaged|(damage|surface|deposit)/site-\d+)\.(stl|ply|step))"
 )
-"""What a run writes, by its path in the output folder. Whatever else stands there is the user's, and stays, unless the
-old result.json names it as a file of its own, as where a plugin wrote another format."""
+"""What a run writes, by its path in the output folder. Other files are the user's and stay, unless the
+old result.json lists them, as those that a plugin wrote in another format."""
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """Where one run works: ``folder`` takes the files, ``cache`` the stages' outputs; ``target`` is the final place."""
+    """The folders of one run: ``folder`` for its files, ``cache`` for the stages' outputs, ``target`` the final one."""
 
     target: Path
     folder: Path
     cache: Cache
 
     def finish(self, stems: list[str]) -> None:
-        """Moves the result into place; anything in the old output that is not damageest's own moves along."""
+        """Moves the result to its final folder; the user's own files in the old output are kept."""
         self.cache.keep_only(stems)
         os.replace(self.cache.folder, self.folder / "stages")
         old = _old_path(self.target)
@@ -103,7 +103,7 @@ def _read_named(old: Path) -> set[str]:
 
 
 def _refuse_other_folder(target: Path) -> None:
-    """A folder that damageest did not write is never replaced."""
+    """Raises JobError for a folder that damageest did not write: it is never replaced."""
     if target.is_file():
         raise JobError([Fault(f"{target} is a file; name a folder", "output")])
     if target.is_dir() and any(target.iterdir()) and not (target / "result.json").is_file():

@@ -36,7 +36,7 @@ class Provider:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Digest over version and source: what a changed implementation gave before is not taken for its own."""
+        """Digest over version and source: results of an earlier version of the code are not used."""
         digest = hashlib.sha256(str(self).encode())
         spec = importlib.util.find_spec(self.module.split(".")[0])
         for place in (spec.submodule_search_locations or [spec.origin or ""]) if spec else []:
@@ -78,7 +78,7 @@ def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[t
 
 @contextmanager
 def ignore_shadow_warnings() -> Iterator[None]:
-    """Without pydantic's warning on options that shadow an attribute: the registry refuses those with its own words."""
+    """Hides pydantic's warning on options that shadow an attribute: the registry refuses them with a message of its own."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Field name .* shadows an attribute", category=UserWarning)
         yield

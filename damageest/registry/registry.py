@@ -41,7 +41,7 @@ class Implementation:
 
 @dataclass(frozen=True)
 class Registry:
-    """All that was found. ``clashes`` are names that two distributions provide: no job can use them. ``writers``: the
+    """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them. ``writers``: the
     formats that `export` can write, by name."""
 
     implementations: tuple[Implementation, ...]

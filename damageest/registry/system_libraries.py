@@ -1,4 +1,4 @@
-"""System libraries that a plugin expects: looked for before its package is imported, and named where missing."""
+"""System libraries that a plugin needs: tried before its package is imported, and named where missing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from damageest.errors import PluginError
 
 
 def load(library: str) -> None:
-    """Loads a shared library into the process, for others to find. Raises OSError where it is not there."""
+    """Loads a shared library into the process. Raises OSError where it is missing."""
     ctypes.CDLL(library)
 
 
@@ -30,7 +30,7 @@ def require(owner: str, packages: Mapping[str, str], load: Callable[[str], None]
     missing = [library for library in packages if not can_load(library, load)]
     if missing:
         raise PluginError(
-            f"{owner} needs {', '.join(missing)} from the system, and does not find it here",
+            f"{owner} needs {', '.join(missing)} from the system; missing here",
             f"apt-get install {' '.join(packages[library] for library in missing)}, "
             "or the packages that have these files on this system",
         )

@@ -32,7 +32,7 @@ class ScanReport(_Model):
     paths: list[str]
     points: int
     noise: float = Field(description="measured standard deviation of the points off the local surface")
-    spacing: float = Field(description="measured distance that a surface reconstruction has to bridge")
+    spacing: float = Field(description="measured distance that a reconstructed surface has to bridge")
     notes: list[str]
 
 
@@ -48,10 +48,10 @@ class AlignmentReport(_Model):
 
 class EvidenceReport(_Model):
     ids_residual: float = Field(description="95th percentile of the IDS points' distance to the damage volume")
-    intact_points_inside: int = Field(description="intact scan points deeper than the tolerance inside it")
+    intact_points_inside: int = Field(description="intact scan points on the skin that it removes")
     skin_contradicted: float = Field(description="share of the removed skin that intact scan points lie on")
     skin_unseen: float = Field(description="share of the skin beside the damage that the scan does not show")
-    consistent: bool = Field(description="whether the scan bears the damage volume out")
+    consistent: bool = Field(description="whether the scan agrees with the damage volume")
     reasons: list[str] = Field(description="why it is not")
 
 
@@ -72,7 +72,7 @@ class SplineReport(_Model):
 
 class ExportReport(_Model):
     files: list[str] = Field(description="all that were written; those below scan_frame/ are in the scan's frame")
-    notes: list[str] = Field(description="what was written otherwise than asked for, and why")
+    notes: list[str] = Field(description="what was written in another way than asked for, and why")
 
 
 class ThicknessReport(_Model):
@@ -86,13 +86,13 @@ class ThicknessReport(_Model):
 class DepositReport(_Model):
     volume: float = Field(description="of what is to be deposited")
     stock_volume: float = Field(description="of its share beyond the nominal surface, to be milled off")
-    cut_back_volume: float = Field(description="of sound metal to be taken off before, for a clean surface")
+    cut_back_volume: float = Field(description="of intact metal to be removed before, for a clean surface")
     thickness: ThicknessReport | None = Field(description="of the stock; null where none was asked for or measured")
     faces: list[int] = Field(description="numbers of the CAD faces that stock stands on; empty without B-rep")
 
 
 class MaterialReport(_Model):
-    """Sums over all sites, but for those that the stage allowance refused."""
+    """Sums over all sites except those that the stage allowance refused."""
 
     deposit_volume: float
     stock_volume: float
@@ -116,7 +116,7 @@ class SiteReport(_Model):
 
 
 class TruthReport(_Model):
-    """Only after a virtual scan: how far the result is from what is known to be true."""
+    """Only after a virtual scan: how far the result is from the known truth."""
 
     volume: float
     iou: float = Field(description="intersection over union of found and true damage")
