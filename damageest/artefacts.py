@@ -124,7 +124,10 @@ def open_edges(faces: Ints) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Solid(Mesh):
-    """A watertight mesh bounding positive volume, of one or more components. The constructor raises ArtefactError for anything else."""
+    """A watertight mesh bounding positive volume, of one or more components.
+
+    The constructor raises ArtefactError for anything else.
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -148,7 +151,7 @@ class Deposit(Solid):
     """What is to be deposited for one damage, including stock to be milled off.
 
     ``cavity`` is the damage volume (DV) enlarged by the cut-back into intact metal, None without a cut-back;
-    ``cut_back_volume`` the volume that this removes in addition. ``stock_volume``: of what is above the nominal surface;
+    ``cut_back_volume`` the volume that this removes in addition. ``stock_volume``: what is above the nominal surface;
     ``thickness``: its least, mean and largest height over the skin where stock was asked for, None without any;
     ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`, empty where the part has
     none. ``notes`` are warnings.
@@ -253,8 +256,8 @@ class Samples(_Arrays):
 class Pose(_Arrays):
     """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
 
-    ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is one of
-    several right ones. ``notes`` say so in words.
+    ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is
+    one of several right ones. ``notes`` say so in words.
     """
 
     T_part_scan: Floats

@@ -43,7 +43,8 @@ def make_deposits(allowance: Contract) -> Step:
 
 
 def separate_deposits(engine: Engine, work: Work) -> Work:
-    """Takes from each deposit and its cavity what those of the sites before it hold already, so that no volume is counted twice."""
+    """Removes from each deposit and its cavity what those of the sites before it contain, so that no volume counts
+    twice."""
     done: list[FoundSite] = []
     for site in work.sites:
         deposit = site.deposit
@@ -64,7 +65,7 @@ def _subtract_earlier(deposit: Deposit, earlier: FoundSite, damage: Solid) -> De
     origin = deposit.bounds.mean(axis=0)
     body, taken = to_manifold(deposit, origin), to_manifold(other, origin)
     own = to_manifold(damage, origin)
-    if (taken ^ own).volume() > SPECK * damage.volume:  # of an allowance that does not take the other sites into account
+    if (taken ^ own).volume() > SPECK * damage.volume:  # the allowance ignored the other sites
         taken -= own
     common = (body ^ taken).volume()
     if common <= SPECK * deposit.volume:

@@ -83,7 +83,9 @@ def gather_sites(engine: Engine, work: Work) -> Work:
     covered = {cluster for site in out for cluster in site.clusters}
     failures = []
     for cluster in sorted({c for candidate in work.candidates for c in candidate.clusters} - covered):
-        error = StageError("no damage volume could be computed from its points", "the other method, or a smaller tolerance")
+        error = StageError(
+            "no damage volume could be computed from its points", "the other method, or a smaller tolerance"
+        )
         error.stage, error.use, error.site = "boolean", method, cluster
         failures.append(error)
     warnings = []

@@ -78,7 +78,7 @@ def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[t
 
 @contextmanager
 def ignore_shadow_warnings() -> Iterator[None]:
-    """Hides pydantic's warning on options that shadow an attribute: the registry refuses them with a message of its own."""
+    """Hides pydantic's warning on options that shadow an attribute: the registry refuses them with its own message."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Field name .* shadows an attribute", category=UserWarning)
         yield

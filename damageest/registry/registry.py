@@ -41,8 +41,8 @@ class Implementation:
 
 @dataclass(frozen=True)
 class Registry:
-    """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them. ``writers``: the
-    formats that `export` can write, by name."""
+    """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them.
+    ``writers``: the formats that `export` can write, by name."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]
