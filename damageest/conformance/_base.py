@@ -51,7 +51,7 @@ class StageContract:
     def scene(self) -> dict[str, Any]:
         """Everything that the contract gives, by name."""
         known = vars(_scene.scene())
-        return {name: known[name] for name in type(self.stage).takes if name in known}
+        return {name: known[name] for name in type(self.stage).takes() if name in known}
 
     def inputs(self, scale: float = 1.0, turn: Floats | None = None, shift: Floats | None = None) -> dict[str, Any]:
         """The scene scaled, turned and shifted in that order."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from damageest_octree.tree import Tree, dilated, encode, plant
 from numpy.typing import NDArray
 
 from damageest.artefacts import INTACT, Deviation, Floats, Ints, Part, Scan, Sites
 from damageest.geometry.distance import signed_distance
+from damageest_octree.tree import Tree, dilated, encode, plant
 
 Flags = NDArray[np.bool_]
 PROBES = 5000
