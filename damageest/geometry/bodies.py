@@ -1,4 +1,4 @@
-"""The connected bodies of a solid, and the shells of which each is made."""
+"""The connected bodies of a solid, and the outer shell and cavities of each."""
 
 from __future__ import annotations
 
@@ -11,33 +11,42 @@ from damageest.geometry.distance import is_inside
 
 
 def split_bodies(solid: Solid) -> list[Solid]:
-    """The connected bodies of a solid, by their shared vertices; those without measurable volume are left out.
+    """The connected bodies of a solid, in the order of their first vertices.
 
-    As manifold3d's ``decompose``, whose time grows with the number of bodies times that of the faces. A cavity, whose
-    faces are connected to no others, has negative volume and is left out too: see `split_shells`.
+    Two triangles belong to one body if they are connected by shared vertices. Bodies whose volume is zero within
+    rounding are left out. A cavity shares no vertex with the shell around it and has negative volume: it is left out
+    too, so the volume of a hollow body counts the cavity. Use `split_shells` where cavities matter.
+
+    Gives the same bodies as manifold3d's ``decompose``, whose time grows with the number of bodies times the number
+    of faces. Unit and frame are those of ``solid``.
     """
-    pieces = _split(solid)
+    pieces = _split_pieces(solid)
     if len(pieces) == 1:
         return [solid]
     found = []
     for vertices, faces in pieces:
         try:
             found.append(Solid(vertices, faces))
-        except ArtefactError:  # a sliver whose volume rounding takes away
+        except ArtefactError:  # a cavity, or a sliver whose volume is zero or negative within rounding
             continue
     return found
 
 
 def split_shells(solid: Solid) -> list[tuple[Solid, list[Solid]]]:
-    """Each connected body as its outer shell, and the cavities in it as solids of their own."""
+    """The connected bodies of a solid: for each its outer shell, and the cavities inside it.
+
+    Both are solids with faces outward, so the volume of a body is that of its shell minus those of its cavities. A
+    cavity belongs to the smallest shell that encloses its first vertex. Shells and cavities whose volume is zero within
+    rounding are left out. Unit and frame are those of ``solid``.
+    """
     outer: list[Solid] = []
     cavities: list[Solid] = []
-    for vertices, faces in _split(solid):
+    for vertices, faces in _split_pieces(solid):
         for found, turned in ((outer, faces), (cavities, faces[:, ::-1])):
             try:
                 found.append(Solid(vertices, turned))
                 break
-            except ArtefactError:  # inside out, or flat: neither
+            except ArtefactError:  # facing the other way, or flat
                 continue
     out: list[tuple[Solid, list[Solid]]] = [(body, []) for body in outer]
     for cavity in cavities:
@@ -47,8 +56,9 @@ def split_shells(solid: Solid) -> list[tuple[Solid, list[Solid]]]:
     return out
 
 
-def _split(solid: Solid) -> list[tuple[Floats, Ints]]:
-    """Vertices and faces of each piece that no vertex joins to another, in the order of their first vertices."""
+def _split_pieces(solid: Solid) -> list[tuple[Floats, Ints]]:
+    """Vertices (V,3) and faces (F,3) of each piece that shares no vertex with another, in the order of their first
+    vertices."""
     size, faces = len(solid.vertices), solid.faces
     links = coo_array((np.ones(2 * len(faces)), np.concatenate([faces[:, :2], faces[:, 1:]]).T), shape=(size, size))
     of_face = connected_components(links, directed=False)[1][faces[:, 0]]

@@ -1,4 +1,7 @@
-"""The bodies of a mesh: which triangles belong together, which way they face, and what overlapping ones amount to."""
+"""The bodies of a mesh: which triangles belong to one body, which way they face, and the union of overlapping bodies.
+
+The steps of `damageest.geometry.healing.heal`, also useful alone. Coordinates may be in any unit and frame.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,13 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, open_edges
 from damageest.errors import InputError
 
-_PAIRS = 5000
+_MOST_PAIRS = 5000
+"""Pairs of bodies with overlapping bounds up to which each pair is compared; above it all bodies are united at once."""
 
 
 def _pair_neighbours(faces: Ints) -> tuple[Ints, Ints, Ints]:
-    """Pairs of triangles over edges that exactly two share, and whether their windings disagree there (0 or 1)."""
+    """Pairs of triangles (P,), (P,) over edges that exactly two share, and whether their windings disagree (P,), 0 or
+    1."""
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     owner = np.tile(np.arange(len(faces)), 3)
     low, high = directed.min(1), directed.max(1)
@@ -26,7 +31,8 @@ def _pair_neighbours(faces: Ints) -> tuple[Ints, Ints, Ints]:
     return owner[two], owner[two + 1], (forward[two] == forward[two + 1]).astype(np.int64)
 
 
-def _label(a: Ints, b: Ints, count: int) -> tuple[Ints, int]:
+def _label_components(a: Ints, b: Ints, count: int) -> tuple[Ints, int]:
+    """Component (count,) of each of ``count`` nodes under the links from ``a`` to ``b``, and how many there are."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -37,27 +43,36 @@ def _label(a: Ints, b: Ints, count: int) -> tuple[Ints, int]:
 
 
 def label_bodies(faces: Ints) -> tuple[Ints, int]:
-    """Per triangle (F,) the number of its body, joined over shared edges, and how many bodies there are."""
+    """The body (F,) of each of the faces (F,3), numbered from 0, and the number of bodies.
+
+    Two triangles belong to one body if they are connected over edges that exactly two triangles share.
+    """
     a, b, _ = _pair_neighbours(faces)
-    return _label(a, b, len(faces))
+    return _label_components(a, b, len(faces))
 
 
 def orient_faces(faces: Ints) -> tuple[Ints, int | None]:
-    """The faces with windings that agree, and how many were turned; None where the surface is one-sided.
+    """The faces (F,3) with consistent windings, and how many were reversed; the faces as they are, and None, where the
+    surface is one-sided (like a Moebius strip).
 
-    Works on the two-sheeted cover of the triangles' adjacency: triangle f stands twice, as read and turned, and an edge
-    joins the copies that agree. One component then is one consistent choice. In each body the lesser number is turned.
+    In each body the smaller number of triangles is reversed. Whether the faces then point outward is not decided here:
+    see `resolve_bodies`.
+
+    Each triangle has two nodes in a graph, one as read and one reversed. An edge of the mesh connects the nodes that
+    agree over it. Each component of the graph then is one consistent choice.
     """
     a, b, differ = _pair_neighbours(faces)
     n = len(faces)
-    label, _ = _label(np.concatenate([a, a + n]), np.concatenate([b + n * differ, b + n * (1 - differ)]), 2 * n)
+    label, _ = _label_components(
+        np.concatenate([a, a + n]), np.concatenate([b + n * differ, b + n * (1 - differ)]), 2 * n
+    )
     as_read, turned = label[:n], label[n:]
     if (as_read == turned).any():
         return faces, None
-    # a body's two sheets are mirror images; the one that holds more triangles as read wins
-    votes = np.bincount(as_read, minlength=int(label.max()) + 1)
-    flip = votes[as_read] < votes[turned]
-    tie = votes[as_read] == votes[turned]
+    # the two components of a body mirror each other; the one that holds more triangles as read is taken
+    kept = np.bincount(as_read, minlength=int(label.max()) + 1)
+    flip = kept[as_read] < kept[turned]
+    tie = kept[as_read] == kept[turned]
     flip |= tie & (as_read > turned)
     result = faces.copy()
     result[flip] = result[flip][:, ::-1]
@@ -65,35 +80,48 @@ def orient_faces(faces: Ints) -> tuple[Ints, int | None]:
 
 
 def signed_volumes(vertices: Floats, faces: Ints, label: Ints, count: int) -> Floats:
-    """(count,) the volume of each closed body, negative where its triangles face inward."""
+    """Volume (count,) of each closed body, negative where its triangles face inward.
+
+    Args:
+        vertices, faces: (V,3), (F,3) of all bodies.
+        label: (F,) the body of each face, from 0 to ``count`` - 1, as `label_bodies` gives it.
+
+    In the cube of the vertices' unit; by the divergence theorem about the centre of all vertices' bounds.
+    """
     centre = (vertices.min(0) + vertices.max(0)) / 2
     a, b, c = np.moveaxis((vertices - centre)[faces], 1, 0)
     each = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
     return np.bincount(label, each, minlength=count).astype(np.float64)
 
 
-def _manifold(vertices: Floats, faces: Ints) -> Any:
-    """The mesh as a manifold3d body; coordinates should be near the origin."""
+def _to_manifold(vertices: Floats, faces: Ints) -> Any:
+    """The mesh as a manifold3d body, whose status the caller checks; coordinates should be near the origin."""
     import manifold3d as m3
 
     return m3.Manifold(m3.Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(faces.astype(np.uint64))))
 
 
-def _arrays(body: Any) -> tuple[Floats, Ints]:
+def _to_arrays(body: Any) -> tuple[Floats, Ints]:
+    """Vertices (V,3) and faces (F,3) of a manifold3d body."""
     mesh = body.to_mesh64()
     return np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
 
 
 def split_pinches(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
-    """Gives each sheet its own vertices where an even number of triangles meet at an edge, as in two touching cubes."""
+    """The mesh (V,3), (F,3) with vertices of its own for each sheet where an even number of triangles, four or more,
+    meet at an edge, as where two cubes touch along an edge.
+
+    ``notes`` gets a line where this was done. A mesh that is closed already, or that cannot be closed so, is given back
+    as it is.
+    """
     if not open_edges(faces):
         return vertices, faces
     import manifold3d as m3
 
-    body = _manifold(vertices, faces)
+    body = _to_manifold(vertices, faces)
     if body.status() != m3.Error.NoError or body.is_empty():
         return vertices, faces
-    new_vertices, new_faces = _arrays(body)
+    new_vertices, new_faces = _to_arrays(body)
     if open_edges(new_faces):
         return vertices, faces
     notes.append("doubled the vertices of edges where more than two triangles meet")
@@ -101,13 +129,19 @@ def split_pinches(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floa
 
 
 def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
-    """Faces outward, cavities inward, overlapping bodies united. The mesh must be closed."""
+    """A mesh (V,3), (F,3) of the same bodies with faces outward, cavities inward and overlapping bodies united.
+
+    The mesh given must be closed, with consistent windings in each body. Bodies without volume are dropped. ``notes``
+    gets a line for each change, and one on separate bodies and cavities that are kept.
+
+    Raises InputError where no body has volume, or where bodies overlap but cannot be united.
+    """
     label, count = label_bodies(faces)
     volumes = signed_volumes(vertices, faces, label, count)
     size = float(np.prod(np.maximum(np.ptp(vertices, axis=0), 1e-300)))
     flat = np.abs(volumes) <= 1e-12 * size
     if flat.all():
-        raise InputError("encloses no volume: its bodies are flat; a part must be a solid")
+        raise InputError("encloses no volume: all its bodies are flat; a part must be a solid")
     if flat.any():
         notes.append(f"dropped {int(flat.sum())} bodies without volume")
         faces = faces[~flat[label]]
@@ -118,28 +152,30 @@ def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Flo
         top = depth == 0
         if (volumes[top] < 0).all():
             faces, volumes = faces[:, ::-1], -volumes
-            notes.append("turned the part inside out: all its triangles faced inward")
+            notes.append("reversed all triangles: they faced inward")
         wrong = top & (volumes < 0)
         if wrong.any():
-            faces, volumes = _flip(faces, wrong[label]), np.abs(volumes) * np.where(wrong, 1, np.sign(volumes))
-            notes.append(f"turned {int(wrong.sum())} of {count} bodies inside out: the triangles faced inward")
+            faces, volumes = _reverse_faces(faces, wrong[label]), np.abs(volumes) * np.where(wrong, 1, np.sign(volumes))
+            notes.append(f"reversed the triangles of {int(wrong.sum())} of {count} bodies: they faced inward")
         if ((volumes > 0) == (depth % 2 == 0)).all():
             cavities = int((volumes < 0).sum())
             if count - cavities > 1:
                 notes.append(f"{count - cavities} separate bodies, kept as one part")
             if cavities:
                 notes.append(f"{cavities} inner cavit{'ies' if cavities > 1 else 'y'}, kept")
-            return _compact(vertices, faces)
+            return _drop_unused_vertices(vertices, faces)
     return _unite(vertices, faces, label, volumes, notes)
 
 
-def _flip(faces: Ints, which: Any) -> Ints:
+def _reverse_faces(faces: Ints, which: Any) -> Ints:
+    """The faces with the winding of some of them reversed."""
     faces = faces.copy()
     faces[which] = faces[which][:, ::-1]
     return faces
 
 
-def _compact(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
+def _drop_unused_vertices(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    """The same mesh without vertices that no face uses."""
     used = np.unique(faces)
     if len(used) == len(vertices):
         return vertices, faces
@@ -149,7 +185,11 @@ def _compact(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
 
 
 def _find_nesting(vertices: Floats, faces: Ints, label: Ints, count: int) -> tuple[Ints, bool]:
-    """In how many others each body lies (count,), and whether any two cross or touch."""
+    """In how many other bodies each body lies (count,), and whether any two cross or touch.
+
+    Two bodies are disjoint if the volume of their union is the sum of their volumes, and nested if it is the larger of
+    the two. A smaller surface area of the union shows that they touch.
+    """
     depth = np.zeros(count, np.int64)
     if count == 1:
         return depth, False
@@ -163,14 +203,14 @@ def _find_nesting(vertices: Floats, faces: Ints, label: Ints, count: int) -> tup
         for i in range(count - 1)
         for j in i + 1 + np.flatnonzero(((low[i] <= high[i + 1 :]) & (low[i + 1 :] <= high[i])).all(1))
     ]
-    if len(pairs) > _PAIRS:
+    if len(pairs) > _MOST_PAIRS:
         return depth, True
     origin = (vertices.min(0) + vertices.max(0)) / 2
     solids: dict[int, Any] = {}
     for i in {k for pair in pairs for k in pair}:
-        v, f = _compact(vertices - origin, faces[label == i])
-        body = _manifold(v, f)
-        solids[i] = body if body.volume() > 0 else _manifold(v, f[:, ::-1])
+        v, f = _drop_unused_vertices(vertices - origin, faces[label == i])
+        body = _to_manifold(v, f)
+        solids[i] = body if body.volume() > 0 else _to_manifold(v, f[:, ::-1])
     for i, j in pairs:
         a, b = solids[i], solids[j]
         both = (a + b).volume()
@@ -190,22 +230,23 @@ def _find_nesting(vertices: Floats, faces: Ints, label: Ints, count: int) -> tup
 
 
 def _unite(vertices: Floats, faces: Ints, label: Ints, volumes: Floats, notes: list[str]) -> tuple[Floats, Ints]:
-    """The union of the bodies that face outward, minus that of those that face inward."""
+    """The union of the bodies that face outward, minus the union of those that face inward. The faces of each body are
+    those with its ``label`` (F,); ``volumes`` are signed."""
     import manifold3d as m3
 
     if (volumes < 0).all():
         faces, volumes = faces[:, ::-1], -volumes
-        notes.append("turned the part inside out: all its triangles faced inward")
+        notes.append("reversed all triangles: they faced inward")
     origin = (vertices.min(0) + vertices.max(0)) / 2
     gathered: dict[bool, list[Any]] = {True: [], False: []}
     for i, volume in enumerate(volumes):
         mesh = faces[label == i]
-        v, f = _compact(vertices - origin, mesh if volume > 0 else mesh[:, ::-1])
-        body = _manifold(v, f)
+        v, f = _drop_unused_vertices(vertices - origin, mesh if volume > 0 else mesh[:, ::-1])
+        body = _to_manifold(v, f)
         if body.status() != m3.Error.NoError:
             raise InputError(
-                f"one of its {len(volumes)} overlapping bodies is no solid ({body.status()}); "
-                "unite them in the CAD system"
+                f"{len(volumes)} of its bodies overlap, and one of them is not a solid ({body.status()}); "
+                "unite them in the CAD system and export again"
             )
         gathered[bool(volume > 0)].append(body)
     result = m3.Manifold.batch_boolean(gathered[True], m3.OpType.Add)
@@ -213,6 +254,6 @@ def _unite(vertices: Floats, faces: Ints, label: Ints, volumes: Floats, notes: l
         result -= m3.Manifold.batch_boolean(gathered[False], m3.OpType.Add)
     if result.status() != m3.Error.NoError or result.is_empty():
         raise InputError("its overlapping bodies could not be united; unite them in the CAD system and export again")
-    new_vertices, new_faces = _arrays(result)
+    new_vertices, new_faces = _to_arrays(result)
     notes.append(f"united {len(volumes)} bodies that overlap, touch or lie in one another into one part")
     return new_vertices + origin, new_faces

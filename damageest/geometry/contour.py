@@ -1,4 +1,4 @@
-"""The surface at a given distance from a part, on a regular lattice."""
+"""The solid inside a distance function's zero level, sampled on a voxel grid."""
 
 from __future__ import annotations
 
@@ -12,22 +12,31 @@ from damageest.geometry.isosurface import extract_region
 from damageest.geometry.poisson import Grid
 
 BLOCK = 6
+"""Nodes along each axis of the blocks in which the function is first evaluated once."""
 MOST_NODES = 60_000_000
-"""Nodes of a lattice in memory at once, at some 12 bytes each."""
+"""Nodes of a grid in memory at once, at about 12 bytes each."""
 
 
 def extract_contour(
     distance: Callable[[Floats], Floats], low: Floats, shape: tuple[int, int, int], cell: float
 ) -> Solid:
-    """Where ``distance`` (points (N,3) to signed values (N,), Lipschitz with constant 1) is negative, as a solid, on
-    the lattice of ``shape`` nodes from ``low`` (3,) on, ``cell`` apart; the lattice's walls close it.
+    """The solid where ``distance`` is negative, by marching cubes on a voxel grid; the walls of the grid close it.
 
-    Exact values are only taken in blocks of nodes that the zero level may cross. Raises StageError where the lattice
-    would not fit in memory, or nothing lies inside.
+    Args:
+        distance: takes points (N,3) and gives signed values (N,) that change by no more than the points move
+            (Lipschitz constant 1), as a signed distance does. It is called with many points at once.
+        low: (3,) the grid's lowest node.
+        shape: how many nodes the grid has along x, y and z.
+        cell: the grid spacing.
+
+    ``low``, ``cell`` and the values are lengths in one unit, ``low`` in the frame of the points; so is the solid. The
+    function is evaluated once per block of nodes, and at each node only in blocks that the zero level may cross.
+
+    Raises StageError where the grid would not fit in memory (see MOST_NODES), or where no node is inside.
     """
     if (nodes := int(np.prod(shape))) > MOST_NODES:
         raise StageError(
-            f"a lattice of {nodes:,} nodes {cell:.3g} apart is too large; {MOST_NODES:,} are bearable",
+            f"a voxel grid of {nodes:,} nodes, {cell:.3g} apart, does not fit in memory; at most {MOST_NODES:,} do",
             f"a cell of {cell * (nodes / MOST_NODES) ** (1 / 3) * 1.05:.3g} or more, or method: implicit",
         )
     blocks = [-(-n // BLOCK) for n in shape]
@@ -42,5 +51,5 @@ def extract_contour(
     field = -field[: shape[0], : shape[1], : shape[2]]
     solid = extract_region(Grid(low, cell, shape), np.ascontiguousarray(field, dtype=np.float64))
     if solid is None:
-        raise StageError("the background came out empty", "another cell, or method: implicit")
+        raise StageError("no node of the voxel grid is inside: the solid is empty", "another cell, or method: implicit")
     return solid

@@ -1,7 +1,8 @@
-"""Distances from points to triangle meshes, and which points lie inside: the one module that calls libigl for them.
+"""Distances from points to triangle meshes, and which points lie inside. No other module imports libigl.
 
-Far from the origin, differences of coordinates lose digits. So every function first moves points and mesh to the centre
-of the mesh's bounds. Callers give coordinates as they are.
+Points and mesh are in one unit and one frame; distances are in that unit. Far from the origin, differences of
+coordinates lose digits. So the functions first move points and mesh to the centre of the mesh's bounds, except where a
+docstring says otherwise, and callers give coordinates as they are.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ Flags = NDArray[np.bool_]
 
 
 class Closest(NamedTuple):
-    """``distance`` (N,) to the mesh, not signed; ``face`` (N,) the nearest triangle; ``place`` (N,3) the nearest point
-    on it."""
+    """The nearest places on a mesh: ``distance`` (N,) to it, not signed; ``face`` (N,) the nearest triangle; ``place``
+    (N,3) the nearest point on that triangle."""
 
     distance: Floats
     face: Ints
@@ -27,7 +28,7 @@ class Closest(NamedTuple):
 
 
 def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
-    """The nearest point on a mesh for each of ``points`` (N,3). The mesh may be open, and needs one triangle."""
+    """The nearest place on a mesh for each of ``points`` (N,3). The mesh may be open; it must have a triangle."""
     import igl
 
     if not len(points):
@@ -40,12 +41,15 @@ def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
 
 
 def distance_to_mesh(points: Floats, mesh: Mesh) -> Floats:
-    """Distance (N,), not signed, of ``points`` (N,3) to a mesh."""
+    """Distance (N,), not signed, of ``points`` (N,3) to a mesh, which may be open and must have a triangle."""
     return closest_on_mesh(points, mesh).distance
 
 
 def distance_to_edges(points: Floats, vertices: Floats, edges: Ints) -> Floats:
-    """Distance (N,) of ``points`` (N,3) to the nearest of the straight ``edges`` (E,2) between ``vertices`` (V,3)."""
+    """Distance (N,) of ``points`` (N,3) to the nearest of the straight ``edges`` (E,2) between ``vertices`` (V,3).
+
+    At least one edge is needed. Coordinates are moved to the mean of the vertices.
+    """
     import igl
 
     centre = vertices.mean(axis=0)
@@ -56,7 +60,10 @@ def distance_to_edges(points: Floats, vertices: Floats, edges: Ints) -> Floats:
 
 
 class SurfaceTree:
-    """A mesh prepared for many closest-point queries. It does not move the mesh: give it one near the origin."""
+    """A mesh prepared for many closest-point queries.
+
+    It does not move points and mesh to the origin: give it a mesh near the origin.
+    """
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
@@ -70,7 +77,7 @@ class SurfaceTree:
         return tree
 
     def closest(self, points: Floats) -> Closest:
-        """As `closest_on_mesh`."""
+        """The nearest place on the mesh for each of ``points`` (N,3), N at least 1, as `closest_on_mesh` gives it."""
         squared, face, place = self._tree.squared_distance(
             self.mesh.vertices, self.mesh.faces, np.ascontiguousarray(points, np.float64)
         )
@@ -78,8 +85,11 @@ class SurfaceTree:
 
 
 def winding_number(points: Floats, mesh: Mesh) -> Floats:
-    """Winding number (N,) of a mesh about ``points`` (N,3): 1 inside a closed mesh, 0 outside, between the two for an
-    open one; negative inside a mesh that is turned inside out. Barill et al. 2018, to some 1e-2."""
+    """Winding number (N,) of a mesh about ``points`` (N,3), without unit: 1 inside a closed mesh, 0 outside.
+
+    It lies between 0 and 1 for an open mesh, and is negative inside a mesh whose faces point inward. By the fast
+    approximation of Barill et al. 2018, exact to about 0.01.
+    """
     import igl
 
     if not len(points):
@@ -92,16 +102,16 @@ def winding_number(points: Floats, mesh: Mesh) -> Floats:
 
 
 def is_inside(points: Floats, mesh: Mesh) -> Flags:
-    """Whether each of ``points`` (N,3) lies inside a closed mesh, by its winding number. Shape (N,)."""
+    """Whether each of ``points`` (N,3) lies inside a closed mesh (N,): where its winding number is above 0.5."""
     return winding_number(points, mesh) > 0.5
 
 
 def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
-    """Distance (N,) of ``points`` (N,3) to a watertight mesh, positive outside, and the nearest triangle (N,).
+    """Signed distance (N,) of ``points`` (N,3) to a watertight mesh, positive outside, and the nearest triangle (N,).
 
     The sign is that of the angle-weighted pseudonormal (Baerentzen and Aanaes 2005), exact on a clean watertight mesh.
-    Where the nearest point lies on an edge or corner that flat, slender or doubled triangles touch, as CAD
-    tessellations have, the pseudonormal is not reliable and the winding number gives the sign instead.
+    Where the nearest place lies on an edge or corner of a flat or slender triangle, or on a vertex that exists twice,
+    as CAD tessellations have, the pseudonormal is unreliable and the winding number gives the sign instead.
     """
     import igl
 
@@ -124,8 +134,9 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     cross = mesh.cross[used]
     normal = (cross / np.linalg.norm(cross, axis=1, keepdims=True))[nearest]
     beside = np.linalg.norm(np.cross(away, normal), axis=1) > 1e-7 * np.abs(signed)
-    # libigl takes a point on the short edge of a slender triangle for one in its middle, and that face's normal for the
-    # pseudonormal: seen at 4 of 70,000 points round a tube with a hole, millimetres off, and with the wrong sign.
+    # Where the nearest place lies on the short edge of a slender triangle, libigl sometimes gives the normal of that
+    # face and not the pseudonormal of the edge: 4 of 70,000 points around a tube with a hole, millimetres from the
+    # surface, had the wrong sign.
     doubtful = beside & (np.einsum("ij,ij->i", pseudo, normal) > (1 - 1e-9) * np.linalg.norm(pseudo, axis=1))
     if (unreliable := _find_unreliable_vertices(mesh, flat, scale)).any():
         doubtful |= beside & unreliable[faces[nearest]].any(axis=1)
@@ -136,9 +147,10 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
 
 
 def run_libigl_pass(points: Floats, mesh: Mesh) -> Floats:
-    """libigl's own signed distance (N,) of ``points`` (N,3), without the checks of `signed_distance`.
+    """libigl's signed distance (N,) of ``points`` (N,3) to a watertight mesh, without the corrections of
+    `signed_distance` and without moving coordinates to the origin.
 
-    Measurements use it as the reference cost: what a method has to do that compares a scan with CAD point by point.
+    Evaluations use its time as a reference: the least work of a method that compares a scan with CAD point by point.
     """
     import igl
 
@@ -147,7 +159,7 @@ def run_libigl_pass(points: Floats, mesh: Mesh) -> Floats:
 
 
 def _find_flat(mesh: Mesh, scale: float) -> Flags:
-    """(F,) whether a triangle's height over its longest edge is below what float64 coordinates resolve."""
+    """Whether the height of each triangle over its longest edge (F,) is below what float64 coordinates resolve."""
     triangles = mesh.triangles
     longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
     result: Flags = np.linalg.norm(mesh.cross, axis=1) <= 1e-10 * scale * np.maximum(longest, 1e-10 * scale)
@@ -155,7 +167,7 @@ def _find_flat(mesh: Mesh, scale: float) -> Flags:
 
 
 def _find_unreliable_vertices(mesh: Mesh, flat: Flags, scale: float) -> Flags:
-    """(V,) whether a vertex belongs to a flat triangle or lies on top of another vertex."""
+    """Whether each vertex (V,) belongs to a flat triangle or lies at the place of another vertex."""
     unreliable = np.zeros(len(mesh.vertices), bool)
     unreliable[mesh.faces[flat]] = True
     cell = np.round((mesh.vertices - mesh.bounds[0]) / (1e-9 * scale)).astype(np.int64)

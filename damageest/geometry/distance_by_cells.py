@@ -1,7 +1,8 @@
-"""Signed distances of very many points, most of them on the surface: few are searched for, the others follow.
+"""Signed distances of very many points, most of them near the surface, with a nearest-triangle search for few of them.
 
-Where points are many, one in a small cell of space tells which triangle is nearest, and the height over its plane is
-the distance of the others, as far as they are over that triangle, or over others in the same plane.
+Space is divided into small cells. The nearest triangle is searched for one point of a cell. The distance of the other
+points in the cell is their height over the plane of that triangle, provided they lie over the triangle, or over others
+in the same plane.
 """
 
 from __future__ import annotations
@@ -18,69 +19,78 @@ Flags = NDArray[np.bool_]
 Exact = Callable[[Floats], tuple[Floats, Ints]]
 
 PER_CELL = 16
-"""Points of the surface in a cell, about."""
+"""About how many points on the surface lie in a cell."""
 
 ROUNDS = 4
-"""Times that a cell's points are given another triangle to be over."""
+"""How often the points of a cell that are not over its triangle are tried with the triangle of another point."""
 
 SHARP = np.radians(10.0)
-"""Edges that turn by more have points beside them which are over one face and nearer to the other, by more than a
-hundredth of their distance."""
+"""Angle in radians between two faces above which their edge is sharp: points beside it may be over one face and nearer
+to the other, by more than 1 % of their distance."""
 
 CLEAR = 3.0
-"""How far from the edges of its triangle a point beside a sharp edge has to be, in heights over it."""
+"""A point beside a sharp edge has to be this many times its height over the triangle away from the triangle's edges."""
 
 PAD = 4
+"""Layers of empty cells around the part."""
 
 
 def signed_distance_by_cells(points: Floats, part: Mesh, near: float, exact: Exact) -> tuple[Floats, Ints]:
-    """What ``exact`` gives of the points (N,3), signed distance (N,) and nearest triangle (N,), with far fewer of them
-    searched for.
+    """Signed distance (N,) of points (N,3) to the part, positive outside, and the nearest triangle (N,).
 
-    Exact beyond ``near`` of the surface. Nearer, off by a hundredth of the distance at most, unless walls are thinner
-    than twice ``near``: there it is the distance to a wall within ``near``, if not to the nearest.
+    Farther than ``near`` from the surface the values are those of ``exact``. Within ``near`` they differ from them by
+    at most 1 % of the distance. Where a wall is thinner than twice ``near``, the distance may be that to the farther of
+    its two sides, if that side is within ``near``.
+
+    Args:
+        points: (N,3), N at least 1, in the frame of the part.
+        part: the triangles that ``exact`` measures to.
+        near: length, in the unit of the points.
+        exact: gives signed distance and nearest triangle of some of the points, as
+            `damageest.geometry.distance.signed_distance` does with the part given.
     """
     low, high = part.bounds
     size = max(2 * near, np.sqrt(PER_CELL * part.area / len(points)), float((high - low).max()) / MOST_ALONG)
-    lattice = VoxelGrid(low - PAD * size, size, np.ceil((high - low) / size).astype(np.int64) + 2 * PAD)
+    grid = VoxelGrid(low - PAD * size, size, np.ceil((high - low) / size).astype(np.int64) + 2 * PAD)
     sharp, bent = (_place_along(part, edges, size / 4) for edges in _find_creases(part, near / size))
-    beside = lattice.mark_around(sharp, 1)
-    # any two points of a cell are 1.74 of its edges apart
-    plane = ~lattice.mark_around(np.concatenate([sharp, bent]), 2)
+    beside = grid.mark_around(sharp, 1)
+    # any two points of a cell are at most 1.74 of its edges apart
+    plane = ~grid.mark_around(np.concatenate([sharp, bent]), 2)
 
     frames, centre = _build_frames(part), part.bounds.mean(axis=0)
-    cell = np.concatenate([lattice.number_cells(points[i : i + CHUNK]) for i in range(0, len(points), CHUNK)])
+    cell = np.concatenate([grid.number_cells(points[i : i + CHUNK]) for i in range(0, len(points), CHUNK)])
     signed, face = np.full(len(points), np.nan), np.zeros(len(points), np.int64)
     first = np.zeros(len(beside), np.int64)
-    open_ = np.arange(len(points))
+    waiting = np.arange(len(points))
     for _ in range(ROUNDS):
-        if not len(open_):
+        if not len(waiting):
             break
-        first[cell[open_[::-1]]] = open_[::-1]  # of points in one cell the first is written last, and stays
-        seen = first[cell[open_]]
-        asked = open_[seen == open_]
-        signed[asked], face[asked] = exact(points[asked])
-        follows = (seen != open_) & (np.abs(signed[seen]) <= near)
-        open_, seen = open_[follows], seen[follows]
-        rest = []
-        for start in range(0, len(open_), CHUNK):
-            some, over = open_[start : start + CHUNK], face[seen[start : start + CHUNK]]
-            height, inside = _measure_heights(points[some] - centre, frames[over])
-            # beside a sharp edge the other face is farther where that is true of the edge
-            over_it = inside >= np.where(beside[cell[some]], CLEAR * np.abs(height), 0)
-            good = (np.abs(height) <= near) & (over_it | plane[cell[some]])
-            signed[some[good]], face[some[good]] = height[good], over[good]
-            rest.append(some[~good])
-        before, open_ = len(open_), np.concatenate(rest) if rest else open_[:0]
-        if before - len(open_) < len(asked):  # triangles so small that few points share one
+        first[cell[waiting[::-1]]] = waiting[::-1]  # in reverse, so that the first point of each cell remains
+        guide = first[cell[waiting]]
+        searched = waiting[guide == waiting]
+        signed[searched], face[searched] = exact(points[searched])
+        is_guided = (guide != waiting) & (np.abs(signed[guide]) <= near)
+        waiting, guide = waiting[is_guided], guide[is_guided]
+        remaining = []
+        for start in range(0, len(waiting), CHUNK):
+            batch, over = waiting[start : start + CHUNK], face[guide[start : start + CHUNK]]
+            height, inside = _measure_heights(points[batch] - centre, frames[over])
+            # beside a sharp edge, the other face is farther off than this one if the edge is
+            is_over = inside >= np.where(beside[cell[batch]], CLEAR * np.abs(height), 0)
+            is_valid = (np.abs(height) <= near) & (is_over | plane[cell[batch]])
+            signed[batch[is_valid]], face[batch[is_valid]] = height[is_valid], over[is_valid]
+            remaining.append(batch[~is_valid])
+        before, waiting = len(waiting), np.concatenate(remaining) if remaining else waiting[:0]
+        if before - len(waiting) < len(searched):  # triangles are so small that few points lie over the same one
             break
-    left = np.flatnonzero(np.isnan(signed))
-    signed[left], face[left] = exact(points[left])
+    remaining_points = np.flatnonzero(np.isnan(signed))
+    signed[remaining_points], face[remaining_points] = exact(points[remaining_points])
     return signed, face
 
 
 def _find_creases(part: Mesh, slope: float) -> tuple[Ints, Ints]:
-    """Edges (E,2) that are sharp or belong to other than two faces, and those that only bend."""
+    """Edges (E,2) that are sharp or do not belong to exactly two faces, and edges (E,2) where the surface bends by more
+    than a thousandth of ``slope`` (radians) but is not sharp."""
     edges = np.sort(part.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     code = edges[:, 0] * len(part.vertices) + edges[:, 1]
     order = np.argsort(code, kind="stable")
@@ -95,7 +105,7 @@ def _find_creases(part: Mesh, slope: float) -> tuple[Ints, Ints]:
 
 
 def _place_along(part: Mesh, edges: Ints, step: float) -> Floats:
-    """Points (M,3) along edges (E,2), their ends among them, no more than ``step`` apart."""
+    """Points (M,3) along edges (E,2), including both ends, at most ``step`` apart."""
     a, b = part.vertices[edges[:, 0]], part.vertices[edges[:, 1]]
     count = np.ceil(np.linalg.norm(b - a, axis=1) / step).astype(np.int64) + 1
     of = np.repeat(np.arange(len(edges)), count)
@@ -104,7 +114,8 @@ def _place_along(part: Mesh, edges: Ints, step: float) -> Floats:
 
 
 def _build_frames(part: Mesh) -> Floats:
-    """(F,4,4) per triangle four planes, about the middle of the bounds: its own, and those through its edges on it."""
+    """Four planes per triangle (F,4,4), relative to the centre of the bounds: its own, and the ones through its edges
+    perpendicular to it, facing inward."""
     corners = part.triangles - part.bounds.mean(axis=0)
     normal = part.cross / np.maximum(np.linalg.norm(part.cross, axis=1), 1e-300)[:, None]
     inward = np.cross(normal[:, None], np.roll(corners, -1, axis=1) - corners)
@@ -116,7 +127,7 @@ def _build_frames(part: Mesh) -> Floats:
 
 
 def _measure_heights(points: Floats, frames: Floats) -> tuple[Floats, Floats]:
-    """Height (N,) of points (N,3) over the plane of a triangle each, (N,4,4), and how far they are from its edges (N,)
-    measured in that plane, negative beside the triangle."""
+    """Height (N,) of each of the points (N,3) over the plane of one triangle, given by its planes (N,4,4), and its
+    distance (N,) to the triangle's edges in that plane, negative beside the triangle."""
     value = np.einsum("nij,nj->ni", frames[:, :, :3], points) + frames[:, :, 3]
     return value[:, 0], np.minimum(np.minimum(value[:, 1], value[:, 2]), value[:, 3])

@@ -1,4 +1,4 @@
-"""Exact duplicates among points."""
+"""Points that are exactly equal."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from damageest.artefacts import Floats, Ints
 
 
 def find_duplicates(points: Floats) -> tuple[Ints, Ints]:
-    """Exact duplicates among points (N,3): ``keep`` (M,), the index of each distinct point's first copy, rising, and
-    ``inverse`` (N,), which of them each point equals.
+    """Which of the points (N,3) are exactly equal: ``keep`` (M,) and ``inverse`` (N,).
 
-    Sorts one 64-bit hash per point, far faster than sorting rows; points that share a hash are compared in full.
+    ``keep`` holds, ascending, the index of the first copy of each distinct point. ``inverse`` tells which of them each
+    point equals, so that ``points[keep][inverse]`` equals ``points``. 0 and -0 are equal.
+
+    Sorts one 64-bit hash per point, which is much faster than sorting rows. Points with equal hashes are compared in
+    full.
     """
     bits = (np.ascontiguousarray(points, dtype=np.float64) + 0.0).view(np.uint64)  # + 0.0 turns -0 into 0
     mixed = np.zeros(len(points), np.uint64)
@@ -25,7 +28,7 @@ def find_duplicates(points: Floats) -> tuple[Ints, Ints]:
         return every, every
     order = np.argsort(mixed, kind="stable")
     same = (mixed[order][1:] == mixed[order][:-1]) & (bits[order][1:] == bits[order][:-1]).all(1)
-    # two distinct points under one hash may interleave their copies: then rows themselves are sorted
+    # copies of two distinct points with equal hashes may alternate in the order: then the rows themselves are sorted
     clash = (mixed[order][1:] == mixed[order][:-1]) & ~same
     if clash.any():
         _, first, inverse = np.unique(bits, axis=0, return_index=True, return_inverse=True)

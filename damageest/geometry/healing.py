@@ -1,4 +1,4 @@
-"""Turning a triangle mesh that nearly is a solid into one, saying what was done; refusing where that were guessing."""
+"""Repair of a triangle mesh that is nearly a solid. Only safe repairs are made, and each is reported."""
 
 from __future__ import annotations
 
@@ -11,14 +11,19 @@ from damageest.geometry.body_repair import label_bodies, orient_faces, resolve_b
 from damageest.geometry.duplicates import find_duplicates
 
 _HOLE_EDGES = 12
+"""Edges of a hole up to which it may be closed."""
 _HOLE_AREA = 0.01
+"""Largest share of the surface area for the squared diagonal of a hole of more than three edges."""
 
 
 def heal(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, tuple[str, ...]]:
-    """A watertight mesh from one that nearly is: vertices (V,3), faces (F,3), and a note for each repair made.
+    """A watertight mesh from one that nearly is: vertices (V,3), faces (F,3), and a note (text) for each repair.
 
-    Merges vertices, drops degenerate and doubled faces, makes windings agree and face outward, closes holes of a few
-    edges, and unites bodies that overlap. Raises InputError, saying what is wrong and where, for anything beyond that.
+    Merges vertices, drops degenerate and duplicate faces, makes windings consistent and outward, closes holes of a few
+    edges, and unites bodies that overlap. Vertices are merged up to 1e-5 of the diagonal of the bounds; holes have
+    three edges, or up to 12 within 1 % of the surface area. Coordinates may be in any unit and frame, and stay in them.
+
+    Raises InputError, with what is wrong, where and what to do, for a mesh that needs more than that.
     """
     vertices = np.asarray(vertices, dtype=np.float64)
     faces = np.asarray(faces, dtype=np.int64)
@@ -27,14 +32,14 @@ def heal(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, tuple[str, ...]]:
     if bad := int((~np.isfinite(vertices)).any(1).sum()):
         raise InputError(f"{bad} of its vertices are not finite numbers; export the part again")
     notes: list[str] = []
-    vertices, faces = _merge(vertices, faces, notes)
-    vertices, faces = _tidy(vertices, faces, notes)
+    vertices, faces = _merge_vertices(vertices, faces, notes)
+    vertices, faces = _drop_degenerate(vertices, faces, notes)
     if not len(faces):
         raise InputError("all its triangles are degenerate; a part must enclose a volume")
     if open_edges(faces):
-        faces = _drop_doubles(faces, notes)
-        faces = _wind(vertices, faces, notes)
-        faces = _fill(vertices, faces, notes)
+        faces = _drop_duplicate_faces(faces, notes)
+        faces = _align_windings(vertices, faces, notes)
+        faces = _fill_holes(vertices, faces, notes)
         vertices, faces = split_pinches(vertices, faces, notes)
     if open_edges(faces):
         raise InputError(_describe_open(vertices, faces))
@@ -42,14 +47,15 @@ def heal(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, tuple[str, ...]]:
     return vertices, faces, tuple(notes)
 
 
-def _merge(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
-    """Merges equal vertices, then, only while the mesh is open, ever less equal ones up to 1e-5 of the diagonal."""
+def _merge_vertices(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
+    """Merges equal vertices. While the mesh is still open, merges vertices closer than 1e-7, 1e-6 and 1e-5 of the
+    diagonal, if that leaves fewer odd edges."""
     if not open_edges(faces):
         return vertices, faces
     keep, inverse = find_duplicates(vertices)
     before = len(vertices)
     vertices, faces = vertices[keep], inverse[faces]
-    soup = before == 3 * len(faces)  # as in every STL file: nothing to tell
+    soup = before == 3 * len(faces)  # as in every STL file, so not worth a note
     if len(vertices) < before and not soup:
         notes.append(f"merged {before - len(vertices)} duplicate vertices")
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
@@ -79,13 +85,15 @@ def _merge(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Int
 
 
 def _is_proper(faces: Ints) -> NDArray[np.bool_]:
+    """Whether the three vertices of each face differ (F,)."""
     a, b, c = faces.T
     proper: NDArray[np.bool_] = (a != b) & (b != c) & (c != a)
     return proper
 
 
 def _list_edges(faces: Ints) -> tuple[Ints, Ints, Ints]:
-    """Undirected edges (E,2), which of them each of the 3F directed ones is, and how many triangles each has."""
+    """Undirected edges (E,2), the number of the edge for each of the 3F directed ones, and how many triangles each edge
+    has (E,)."""
     directed = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     size = int(faces.max()) + 1
     codes, inverse, counts = np.unique(directed[:, 0] * size + directed[:, 1], return_inverse=True, return_counts=True)
@@ -93,10 +101,11 @@ def _list_edges(faces: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 def _count_odd_edges(faces: Ints) -> int:
+    """How many edges have an odd number of triangles; 0 for no faces."""
     return int((_list_edges(faces)[2] % 2).sum()) if len(faces) else 0
 
 
-def _tidy(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
+def _drop_degenerate(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
     """Drops triangles with a repeated corner and vertices that no triangle uses."""
     proper = _is_proper(faces)
     if not proper.all():
@@ -110,8 +119,9 @@ def _tidy(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints
     return vertices, faces
 
 
-def _drop_doubles(faces: Ints, notes: list[str]) -> Ints:
-    """Of triangles on the same vertices keeps one, or none of an even number where that closes the mesh better."""
+def _drop_duplicate_faces(faces: Ints, notes: list[str]) -> Ints:
+    """Keeps one of several triangles on the same vertices; or none of an even number, where the mesh then has fewer
+    open edges."""
     _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     if (counts == 1).all():
         return faces
@@ -122,24 +132,26 @@ def _drop_doubles(faces: Ints, notes: list[str]) -> Ints:
         return int((_list_edges(mesh)[2] != 2).sum()) if len(mesh) else 3 * len(faces)
 
     kept = one if defects(one) <= defects(none) else none
-    notes.append(f"dropped {len(faces) - len(kept)} triangles lying exactly on another")
+    notes.append(f"dropped {len(faces) - len(kept)} triangles that lie exactly on another one")
     return kept
 
 
-def _wind(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
-    """Makes neighbouring triangles run the same way round."""
+def _align_windings(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
+    """Makes the windings of neighbouring triangles agree."""
     turned, flipped = orient_faces(faces)
     if flipped is None:
         raise InputError(
-            "its surface is one-sided (like a Moebius strip): no choice of windings agrees; export it again as a solid"
+            "its surface is one-sided (like a Moebius strip), so its triangles have no consistent winding; "
+            "export it again as a solid"
         )
     if flipped:
-        notes.append(f"turned round {flipped} triangles whose winding disagreed with their neighbours'")
+        notes.append(f"reversed {flipped} triangles whose winding disagreed with their neighbours")
     return turned
 
 
-def _trace_loops(faces: Ints) -> list[Ints]:
-    """The boundary's simple closed loops of vertices, against the triangles' sense; parted where they touch."""
+def _trace_hole_loops(faces: Ints) -> list[Ints]:
+    """The closed loops of vertices along the boundary, against the direction of the triangles, so that a patch on a
+    loop continues the winding. Loops that touch in a vertex are separated there."""
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     _, inverse, counts = _list_edges(faces)
     follow: dict[int, list[int]] = {}
@@ -151,7 +163,7 @@ def _trace_loops(faces: Ints) -> list[Ints]:
         place: dict[int, int] = {}
         at = begin
         while True:
-            if at in place:  # back where the path was: what lies between is a loop
+            if at in place:  # the path returns to a vertex: the part since then is a loop
                 loop = path[place[at] :]
                 for vertex in loop:
                     del place[vertex]
@@ -165,15 +177,15 @@ def _trace_loops(faces: Ints) -> list[Ints]:
     return [loop for loop in loops if len(loop) >= 3]
 
 
-def _fill(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
-    """Closes holes that a missing triangle or two leave: three edges, or up to 12 and 1 % of the surface's area."""
+def _fill_holes(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
+    """Closes holes that a few missing triangles leave: of three edges, or of up to 12 and 1 % of the surface area."""
     corners = vertices[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
     patches: list[Ints] = []
-    for loop in _trace_loops(faces):
+    for loop in _trace_hole_loops(faces):
         if len(loop) > _HOLE_EDGES:
             continue
-        patch = _patch(vertices, loop)
+        patch = _triangulate_loop(vertices, loop)
         ring = vertices[loop]
         span = np.ptp(ring, axis=0)
         if len(loop) == 3 or float(span @ span) <= _HOLE_AREA * area:
@@ -186,8 +198,8 @@ def _fill(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
     return filled
 
 
-def _patch(vertices: Floats, loop: Ints) -> Ints:
-    """Triangles over a small loop, of least total area (dynamic programming over its diagonals)."""
+def _triangulate_loop(vertices: Floats, loop: Ints) -> Ints:
+    """Triangles (T,3) over a small loop with the least total area (dynamic programming over its diagonals)."""
     n = len(loop)
     p = vertices[loop]
     cost = np.zeros((n, n))
@@ -213,7 +225,7 @@ def _patch(vertices: Floats, loop: Ints) -> Ints:
 
 
 def _describe_open(vertices: Floats, faces: Ints) -> str:
-    """What keeps the mesh from being a solid, where, and what to do."""
+    """The message on a mesh that is not closed: what is wrong, where, and what to do."""
     edges, _, counts = _list_edges(faces)
     parts = []
     for which, name in (
@@ -227,12 +239,13 @@ def _describe_open(vertices: Floats, faces: Ints) -> str:
             parts.append(f"{int(which.sum())} {name}, the first at {places}{box}")
     _, bodies = label_bodies(faces)
     if not parts:
-        parts.append(f"{open_edges(faces)} edges whose two triangles run the same way round")
+        parts.append(f"{open_edges(faces)} edges whose two triangles have opposite windings")
     return (
-        f"not watertight, so it has no inside: {'; '.join(parts)} ({len(faces)} triangles in {bodies} "
+        f"not watertight: {'; '.join(parts)} ({len(faces)} triangles in {bodies} "
         f"piece{'s' * (bodies != 1)}). Export the part again as a solid, or close the mesh in a mesh editor"
     )
 
 
 def _format_point(p: Floats) -> str:
+    """A point as text: '(1, 2.5, 3)'."""
     return "({:.6g}, {:.6g}, {:.6g})".format(*p)

@@ -1,4 +1,4 @@
-"""The positive side of a field on a grid, as a solid."""
+"""The positive side of a field on a voxel grid, as a solid."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ from damageest.geometry.poisson import Grid, GridValues
 
 
 def extract_region(grid: Grid, field: GridValues) -> Solid | None:
-    """Where the field is positive, closed by the walls of the grid; None where it is so nowhere."""
+    """The solid where a field is positive, closed by the walls of the grid; None where the field is nowhere positive.
+
+    Args:
+        grid: the places of the field's nodes; the solid is in its unit and frame.
+        field: (shape of the grid) values of any unit at the nodes.
+
+    By vtk's flying edges, a form of marching cubes (Schroeder et al. 2015). Values below 1e-5 of the largest count as
+    positive. Raises ArtefactError where rounding leaves a mesh that is not watertight.
+    """
     from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
     from vtkmodules.vtkCommonDataModel import vtkImageData
     from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
@@ -17,7 +25,7 @@ def extract_region(grid: Grid, field: GridValues) -> Solid | None:
     scale = float(np.abs(field).max())
     if not scale > 0:
         return None
-    # A level that passes exactly through a node would make triangles of no area, so zeros are pushed to one side.
+    # A zero level exactly at a node would give triangles without area, so values near zero are moved to one side.
     values = np.where(np.abs(field) < 1e-5 * scale, 1e-5 * scale, field)
     values = np.pad(values, 1, constant_values=-scale).astype(np.float32)
     image = vtkImageData()

@@ -1,4 +1,4 @@
-"""The closed loops that bound an open mesh."""
+"""The boundary loops of an open mesh, and which of them are rims."""
 
 from __future__ import annotations
 
@@ -7,23 +7,29 @@ import numpy as np
 from damageest.artefacts import Ints, Surface
 from damageest.errors import StageError
 
-SMALL = 10
-"""Nodes of a loop that counts as a flaw of the reconstruction, to be closed, and not as a rim (paper 3.2)."""
+MOST_FLAW_VERTICES = 10
+"""Vertices up to which a boundary loop is a flaw of the reconstruction, to be closed, and not a rim (paper 3.2)."""
 
 
 def trace_loops(faces: Ints) -> list[Ints]:
-    """Vertex loops along the boundary edges of faces (F,3), in the direction of their faces; longest first.
+    """The boundary loops of faces (F,3), each an array of vertex indices; most vertices first.
 
-    Raises StageError where two loops meet in a vertex, so that they cannot be told apart.
+    A loop runs in the direction of its faces; its last vertex is followed by the first. A closed mesh has none. The
+    mesh must be a manifold with consistent windings.
+
+    Raises StageError where two loops meet in a vertex, because they cannot be separated.
     """
     if not len(faces):
         return []
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = int(faces.max()) + 1
-    lonely = ~np.isin(edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0])
-    starts, ends = edges[lonely].T
+    is_boundary = ~np.isin(edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0])
+    starts, ends = edges[is_boundary].T
     if len(np.unique(starts)) != len(starts):
-        raise StageError("the surface pinches: two of its rims meet in a point", "another spacing, or method: implicit")
+        raise StageError(
+            "two boundary loops of the surface meet in a point and cannot be separated",
+            "another spacing, or method: implicit",
+        )
     after = dict(zip(starts.tolist(), ends.tolist(), strict=True))
     found = []
     while after:
@@ -37,8 +43,15 @@ def trace_loops(faces: Ints) -> list[Ints]:
 
 
 def trace_rims(surface: Surface) -> list[Ints]:
-    """The loops that are no flaws. Raises StageError where there is none."""
-    found = [loop for loop in trace_loops(surface.faces) if len(loop) > SMALL]
+    """The boundary loops of more than MOST_FLAW_VERTICES vertices, as `trace_loops` gives them.
+
+    Raises StageError where there is none, or where two loops meet in a vertex.
+    """
+    found = [loop for loop in trace_loops(surface.faces) if len(loop) > MOST_FLAW_VERTICES]
     if not found:
-        raise StageError("the damage surface has no rim: it is closed, or no more than a speck", "method: implicit")
+        raise StageError(
+            "the damage surface has no rim: it is closed, or none of its boundary loops has more than "
+            f"{MOST_FLAW_VERTICES} vertices",
+            "method: implicit",
+        )
     return found

@@ -1,4 +1,4 @@
-"""From vertices and faces, wherever they came from, to a `Part`."""
+"""A `Part` from vertices and faces, as a file or a program gives them."""
 
 from __future__ import annotations
 
@@ -24,10 +24,21 @@ def make_part(
     tessellation_error: float = 0.0,
     notes: tuple[str, ...] = (),
 ) -> Part:
-    """A part from vertices (V,3), already in ``unit``, and faces (F,3), repaired where that is safe.
+    """A part from vertices (V,3) and faces (F,3), repaired where that is safe (see `damageest.geometry.healing`).
 
-    A repair that changes the triangles loses ``faces_brep``, which then would name the wrong ones. Raises InputError,
-    naming ``path``, for a mesh that is not a solid and cannot safely be made one.
+    Args:
+        vertices: (V,3) in ``unit``, in the frame that becomes the part's.
+        faces: (F,3), whose triangles may be in any order and face inward.
+        unit: name of the unit of length; it is noted, nothing is converted.
+        path, sha256: the file that the part was read from, and its checksum, for messages and the report.
+        repair: False refuses a mesh that is not watertight instead of repairing it.
+        faces_brep: (F,) number of the CAD face of each triangle; dropped, with the two names below, where a repair
+            changes the triangles, because the numbers would then be those of other triangles.
+        face_names, face_kinds: what the CAD file calls these faces.
+        tessellation_error: bound of the distance between CAD surface and triangles, in ``unit``.
+        notes: what was converted before; the repairs are added.
+
+    Raises InputError, which starts with ``path``, for a mesh that is not a solid and cannot safely be repaired.
     """
     name = path or "the part"
     try:
@@ -35,7 +46,7 @@ def make_part(
         if v.ndim != 2 or f.ndim != 2 or v.shape[1] != 3 or f.shape[1] != 3:
             raise ValueError(f"expected vertices (V,3) and faces (F,3), got {v.shape} and {f.shape}")
         if len(f) and (f.min() < 0 or f.max() >= len(v)):
-            raise ValueError(f"a face refers to a vertex outside the {len(v)} there are")
+            raise ValueError(f"a face has an index outside the {len(v)} vertices")
     except (ValueError, TypeError) as error:
         raise InputError(f"{name}: {error}") from None
     try:
@@ -45,7 +56,7 @@ def make_part(
             notes = (*notes, *made)
             if faces_brep is not None and not np.array_equal(given, f):
                 faces_brep, face_names, face_kinds = None, (), ()
-                notes = (*notes, "the repair changed the triangles: which CAD face each came from is no longer known")
+                notes = (*notes, "the repair changed the triangles: the CAD face of each triangle is no longer known")
         elif open_edges(f):
             raise InputError("not watertight, and 'repair' is off; set repair: true, or export the part as a solid")
         return Part(v, f, unit, path, sha256, faces_brep, face_names, face_kinds, tessellation_error, notes)

@@ -1,4 +1,7 @@
-"""Which points lie near which: neighbours, thinning, the area that a point stands for, points near places."""
+"""Which points lie near others: nearest neighbours, points near given places, thinning, the area per point.
+
+All lengths and points of a call are in one unit and one frame.
+"""
 
 from __future__ import annotations
 
@@ -9,28 +12,28 @@ from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, number_cubes
 
 
 def find_nearby(points: Floats, places: Floats, reach: float) -> Ints:
-    """Ascending indices of all points (N,3) within ``reach`` of one of the places (M,3), and of some farther off.
+    """Ascending indices of all points (N,3) within ``reach`` of one of the places (M,3), and of some farther away.
 
-    By a lattice of cubes no smaller than the reach: a point counts where its cube holds a place or touches one that
-    does. So the nearest neighbours of a place among these points are those among all, as far as the reach goes.
+    By a voxel grid with cubes at least as large as ``reach``: a point is included if its cube holds a place or touches
+    a cube that does. So within ``reach`` of a place, its nearest neighbours among these points are those among all.
     """
     if not len(places) or not len(points):
         return np.empty(0, np.int64)
     low, high = places.min(axis=0), places.max(axis=0)
     size = max(reach * (1 + 1e-9), float((high - low).max()) / MOST_ALONG, 1e-300)
-    # two empty layers all round: one that the places' neighbours may reach into, one for whatever lies beyond
+    # two empty layers on every side: one for the cubes next to the places, one for all points farther away
     low = low - 2 * size
     shape = np.floor((high - low) / size).astype(np.int64) + 3
-    lattice = VoxelGrid(low, size, shape)
-    taken = lattice.mark_around(places, 1)
+    grid = VoxelGrid(low, size, shape)
+    is_near = grid.mark_around(places, 1)
     found = []
     for start in range(0, len(points), CHUNK):
-        found.append(start + np.flatnonzero(taken[lattice.number_cells(points[start : start + CHUNK])]))
+        found.append(start + np.flatnonzero(is_near[grid.number_cells(points[start : start + CHUNK])]))
     return np.concatenate(found)
 
 
 def find_in_box(points: Floats, low: Floats, high: Floats) -> Ints:
-    """Ascending indices of the points (N,3) strictly inside a box."""
+    """Ascending indices of the points (N,3) strictly inside the box from ``low`` (3,) to ``high`` (3,)."""
     index = np.flatnonzero((points[:, 0] > low[0]) & (points[:, 0] < high[0]))
     for axis in (1, 2):
         along = points[index, axis]
@@ -39,7 +42,11 @@ def find_in_box(points: Floats, low: Floats, high: Floats) -> Ints:
 
 
 def thin_points(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
-    """Means (M,3) of the points (N,3) in each cube of edge ``cell``, how many each stands for, and one of those."""
+    """Points (N,3) thinned to their mean in each cube of edge ``cell``.
+
+    Returns:
+        The means (M,3), how many points each is the mean of (M,), and the index (M,) of the first of these points.
+    """
     _, first, group, counts = np.unique(
         number_cubes(points, cell)[1], return_index=True, return_inverse=True, return_counts=True
     )
@@ -48,15 +55,21 @@ def thin_points(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
 
 
 def pick_one_per_cube(points: Floats, cell: float) -> Ints:
-    """Index of the first of the points (N,3) in each cube of edge ``cell``."""
+    """Ascending indices (M,) of the first of the points (N,3) in each cube of edge ``cell``."""
     return np.sort(np.unique(number_cubes(points, cell)[1], return_index=True)[1])
 
 
 def find_neighbours(
     points: Floats, count: int, among: Floats | None = None, reach: float = np.inf
 ) -> tuple[Floats, Ints]:
-    """Distances and indices (N,count) of each point's nearest ``among`` others, or among all, itself first. Beyond
-    ``reach`` the distance is infinite and the index no point's."""
+    """The nearest neighbours of each of the points (N,3): distances (N,count) and indices (N,count), nearest first.
+
+    Args:
+        count: neighbours wanted; fewer columns where there are fewer points to find.
+        among: (M,3) the points to find; by default the points themselves, so that each point is its own first
+            neighbour.
+        reach: beyond this distance none is found: the distance is infinite and the index M.
+    """
     from scipy.spatial import cKDTree
 
     among = points if among is None else among
@@ -66,7 +79,11 @@ def find_neighbours(
 
 
 def measure_local_areas(points: Floats) -> Floats:
-    """Area (N,) that each of the points on a surface stands for, from its eight nearest."""
+    """The area (N,) of surface that each of the points (N,3) stands for, from its eight nearest neighbours.
+
+    At most four times the median of all, so that single outliers stay small. In the square of the points' unit; 1e-12
+    each for fewer than three points.
+    """
     if len(points) < 3:
         return np.full(len(points), 1e-12)
     distance, _ = find_neighbours(points, 9)

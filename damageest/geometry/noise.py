@@ -1,4 +1,4 @@
-"""What a scan says about itself: how noisy its points are, and how far apart."""
+"""The noise and the point spacing of a scan, measured from its points alone."""
 
 from __future__ import annotations
 
@@ -10,28 +10,32 @@ from damageest.artefacts import Floats
 from damageest.geometry.neighbourhoods import find_nearby
 
 _SAMPLES = (4000, 1500)
+"""Places at which the scan is measured: for a scan of up to _WHOLE points, and for a larger one."""
 _WHOLE = 200_000
 _LEVELS = (16, 32, 64, 128, 256, 512)
+"""Neighbours of a patch, tried in turn."""
 _WIDE = 8.0
+"""Ratio of a patch's radius to the noise from which the patch is wide enough."""
 _SECTORS = 6
 
 
 def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, float]:
-    """Noise and spacing of a scan, ``points`` (N,3), in its unit of length; the same seed gives the same answer.
+    """Noise and spacing of a scan with ``points`` (N,3), in the unit of the points, in any frame.
 
-    Noise: the standard deviation of the points off the local surface. At a few thousand points a quadric is fitted to
-    the nearest neighbours, all of them, however dense; the residual variance, by its degrees of freedom, of those
-    patches that agree with one another is what the scanner's noise makes of a smooth surface. Patches across an edge, a
-    damage or a second wall have more and fall out as long as they are few enough. Patches grow until they are wide
-    against the noise: narrower ones would take the noise's own direction for the surface's. On a surface whose bends
-    are all tighter than a patch the answer includes what a quadric cannot follow, hence is too high.
+    Noise is the standard deviation of the points from the local surface. At a few thousand places a quadric is fitted
+    to the nearest neighbours (a patch), all of them, also where points are dense. The residual variance of a patch,
+    divided by its degrees of freedom, is that of the noise if the surface is smooth there. Patches across an edge, a
+    damage or a second wall have a larger one; they are left out, provided they are the minority. Patches are widened
+    until their radius is 8 times the noise, because the plane of a narrower patch follows the noise and not the
+    surface. On a surface with radii of curvature smaller than a patch, the result includes what a quadric cannot
+    follow and is too high.
 
-    Spacing: the gap that a reconstruction has to bridge. Round each sample point, in the local plane, the distance to
-    the nearest neighbour in each of six sectors; the median of the six; and of these the median by area covered, not by
-    number of points, so that neither dense rows of points nor dense regions hide the gaps between them. On a randomly
-    sampled surface about 1.1 / sqrt(points per area), on a grid about the pitch.
+    Spacing is the gap that a reconstruction has to bridge. Around each place, in the local plane, it takes the distance
+    to the nearest neighbour in each of six sectors, and the median of the six. The median of these is weighted by area
+    and not by number of points, so that dense rows or dense regions do not hide the gaps between them. It is about
+    1.1 / sqrt(points per area) on a randomly sampled surface, and about the pitch on a grid.
 
-    Fewer than 16 points: both are 0.
+    The same points and seed give the same result. Both are 0 for fewer than 16 points.
     """
     points = np.asarray(points, dtype=np.float64)
     if len(points) < _LEVELS[0]:
@@ -44,19 +48,19 @@ def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, flo
     middle = centres.mean(axis=0)  # far from the origin, products of coordinates lose digits
     centres = centres - middle
     noise = spacing = 0.0
-    settled, held = False, 0
+    settled, gathered = False, 0
     for k in sorted({min(k, len(points)) for k in _LEVELS}):
-        if k > held:  # 64 mostly do
-            held = max(k, 64) if dense else len(points)
-            near = (_gather_around(points, centres + middle, held, rng) if dense else points) - middle
-            tree = cKDTree(near, balanced_tree=False, compact_nodes=False)
-        some = centres[: max(500, 400_000 // k)]  # wide patches average more points each: fewer of them will do
+        if k > gathered:  # 64 are enough for most scans
+            gathered = max(k, 64) if dense else len(points)
+            around = (_gather_around(points, centres + middle, gathered, rng) if dense else points) - middle
+            tree = cKDTree(around, balanced_tree=False, compact_nodes=False)
+        some = centres[: max(500, 400_000 // k)]  # wide patches average more points each, so fewer are needed
         far, index = (np.asarray(a) for a in tree.query(some, k=k))
-        local, roundness = _to_local(near[index])
+        local, roundness = _to_principal_axes(around[index])
         if k <= 64:
             spacing = _measure_spacing(local[:, :, :2] - local[:, :1, :2]) or spacing
         even = roundness > 0.15
-        # rows of points: the patch must span several before it shows the surface
+        # where points lie in rows, a patch has to span several rows before it shows the surface
         if not settled and even.sum() >= 0.3 * len(even):
             noise = _find_clean_level(_measure_residual_variance(local[even]), k - 6)
             settled = bool(np.median(far[:, -1]) >= _WIDE * noise)
@@ -66,9 +70,9 @@ def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, flo
 
 
 def _gather_around(points: Floats, centres: Floats, count: int, rng: np.random.Generator) -> Floats:
-    """The points round the centres (M,3), among them the ``count`` nearest of nearly each.
+    """The points around the centres (M,3), including the ``count`` nearest ones of nearly every centre.
 
-    Density must not be thinned, but a tree over all of very many points would cost seconds.
+    The points must not be thinned, because their density matters; but a tree over very many points takes seconds.
     """
     from scipy.spatial import cKDTree
 
@@ -78,8 +82,9 @@ def _gather_around(points: Floats, centres: Floats, count: int, rng: np.random.G
     return points[find_nearby(points, centres, float(np.percentile(reach, 95)))]
 
 
-def _to_local(patches: Floats) -> tuple[Floats, Floats]:
-    """Patches (m,k,3) in their principal axes, widest first, and how round each is, from 0 to 1."""
+def _to_principal_axes(patches: Floats) -> tuple[Floats, Floats]:
+    """Patches (m,k,3) in their principal axes, widest first, and the ratio (m,) of second to first width: near 0 for
+    points in a row, 1 for a round patch."""
     centred = patches - patches.mean(1, keepdims=True)
     spread, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", centred, centred))
     local = np.einsum("mki,mij->mkj", centred, axes[:, :, ::-1])
@@ -88,7 +93,7 @@ def _to_local(patches: Floats) -> tuple[Floats, Floats]:
 
 
 def _measure_residual_variance(local: Floats) -> Floats:
-    """(m,) variance of each patch's heights over the quadric fitted to them, by k - 6 degrees of freedom."""
+    """Variance (m,) of each patch's heights over the quadric fitted to them, with k - 6 degrees of freedom."""
     size = np.maximum(np.abs(local[:, :, :2]).max(axis=(1, 2), keepdims=True), 1e-300)
     u, v = np.moveaxis(local[:, :, :2] / size, 2, 0)
     basis = np.linalg.qr(np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)).Q
@@ -99,10 +104,10 @@ def _measure_residual_variance(local: Floats) -> Floats:
 
 
 def _find_clean_level(variances: Floats, freedom: int) -> float:
-    """The standard deviation that the lower, agreeing part of the patches' variances has in common.
+    """The standard deviation sigma of the noise, from the variances (m,) of the patches without edges or damage.
 
-    Under noise alone they follow sigma^2 chi^2(f) / f. Starts low in the distribution, then takes the median of all
-    that sigma does not rule out, until that stands.
+    With noise alone the variances follow sigma^2 chi^2(f) / f. Sigma is first taken from a low quantile, then again and
+    again from the median of all variances that are plausible for sigma, until it no longer changes.
     """
     if freedom < 1:
         return 0.0
@@ -132,7 +137,7 @@ def _measure_spacing(around: Floats) -> float:
         np.stack([np.where(sector == s, distance, np.inf).min(1) for s in range(_SECTORS)], axis=1), axis=1
     )
     gap = (nearest[:, 2] + nearest[:, 3]) / 2
-    gap = np.sort(gap[np.isfinite(gap)])  # fewer than four sectors with a neighbour: the patch does not show the gap
+    gap = np.sort(gap[np.isfinite(gap)])  # with neighbours in fewer than four sectors, the gap is not measurable
     if len(gap) < 0.1 * len(around):
         return 0.0
     area = np.cumsum(np.minimum(gap, 3 * np.median(gap)) ** 2)

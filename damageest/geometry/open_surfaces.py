@@ -1,4 +1,7 @@
-"""What reconstructions by other libraries share: oriented points on local fits going in, an open surface coming out."""
+"""Steps around a surface reconstruction by another library: oriented points before it, a trimmed open surface after it.
+
+Points, part and lengths are in one unit, points and part in the part's frame.
+"""
 
 from __future__ import annotations
 
@@ -12,64 +15,92 @@ from damageest.geometry.neighbourhoods import thin_points
 from damageest.geometry.orientation import turn_toward_void
 
 FEWEST = 16
-SMOOTHED = 32
-"""Points of each local fit."""
+"""Points needed to reconstruct an inner damage surface."""
+FIT_COUNT = 32
+"""Neighbours of each local fit."""
 
 
 def centre_points(points: Floats) -> Floats:
-    """The mean (3,) of points (M,3). Raises StageError where they are too few for a surface."""
+    """The mean (3,) of points (N,3). Raises StageError for fewer than FEWEST points."""
     if len(points) < FEWEST:
-        raise StageError(f"{len(points)} points are too few for a surface; it takes {FEWEST}", "method: implicit")
+        raise StageError(
+            f"no inner damage surface could be reconstructed from {len(points)} points; at least {FEWEST} are needed",
+            "method: implicit",
+        )
     return np.asarray(points.mean(axis=0))
 
 
 def thin_for_surface(points: Floats, cell: float) -> Floats:
-    """Points (M,3) thinned to one in each cube of 0.7 ``cell``. Raises StageError where too few are left."""
+    """Points (N,3) thinned to their means (M,3) in cubes of edge 0.7 ``cell``.
+
+    Raises StageError where fewer than FEWEST are left.
+    """
     cloud, *_ = thin_points(points, 0.7 * cell)
     if len(cloud) < FEWEST:
         raise StageError(
-            f"{len(points)} points, {len(cloud)} after thinning, are too few for a surface",
+            f"no inner damage surface could be reconstructed from {len(points)} points, {len(cloud)} after thinning; "
+            f"at least {FEWEST} are needed",
             "a smaller spacing, or method: implicit",
         )
     return cloud
 
 
 def orient_points(points: Floats, part: Part, cell: float, noise: float) -> tuple[Floats, Floats]:
-    """Points (M,3), thinned to one in each cube of 0.7 ``cell`` and moved onto local fits, and their unit normals,
-    which agree with one another and face the nominal skin rather than not.
+    """Points (N,3) thinned and moved onto local fits (M,3), and their unit normals (M,3), toward the lost metal.
 
-    Raises StageError where too few are left.
+    The points are thinned as by `thin_for_surface`. The normals agree with one another and, of the two possible
+    directions, have the one toward the nominal skin of the part.
+
+    Args:
+        points: (N,3) inner-damage-surface points in the part's frame.
+        cell: length below which nothing is resolved.
+        noise: standard deviation of the points from the surface.
+
+    Raises StageError where fewer than FEWEST are left.
     """
-
     cloud = thin_for_surface(points, cell)
-    cloud, normals, _ = smooth_points(cloud, noise, min(SMOOTHED, len(cloud) // 2))
+    cloud, normals, _ = smooth_points(cloud, noise, min(FIT_COUNT, len(cloud) // 2))
     nothing = np.empty((0, 3))
-    # The nearest skin may be that behind a thin wall: it breaks the tie between two consistent ways, and no more.
-    hint = 1e-4 * _to_skin(cloud, part)
+    # The nearest skin may be that behind a thin wall, so its weight is small: it only decides between the two
+    # consistent orientations of all normals.
+    hint = 1e-4 * _find_skin_directions(cloud, part)
     return cloud, turn_toward_void(cloud, normals, hint, nothing, nothing, np.empty(0), cell)
 
 
 def trim_surface(vertices: Floats, faces: Ints, cloud: Floats, reach: float, part: Part, tolerance: float) -> Surface:
-    """The largest piece (V,3), (F,3) of what lies within ``reach`` of the points, normals toward the lost material.
+    """The largest piece of a reconstructed mesh near its points, as an inner damage surface, normals toward the lost
+    metal.
+
+    Args:
+        vertices, faces: (V,3), (F,3) the mesh as reconstructed, closed or open, faces in either direction.
+        cloud: (M,3) the points that it was reconstructed from.
+        reach: a face stays if its vertices are within this distance of a point.
+        part, tolerance: a face stays if its vertices are less than half the tolerance outside the part.
 
     Raises StageError where nothing is left.
     """
     from scipy.spatial import cKDTree
 
     if len(faces):
-        # What no point vouches for, and what overshoots the part, would bound no lost material.
-        near = np.asarray(cKDTree(cloud).query(vertices, workers=2)[0]) < reach
-        near &= signed_distance(vertices, part)[0] < 0.5 * tolerance
-        faces = take_largest_piece(faces[near[faces].all(axis=1)])
+        # Surface far from all points, or outside the part, does not bound lost metal.
+        is_near = np.asarray(cKDTree(cloud).query(vertices, workers=2)[0]) < reach
+        is_near &= signed_distance(vertices, part)[0] < 0.5 * tolerance
+        faces = take_largest_piece(faces[is_near[faces].all(axis=1)])
     if not len(faces):
-        raise StageError("no surface came about", "another spacing, or method: implicit")
+        raise StageError(
+            "the reconstruction gives no inner damage surface near the points inside the part",
+            "another spacing, or method: implicit",
+        )
     used, faces = np.unique(faces, return_inverse=True)
     surface = Surface(vertices[used], faces.reshape(-1, 3))
     return surface if faces_skin(surface, part) else Surface(surface.vertices, surface.faces[:, ::-1])
 
 
 def take_largest_piece(faces: Ints) -> Ints:
-    """The largest piece whose triangles hang together by edges, without corners where two rims touch."""
+    """The largest piece of faces (F,3) whose triangles are connected by edges, as a manifold.
+
+    Triangles at a vertex where two boundary loops touch, or at an edge of more than two triangles, are removed.
+    """
     import trimesh
 
     while len(faces):
@@ -81,19 +112,19 @@ def take_largest_piece(faces: Ints) -> Ints:
         starts, often = np.unique(edges[counts[inverse.reshape(-1)] == 1][:, 0], return_counts=True)
         if often.max(initial=0) <= 1 and counts.max() <= 2:
             break
-        bad = np.union1d(starts[often > 1], edges[counts[inverse.reshape(-1)] > 2])
-        faces = faces[~np.isin(faces, bad).any(axis=1)]
+        touching = np.union1d(starts[often > 1], edges[counts[inverse.reshape(-1)] > 2])
+        faces = faces[~np.isin(faces, touching).any(axis=1)]
     return faces
 
 
 def faces_skin(surface: Surface, part: Part) -> bool:
-    """Whether the normals point to the nominal skin nearest to them, by area."""
+    """Whether the normals of a surface point to the nearest skin of the part, in the mean over the area."""
     middle = surface.triangles.mean(axis=1)
     step = closest_on_mesh(middle, part).place - middle
     return float(np.einsum("ij,ij->", surface.cross, step)) >= 0
 
 
-def _to_skin(points: Floats, part: Part) -> Floats:
-    """Unit vectors (N,3) to the nearest place on the part; 0 on it."""
+def _find_skin_directions(points: Floats, part: Part) -> Floats:
+    """Unit vectors (N,3) from points (N,3) to the nearest place on the part; 0 for a point on it."""
     step = closest_on_mesh(points, part).place - points
     return np.asarray(step / np.maximum(np.linalg.norm(step, axis=1), 1e-300)[:, None])

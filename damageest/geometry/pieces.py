@@ -1,8 +1,8 @@
-"""From what the Booleans gave to the sites of the job.
+"""The sites of a damage volume: its pieces, and the clusters of inner-damage-surface (IDS) points that bound them.
 
-A site is what belongs together: clusters of inner-damage-surface (IDS) points that bound one piece of lost material,
-and the pieces that one cluster bounds. So a section missing from a ring is one site with two clusters, and a cut that
-takes two teeth at once is one site with two pieces. Pieces that no IDS point touches are scraps of the method.
+Clusters that bound one piece of lost metal, and pieces that one cluster bounds, belong to one site. So a section
+missing from a ring is one site with two clusters, and a cut through two teeth is one site with two pieces. Pieces with
+hardly any IDS point on them are errors of the method; they are dropped.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.solids import concatenate_meshes
 from damageest.geometry.voxels import number_cubes
 
-ENOUGH = 5
-"""IDS points that have to lie on a piece for it to count."""
+FEWEST_POINTS = 5
+"""IDS points of one cluster that have to lie on a piece, or the piece is dropped."""
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One connected piece of lost material and the clusters whose points lie on it."""
+    """One connected piece of lost metal, and the numbers of the clusters whose points lie on it."""
 
     solid: Solid
     clusters: tuple[int, ...]
@@ -33,25 +33,27 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class JoinedPieces:
-    """One site: ``damage`` (of one or more pieces) and its ``clusters``; ``dropped`` volume of scraps beside it."""
+    """One site: its ``damage`` of one or more pieces, and the numbers of its ``clusters``."""
 
     damage: Solid
     clusters: tuple[int, ...]
 
 
 def find_pieces(damage: Solid, points: Floats, label: NDArray[np.integer], reach: float) -> tuple[list[Piece], float]:
-    """Splits a damage volume and drops what no IDS point touches.
+    """The pieces of a damage volume that IDS points bound, and the volume of those dropped.
 
     Args:
-        points, label: (M,3) IDS points in the part's frame, and the cluster of each.
-        reach: how far from a piece a point may lie and still bound it.
+        damage: the damage volume, of one or more connected pieces.
+        points: (N,3) IDS points, in the unit and frame of ``damage``.
+        label: (N,) the cluster of each point, not negative.
+        reach: distance from a piece up to which a point counts as lying on it.
 
-    Returns:
-        The pieces, and the volume of what was dropped.
+    A piece is dropped where fewer than FEWEST_POINTS points of every cluster lie on it. A cluster bounds a
+    piece if at least FEWEST_POINTS of its points lie there, and at least 2 % as many as of the cluster with most.
     """
     solids = split_bodies(damage)
     vertices, faces, owner = concatenate_meshes(solids)
-    # of points much closer together than the reach, one speaks for those about it
+    # of points much closer together than the reach, the distance is computed for one
     cell = number_cubes(points, reach / 2)[1]
     _, first, counts = np.unique(np.stack([cell, label]), axis=1, return_index=True, return_counts=True)
     distance, face, _ = closest_on_mesh(points[first], Mesh(vertices, faces))
@@ -60,8 +62,8 @@ def find_pieces(damage: Solid, points: Floats, label: NDArray[np.integer], reach
     np.add.at(touching, (owner[face[near]], label[first[near]]), counts[near])
     kept, dropped = [], 0.0
     for solid, counts in zip(solids, touching, strict=True):
-        if counts.max() >= ENOUGH:
-            enough = counts >= max(ENOUGH, 0.02 * counts.max())
+        if counts.max() >= FEWEST_POINTS:
+            enough = counts >= max(FEWEST_POINTS, 0.02 * counts.max())
             kept.append(Piece(solid, tuple(int(c) for c in np.flatnonzero(enough))))
         else:
             dropped += solid.volume
@@ -69,7 +71,11 @@ def find_pieces(damage: Solid, points: Floats, label: NDArray[np.integer], reach
 
 
 def join_pieces(pieces: Sequence[Piece]) -> list[JoinedPieces]:
-    """Joins pieces and clusters that belong together; largest site first. Overlaps between pieces are united."""
+    """The sites that pieces and clusters form, largest damage first.
+
+    Pieces that share a cluster, directly or through other pieces, become one site. Where pieces overlap, their union is
+    taken. Unit and frame are those of the pieces. Raises ValueError where manifold3d rejects a piece.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -1,8 +1,10 @@
-"""A screened Poisson solve on a regular grid: one indicator-like field through oriented points.
+"""Screened Poisson reconstruction on a regular grid: a field that is zero on oriented points and rises along their
+normals.
 
 Kazhdan and Hoppe, "Screened Poisson surface reconstruction" (2013), discretised on a staggered grid: the normals are
-splatted to the grid's edges, the field lives at its nodes, and the constant-coefficient part of the operator is
-inverted by a cosine transform (free, i.e. Neumann, sides), which makes conjugate gradients converge in a few steps.
+distributed to the edges of the grid, and the field has its values at the nodes. The part of the operator with constant
+coefficients is inverted by a cosine transform (Neumann conditions at the sides), so that conjugate gradients converge
+in a few steps. The zero level becomes a solid with `damageest.geometry.isosurface.extract_region`.
 """
 
 from __future__ import annotations
@@ -15,11 +17,15 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats
 
 GridValues = NDArray[np.float32]
+"""Values at the nodes of a `Grid`, in its shape."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Nodes at ``origin + cell * (i, j, k)``, ``shape`` of them along x, y, z."""
+    """Nodes at ``origin + cell * (i, j, k)``, as many along x, y and z as ``shape`` tells.
+
+    ``origin`` (3,) and ``cell`` are lengths in one unit, in the frame of the points used with the grid.
+    """
 
     origin: Floats
     cell: float
@@ -27,20 +33,25 @@ class Grid:
 
     @property
     def size(self) -> int:
+        """The number of nodes."""
         return int(np.prod(self.shape))
 
     def coarsen(self) -> Grid:
-        """Half the resolution, each node in the middle of eight; the shape has to be even."""
+        """The grid of half the resolution, each node in the middle of eight; the shape has to be even."""
         nx, ny, nz = (n // 2 for n in self.shape)
         return Grid(self.origin + self.cell / 2, 2 * self.cell, (nx, ny, nz))
 
     def contains(self, points: Floats) -> NDArray[np.bool_]:
-        """Which points (N,3) lie within the grid."""
+        """Whether each of the points (N,3) lies within the grid (N,)."""
         at = (points - self.origin) / self.cell
         return np.asarray(((at >= 0) & (at <= np.array(self.shape) - 1.001)).all(axis=1))
 
     def find_corners(self, points: Floats, shift: Floats | None = None) -> tuple[NDArray[np.int64], Floats]:
-        """Flat node indices (N,8) round each point and trilinear weights (N,8); ``shift`` moves the nodes, in cells."""
+        """The eight nodes around each of the points (N,3), for trilinear interpolation.
+
+        Gives their indices in the flat field (N,8) and their weights (N,8), which add up to 1. ``shift`` (3,) moves the
+        nodes by that many cells. A point outside the grid is taken at its side.
+        """
         at = (points - self.origin) / self.cell - (0 if shift is None else shift)
         at = np.clip(at, 0, np.array(self.shape) - 1.001)
         low = np.floor(at).astype(np.int64)
@@ -56,7 +67,10 @@ class Grid:
 
 
 def make_grid(low: Floats, high: Floats, cell: float) -> Grid:
-    """The grid over a box; its shape suits the cosine transform and two halvings."""
+    """A grid of spacing ``cell`` over the box from ``low`` (3,) to ``high`` (3,).
+
+    It is somewhat larger than the box, so that its shape is efficient for the cosine transform and can be halved twice.
+    """
     from scipy.fft import next_fast_len
 
     counts = [max(4 * int(next_fast_len(int(np.ceil(n / 4)) + 1, real=True)), 16) for n in (high - low) / cell]
@@ -68,15 +82,18 @@ def solve_poisson(
     grid: Grid, points: Floats, normals: Floats, areas: Floats, screening: float, start: GridValues | None = None,
     accuracy: float = 2e-3, most: int = 30,
 ) -> GridValues:  # fmt: skip
-    """The field (shape of the grid), 0 on the points and rising along their normals.
+    """The field (shape of the grid) that is 0 on the points and rises along their normals.
+
+    Across the surface it rises by about 1, within a few cells.
 
     Args:
-        points, normals: (N,3), in the grid.
-        areas: (N,), what area of the surface each point stands for.
-        screening: how strongly the points pull the field to 0.
-        start: a first guess, such as the refined solution of a coarser grid.
-        accuracy: of the residual, relative to the right side.
-        most: steps of conjugate gradients.
+        grid: nodes of the field.
+        points, normals: (N,3) points within the grid, and unit normals toward the positive side.
+        areas: (N,) the area of surface that each point stands for, in the square of the points' unit.
+        screening: weight of the condition that the field is 0 on the points; 0 leaves it out.
+        start: first guess, such as the refined solution of a coarser grid.
+        accuracy: norm of the residual, relative to the right side, at which the solver stops.
+        most: largest number of conjugate-gradient steps.
     """
     from scipy.sparse import csr_array
 
@@ -88,16 +105,16 @@ def solve_poisson(
     pull = (screening * share).astype(np.float32)
     back = csr_array(look.T)
     shift = float(pull.sum()) / grid.size
-    symbol = _symbol(grid) + shift
+    eigenvalues = _eigenvalues(grid) + shift
 
     def apply(x: GridValues) -> GridValues:
-        drawn: GridValues = (back @ (pull * (look @ x.ravel()))).reshape(grid.shape)
-        return _laplacian(x) + drawn
+        screened: GridValues = (back @ (pull * (look @ x.ravel()))).reshape(grid.shape)
+        return _laplacian(x) + screened
 
-    x: GridValues = _precondition(right, symbol) if start is None else start.copy()
+    x: GridValues = _precondition(right, eigenvalues) if start is None else start.copy()
     r = right - apply(x)
     goal = accuracy * float(np.sqrt(np.vdot(right, right)))
-    z = _precondition(r, symbol)
+    z = _precondition(r, eigenvalues)
     p, rho = z, float(np.vdot(r, z))
     for _ in range(most):
         if float(np.sqrt(np.vdot(r, r))) <= goal or rho <= 0:
@@ -106,25 +123,29 @@ def solve_poisson(
         step = np.float32(rho / float(np.vdot(p, q)))
         x += step * p
         r -= step * q
-        z = _precondition(r, symbol)
+        z = _precondition(r, eigenvalues)
         rho, before = float(np.vdot(r, z)), rho
         p = z + np.float32(rho / before) * p
     return x
 
 
 def solve_coarse_to_fine(grid: Grid, points: Floats, normals: Floats, areas: Floats, screening: float) -> GridValues:
-    """As `solve`, from the solution at half the resolution: a few fine steps do what took many."""
+    """As `solve_poisson`, started from the solution on a grid of half the resolution.
+
+    It then needs fewer steps on the fine grid. Grids of fewer than 300,000 nodes are solved at once. The shape of a
+    larger one has to be even.
+    """
     if grid.size < 300_000:
         return solve_poisson(grid, points, normals, areas, screening)
     half = grid.coarsen()
     inside = half.contains(points)
     start = solve_coarse_to_fine(half, points[inside], normals[inside], areas[inside], screening)
-    # The coarse field rises over twice the length: the same step across the surface, so no scaling is due.
+    # The coarse field has the same step across the surface, over twice the length, so it needs no scaling.
     return solve_poisson(grid, points, normals, areas, screening, refine_field(start), 1e-2, 8)
 
 
 def refine_field(coarse: GridValues) -> GridValues:
-    """The field of ``Grid.coarser()`` carried to the nodes of the finer grid, linearly."""
+    """A field on ``grid.coarsen()``, interpolated linearly to the nodes of ``grid``: twice as many along each axis."""
     out: GridValues = coarse
     for axis in range(3):
         x: GridValues = np.moveaxis(out, axis, 0)
@@ -135,7 +156,7 @@ def refine_field(coarse: GridValues) -> GridValues:
 
 
 def _divergence(grid: Grid, points: Floats, vectors: Floats) -> GridValues:
-    """Adjoint of the grid's gradient, applied to vectors splatted to the edges' middles."""
+    """The adjoint of the grid's gradient, applied to the vectors (N,3) distributed to the middles of the edges."""
     total = np.zeros(grid.shape, np.float32)
     for axis in range(3):
         shift = np.zeros(3)
@@ -150,6 +171,7 @@ def _divergence(grid: Grid, points: Floats, vectors: Floats) -> GridValues:
 
 
 def _laplacian(x: GridValues) -> GridValues:
+    """Minus the Laplace operator in units of the cell, with Neumann conditions at the sides."""
     out = np.zeros_like(x)
     for axis in range(3):
         a, o = np.moveaxis(x, axis, 0), np.moveaxis(out, axis, 0)
@@ -159,12 +181,14 @@ def _laplacian(x: GridValues) -> GridValues:
     return out
 
 
-def _symbol(grid: Grid) -> GridValues:
+def _eigenvalues(grid: Grid) -> GridValues:
+    """The eigenvalue of `_laplacian` for each wave of the cosine transform."""
     waves = [(2 - 2 * np.cos(np.pi * np.arange(n) / n)).astype(np.float32) for n in grid.shape]
     return np.asarray(waves[0][:, None, None] + waves[1][None, :, None] + waves[2][None, None, :], dtype=np.float32)
 
 
-def _precondition(right: GridValues, symbol: GridValues) -> GridValues:
+def _precondition(right: GridValues, eigenvalues: GridValues) -> GridValues:
+    """The solution with the constant-coefficient part of the operator alone."""
     from scipy.fft import dctn, idctn
 
-    return np.asarray(idctn(dctn(right, workers=2) / symbol, workers=2, overwrite_x=True), dtype=np.float32)
+    return np.asarray(idctn(dctn(right, workers=2) / eigenvalues, workers=2, overwrite_x=True), dtype=np.float32)

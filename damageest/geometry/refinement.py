@@ -1,4 +1,7 @@
-"""A closed mesh made fine where it is needed, and points put into it as vertices."""
+"""Local refinement of a closed mesh, and insertion of points as vertices.
+
+Mesh, points and edge lengths are in one unit, mesh and points in one frame.
+"""
 
 from __future__ import annotations
 
@@ -8,48 +11,60 @@ from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.distance import closest_on_mesh
 
 MOST_ROUNDS = 60
+"""Rounds of halving after which refinement stops, even if edges are still too long."""
 
 
 def find_nearest(mesh: Mesh, points: Floats) -> tuple[Ints, Floats]:
-    """(faces (N,), places (N,3)): where on the mesh lies what is nearest to the points (N,3)."""
+    """The place on the mesh nearest to each of the points (N,3): its face (N,) and its coordinates (N,3)."""
     _, face, place = closest_on_mesh(points, mesh)
     return face, place
 
 
 def refine_at(mesh: Mesh, face: Ints, foot: Floats, edge: float) -> tuple[Mesh, Ints]:
-    """The mesh, conforming as it was, with no edge longer than ``edge`` on the faces that hold the points ``foot``
-    (N,3), which lie on its faces ``face`` (N,); and the faces that hold them now.
+    """The mesh refined around points on it, and the face (N,) of each point in the refined mesh.
 
-    Longest edges are halved (Rivara 1984), so that triangles grow coarser away from the points and none gets thin.
+    No edge of a face with such a point is longer than ``edge``. A closed mesh stays closed, and the surface is the same
+    set of points. Longest edges are halved (Rivara 1984), so that triangles become larger away from the points and none
+    becomes thin.
+
+    Args:
+        mesh: conforming: no vertex lies within an edge of another face.
+        face: (N,) the face that each point lies on, N at least 1.
+        foot: (N,3) the points, as `find_nearest` gives them.
+        edge: longest edge allowed.
     """
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
     for _ in range(MOST_ROUNDS):
-        held = np.unique(face)
-        corners = vertices[faces[held]]
+        holders = np.unique(face)
+        corners = vertices[faces[holders]]
         length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
         if (length <= edge).all():
             break
-        vertices, faces, parent = _split(vertices, faces, held[(length > edge).any(axis=1)])
-        face = _find_holding(vertices, faces, parent, face, foot)
+        vertices, faces, parent = _bisect_faces(vertices, faces, holders[(length > edge).any(axis=1)])
+        face = _find_new_faces(vertices, faces, parent, face, foot)
     return Mesh(vertices, faces), face
 
 
 def halve_edges(mesh: Mesh, edge: float) -> Mesh:
-    """The mesh, conforming as it was, with no edge longer than ``edge``, by halving the longest of each triangle."""
+    """The mesh with no edge longer than ``edge``, by halving the longest edge of each triangle (Rivara 1984).
+
+    A closed mesh stays closed, and the surface is the same set of points.
+    """
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
     for _ in range(MOST_ROUNDS):
         corners = vertices[faces]
         long = (np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2) > edge).any(axis=1)
         if not long.any():
             break
-        vertices, faces, _ = _split(vertices, faces, np.flatnonzero(long))
+        vertices, faces, _ = _bisect_faces(vertices, faces, np.flatnonzero(long))
     return Mesh(vertices, faces)
 
 
-def _split(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, Ints]:
-    """Halves the longest edge of the ``wanted`` faces and of all that this would leave with a node on their edge.
+def _bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, Ints]:
+    """Halves the longest edge of the ``wanted`` faces, and of the faces that would otherwise have a vertex within an
+    edge.
 
-    Gives vertices, faces, and (F,) the face that each came from.
+    Gives vertices, faces, and the face (F,) that each of them came from.
     """
     corners = vertices[faces]
     length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
@@ -87,29 +102,34 @@ def _split(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, I
     return vertices, np.concatenate([p for p, _ in pieces]), np.concatenate([p for _, p in pieces])
 
 
-def _find_holding(vertices: Floats, faces: Ints, parent: Ints, face: Ints, foot: Floats) -> Ints:
-    """The faces that hold points whose faces were split: one of those that came from it."""
+def _find_new_faces(vertices: Floats, faces: Ints, parent: Ints, face: Ints, foot: Floats) -> Ints:
+    """The face (N,) of each point after some faces were split; it is one of those that came from its face before."""
     children = np.flatnonzero(np.isin(parent, face))
     found, _ = find_nearest(Mesh(vertices, faces[children]), foot)
     return np.asarray(children[found])
 
 
 def insert_points(mesh: Mesh, face: Ints, foot: Floats) -> tuple[Mesh, Ints]:
-    """The mesh with the points ``foot`` (N,3), on its faces ``face`` (N,), among its vertices, and their numbers (N,).
+    """The mesh with points on it inserted as vertices, and the vertex (N,) of each point.
 
-    A point close to a vertex is that vertex; one close to an edge is put a tenth of the triangle's height off it, and
-    so are points so close together that a triangle would be split too often.
+    A point close to a vertex becomes that vertex. A point close to an edge is moved away from it, to a tenth of the
+    triangle's height. Where many points lie in one triangle, the ones left after four rounds become the nearest corner
+    of their triangle. A closed mesh stays closed, and the surface is the same set of points.
+
+    Args:
+        face: (N,) the face that each point lies on.
+        foot: (N,3) the points, as `find_nearest` or `refine_at` leave them.
     """
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
-    image = np.full(len(foot), -1)
+    vertex_of = np.full(len(foot), -1)
     for _ in range(4):
-        waiting = np.flatnonzero(image < 0)
+        waiting = np.flatnonzero(vertex_of < 0)
         if not len(waiting):
             break
-        share = _find_shares(vertices[faces[face[waiting]]], foot[waiting])
+        share = _measure_barycentric(vertices[faces[face[waiting]]], foot[waiting])
         snapped = share.max(axis=1) > 0.8
         corner = faces[face[waiting], share.argmax(axis=1)]
-        image[waiting[snapped]] = corner[snapped]
+        vertex_of[waiting[snapped]] = corner[snapped]
         waiting, share = waiting[~snapped], share[~snapped]
         first = np.unique(face[waiting], return_index=True)[1]
         chosen, at = waiting[first], np.maximum(share[first], 0.1)
@@ -121,16 +141,18 @@ def insert_points(mesh: Mesh, face: Ints, foot: Floats) -> tuple[Mesh, Ints]:
         parent = np.concatenate([np.arange(len(faces)), old, old])
         faces[old] = np.stack([a, b, new], axis=1)
         faces = np.concatenate([faces, np.stack([b, c, new], axis=1), np.stack([c, a, new], axis=1)])
-        image[chosen] = new
-        if (image < 0).any():
-            face = _find_holding(vertices, faces, parent, face, foot)
-    rest = np.flatnonzero(image < 0)
+        vertex_of[chosen] = new
+        if (vertex_of < 0).any():
+            face = _find_new_faces(vertices, faces, parent, face, foot)
+    rest = np.flatnonzero(vertex_of < 0)
     if len(rest):
-        image[rest] = faces[face[rest], _find_shares(vertices[faces[face[rest]]], foot[rest]).argmax(axis=1)]
-    return Mesh(vertices, faces), image
+        vertex_of[rest] = faces[
+            face[rest], _measure_barycentric(vertices[faces[face[rest]]], foot[rest]).argmax(axis=1)
+        ]
+    return Mesh(vertices, faces), vertex_of
 
 
-def _find_shares(corners: Floats, points: Floats) -> Floats:
+def _measure_barycentric(corners: Floats, points: Floats) -> Floats:
     """Barycentric coordinates (N,3) of points (N,3) in triangles (N,3,3), clipped to the triangle."""
     import trimesh
 

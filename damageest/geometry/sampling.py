@@ -1,4 +1,4 @@
-"""Points spread over the triangles of a mesh."""
+"""Random points on the triangles of a mesh."""
 
 from __future__ import annotations
 
@@ -8,10 +8,18 @@ from damageest.artefacts import Floats, Ints, Mesh
 
 
 def sample_by_area(mesh: Mesh, count: int, rng: np.random.Generator, faces: Ints | None = None) -> tuple[Floats, Ints]:
-    """``count`` random points (count,3) spread evenly by area over a mesh, and the triangle (count,) of each.
+    """Random points (count,3) on a mesh, evenly by area, and the triangle (count,) of each.
 
-    Each point falls into its own one of ``count`` equal stretches of the summed area, so that the points leave neither
-    clumps nor holes between triangles. ``faces`` (K,): the triangles to take; all by default. Their area must not be 0.
+    The cumulative area is divided into ``count`` equal intervals with one point in each (stratified sampling), so that
+    every triangle gets its share within one point or two. The triangles come in ascending order of ``faces``.
+
+    Args:
+        mesh: open or closed.
+        count: number of points.
+        rng: source of the random numbers; the same state gives the same points.
+        faces: (K,) the triangles to use, all by default; their total area must not be 0.
+
+    Unit and frame are those of the mesh.
     """
     faces = np.arange(len(mesh.faces)) if faces is None else faces
     total = np.cumsum(np.linalg.norm(mesh.cross[faces], axis=1))

@@ -10,14 +10,18 @@ from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import concatenate_meshes, to_manifold, to_solid
 
 _SAME_VOLUME = 1e-3
+"""Share of a body's volume by which it may change."""
 _SLIVERS = 2e-3
-"""Share of the surface that may lie farther off: wafers and spikes without volume, as Booleans leave them, go."""
+"""Share of the old surface that may be farther than the detail from the new one: thin flakes and spikes without volume,
+as Booleans leave them, are removed."""
 
 
 def simplify_within(solid: Solid, detail: float) -> Solid:
-    """The solid with fewer triangles, its surface within ``detail`` of what it was and its volume within 0.1 %.
+    """The solid with fewer triangles; its surface differs by at most ``detail``, its volume by at most 0.1 %.
 
-    Both are measured, body by body: one that cannot be simplified so far stays as it is.
+    Every vertex of the new surface is within ``detail`` (a length) of the old surface, and the old surface is within it
+    of the new one, except 0.2 % of its area. This is measured for each body and each cavity; one that cannot be
+    simplified within these limits stays as it is. Bodies without measurable volume are dropped. Unit and frame stay.
     """
     pieces: list[Mesh] = []
     for outer, cavities in split_shells(solid):
@@ -32,6 +36,7 @@ def simplify_within(solid: Solid, detail: float) -> Solid:
 
 
 def _simplify_shell(body: Solid, detail: float) -> Solid:
+    """One shell simplified as far as the limits allow; the same where no attempt keeps them."""
     area = np.linalg.norm(body.cross, axis=1)
     origin = body.bounds.mean(0)
     for share in (0.5, 0.2, 0.05):

@@ -1,4 +1,4 @@
-"""The skin of a part (its nominal surface) and what of a damage volume lies on it."""
+"""The faces of a damage volume on the skin of the part (its nominal surface), and those inside the part."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from damageest.geometry.distance import Flags, distance_to_mesh
 
 
 def find_inner_faces(damage: Solid, part: Part) -> Flags:
-    """Which faces (F,) of a damage volume lie inside the part rather than on its skin."""
+    """Whether each face (F,) of a damage volume lies inside the part, and not on its skin.
+
+    A face is on the skin if three points within it are at most 1e-7 of the part's diagonal from it. Both solids are in
+    the unit and frame of the part.
+    """
     corners = damage.triangles
-    # Three points inside each triangle: a face of the cut may touch the skin at a corner or along an edge.
+    # Three points within each triangle, because a face inside the part may touch the skin at a corner or along an edge.
     weights = np.array([[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
     probes = np.einsum("pk,fkj->fpj", weights, corners).reshape(-1, 3)
     distance = distance_to_mesh(probes, part)
@@ -19,7 +23,10 @@ def find_inner_faces(damage: Solid, part: Part) -> Flags:
 
 
 def extract_ids(damage: Solid, part: Part) -> Surface:
-    """The inner damage surface of a damage volume: its faces inside the part, turned toward the lost material."""
+    """The inner damage surface of a damage volume: its faces inside the part, with normals toward the lost metal.
+
+    It has no faces where the damage volume has none inside the part. Both solids are in the unit and frame of the part.
+    """
     faces = damage.faces[find_inner_faces(damage, part)][:, ::-1]
     used, renumbered = np.unique(faces, return_inverse=True)
     return Surface(damage.vertices[used], renumbered.reshape(-1, 3))

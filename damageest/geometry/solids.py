@@ -1,4 +1,8 @@
-"""Solids to manifold3d and back in float64, moved near the origin on the way so that far coordinates cost no digits."""
+"""Solids to manifold3d and back, in float64, and Booleans of solids.
+
+A ``manifold3d.Manifold`` (typed Any) has its coordinates relative to an ``origin`` of the caller's choice. Choose one
+near the solid: far from the origin, Booleans lose digits. Bodies of one Boolean need the same origin, unit and frame.
+"""
 
 from __future__ import annotations
 
@@ -11,32 +15,35 @@ from numpy.typing import ArrayLike
 from damageest.artefacts import Floats, Ints, Mesh, Solid
 
 BALANCE = 1e-7
-"""Share of a solid's volume by which what is cut off and what is left may differ from it together."""
+"""Share of a solid's volume within which the volumes cut off and left have to add up to it."""
 
 
 def to_manifold(mesh: Mesh, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
-    """A ``manifold3d.Manifold`` of a watertight mesh, its coordinates relative to ``origin``.
+    """A ``manifold3d.Manifold`` of a watertight mesh, its coordinates relative to ``origin`` (3,).
 
-    Raises ValueError where manifold3d does not take the mesh for a closed, oriented one.
+    Raises ValueError where manifold3d rejects the mesh because it is not closed, or its windings are not consistent.
     """
     from manifold3d import Error, Manifold, Mesh64
 
     vertices = np.array(mesh.vertices - np.asarray(origin, dtype=np.float64), dtype=np.float64, order="C")
     body = Manifold(Mesh64(vertices, np.array(mesh.faces, dtype=np.uint64, order="C")))
     if body.status() != Error.NoError:
-        raise ValueError(f"manifold3d refuses the mesh: {body.status().name}")
+        raise ValueError(f"manifold3d rejects the mesh: {body.status().name}")
     return body
 
 
 def to_arrays(body: Any, origin: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[Floats, Ints]:
-    """Vertices (V,3) and faces (F,3) of a Manifold, moved by ``origin``."""
+    """Vertices (V,3) and faces (F,3) of a Manifold; ``origin`` (3,) is added to the vertices."""
     mesh = body.to_mesh64()
     vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3] + np.asarray(origin, dtype=np.float64)
     return vertices, np.asarray(mesh.tri_verts).astype(np.int64)
 
 
 def to_solid(body: Any, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Solid | None:
-    """A Manifold as a Solid, moved by ``origin``; None where it is empty or has no volume to speak of."""
+    """A Manifold as a Solid, with ``origin`` (3,) added to the vertices.
+
+    None where the Manifold is empty, or has no volume within rounding.
+    """
     if body.is_empty():
         return None
     vertices, faces = to_arrays(body, origin)
@@ -47,9 +54,9 @@ def to_solid(body: Any, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Solid | None:
 
 
 def concatenate_meshes(meshes: Sequence[Mesh]) -> tuple[Floats, Ints, Ints]:
-    """Vertices (V,3) and faces (F,3) of several meshes as one, and the number (F,) of the mesh that each came from.
+    """Several meshes as one: vertices (V,3), faces (F,3), and the index (F,) of the mesh that each face came from.
 
-    Vertices stay as they are: equal ones of two meshes are not merged.
+    Equal vertices of two meshes are not merged. At least one mesh is needed; raises ValueError without any.
     """
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     vertices = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.empty((0, 3))
@@ -59,18 +66,22 @@ def concatenate_meshes(meshes: Sequence[Mesh]) -> tuple[Floats, Ints, Ints]:
 
 
 def unite(solids: Iterable[Mesh], origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
-    """The union of watertight meshes as a Manifold, relative to ``origin``; empty where there are none."""
+    """The union of watertight meshes as a Manifold, relative to ``origin`` (3,); empty without any.
+
+    Raises ValueError where manifold3d rejects one of them.
+    """
     from manifold3d import Manifold, OpType
 
     return Manifold.batch_boolean([to_manifold(solid, origin) for solid in solids] or [Manifold()], OpType.Add)
 
 
 def subtract_lost(whole: Any, lost: Any) -> Any:
-    """``whole`` minus ``lost``, which lies inside it; both Manifolds, and so is what is given.
+    """``whole`` minus ``lost``, which lies inside it: three Manifolds with one origin.
 
-    Where faces of the two coincide, as a damage volume's outer ones do with the part's, manifold3d 3.5 was seen to take
-    off an eighth too little without a word. So volumes are balanced: of several ways to the same difference, the first
-    that leaves no volume unaccounted for is taken, else the nearest.
+    Where faces of the two coincide, as the outer faces of a damage volume do with those of the part, manifold3d 3.5 can
+    give a wrong difference without an error (one was an eighth too small). So the volumes are checked: the difference
+    is computed in up to three ways, and the first is taken that with ``lost`` adds up to the volume of ``whole`` within
+    BALANCE; if none does, the one with the smallest error.
     """
     nudge = 1e-9 * max(abs(bound) for bound in whole.bounding_box())
     ways: tuple[Callable[[], Any], ...] = (
@@ -88,7 +99,10 @@ def subtract_lost(whole: Any, lost: Any) -> Any:
 
 
 def iou(first: Mesh | None, second: Mesh | None) -> float:
-    """Intersection over union of two solids; 1 where both are nothing."""
+    """Intersection over union of two solids by volume, from 0 to 1.
+
+    None stands for no solid: 1 where both are None, 0 where one is. Raises ValueError where manifold3d rejects one.
+    """
     if first is None or second is None:
         return float(first is second)
     origin = first.bounds.mean(axis=0)

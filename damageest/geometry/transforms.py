@@ -1,4 +1,4 @@
-"""Rigid transforms (4,4) applied to meshes."""
+"""Rigid transforms (4,4): the inverse of a pose, and moved meshes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ M = TypeVar("M", bound=Mesh)
 
 
 def invert_pose(pose: Pose) -> Floats:
-    """T_scan_part (4,4): takes a point from the part's frame to the scanner's."""
+    """T_scan_part (4,4), the inverse of the pose T_part_scan: it maps points from the part's frame to the scanner's.
+
+    The inverse is exact for a rigid transform only: the rotation is transposed.
+    """
     R, t = pose.T_part_scan[:3, :3], pose.T_part_scan[:3, 3]
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = R.T, -R.T @ t
@@ -21,5 +24,8 @@ def invert_pose(pose: Pose) -> Floats:
 
 
 def move_mesh(mesh: M, T: Floats | None) -> M:
-    """The mesh with its vertices moved by a rigid T (4,4); itself where T is None."""
+    """The mesh, of the same class, with its vertices mapped by a rigid ``T`` (4,4); the same mesh where T is None.
+
+    Translation and vertices are in one unit. Other fields stay as they are.
+    """
     return mesh if T is None else replace(mesh, vertices=mesh.vertices @ T[:3, :3].T + T[:3, 3])

@@ -1,4 +1,4 @@
-"""Units of length: their names, the factors between them, and telling a wrong one from the sizes of scan and part."""
+"""Units of length: their names, the factors between them, and the check of scan and part for a wrong unit."""
 
 from __future__ import annotations
 
@@ -11,9 +11,17 @@ from damageest.artefacts import Floats
 from damageest.errors import InputError, suggest
 
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
-"""The units by the name that a job file uses, and how many millimetres each is."""
+"""Millimetres in each unit, by the short name that a job file uses."""
 
-FULL = {"um": "micrometres", "mm": "millimetres", "cm": "centimetres", "m": "metres", "in": "inches", "ft": "feet"}
+FULL_NAMES = {
+    "um": "micrometres",
+    "mm": "millimetres",
+    "cm": "centimetres",
+    "m": "metres",
+    "in": "inches",
+    "ft": "feet",
+}
+"""The name of each unit in messages."""
 
 _ALIASES = {
     "um": "µm μm micron microns micrometre micrometres micrometer micrometers",
@@ -27,7 +35,10 @@ _NAMES = {alias: unit for unit, text in _ALIASES.items() for alias in (unit, *te
 
 
 def canonical_unit(name: str) -> str:
-    """The short name of a unit: 'inches' gives 'in'. Raises InputError with the near miss and the valid names."""
+    """The short name of a unit: 'inches' gives 'in'. Upper and lower case are equal.
+
+    Raises InputError for an unknown name, with the most similar known name and the valid ones.
+    """
     key = name.strip().lower()
     if key in _NAMES:
         return _NAMES[key]
@@ -35,7 +46,10 @@ def canonical_unit(name: str) -> str:
 
 
 def unit_factor(source: str, target: str) -> float:
-    """What a length in ``source`` is multiplied by to be in ``target``: factor('in', 'mm') is 25.4."""
+    """The factor from a length in ``source`` to the same length in ``target``: unit_factor('in', 'mm') is 25.4.
+
+    Raises InputError for an unknown unit.
+    """
     source, target = canonical_unit(source), canonical_unit(target)
     return 1.0 if source == target else MILLIMETRES[source] / MILLIMETRES[target]
 
@@ -43,16 +57,16 @@ def unit_factor(source: str, target: str) -> float:
 def _check_unit(name: str) -> str:
     try:
         return canonical_unit(name)
-    except InputError as error:  # pydantic collects ValueErrors, so that a job's faults are all named at once
+    except InputError as error:  # pydantic collects ValueErrors, so that all faults of a job are reported at once
         raise ValueError(str(error)) from None
 
 
 Unit = Annotated[str, AfterValidator(_check_unit), Field(examples=list(MILLIMETRES))]
-"""A unit as an option of a stage: checked with the job, and brought to its short name."""
+"""A unit as an option of a stage: checked with the job, and replaced by its short name."""
 
 
 def _spread_directions(count: int = 200) -> Floats:
-    """(count,3) unit vectors, evenly over the half sphere (a Fibonacci spiral)."""
+    """Unit vectors (count,3), evenly over a half sphere (a Fibonacci spiral)."""
     i = np.arange(count) + 0.5
     z, turn = i / count, np.pi * (1 + 5**0.5) * i
     r = np.sqrt(1 - z * z)
@@ -60,7 +74,7 @@ def _spread_directions(count: int = 200) -> Floats:
 
 
 def _measure_size(points: Floats, clip: float) -> float:
-    """The largest width of the points over all directions, leaving out the share ``clip`` at either end of each."""
+    """The largest width of the points over all directions, without the share ``clip`` of points at either end."""
     points = points[:: max(1, len(points) // 5000)]
     along = (points - points.mean(0)) @ _spread_directions().T
     low, high = np.quantile(along, [clip, 1 - clip], axis=0) if clip else (along.min(axis=0), along.max(axis=0))
@@ -74,12 +88,19 @@ def diagnose_scale(
     smallest: float = 0.3,
     largest: float = 3.0,
 ) -> str | None:
-    """A sentence on what is wrong where the scan's size cannot be the part's, or None where it can.
+    """A message where the size of the scan cannot be that of the part, None where it can.
 
-    Both ``scan_points`` (N,3) and ``part_vertices`` (V,3) are as read and converted to ``unit``, in any pose: what is
-    compared is the largest width over all directions, for the scan without the outermost 1 % of its points. A scan from
-    ``smallest`` times (metal lost, surface unseen) to ``largest`` times (a fixture around it) the part's size passes.
-    Otherwise a factor between two units is looked for that leaves a plausible ratio; the likelier mistakes first.
+    The largest widths over all directions are compared, for the scan without the outermost 1 % of its points. If their
+    ratio is not plausible, the message names the unit whose use would explain it, the likeliest mistake first.
+
+    Args:
+        scan_points: (N,3) as read, converted to ``unit``, in any frame.
+        part_vertices: (V,3) as read, converted to ``unit``, in any frame.
+        unit: the unit of both.
+        smallest: least plausible ratio of the scan's size to the part's (metal is lost, surface is hidden).
+        largest: greatest plausible ratio (a fixture around the part is in the scan).
+
+    Raises InputError for an unknown unit.
     """
     scan, part = _measure_size(scan_points, 0.01), _measure_size(part_vertices, 0.0)
     if not scan > 0 or not part > 0:
@@ -95,23 +116,27 @@ def diagnose_scale(
         for other in MILLIMETRES:
             if other == here:
                 continue
-            # numbers that mean ``other`` but were read as ``here`` are off by factor(here, other)
+            # numbers in ``other`` that were read as ``here`` are wrong by unit_factor(here, other)
             off = unit_factor(here, other) ** sign
             left = ratio / off
             if 0.4 <= left <= 1.3:
                 rare = 0.3 if {other, here} & {"um", "ft"} else 0.0
                 cost = abs(float(np.log(left))) + rare
                 if best is None or cost < best[0] - 1e-9:
-                    best = (cost, off, f"set {culprit}.unit: {other} if the {culprit}'s numbers are in {FULL[other]}")
+                    best = (
+                        cost,
+                        off,
+                        f"set {culprit}.unit: {other} if the {culprit}'s numbers are in {FULL_NAMES[other]}",
+                    )
                 elif best is not None and cost <= best[0] + 1e-9:
                     best = (best[0], best[1], f"{best[2]}, or {culprit}.unit: {other} if the {culprit}'s are")
     if best is None:
         return (
-            f"the scan's size is {apart}, which no confusion of units explains; "
-            "check that scan and part belong together, and crop away what is not the part"
+            f"the scan's size is {apart}, and no wrong unit explains it; "
+            "check that the scan is of this part, and crop the scan to the part"
         )
     return (
-        f"the scan's size is {apart}: it looks as if one of the two were read in the wrong unit, "
+        f"the scan's size is {apart}: one of the two was probably read in the wrong unit, "
         f"{_format_ratio(best[1])} off; {best[2]}"
     )
 

@@ -1,4 +1,7 @@
-"""Cubes of space that points lie in, by number."""
+"""Voxel grids: the cube of space that each point lies in, by number.
+
+Points, corners and edges are in one unit and one frame.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +13,24 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints
 
 MOST_ALONG = 320
-"""Cubes of a `Lattice` along an axis at most, for the memory's sake: 33 MB."""
+"""Largest number of cubes of a `VoxelGrid` along an axis, so that one byte per cube takes 33 MB at most."""
 
 CHUNK = 1 << 18
-"""Points looked up in a `Lattice` at a time, so that what comes between stays in the processor's cache."""
+"""Points looked up in a `VoxelGrid` at a time, so that intermediate arrays fit in the processor's cache."""
 
 
 class VoxelGrid(NamedTuple):
-    """Cubes of edge ``size`` from corner ``low`` (3,), ``shape`` (3,) of them."""
+    """Cubes of edge ``size`` from the lowest corner ``low`` (3,), as many along x, y and z as ``shape`` (3,) tells.
+
+    The cubes are numbered along z first, then y, then x.
+    """
 
     low: Floats
     size: float
     shape: Ints
 
     def number_cells(self, points: Floats) -> Ints:
-        """The number (N,) of each point's cube; beyond the lattice, of the outermost."""
+        """The number (N,) of the cube of each of the points (N,3); outside the grid, that of the outermost cube."""
         number = np.zeros(len(points), np.int64)
         for axis in range(3):
             along = (points[:, axis] - self.low[axis]) * (1 / self.size)
@@ -33,27 +39,41 @@ class VoxelGrid(NamedTuple):
         return number
 
     def mark_around(self, points: Floats, layers: int) -> NDArray[np.bool_]:
-        """(cubes,) whether a cube holds one of the points or is at most ``layers`` from one that does."""
-        taken = np.zeros(int(np.prod(self.shape)), bool)
-        taken[self.number_cells(points)] = True
+        """Whether each cube (cubes,) holds one of the points (N,3), or is at most ``layers`` cubes from one that does.
+
+        The points must be at least ``layers`` cubes inside the grid.
+        """
+        is_marked = np.zeros(int(np.prod(self.shape)), bool)
+        is_marked[self.number_cells(points)] = True
         steps = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
         for step in steps:  # one axis after the other
-            held = np.flatnonzero(taken)
+            marked = np.flatnonzero(is_marked)
             for shift in range(-layers, layers + 1):
-                taken[held + shift * step] = True
-        return taken
+                is_marked[marked + shift * step] = True
+        return is_marked
 
 
 def number_cubes(points: Floats, edge: float, low: Floats | None = None) -> tuple[Ints, Ints]:
-    """The cube (N,3) of an unbounded lattice from ``low`` (3,), the points' own lowest corner by default, that each of
-    the points (N,3) lies in, and its number (N,): equal for points of one cube, rising along x, then y, then z."""
+    """The cube of each of the points (N,3), in an unbounded voxel grid with cubes of edge ``edge``.
+
+    Returns:
+        The indices (N,3) of the cube along x, y and z, and its number (N,). Points of one cube have the same number;
+        numbers ascend along z first, then y, then x.
+
+    ``low`` (3,) is a corner of the grid, at or below all points; by default the lowest corner of their bounds. At least
+    one point is needed.
+    """
     cell = np.floor((points - (points.min(axis=0) if low is None else low)) / edge).astype(np.int64)
     size = cell.max(axis=0) + 1
     return cell, (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
 
 
 def number_faced_cubes(points: Floats, normals: Floats, edge: float) -> tuple[Ints, Ints]:
-    """As `cubes`, the number (N,) telling apart as well which of the six directions a normal (N,3) is nearest to."""
+    """As `number_cubes`, but points of one cube have the same number (N,) only if their normals (N,3) are nearest to
+    the same one of the six directions along the axes.
+
+    At least one point is needed.
+    """
     cell, number = number_cubes(points, edge)
     axis = np.abs(normals).argmax(axis=1)
     return cell, number * 6 + 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0)

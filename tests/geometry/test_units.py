@@ -95,4 +95,4 @@ def test_a_wrong_unit_is_named_with_what_to_set(wrong, unit, remedies, keep, nam
 def test_sizes_that_no_unit_explains_are_said_not_to_fit():
     said = diagnose_scale(scanned("block") * 3.6, PARTS["block"].vertices)
     assert said is not None
-    assert "no confusion of units" in said
+    assert "no wrong unit explains" in said

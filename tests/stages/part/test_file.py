@@ -89,11 +89,11 @@ def test_a_file_without_unit_is_in_the_jobs_unless_told(tmp_path):
 
 
 SPOILED = {
-    "inside out": ((box().vertices, box().faces[:, ::-1]), 1000, "turned the part inside out"),
+    "inside out": ((box().vertices, box().faces[:, ::-1]), 1000, "reversed all triangles"),
     "some windings": (
         (box().vertices, np.where(np.isin(np.arange(12), [3, 7])[:, None], box().faces[:, ::-1], box().faces)),
         1000,
-        "turned round 2 triangles",
+        "reversed 2 triangles",
     ),
     "a triangle missing": ((box().vertices, box().faces[1:]), 1000, "closed 1 small hole with 1 triangle"),
     "a repeated corner": (
@@ -104,12 +104,12 @@ SPOILED = {
         (box().vertices, np.concatenate([box().faces, box().faces[:, ::-1]])), 1000, "dropped 12 triangles",
     ),
     "two bodies": (joined(box(), box(10, (30, 0, 0))), 2000, "2 separate bodies"),
-    "one of them inside out": (joined(box(), inverted(box(10, (30, 0, 0)))), 2000, "turned 1 of 2 bodies inside out"),
+    "one of them inside out": (joined(box(), inverted(box(10, (30, 0, 0)))), 2000, "reversed the triangles of 1 of 2 bodies"),
     "overlapping": (joined(box(), box(10, (5, 1, 1))), 2000 - 5 * 9 * 9, "united 2 bodies"),
     "face to face": (joined(box(), box(10, (10, 0, 0))), 2000, "united 2 bodies"),
     "one in the other": (joined(box(), box(4)), 1000, "united 2 bodies"),
     "a cavity": (joined(box(), inverted(box(4))), 1000 - 64, "1 inner cavity, kept"),
-    "a cavity, all inside out": (joined(inverted(box()), box(4)), 1000 - 64, "turned the part inside out"),
+    "a cavity, all inside out": (joined(inverted(box()), box(4)), 1000 - 64, "reversed all triangles"),
     "an island in a cavity": (joined(box(), inverted(box(6)), box(2)), 1000 - 216 + 8, "1 inner cavity, kept"),
 }  # fmt: skip
 
