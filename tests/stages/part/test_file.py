@@ -104,7 +104,7 @@ SPOILED = {
         (box().vertices, np.concatenate([box().faces, box().faces[:, ::-1]])), 1000, "dropped 12 triangles",
     ),
     "two bodies": (joined(box(), box(10, (30, 0, 0))), 2000, "2 separate bodies"),
-    "one of them inside out": (joined(box(), inverted(box(10, (30, 0, 0)))), 2000, "reversed the triangles of 1 of 2 bodies"),
+    "one of them inside out": (joined(box(), inverted(box(10, (30, 0, 0)))), 2000, "triangles of 1 of 2 bodies"),
     "overlapping": (joined(box(), box(10, (5, 1, 1))), 2000 - 5 * 9 * 9, "united 2 bodies"),
     "face to face": (joined(box(), box(10, (10, 0, 0))), 2000, "united 2 bodies"),
     "one in the other": (joined(box(), box(4)), 1000, "united 2 bodies"),
