@@ -32,7 +32,7 @@ from damageest.artefacts import (
 from damageest.errors import StageError
 from damageest.pipeline.cache import digest
 from damageest.result import Result
-from damageest.stages.export import Writer, Written
+from damageest.stages.export import ExportedFiles, Writer
 
 T = TypeVar("T")
 
@@ -103,7 +103,7 @@ class JobState(State):
     result = Value[Result]()
     folder = Value[Path]()
     writers = Value[Mapping[str, Writer]]()
-    written = Value[Written]()
+    written = Value[ExportedFiles]()
 
     number = 0
     """That of a site is 1 or more."""

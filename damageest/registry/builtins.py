@@ -17,7 +17,7 @@ def damageest_stages() -> list[type[Stage]]:
     """Every built-in implementation. Imported here, so that loading the built-ins costs a command line little."""
 
     from damageest.stages.align.icp import Icp
-    from damageest.stages.align.none import Unaligned
+    from damageest.stages.align.none import KnownPose
     from damageest.stages.align.register import Register
     from damageest.stages.allowance.milling import Milling
     from damageest.stages.allowance.none import NoAllowance as NoAllowance
@@ -36,7 +36,7 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.enclose.shortest_path import ShortestPath
     from damageest.stages.export.files import Files
     from damageest.stages.part.file import PartFile
-    from damageest.stages.part.reconstruct import Reconstructed
+    from damageest.stages.part.reconstruct import PartFromScan
     from damageest.stages.reconstruct.pyvista import PyVista
     from damageest.stages.reconstruct.signed_distance import SignedDistance
     from damageest.stages.repair.none import NoRepair as NoRepair
@@ -48,10 +48,10 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.segment.mesh_distance import MeshDistance
 
     return [
-        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Unaligned, MeshDistance, Dbscan, PyVista, LargestLoop,
+        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, MeshDistance, Dbscan, PyVista, LargestLoop,
         AllLoops, Offset, BoundingBox, Capsule, CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive,
         Implicit,
-        NoRepair, Manifold, NoAllowance, Milling, Files, Uniform, CloudDistance, SignedDistance, Reconstructed,
+        NoRepair, Manifold, NoAllowance, Milling, Files, Uniform, CloudDistance, SignedDistance, PartFromScan,
     ]  # fmt: skip
 
 
@@ -65,5 +65,5 @@ def damageest_writers() -> Mapping[str, Writer]:
     return {
         "stl": Writer(write_stl_bodies),
         "ply": Writer(write_ply_bodies),
-        "3mf": Writer(write_threemf, together=True),
+        "3mf": Writer(write_threemf, one_file=True),
     }

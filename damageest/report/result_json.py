@@ -8,10 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from damageest.artefacts import Deposit, Floats
 from damageest.result import Result, Site
-from damageest.stages.export import Written
+from damageest.stages.export import ExportedFiles
 
 Vector = tuple[float, float, float]
-_NOTHING = Written()
+_NOTHING = ExportedFiles()
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -160,7 +160,7 @@ def result_schema() -> dict[str, Any]:
     return {"$schema": DIALECT, **Report.model_json_schema(mode="serialization"), "title": "damageest result"}
 
 
-def build_report(result: Result, written: Written = _NOTHING, relative: Any = str) -> dict[str, Any]:
+def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: Any = str) -> dict[str, Any]:
     """The content of result.json as plain values. ``relative`` turns an absolute input path into the one to write."""
     import platform
     from importlib.metadata import version
@@ -217,7 +217,7 @@ def _to_quaternion(T: Floats) -> tuple[float, float, float, float]:
     return w, x, y, z
 
 
-def _report_site(site: Site, written: Written) -> SiteReport:
+def _report_site(site: Site, written: ExportedFiles) -> SiteReport:
     kinds = ("damage", "surface", "deposit")
     own = {
         kind: [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"{kind}/site-{site.id}.")]

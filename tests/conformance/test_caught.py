@@ -16,7 +16,7 @@ from damageest.artefacts import Enclosures, Mesh, Pose, Rims, Samples, Scan, Sit
 from damageest.conformance import _scene
 from damageest.conformance._base import PlacedContract, StageContract
 from damageest.io.meshes import write_stl
-from damageest.stages.align.none import Unaligned
+from damageest.stages.align.none import KnownPose
 from damageest.stages.allowance.none import NoAllowance as NoAllowance
 from damageest.stages.background.bbox import BoundingBox
 from damageest.stages.boolean.manifold import Manifold
@@ -24,7 +24,7 @@ from damageest.stages.boundary.all_loops import AllLoops
 from damageest.stages.cluster.dbscan import Dbscan
 from damageest.stages.enclose.adaptive import Adaptive
 from damageest.stages.enclose.implicit import Implicit
-from damageest.stages.export import Written
+from damageest.stages.export import ExportedFiles
 from damageest.stages.export.files import Files
 from damageest.stages.part.file import PartFile
 from damageest.stages.reconstruct.signed_distance import SignedDistance
@@ -37,7 +37,7 @@ GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
     "Part": (PartFile(path=Path("prism.stl")), {"volume": _scene.prism().volume}),
     "Scan": (Simulate(points=5000), {}),
     "Sample": (Uniform(), {}),
-    "Align": (Unaligned(), {"pose": np.eye(4)}),
+    "Align": (KnownPose(), {"pose": np.eye(4)}),
     "Segment": (MeshDistance(), {}),
     "Cluster": (Dbscan(), {}),
     "Reconstruct": (SignedDistance(), {}),
@@ -103,7 +103,7 @@ def spoilt(value: Any, by: float) -> Any:
             )
         case Enclosures():
             return Enclosures(tuple(replace(item, solid=spoilt(item.solid, by)) for item in value.items))
-        case Written():
+        case ExportedFiles():
             return replace(value, files=(*value.files, f"{by}.txt"))
         case None:
             return Solid(*(getattr(_scene.box_round(np.zeros(3), np.full(3, by), 9), n) for n in ("vertices", "faces")))

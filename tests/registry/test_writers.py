@@ -15,12 +15,12 @@ from tests import damaged_box
 from tests.registry.test_registry import Site, site  # noqa: F401 - a fixture
 
 COUNTED = """
-from damageest.stages.export import Writer, Written
+from damageest.stages.export import Writer, ExportedFiles
 
 def write(folder, stem, bodies, unit):
     text = "".join(f"{body.name}: {len(body.solid.faces)} {unit}\\n" for body in bodies)
     (folder / f"{stem}.count").write_text(text)
-    return Written((f"{stem}.count",), ("counted only",))
+    return ExportedFiles((f"{stem}.count",), ("counted only",))
 
 @hookimpl
 def damageest_writers():

@@ -14,7 +14,7 @@ from damageest.stages.align._points import OrientedPoints, orient_surface
 from damageest.stages.align._search import make_motion, refine, score, select_distinct
 from damageest.stages.align._turns import Axis, find_common_axis, group_turns
 
-TRIED = 40
+MAX_POSES = 40
 """Poses fitted exactly at most: all those of a gear of twenty teeth, either way up."""
 
 COARSE = 0.008
@@ -38,7 +38,7 @@ class Choice:
     band: float
 
 
-def choose(
+def choose_pose(
     poses: Floats, target: PartSurface, field: PlaneGrid, scan: OrientedPoints, points: Floats, noise: float
 ) -> Choice:
     """Fits the promising ones of the poses (H,4,4) and their counterparts exactly and compares them point by point.
@@ -46,7 +46,7 @@ def choose(
     ``points`` (N,3) well spread and in random order, for the exact fit; ``scan`` for the lookups; lengths in diagonals.
     """
     poses, axis = _add_counterparts(poses, field, scan)
-    fits = [fit(target, _keep_close(field, points[:FEW], pose), pose, COARSE, noise, 12) for pose in poses]
+    fits = [fit(target, _keep_near(field, points[:FEW], pose), pose, COARSE, noise, 12) for pose in poses]
     poses = np.array([one.pose for one in fits])
     few = [_measure_distance(target, field, points[:FEW], pose) for pose in poses]
     band = fits[int(np.argmin([robust_cost(distance, 0.75 * COARSE).sum() for distance in few]))].band
@@ -54,7 +54,7 @@ def choose(
     poses = poses[
         _select_equal([robust_cost(_measure_distance(target, field, points[:SOME], pose), band) for pose in poses])
     ]
-    poses = poses[select_distinct(poses, np.zeros(len(poses)), 0.25 * COARSE, TRIED)]
+    poses = poses[select_distinct(poses, np.zeros(len(poses)), 0.25 * COARSE, MAX_POSES)]
 
     costs = [robust_cost(_measure_distance(target, field, points, pose), band) for pose in poses]
     best = int(np.argmin([cost.sum() for cost in costs]))
@@ -63,9 +63,9 @@ def choose(
     pose, others = poses[best], poses[equal]
     if axis is not None:
         # Fitted again, since the axis is known no better than the candidates were.
-        turned = axis.turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose
+        turned = axis.make_turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose
         turned = np.array(
-            [fit(target, _keep_close(field, points[:FEW], one), one, 2 * band, noise, 6).pose for one in turned]
+            [fit(target, _keep_near(field, points[:FEW], one), one, 2 * band, noise, 6).pose for one in turned]
         )
         if any(
             is_worse(robust_cost(_measure_distance(target, field, points, one), band), costs[best]) for one in turned
@@ -75,20 +75,20 @@ def choose(
         # One of each set of turns, then a quarter turn of each: endlessly many cannot be listed.
         every = np.concatenate([pose[None], others])
         heads = every[group_turns(every, axis, 8)]
-        quarter = axis.turns(np.radians([0, 90.0, 180.0, 270.0]))
+        quarter = axis.make_turns(np.radians([0, 90.0, 180.0, 270.0]))
         others = (quarter[:, None] @ heads[None]).reshape(-1, 4, 4)[1:]
     return Choice(pose, others, axis, band)
 
 
-def _keep_close(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
+def _keep_near(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
     """Those of the points that a pose puts near the surface; exact queries of the others are slow and of no use."""
-    return points[np.abs(field.distance[field.index(move_points(pose, points).astype(np.float32))]) < FAR]
+    return points[np.abs(field.distance[field.find_cell(move_points(pose, points).astype(np.float32))]) < FAR]
 
 
 def _measure_distance(target: PartSurface, field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
     """Signed distances (N,) of the moved points: exact near the surface, by the grid far from it."""
     at = move_points(pose, points)
-    distance = field.distance[field.index(at.astype(np.float32))].astype(np.float64)
+    distance = field.distance[field.find_cell(at.astype(np.float32))].astype(np.float64)
     near = np.abs(distance) < FAR
     distance[near] = target.closest(at[near])[0]
     return distance
@@ -101,16 +101,16 @@ def _add_counterparts(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> 
     search would have to be lucky, steps of a degree need not be.
     """
     poses, scores = _rank(poses, field, scan)
-    poses = poses[_select_good(scores)]
+    poses = poses[_select_promising(scores)]
     axis = find_common_axis(poses)
     if axis is not None:
         heads = poses[group_turns(poses, axis, 4)]
-        turned = (axis.turns(np.radians(np.arange(360)))[None] @ heads[:, None]).reshape(-1, 4, 4)
-        turned = turned[select_distinct(turned, score(turned, scan, field, COARSE), 2 * COARSE, 2 * TRIED)]
+        turned = (axis.make_turns(np.radians(np.arange(360)))[None] @ heads[:, None]).reshape(-1, 4, 4)
+        turned = turned[select_distinct(turned, score(turned, scan, field, COARSE), 2 * COARSE, 2 * MAX_POSES)]
         turned = refine(turned, scan, field, np.geomspace(1.5 * COARSE, 0.75 * COARSE, 5))
         poses, scores = _rank(np.concatenate([poses, turned]), field, scan)
-        poses = poses[_select_good(scores)]
-    return poses[:TRIED], axis
+        poses = poses[_select_promising(scores)]
+    return poses[:MAX_POSES], axis
 
 
 def _rank(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Floats]:
@@ -119,7 +119,7 @@ def _rank(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats
     return poses[order], scores[order]
 
 
-def _select_good(scores: Floats) -> NDArray[np.bool_]:
+def _select_promising(scores: Floats) -> NDArray[np.bool_]:
     best = float(scores.max())
     return np.asarray(scores >= best - max(0.06, 0.2 * best))
 
@@ -141,7 +141,7 @@ def is_worse(cost: Floats, best: Floats) -> bool:
     return total > 0.0005 * len(more) and total > 5 * float(np.sqrt((more**2).sum()))
 
 
-def note_unfixed(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[str, ...]:
+def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[str, ...]:
     """A note where the scan leaves the part free to slide: a bar of which both ends are missing or unseen fits anywhere
     along itself. Every slide or turn that the points' planes hardly resist is tried, a few bands far, either way."""
     at = move_points(pose, points)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.distance import SurfaceTree
 
-Singles = NDArray[np.float32]
+Floats32 = NDArray[np.float32]
 
 CELLS = 220_000
 """Cells of the field: about 1/100 of the diagonal each on a compact part."""
@@ -51,11 +51,11 @@ class PlaneGrid:
     All arrays are float32: ``plane`` (X*Y*Z,4) the plane's unit normal and offset, ``distance`` (X*Y*Z,) signed.
     """
 
-    low: Singles
+    low: Floats32
     cell: float
     shape: tuple[int, int, int]
-    plane: Singles
-    distance: Singles
+    plane: Floats32
+    distance: Floats32
 
     @classmethod
     def build(cls, target: PartSurface, margin: float = 0.12) -> PlaneGrid:
@@ -71,7 +71,7 @@ class PlaneGrid:
         size = (int(shape[0]), int(shape[1]), int(shape[2]))
         return cls(low.astype(np.float32), cell, size, plane, distance.astype(np.float32))
 
-    def index(self, points: Singles) -> Ints:
+    def find_cell(self, points: Floats32) -> Ints:
         """The cell of each of (...,3) points; those beyond the grid get the outermost cell, which is far outside."""
         at = (points - self.low) * np.float32(1 / self.cell)
         x, y, z = (np.clip(at[..., k], 0, self.shape[k] - 1).astype(np.int64) for k in range(3))

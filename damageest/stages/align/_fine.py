@@ -13,7 +13,7 @@ from damageest.stages.align._search import make_motion
 REACH = 3.5
 """Where the kernel ends, in standard deviations of the points off the surface."""
 
-STALE = 0.1
+MAX_DRIFT = 0.1
 """How far the points may move, in bands, before their closest points are looked up again: until then their planes do.
 """
 
@@ -43,7 +43,7 @@ def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: f
     step = residue = drift = np.inf
     for turn in range(rounds):
         at = move_points(pose, points)
-        if drift > STALE * band:
+        if drift > MAX_DRIFT * band:
             distance, foot, face = target.closest(at)
             if turn == 0:  # the pose will not move by more than a few bands: what is farther off need not be seen again
                 close = np.abs(distance) < 4 * band

@@ -12,13 +12,13 @@ from damageest.artefacts import Floats, Mesh, Part, Scan
 from damageest.errors import StageError
 from damageest.stages.align._field import PartSurface
 
-FEWEST = 200
+MIN_POINTS = 200
 """Scan points without which an alignment would be guesswork."""
 
-Rows = tuple[float, float, float, float]
+Row = tuple[float, float, float, float]
 
 
-def _check_rigid(rows: tuple[Rows, Rows, Rows, Rows]) -> tuple[Rows, Rows, Rows, Rows]:
+def _check_rigid(rows: tuple[Row, Row, Row, Row]) -> tuple[Row, Row, Row, Row]:
     T = np.array(rows)
     if not np.isfinite(T).all() or np.abs(T[3] - [0, 0, 0, 1]).max() > 1e-9:
         raise ValueError("not a pose: its numbers must be finite and its last row 0, 0, 0, 1")
@@ -29,7 +29,7 @@ def _check_rigid(rows: tuple[Rows, Rows, Rows, Rows]) -> tuple[Rows, Rows, Rows,
     return rows
 
 
-Rigid = Annotated[tuple[Rows, Rows, Rows, Rows], AfterValidator(_check_rigid)]
+RigidPose = Annotated[tuple[Row, Row, Row, Row], AfterValidator(_check_rigid)]
 """A 4x4 pose as an option: four rows of four numbers, checked to be rigid."""
 
 
@@ -48,9 +48,9 @@ class Frame:
         """Raises StageError for a scan of too few or non-finite points, or of a size that cannot be the part's."""
         from damageest.geometry.units import diagnose_scale
 
-        if len(scan.points) < FEWEST:
+        if len(scan.points) < MIN_POINTS:
             raise StageError(
-                f"the scan has {len(scan.points)} points; to align it takes {FEWEST} at least",
+                f"the scan has {len(scan.points)} points; to align it takes {MIN_POINTS} at least",
                 "give a denser scan, or align: none with the pose, if it is known",
             )
         if not np.isfinite(scan.points).all():

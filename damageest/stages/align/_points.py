@@ -9,7 +9,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.sampling import sample_by_area
 
-DENSE = 120_000
+MAX_DENSE = 120_000
 """Scan points that the density and the normals are measured on; more of them cost time and teach nothing new."""
 
 
@@ -26,7 +26,7 @@ class OrientedPoints:
         return OrientedPoints(self.points[index], self.normals[index], self.signed)
 
 
-def draw_strided(count: int, wanted: int, rng: np.random.Generator) -> Ints:
+def draw_stratified(count: int, wanted: int, rng: np.random.Generator) -> Ints:
     """About ``wanted`` of ``count`` indices, one drawn from each of as many equal stretches."""
     if wanted >= count:
         return np.arange(count)
@@ -34,7 +34,7 @@ def draw_strided(count: int, wanted: int, rng: np.random.Generator) -> Ints:
     return np.minimum((edges[:-1] + rng.random(wanted) * np.diff(edges)).astype(np.int64), count - 1)
 
 
-def draw_spread(points: Floats, weights: Floats, wanted: int, rng: np.random.Generator) -> Ints:
+def draw_evenly(points: Floats, weights: Floats, wanted: int, rng: np.random.Generator) -> Ints:
     """Draws about ``wanted`` indices with chance proportional to ``weights`` (N,), evenly in space.
 
     Systematic sampling along a Morton curve: neighbours in the curve are neighbours in space, so equal steps of the
@@ -66,17 +66,17 @@ def orient_scan(
     """
     from scipy.spatial import cKDTree
 
-    index = draw_strided(len(points), DENSE, rng)
+    index = draw_stratified(len(points), MAX_DENSE, rng)
     every = points[index]
     tree = cKDTree(every)
     # neighbours among all of them, but of every second only where they are many
-    index = index[:: 1 + (len(index) > DENSE // 2)]
+    index = index[:: 1 + (len(index) > MAX_DENSE // 2)]
     dense = points[index]
     reach = np.asarray(tree.query(dense, k=min(9, len(every)), workers=-1)[0])[:, -1]
     typical = float(np.median(reach))
     weights = np.where(reach < 5 * typical, np.minimum(reach, 2.5 * typical) ** 2, 0.0)
 
-    chosen = draw_spread(dense, weights, wanted, rng)
+    chosen = draw_evenly(dense, weights, wanted, rng)
     radius = float(np.clip(max(8 * noise, 2.5 * typical), 0.006, 0.03))
     near = np.asarray(tree.query(dense[chosen], k=min(64, len(every)), distance_upper_bound=radius, workers=-1)[1])
     there = near < len(every)
@@ -111,4 +111,4 @@ def draw_by_direction(cloud: OrientedPoints, wanted: int, rng: np.random.Generat
     match = cloud.normals @ compass.T
     nearest = np.argmax(match if cloud.signed else np.abs(match), axis=1)
     weights = 1 / np.sqrt(np.bincount(nearest, minlength=count)[nearest])
-    return cloud.take(draw_spread(cloud.points, weights, wanted, rng))
+    return cloud.take(draw_evenly(cloud.points, weights, wanted, rng))

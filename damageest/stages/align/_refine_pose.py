@@ -14,7 +14,7 @@ from damageest.stages.align._search import make_motion
 
 PATCH = 4.0
 """Edge of the cubes in mean gaps of the points: some sixteen points on a face."""
-FEWEST = 6
+MIN_POINTS = 6
 
 
 def refine_pose(target: PartSurface, points: Floats, best: Fit, rounds: int = 8) -> Fit:
@@ -31,7 +31,7 @@ def refine_pose(target: PartSurface, points: Floats, best: Fit, rounds: int = 8)
     normals = target.normals[face]
     patch = np.unique(number_faced_cubes(move_points(pose, points), normals, edge)[1], return_inverse=True)[1]
     count = np.bincount(patch)
-    many = count >= FEWEST
+    many = count >= MIN_POINTS
     if many.sum() < 30:
         return best
     for _ in range(rounds):

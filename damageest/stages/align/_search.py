@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
-from damageest.stages.align._field import PlaneGrid, Singles
+from damageest.stages.align._field import Floats32, PlaneGrid
 from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
 CHUNK = 2_000_000
@@ -85,13 +85,13 @@ def select_distinct(poses: Floats, scores: Floats, apart: float, wanted: int) ->
 
 def _look_up(
     poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float, planes: bool = False
-) -> tuple[Singles, Singles, NDArray[np.bool_], Singles, NDArray[Any]]:
+) -> tuple[Floats32, Floats32, NDArray[np.bool_], Floats32, NDArray[Any]]:
     """Moved points (H,M,3), their offsets from the nearest plane, whether that plane is near, how well the normals
     agree (0 to 1), and the cells' signed distances, or with ``planes`` the cells."""
     turn = np.swapaxes(poses[:, :3, :3], 1, 2).astype(np.float32)
     moved = scan.points.astype(np.float32) @ turn + poses[:, None, :3, 3].astype(np.float32)
     facing = scan.normals.astype(np.float32) @ turn
-    index = field.index(moved)
+    index = field.find_cell(moved)
     plane = field.plane[index]
     offset = np.einsum("hmk,hmk->hm", moved, plane[..., :3]) + plane[..., 3]
     distance = field.distance[index]

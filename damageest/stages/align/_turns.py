@@ -20,13 +20,13 @@ class Axis:
     direction: Floats
     point: Floats
 
-    def turns(self, angles: Floats) -> Floats:
+    def make_turns(self, angles: Floats) -> Floats:
         """Rotations (K,4,4) about the axis by angles (K,) in radians."""
         result = make_motion(np.column_stack([angles[:, None] * self.direction, np.zeros((len(angles), 3))]))
         result[:, :3, 3] = self.point - np.einsum("kij,j->ki", result[:, :3, :3], self.point)
         return result
 
-    def fixes(self, motions: Floats) -> NDArray[np.bool_]:
+    def is_turn(self, motions: Floats) -> NDArray[np.bool_]:
         """Which of the rigid motions (K,4,4) are turns about this axis, nearly (K,)."""
         direction, angle, point, slide = _find_screw(motions)
         same = (np.abs(direction @ self.direction) > PARALLEL) & (
@@ -60,7 +60,7 @@ def group_turns(poses: Floats, axis: Axis, wanted: int) -> list[int]:
     """Indices of at most ``wanted`` poses, one of each set that turns about ``axis`` carry into one another."""
     heads: list[int] = []
     for index in range(len(poses)):
-        if heads and axis.fixes(poses[index][None] @ np.linalg.inv(poses[heads])).any():
+        if heads and axis.is_turn(poses[index][None] @ np.linalg.inv(poses[heads])).any():
             continue
         heads.append(index)
         if len(heads) == wanted:

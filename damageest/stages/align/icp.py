@@ -10,7 +10,7 @@ from pydantic import Field as Option
 from damageest.artefacts import Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.stages.align import Align
-from damageest.stages.align._frame import Rigid
+from damageest.stages.align._frame import RigidPose
 
 
 class Icp(Align):
@@ -20,7 +20,7 @@ class Icp(Align):
     """
 
     use: Literal["icp"] = "icp"
-    T_part_scan: Rigid | None = Option(
+    T_part_scan: RigidPose | None = Option(
         None, description="initial pose, 4x4, scanner's frame to the part's, in the job's unit; default: no motion"
     )
     max_distance: float | None = Option(
@@ -35,22 +35,22 @@ class Icp(Align):
 
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """Raises StageError where the fit does not settle or what it settles on does not explain the scan."""
+        from damageest.stages.align._check_pose import check_pose
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import Frame
-        from damageest.stages.align._judge import judge
-        from damageest.stages.align._points import draw_spread, orient_scan
+        from damageest.stages.align._points import draw_evenly, orient_scan
 
         frame = Frame.build(scan, part)
         noise = scan.noise / frame.size
         rng = np.random.default_rng(self.seed)
         dense, weights, _ = orient_scan(frame.scale_points(scan), scan.normals, noise, 100, rng)
-        points = rng.permutation(dense[draw_spread(dense, weights, 30_000, rng)])
+        points = rng.permutation(dense[draw_evenly(dense, weights, 30_000, rng)])
         start = frame.scale_pose(np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan))
         band = 0.03 if self.max_distance is None else self.max_distance / frame.size
         best = fit(frame.target, points, start, band, noise, self.iterations)
-        verdict = judge(frame.target, best, points, dense, tolerance / frame.size)
+        verdict = check_pose(frame.target, best, points, dense, tolerance / frame.size)
         if not verdict.is_acceptable:
-            raise verdict.refuse(
+            raise verdict.build_error(
                 "align: register needs no initial pose; or give a closer T_part_scan, or a larger max_distance "
                 f"(now {band * frame.size:.4g} {part.unit})"
             )

@@ -10,14 +10,14 @@ from pydantic import Field as Option
 from damageest.artefacts import Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.stages.align import Align
-from damageest.stages.align._frame import Rigid
+from damageest.stages.align._frame import RigidPose
 
 
-class Unaligned(Align):
+class KnownPose(Align):
     """Takes the pose as given: no motion, or the one named. Nothing is fitted or checked, only reported."""
 
     use: Literal["none"] = "none"
-    T_part_scan: Rigid | None = Option(
+    T_part_scan: RigidPose | None = Option(
         None, description="the pose, 4x4, scanner's frame to the part's, in the job's unit; default: no motion"
     )
 

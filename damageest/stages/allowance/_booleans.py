@@ -17,14 +17,14 @@ DUST = 1e-9
 """Share of the stock's volume below which a piece of it is rounding."""
 
 
-def tidy(body: Any, diagonal: float) -> Any:
+def simplify_exactly(body: Any, diagonal: float) -> Any:
     """A Manifold without what it needs not to have its shape. As it was, where that would change its volume: manifold3d
     was seen to take a facet along."""
     simple = body.as_original().simplify(1e-9 * diagonal)
     return simple if abs(simple.volume() - body.volume()) <= SLACK * abs(body.volume()) else body
 
 
-def take_touching(proud: Any, filled: Any, tolerance: float) -> Any:
+def keep_touching(proud: Any, filled: Any, tolerance: float) -> Any:
     """Without the pieces of stock that do not touch what is filled, as behind a thin wall that cuts them off, and
     without the dust of the Boolean."""
     from manifold3d import Manifold
@@ -55,7 +55,7 @@ def join(filled: Any, proud: Any) -> Any:
     return min(tried, key=lambda item: item[0])[1]
 
 
-def draw_apart(body: Any, origin: Floats, by: float) -> Solid | None:
+def separate_sheets(body: Any, origin: Floats, by: float) -> Solid | None:
     """A Manifold as a Solid that closes for readers who know vertices by their place alone, in single precision too.
 
     A Boolean may leave lines along which sheets touch, each with vertices of its own; merged, their edges have four
@@ -76,11 +76,11 @@ def draw_apart(body: Any, origin: Floats, by: float) -> Solid | None:
                 break
             if round_to_single(tried, mend=False) is not None:
                 return tried
-            tried = _draw_in(tried, by)
+            tried = _move_inward(tried, by)
     return first
 
 
-def _draw_in(body: Solid, by: float) -> Solid | None:
+def _move_inward(body: Solid, by: float) -> Solid | None:
     """The solid with those vertices drawn in that stand where another stands; None where it is none any more."""
     from scipy.spatial import cKDTree
 

@@ -12,9 +12,9 @@ from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import BALANCE, subtract_lost, to_manifold, to_solid
-from damageest.stages.allowance._booleans import tidy
+from damageest.stages.allowance._booleans import simplify_exactly
 
-FINE, COARSE, COARSEST = 0.5, 0.75, 1.0
+FINE, COARSE, MAX_CELL = 0.5, 0.75, 1.0
 """Edge of a lattice cell, in tolerances: for a cut-back of less than two tolerances, for a larger one, and as far as
 the memory may make it larger."""
 
@@ -29,7 +29,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
     inside = find_inner_faces(damage, part)
     if not inside.any():
         return damage
-    round_it = to_manifold(_grow_within(damage, damage.faces[inside], part, inner, tolerance), origin)
+    round_it = to_manifold(_grow_faces(damage, damage.faces[inside], part, inner, tolerance), origin)
     round_it = round_it.simplify(tolerance / 16)
     if others is not None:
         round_it -= to_manifold(others, origin)
@@ -48,7 +48,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
         if missing <= BALANCE * whole.volume():
             break
     missing, cavity = min(tried, key=lambda item: item[0])
-    solid = to_solid(tidy(cavity, part.diagonal), origin)
+    solid = to_solid(simplify_exactly(cavity, part.diagonal), origin)
     if solid is None or missing > 1e-3 * lost.volume():
         raise StageError(
             f"the cut-back does not add up: {missing:.3g} in volume is lost or counted twice",
@@ -57,7 +57,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
     return solid
 
 
-def _grow_within(damage: Solid, faces: Any, part: Part, inner: float, tolerance: float) -> Solid:
+def _grow_faces(damage: Solid, faces: Any, part: Part, inner: float, tolerance: float) -> Solid:
     """Everything within ``inner`` and a quarter of a tolerance of some faces of the damage volume, near the part."""
     from damageest.geometry.contour import MOST_NODES, extract_contour
 
@@ -65,15 +65,15 @@ def _grow_within(damage: Solid, faces: Any, part: Part, inner: float, tolerance:
     reach = inner + tolerance / 4
     mesh = Mesh(damage.vertices - origin, faces)
     used = mesh.vertices[np.unique(faces)]
-    margin = reach + 2 * COARSEST * tolerance
+    margin = reach + 2 * MAX_CELL * tolerance
     low = np.maximum(used.min(axis=0) - margin, part.bounds[0] - origin - 4 * tolerance)
     high = np.minimum(used.max(axis=0) + margin, part.bounds[1] - origin + 4 * tolerance)
     fitting = float((np.prod(high - low + 2 * tolerance) / MOST_NODES) ** (1 / 3)) * 1.02
     cell = max((FINE if inner < 2 * tolerance else COARSE) * tolerance, fitting)
-    if cell > COARSEST * tolerance:
+    if cell > MAX_CELL * tolerance:
         raise StageError(
             f"a damage this large cannot be cut back to within the tolerance {tolerance:.3g} in the memory there is",
-            f"a tolerance of {cell / COARSEST:.3g} or more, or inner: 0",
+            f"a tolerance of {cell / MAX_CELL:.3g} or more, or inner: 0",
         )
 
     def distance(points: Floats) -> Floats:

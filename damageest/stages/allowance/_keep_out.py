@@ -11,11 +11,11 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import DamageestError, StageError
-from damageest.stages.allowance._selectors import Bar, KeepOut, Wanted
-from damageest.stages.allowance._skin import SkinFaces, sort_skin
+from damageest.stages.allowance._selectors import Bar, KeepOut, StockPlan
+from damageest.stages.allowance._skin import SkinFaces, label_skin
 from damageest.stages.allowance._stock import build_stock
 
-MOST_ENTERED = 1e-3
+MAX_ENTERED = 1e-3
 """Share of a damage volume that may lie in a solid to keep free."""
 SIDES = 256
 """Of a round bar: it is drawn around the true one, 0.01 % wider at its corners."""
@@ -26,7 +26,7 @@ def build_keep_out(
     skin: SkinFaces,
     filled: Any,
     part: Part,
-    wanted: Wanted,
+    plan: StockPlan,
     reach: float,
     origin: Floats,
     tolerance: float,
@@ -43,27 +43,27 @@ def build_keep_out(
             continue
         body = _build_body(item, part, origin)
         entered = (body ^ filled).volume() / filled.volume()
-        if entered > MOST_ENTERED:
+        if entered > MAX_ENTERED:
             raise StageError(
                 f"{entered:.1%} of the damage volume, {entered * filled.volume():.4g}, lies in keep_out {number + 1}, "
                 "and the deposit has to hold all of it",
                 "a smaller solid there, or skin (faces, facing, kind) instead, which only keeps the stock away",
             )
         bodies.append(body)
-    if wanted.free_skin():
+    if plan.skin_to_keep_free():
         bodies.append(build_stock(replace(skin, height=np.where(skin.free, reach, 0.0)), tolerance, drawn_in=0))
-        around = _take_skin_around(skin, part, wanted, reach, origin)
+        around = _take_skin_near(skin, part, plan, reach, origin)
         if around is not None:
             bodies.append(build_stock(replace(around, height=np.where(around.free, reach, 0.0)), tolerance, drawn_in=0))
     return Manifold.batch_boolean(bodies, OpType.Add) if bodies else Manifold()
 
 
-def _take_skin_around(skin: SkinFaces, part: Part, wanted: Wanted, reach: float, origin: Floats) -> SkinFaces | None:
+def _take_skin_near(skin: SkinFaces, part: Part, plan: StockPlan, reach: float, origin: Floats) -> SkinFaces | None:
     """The part's own skin near the damage."""
     corners = part.triangles - origin
     low, high = skin.vertices.min(axis=0) - 2 * reach, skin.vertices.max(axis=0) + 2 * reach
     near = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
-    return sort_skin(part.vertices - origin, part.faces[near], part, wanted, origin) if near.any() else None
+    return label_skin(part.vertices - origin, part.faces[near], part, plan, origin) if near.any() else None
 
 
 def _build_body(item: KeepOut, part: Part, origin: Floats) -> Any:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.solids import to_manifold
-from damageest.stages.allowance._skin import ON, SkinFaces
+from damageest.stages.allowance._skin import ON_PART, SkinFaces
 
 OPPOSITE, NARROW = -0.5, -0.87
 """Cosine between the normals of skin and wall from which on the wall faces the skin, and from which on it does so even
@@ -20,22 +20,22 @@ SAMPLES = 3000
 
 
 @dataclass(frozen=True, eq=False)
-class Crowd:
+class StockConflict:
     """Points of the skin whose stock has no room: ``points`` (N,3) relative to the origin, the ``free`` way (N,) along
     the normal to the opposite wall, the stock ``wanted`` (N,) on this side and on the ``other`` (N,)."""
 
     points: Floats
-    free: Floats
-    wanted: Floats
-    other: Floats
+    clearance: Floats
+    height: Floats
+    opposite: Floats
 
     def __str__(self) -> str:
-        worst = int(np.argmin(self.free - self.wanted - self.other))
+        worst = int(np.argmin(self.clearance - self.height - self.opposite))
         x, y, z = self.points[worst]
-        both = f" and {self.other[worst]:.4g} on the opposite wall" if self.other[worst] else ""
+        both = f" and {self.opposite[worst]:.4g} on the opposite wall" if self.opposite[worst] else ""
         return (
-            f"no room for the stock at ({x:.4g}, {y:.4g}, {z:.4g}): {self.free[worst]:.4g} is free there, and "
-            f"{self.wanted[worst]:.4g} is wanted{both}"
+            f"no room for the stock at ({x:.4g}, {y:.4g}, {z:.4g}): {self.clearance[worst]:.4g} is free there, and "
+            f"{self.height[worst]:.4g} is wanted{both}"
         )
 
 
@@ -46,7 +46,7 @@ def place_probes(skin: SkinFaces, seed: int = 11) -> tuple[Floats, NDArray[np.in
     return np.concatenate([points, skin.triangles[large].mean(axis=1)]), np.concatenate([face, large])
 
 
-def find_crowded(skin: SkinFaces, part: Part, tolerance: float, origin: Floats) -> Crowd | None:
+def find_stock_conflict(skin: SkinFaces, part: Part, tolerance: float, origin: Floats) -> StockConflict | None:
     """Places where the stock meets an opposite wall of the part, or that wall's own stock; None where it has room.
     ``skin`` with what is wanted on it, relative to ``origin`` (3,)."""
 
@@ -56,9 +56,9 @@ def find_crowded(skin: SkinFaces, part: Part, tolerance: float, origin: Floats) 
     points, face = place_probes(wanted)
     normal, height = wanted.normal[face], wanted.height[face]
     most = float(height.max())
-    away = 10 * ON * part.diagonal
+    away = 10 * ON_PART * part.diagonal
     body = to_manifold(part, origin)
-    free, place, facing = _measure_free_way(body, points + away * normal, normal, height + most)
+    free, place, facing = _measure_clearance(body, points + away * normal, normal, height + most)
     hit = np.flatnonzero(np.isfinite(free))
     hit = hit[~_is_corner(points[hit], normal[hit], place[hit], facing[hit], part, tolerance, origin)]
     if not len(hit):
@@ -69,7 +69,7 @@ def find_crowded(skin: SkinFaces, part: Part, tolerance: float, origin: Floats) 
     if not short.any():
         return None
     some = hit[short]
-    return Crowd(points[some] + origin, free[some] + away, height[some], other[short])
+    return StockConflict(points[some] + origin, free[some] + away, height[some], other[short])
 
 
 def _is_corner(
@@ -87,7 +87,7 @@ def _is_corner(
     return np.asarray(wide & (distance_to_mesh(meeting + origin, part) <= tolerance))
 
 
-def _measure_free_way(body: Any, start: Floats, direction: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:
+def _measure_clearance(body: Any, start: Floats, direction: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:
     """The free way (N,) from each start to the first wall that faces it, inf where that is beyond reach or the first
     wall does not face it; the place (N,3) where it ends, and the wall's normal (N,3)."""
     free, place, facing = np.full(len(start), np.inf), np.zeros((len(start), 3)), np.zeros((len(start), 3))

@@ -7,12 +7,12 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh, distance_to_edges
 from damageest.geometry.solids import to_arrays, to_manifold
-from damageest.stages.allowance._selectors import Wanted
-from damageest.stages.allowance._skin import ON, SkinFaces, clip, sort_skin
+from damageest.stages.allowance._selectors import StockPlan
+from damageest.stages.allowance._skin import ON_PART, SkinFaces, clip, label_skin
 
 
 def grow_over_rim(
-    skin: SkinFaces, part: Part, wanted: Wanted, overlap: float, tolerance: float, origin: Floats
+    skin: SkinFaces, part: Part, plan: StockPlan, overlap: float, tolerance: float, origin: Floats
 ) -> SkinFaces | None:
     """The part's skin within ``overlap`` of the rim, on both sides of it, as far as it hangs together with it; with the
     same stock as anywhere. None where there is nothing to run over."""
@@ -34,14 +34,14 @@ def grow_over_rim(
     faces = faces[inside]
     if not len(faces):
         return None
-    faces = _take_joined(vertices, faces, ends.mean(axis=1), part)
-    band = sort_skin(vertices, faces, part, wanted, origin)
+    faces = _keep_connected(vertices, faces, ends.mean(axis=1), part)
+    band = label_skin(vertices, faces, part, plan, origin)
     return band if (band.height > 0).any() else None
 
 
 def _find_rim(skin: SkinFaces) -> Ints:
     """(E,2) edges where skin with stock meets intact skin: those that no other skin of the damage shares."""
-    border = skin.find_rims()
+    border = skin.find_border_edges()
     if not len(border):
         return border
     edges = np.sort(skin.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
@@ -50,7 +50,7 @@ def _find_rim(skin: SkinFaces) -> Ints:
     return np.asarray(border[np.isin(border @ [size, 1], tall @ [size, 1])])
 
 
-def _take_joined(vertices: Floats, faces: Ints, places: Floats, part: Part) -> Ints:
+def _keep_connected(vertices: Floats, faces: Ints, places: Floats, part: Part) -> Ints:
     """Those faces that hang together, by their corners, with one that one of the places (M,3) lies on."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -61,5 +61,5 @@ def _take_joined(vertices: Floats, faces: Ints, places: Floats, part: Part) -> I
         coo_array((np.ones(len(rows)), (rows, columns)), shape=(size, size)), directed=False
     )
     distance, face, _ = closest_on_mesh(places, Mesh(vertices, faces))
-    seeds = np.unique(label[faces[face[distance <= 10 * ON * part.diagonal], 0]])
+    seeds = np.unique(label[faces[face[distance <= 10 * ON_PART * part.diagonal], 0]])
     return np.asarray(faces[np.isin(label[faces[:, 0]], seeds)])

@@ -19,11 +19,11 @@ Mask = NDArray[np.bool_]
 Plane = tuple[Floats, float]
 """Unit normal (3,) and offset: points x with ``normal . x > offset`` are beyond it."""
 
-SHOWN = 12
+MAX_LISTED = 12
 """Valid names that an error lists at most."""
 
 
-def _has_length(value: Vector) -> Vector:
+def _check_direction(value: Vector) -> Vector:
     if not np.linalg.norm(value) > 1e-12:
         raise ValueError("a direction must have a length")
     return value
@@ -35,11 +35,11 @@ def _check_order(value: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
     return value
 
 
-Direction = Annotated[Vector, AfterValidator(_has_length)]
+Direction = Annotated[Vector, AfterValidator(_check_direction)]
 Corners = Annotated[tuple[Vector, Vector], AfterValidator(_check_order)]
 
 
-class Strict(BaseModel):
+class StrictMapping(BaseModel):
     """A mapping in a job that says which keys it takes when it gets another."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, serialize_by_alias=True)
@@ -58,21 +58,21 @@ class Strict(BaseModel):
         return value
 
 
-class HalfSpace(Strict):
+class HalfSpace(StrictMapping):
     """Everything on the side of a plane that its normal points to."""
 
     point: Vector = Field(description="on the plane, in part coordinates, in the job's unit")
     normal: Direction = Field(description="toward the side that is meant; its length does not matter")
 
 
-class Facing(Strict):
+class Facing(StrictMapping):
     """Skin whose outward normal is close to a direction."""
 
     direction: Direction = Field(description="in part coordinates; its length does not matter")
     angle: float = Field(30.0, gt=0, le=180, description="degrees between it and the skin's outward normal, at most")
 
 
-class Selector(Strict):
+class Selector(StrictMapping):
     """Skin of the part. Of several conditions, all have to hold."""
 
     box: Corners | None = Field(None, description="lowest and highest corner in part coordinates, in the job's unit")
@@ -86,12 +86,12 @@ class Selector(Strict):
     kind: Literal["plane", "cylinder", "other"] | None = Field(None, description="of the CAD face's surface")
 
     @model_validator(mode="after")
-    def _says_something(self) -> Self:
-        if fault := self.fault():
+    def _check_conditions(self) -> Self:
+        if fault := self.find_fault():
             raise ValueError(fault)
         return self
 
-    def fault(self) -> str:
+    def find_fault(self) -> str:
         """What is wrong with the conditions together; empty where nothing is."""
         return "" if self.conditions() else f"says no skin; give one or more of: {', '.join(Selector.model_fields)}"
 
@@ -110,7 +110,7 @@ class Selector(Strict):
             found.append((normal, float(normal @ (np.array(self.half_space.point) - origin))))
         return found
 
-    def picks(self, points: Floats, normals: Floats, parents: Ints, part: Part) -> Mask:
+    def matches(self, points: Floats, normals: Floats, parents: Ints, part: Part) -> Mask:
         """(N,) whether skin at points (N,3) in part coordinates, with outward normals (N,3), on the part's triangles
         ``parents`` (N,), is meant. Raises StageError where the part does not know the face."""
         meant = np.ones(len(points), bool)
@@ -136,7 +136,7 @@ class StockTarget(Selector):
     outer: float = Field(ge=0, allow_inf_nan=False, description="stock beyond this skin, in the job's unit; 0: none")
 
 
-class Bar(Strict):
+class Bar(StrictMapping):
     """A round bar."""
 
     start: Vector = Field(alias="from", description="centre of one end, in part coordinates, in the job's unit")
@@ -144,7 +144,7 @@ class Bar(Strict):
     radius: float = Field(gt=0, allow_inf_nan=False, description="in the job's unit")
 
     @model_validator(mode="after")
-    def _is_long(self) -> Self:
+    def _check_length(self) -> Self:
         if not np.linalg.norm(np.subtract(self.end, self.start)) > 0:
             raise ValueError("from and to are the same point; a bar has a length")
         return self
@@ -157,7 +157,7 @@ class KeepOut(Selector):
     cylinder: Bar | None = Field(None, description="a solid round bar: from, to, radius")
     mesh: JobPath | None = Field(None, description="a watertight mesh file in part coordinates, in the job's unit")
 
-    def fault(self) -> str:
+    def find_fault(self) -> str:
         """As of skin, or of a solid."""
         solids = [name for name in ("cylinder", "mesh") if getattr(self, name) is not None]
         one = len(solids) + bool(self.conditions()) == 1
@@ -170,7 +170,7 @@ class KeepOut(Selector):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class StockPlan:
     """What a job asks for: stock of ``outer`` where no target matches, and what to keep free."""
 
     outer: float
@@ -178,30 +178,30 @@ class Wanted:
     keep_out: tuple[KeepOut, ...]
 
     @property
-    def most(self) -> float:
+    def max_height(self) -> float:
         """The largest stock that skin may get."""
         return max([self.outer, *(target.outer for target in self.targets)])
 
-    def free_skin(self) -> tuple[KeepOut, ...]:
+    def skin_to_keep_free(self) -> tuple[KeepOut, ...]:
         return tuple(item for item in self.keep_out if not item.is_solid())
 
     def planes(self, origin: Floats) -> list[Plane]:
         """All planes along which skin is to be cut before it is sorted."""
-        return [plane for item in (*self.targets, *self.free_skin()) for plane in item.planes(origin)]
+        return [plane for item in (*self.targets, *self.skin_to_keep_free()) for plane in item.planes(origin)]
 
-    def kept_free(self, points: Floats, normals: Floats, parents: Ints, part: Part) -> Mask:
-        """(N,) skin that must stay without stock; as `Selector.picks`."""
+    def is_kept_free(self, points: Floats, normals: Floats, parents: Ints, part: Part) -> Mask:
+        """(N,) skin that must stay without stock; as `Selector.matches`."""
         found = np.zeros(len(points), bool)
-        for item in self.free_skin():
-            found |= item.picks(points, normals, parents, part)
+        for item in self.skin_to_keep_free():
+            found |= item.matches(points, normals, parents, part)
         return found
 
     def heights(self, points: Floats, normals: Floats, parents: Ints, part: Part) -> Floats:
-        """(N,) stock wanted on skin; as `Selector.picks`."""
+        """(N,) stock wanted on skin; as `Selector.matches`."""
         height = np.full(len(points), self.outer)
         for target in reversed(self.targets):
-            height[target.picks(points, normals, parents, part)] = target.outer
-        height[self.kept_free(points, normals, parents, part)] = 0.0
+            height[target.matches(points, normals, parents, part)] = target.outer
+        height[self.is_kept_free(points, normals, parents, part)] = 0.0
         return height
 
 
@@ -227,7 +227,7 @@ def _find_number(part: Part, face: int | str) -> int:
         return part.face_names.index(face)
     if not names:
         raise StageError(f"no CAD face '{face}': the part's faces have no names", f"a number from 0 to {count - 1}")
-    listed = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+    listed = ", ".join(names[:MAX_LISTED]) + (f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else "")
     raise StageError(
         f"no CAD face '{face}'{suggest(face, names)}", f"a name of: {listed}; or a number up to {count - 1}"
     )

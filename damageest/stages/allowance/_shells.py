@@ -34,7 +34,7 @@ def build_shells(
     links = coo_array((np.ones(int(shared.sum())), (pairs[shared, 0], pairs[shared, 1])), shape=(count, count))
     size, patch = connected_components(links, directed=False)
     folded = np.zeros(size, bool)
-    folded[patch[_turn(lows, tops)]] = True
+    folded[patch[_is_folded(lows, tops)]] = True
     creases = pairs[~shared]
     folded[patch[creases[patch[creases[:, 0]] == patch[creases[:, 1]], 0]]] = True
     made, rest = [], [np.flatnonzero(folded[patch])]
@@ -56,7 +56,7 @@ def build_shells(
     return made, np.sort(np.concatenate(rest))
 
 
-def _turn(lows: Floats, tops: Floats) -> NDArray[np.bool_]:
+def _is_folded(lows: Floats, tops: Floats) -> NDArray[np.bool_]:
     """(F,) whether the upper triangle faces another way than the lower one, or is less than a tenth of it: the skin
     bends about as sharply as the stock is high."""
 

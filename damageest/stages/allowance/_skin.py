@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh
-from damageest.stages.allowance._selectors import Wanted
+from damageest.stages.allowance._selectors import StockPlan
 
-ON = 1e-7
+ON_PART = 1e-7
 """Distance from the part, in its diagonals, up to which a face lies on it."""
 
 
@@ -45,7 +45,7 @@ class SkinFaces:
             self.free[faces],
         )  # fmt: skip
 
-    def find_rims(self) -> Ints:
+    def find_border_edges(self) -> Ints:
         """(E,2) edges that only one face has."""
         edges = np.sort(np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]]), axis=1)
         unique, count = np.unique(edges, axis=0, return_counts=True)
@@ -63,24 +63,24 @@ class SkinFaces:
         return np.asarray(a * (1 - u) + b * u * (1 - v) + c * u * v), face
 
 
-def take_skin(body: Mesh, part: Part, wanted: Wanted, origin: Floats) -> SkinFaces:
+def take_skin(body: Mesh, part: Part, plan: StockPlan, origin: Floats) -> SkinFaces:
     """The faces of a solid in the part that lie on the part's surface, cut along the planes of the selectors and told
     apart by the stock wanted on them."""
-    return sort_skin(body.vertices - origin, body.faces, part, wanted, origin)
+    return label_skin(body.vertices - origin, body.faces, part, plan, origin)
 
 
-def sort_skin(vertices: Floats, faces: Ints, part: Part, wanted: Wanted, origin: Floats) -> SkinFaces:
+def label_skin(vertices: Floats, faces: Ints, part: Part, plan: StockPlan, origin: Floats) -> SkinFaces:
     """Of a mesh relative to ``origin``, the faces that lie on the part, cut and told apart."""
     on, parent = find_on_part(vertices, faces, part, origin)
     faces, parent = faces[on], parent[on]
-    for normal, offset in wanted.planes(origin):
+    for normal, offset in plan.planes(origin):
         value = vertices @ normal - offset
-        vertices, faces, kept, _ = clip(vertices, faces, np.where(np.abs(value) < ON * part.diagonal, 0.0, value))
+        vertices, faces, kept, _ = clip(vertices, faces, np.where(np.abs(value) < ON_PART * part.diagonal, 0.0, value))
         parent = parent[kept]
     normal = normalise(part.cross)[parent]
     middle = vertices[faces].mean(axis=1) + origin
-    height = wanted.heights(middle, normal, parent, part)
-    return SkinFaces(vertices, faces, parent, normal, height, wanted.kept_free(middle, normal, parent, part))
+    height = plan.heights(middle, normal, parent, part)
+    return SkinFaces(vertices, faces, parent, normal, height, plan.is_kept_free(middle, normal, parent, part))
 
 
 def find_on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> tuple[NDArray[np.bool_], Ints]:
@@ -90,11 +90,11 @@ def find_on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> t
     corners = vertices[faces]
     probes = np.einsum("pk,fkj->fpj", weights, corners).reshape(-1, 3)
     distance, parent, _ = closest_on_mesh(probes + origin, part)
-    near = distance.reshape(-1, 4).max(axis=1) <= ON * part.diagonal
+    near = distance.reshape(-1, 4).max(axis=1) <= ON_PART * part.diagonal
     parent = np.asarray(parent.reshape(-1, 4)[:, 3], np.int64)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # slivers face anywhere, and left out they would leave slits
-    sliver = np.linalg.norm(cross, axis=1) < (100 * ON * part.diagonal) ** 2
+    sliver = np.linalg.norm(cross, axis=1) < (100 * ON_PART * part.diagonal) ** 2
     return near & (sliver | (np.einsum("ij,ij->i", cross, part.cross[parent]) > 0)), parent
 
 

@@ -19,12 +19,12 @@ from damageest.stages.allowance._skin import SkinFaces, normalise
 
 SMOOTH = 30.0
 """Degrees between neighbouring triangles up to which they may share upper corners."""
-LEANING = 8.0
+MAX_LEAN = 8.0
 """Degrees that a common way up may lean from a triangle's normal."""
-MITRED = 100.0
+MAX_MITRE = 100.0
 """Degrees between normals up to which an edge is mitred to a point; a sharper one gets `ROUNDS` mitres."""
 ROUNDS = 3
-DRAWN_IN = 4e-3
+INSET = 4e-3
 """Of the slack: how far inside its border the stock begins. What ends exactly where other metal begins would touch it
 along lines without thickness."""
 
@@ -41,18 +41,18 @@ class _Edges:
     at: Ints
 
 
-def build_stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: float = DRAWN_IN) -> Any:
+def build_stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: float = INSET) -> Any:
     """A Manifold, relative to the skin's origin: stock of each face's height, and up to ``slack`` more. It reaches a
     little below the skin, for the caller to cut off. ``roomy``: no stock meets that of opposite skin; ``drawn_in``: how
     far inside the skin's border it begins, in slacks."""
     from manifold3d import Manifold, OpType
 
-    skin = _draw_in(skin.select(skin.height > 0), drawn_in * slack)
+    skin = _inset_border(skin.select(skin.height > 0), drawn_in * slack)
     if not len(skin.faces):
         return Manifold()
     edges = _find_edges(skin)
     height = skin.height + slack / 2
-    group, up = _directions(skin, height, edges, slack / 2)
+    group, up = _find_directions(skin, height, edges, slack / 2)
     sink = 1e-3 * slack
     corner = skin.triangles
     tops = corner + up[group].reshape(-1, 3, 3)
@@ -71,7 +71,7 @@ def build_stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: flo
     return Manifold.batch_boolean([*bodies, *(Manifold.hull_points(cloud) for cloud in clouds)], OpType.Add)
 
 
-def _draw_in(skin: SkinFaces, by: float) -> SkinFaces:
+def _inset_border(skin: SkinFaces, by: float) -> SkinFaces:
     """The skin with its border moved inward."""
     start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
     size = len(skin.vertices)
@@ -98,15 +98,15 @@ def _find_edges(skin: SkinFaces) -> _Edges:
     i, j = order[where[count == 2]], order[where[count == 2] + 1]
     opposite = start[i] == stop[j]
     i, j = i[opposite], j[opposite]
-    at = np.stack([np.stack([i, _next(i)], 1), np.stack([_next(j), j], 1)], 1)
+    at = np.stack([np.stack([i, _next_corner(i)], 1), np.stack([_next_corner(j), j], 1)], 1)
     return _Edges(i // 3, j // 3, start[i], stop[i], at)
 
 
-def _next(corner: Ints) -> Ints:
+def _next_corner(corner: Ints) -> Ints:
     return corner // 3 * 3 + (corner % 3 + 1) % 3
 
 
-def _directions(skin: SkinFaces, height: Floats, edges: _Edges, slack: float) -> tuple[Ints, Floats]:
+def _find_directions(skin: SkinFaces, height: Floats, edges: _Edges, slack: float) -> tuple[Ints, Floats]:
     """The group (3F,) of each corner of each face, and the way up (G,3) from the skin to the stock's top that all
     corners of a group share: the faces' mean normal, long enough that each face has its height, none ``slack`` more."""
     from scipy.sparse import coo_array
@@ -117,7 +117,7 @@ def _directions(skin: SkinFaces, height: Floats, edges: _Edges, slack: float) ->
     alike = (dot > np.cos(np.radians(SMOOTH))) & (height[edges.first] == height[edges.second])
     pairs = edges.at[alike].transpose(0, 2, 1).reshape(-1, 2)
     owner = np.arange(count) // 3
-    angle = _angles(skin.triangles).ravel()
+    angle = _measure_angles(skin.triangles).ravel()
 
     def grouped(pairs: Ints) -> tuple[Ints, Floats, Floats]:
         links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
@@ -131,20 +131,23 @@ def _directions(skin: SkinFaces, height: Floats, edges: _Edges, slack: float) ->
 
     group, _, least = grouped(pairs)
     # groups that bend too much for one common way up are taken apart
-    bearable = least[group] >= np.maximum(height / (height + slack), np.cos(np.radians(LEANING)))[owner]
+    bearable = least[group] >= np.maximum(height / (height + slack), np.cos(np.radians(MAX_LEAN)))[owner]
     group, mean, least = grouped(pairs[bearable[pairs].all(axis=1)])
     tall = np.zeros(len(mean))
     tall[group] = height[owner]
     return group, mean * (tall / least)[:, None]
 
 
-def _angles(triangles: Floats) -> Floats:
+def _measure_angles(triangles: Floats) -> Floats:
     """(F,3) angles at the corners."""
-    along, back = unit_rows(triangles[:, [1, 2, 0]] - triangles), unit_rows(triangles[:, [2, 0, 1]] - triangles)
+    along, back = (
+        _normalise_rows(triangles[:, [1, 2, 0]] - triangles),
+        _normalise_rows(triangles[:, [2, 0, 1]] - triangles),
+    )
     return np.asarray(np.arccos(np.clip(np.einsum("fkj,fkj->fk", along, back), -1, 1)))
 
 
-def unit_rows(vectors: Floats) -> Floats:
+def _normalise_rows(vectors: Floats) -> Floats:
     """(...,3) of length 1."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
 
@@ -182,7 +185,7 @@ def _build_mitres(n: Floats, outward: Floats, turn: Floats, tall: Floats, other:
     second one's normal; ``tall``, ``other`` (E,): heights on both.
     """
     found = np.full((len(n), ROUNDS, 3), np.nan)
-    blunt = turn <= np.radians(MITRED)
+    blunt = turn <= np.radians(MAX_MITRE)
     # in the plane across the edge: the point `tall` above the first face and `other` above the second
     aside = (other - tall * np.cos(turn)) / np.sin(turn)
     short = np.hypot(tall, aside) <= 1.6 * np.maximum(

@@ -12,24 +12,22 @@ from damageest.artefacts import Floats, Mesh, Part
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_edges, distance_to_mesh, is_inside
 from damageest.geometry.solids import to_arrays
-from damageest.stages.allowance._limits import Crowd
+from damageest.stages.allowance._limits import StockConflict
 from damageest.stages.allowance._selectors import Mask
-from damageest.stages.allowance._skin import ON, SkinFaces, normalise
+from damageest.stages.allowance._skin import ON_PART, SkinFaces, normalise
 
-VOLUME = 1e-4
+MAX_VOLUME = 1e-4
 """Share of its volume that a damage may stick out of its deposit, or a deposit into metal."""
-MISSED = 0.01
+MAX_MISSED = 0.01
 """Share of sampled points of the skin at which the thickness may be missed: at creases, where it has no one value."""
 SAMPLES = 2000
-LONGEST = 1.6
+MAX_MITRE = 1.6
 """Of a mitre, in heights."""
-CLIPPED = (
-    "a smaller outer there, or another inner; if neither helps, an export of part and damage would help to mend it"
-)
+REMEDY = "a smaller outer there, or another inner; if neither helps, an export of part and damage would help to mend it"
 
 
 @dataclass(frozen=True, eq=False)
-class Worked:
+class DepositGeometry:
     """Everything that the check looks at, as Manifolds relative to ``origin``: the ``deposit``, the ``cavity`` it
     fills, the metal ``left``, what is ``kept_out``; the ``skin`` with its heights, and the ``band`` that the stock runs
     over beside it."""
@@ -47,18 +45,20 @@ class Worked:
         return [self.skin] if self.band is None else [self.skin, self.band]
 
 
-def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -> tuple[float, float, float] | None:
+def check_deposit(
+    work: DepositGeometry, part: Part, tolerance: float, crowds: Sequence[StockConflict]
+) -> tuple[float, float, float] | None:
     """The least, mean and largest thickness of the stock; None where none is wanted. Raises StageError with the figure
     where a guarantee is not kept."""
 
     missing = (work.cavity - work.deposit).volume() / work.cavity.volume()
-    if missing > VOLUME:
-        raise StageError(f"the deposit would miss {missing:.2%} of the damage volume", CLIPPED)
+    if missing > MAX_VOLUME:
+        raise StageError(f"the deposit would miss {missing:.2%} of the damage volume", REMEDY)
     entered = (work.deposit ^ work.left).volume() / work.deposit.volume()
-    if entered > VOLUME:
-        raise StageError(f"{entered:.2%} of the deposit would lie in metal that is left", CLIPPED)
-    over, place = find_strayed(work, part, tolerance)
-    if over > MISSED:
+    if entered > MAX_VOLUME:
+        raise StageError(f"{entered:.2%} of the deposit would lie in metal that is left", REMEDY)
+    over, place = find_stray_stock(work, part, tolerance)
+    if over > MAX_MISSED:
         near = ", ".join(f"{value:.4g}" for value in place)
         raise StageError(
             f"stock would stand over {over:.1%} of the skin round it that is to have none, as at ({near})",
@@ -68,15 +68,15 @@ def check(work: Worked, part: Part, tolerance: float, crowds: Sequence[Crowd]) -
     if not len(wanted.faces):
         return None
     found = measure_thickness(work, wanted, part, crowds)
-    wrong = found.is_wrong(tolerance, ON * part.diagonal)
-    if wrong.mean() > MISSED:
+    wrong = found.is_wrong(tolerance, ON_PART * part.diagonal)
+    if wrong.mean() > MAX_MISSED:
         worst = float(np.abs(found.thick - found.height)[wrong].max())
         raise StageError(
             f"the stock's thickness is missed on {wrong.mean():.1%} of the skin, by up to {worst:.3g}",
             "a larger tolerance, or a smaller outer",
         )
     # at the very border the way along the normal may lead out of the wall, which is no thickness of the stock
-    rims = wanted.find_rims()
+    rims = wanted.find_border_edges()
     inner = np.ones(len(found.thick), bool)
     if len(rims):
         inner = distance_to_edges(found.points, wanted.vertices, rims) > tolerance / 2
@@ -101,15 +101,17 @@ class Thickness:
         """(N,) where the stock is thinner than wanted, or more than a tolerance thicker; covered by other stock, it may
         be as thick as that one's mitre."""
         low = ~self.covered & (self.thick < self.height * (1 - 1e-6) - rounding)
-        bound = np.where(self.covered, LONGEST * self.height.max(), self.height) + tolerance
+        bound = np.where(self.covered, MAX_MITRE * self.height.max(), self.height) + tolerance
         return np.asarray(~self.ended & (low | (self.thick > bound)))
 
 
-def measure_thickness(work: Worked, wanted: SkinFaces, part: Part, crowds: Sequence[Crowd]) -> Thickness:
+def measure_thickness(
+    work: DepositGeometry, wanted: SkinFaces, part: Part, crowds: Sequence[StockConflict]
+) -> Thickness:
     """Measured by rays along the normal of the skin with stock."""
     from scipy.spatial import cKDTree
 
-    rounding = 10 * ON * part.diagonal
+    rounding = 10 * ON_PART * part.diagonal
     points, face = wanted.sample(SAMPLES, seed=23)
     normal, height = wanted.normal[face], wanted.height[face]
     reach = 4 * float(height.max()) + part.diagonal
@@ -130,7 +132,7 @@ def measure_thickness(work: Worked, wanted: SkinFaces, part: Part, crowds: Seque
     return Thickness(points, height, np.where(covered, nearest, far), covered, ended)
 
 
-def find_strayed(work: Worked, part: Part, tolerance: float) -> tuple[float, Floats]:
+def find_stray_stock(work: DepositGeometry, part: Part, tolerance: float) -> tuple[float, Floats]:
     """The share of sampled skin without stock, of the damage and of the part round it, that the deposit stands over all
     the same, and one such place (3,) in the part's frame. Skin nearer to skin with stock than that is high does not
     count: in a concave corner the stock leans on it."""
@@ -152,7 +154,7 @@ def find_strayed(work: Worked, part: Part, tolerance: float) -> tuple[float, Flo
     return float(over.mean()), work.origin + points[over.argmax()]
 
 
-def _measure_to_stock(work: Worked, points: Floats) -> Floats:
+def _measure_to_stock(work: DepositGeometry, points: Floats) -> Floats:
     """(N,) distance to the nearest skin with stock."""
     found = np.full(len(points), np.inf)
     for skin in work.skins():

@@ -10,11 +10,11 @@ from pydantic import Field
 from damageest.artefacts import Deposit, Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.stages.allowance import Allowance
-from damageest.stages.allowance._selectors import KeepOut, StockTarget, Wanted
+from damageest.stages.allowance._selectors import KeepOut, StockPlan, StockTarget
 
-CRUMBS = 1e-6
+MAX_DUST = 1e-6
 """Share of the stock's volume."""
-DRAWN_IN = 1e-3
+SHEET_GAP = 1e-3
 """Of the tolerance: by how much sheets that touch are moved apart."""
 
 
@@ -60,38 +60,40 @@ class Milling(Allowance):
         from manifold3d import Manifold
 
         from damageest.geometry.solids import subtract_lost, to_manifold
-        from damageest.stages.allowance._booleans import draw_apart, join, take_touching, tidy
+        from damageest.stages.allowance._booleans import join, keep_touching, separate_sheets, simplify_exactly
         from damageest.stages.allowance._cut_back import cut_back
         from damageest.stages.allowance._keep_out import build_keep_out
-        from damageest.stages.allowance._limits import find_crowded
+        from damageest.stages.allowance._limits import find_stock_conflict
         from damageest.stages.allowance._overlap import grow_over_rim
         from damageest.stages.allowance._skin import take_skin
         from damageest.stages.allowance._stock import build_stock
-        from damageest.stages.allowance._verify import Worked, check
+        from damageest.stages.allowance._verify import DepositGeometry, check_deposit
 
         origin: Floats = part.bounds.mean(axis=0)
-        wanted = Wanted(self.outer, self.targets, self.keep_out)
+        plan = StockPlan(self.outer, self.targets, self.keep_out)
         cavity = cut_back(damage, part, others, self.inner, tolerance) if self.inner else damage
         filled, whole = to_manifold(cavity, origin), to_manifold(part, origin)
         left = subtract_lost(whole, filled)
-        skin = take_skin(cavity, part, wanted, origin)
-        reach = wanted.most + tolerance
-        barred = build_keep_out(self.keep_out, skin, filled, part, wanted, reach, origin, tolerance)
-        band = grow_over_rim(skin, part, wanted, self.overlap, tolerance, origin)
+        skin = take_skin(cavity, part, plan, origin)
+        reach = plan.max_height + tolerance
+        barred = build_keep_out(self.keep_out, skin, filled, part, plan, reach, origin, tolerance)
+        band = grow_over_rim(skin, part, plan, self.overlap, tolerance, origin)
         skins = [skin] if band is None else [skin, band]
-        crowds = [crowd for each in skins if (crowd := find_crowded(each, part, tolerance, origin)) is not None]
+        crowds = [crowd for each in skins if (crowd := find_stock_conflict(each, part, tolerance, origin)) is not None]
         if crowds and self.crowded == "refuse":
             raise StageError(str(crowds[0]), "a smaller outer there by targets, keep_out, or crowded: clip")
         proud = sum((build_stock(each, tolerance / 2, roomy=not crowds) for each in skins), Manifold())
-        proud = tidy(proud, part.diagonal)
+        proud = simplify_exactly(proud, part.diagonal)
         for body in (left, barred):
             within = proud ^ body
             # crumbs of rounding, cut off, would leave lines where the stock touches what it stands on and no more
-            if within.volume() > CRUMBS * proud.volume():
+            if within.volume() > MAX_DUST * proud.volume():
                 proud = subtract_lost(proud, within)
-        deposit = tidy(join(filled, take_touching(proud, filled, tolerance)), part.diagonal)
-        thickness = check(Worked(deposit, filled, left, barred, skin, band, origin), part, tolerance, crowds)
-        body = draw_apart(deposit, origin, DRAWN_IN * tolerance)
+        deposit = simplify_exactly(join(filled, keep_touching(proud, filled, tolerance)), part.diagonal)
+        thickness = check_deposit(
+            DepositGeometry(deposit, filled, left, barred, skin, band, origin), part, tolerance, crowds
+        )
+        body = separate_sheets(deposit, origin, SHEET_GAP * tolerance)
         if body is None:
             raise StageError("the deposit came out empty", "a slightly different outer")
         notes = [f"{crowd}; clipped there" for crowd in crowds[:1]]

@@ -7,7 +7,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.voxels import number_cubes
 
-PAIRS = 20_000_000
+MAX_PAIRS = 20_000_000
 """Pairs of neighbours that may be held at once, 16 bytes each; more, and points are first gathered into a grid."""
 
 
@@ -24,7 +24,7 @@ def run_dbscan(points: Floats, eps: float, neighbours: int) -> Ints:
     of = np.arange(len(points))
     weight = np.ones(len(points), np.int64)
     tree = cKDTree(points)
-    if len(points) > 1000 and tree.count_neighbors(tree, eps) / 2 > PAIRS:
+    if len(points) > 1000 and tree.count_neighbors(tree, eps) / 2 > MAX_PAIRS:
         points, of, weight = _gather_in_cells(points, eps / 4)
         tree = cKDTree(points)
     pairs = tree.query_pairs(eps, output_type="ndarray")

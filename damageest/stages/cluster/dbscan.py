@@ -13,13 +13,13 @@ from damageest.geometry.neighbourhoods import find_nearby
 from damageest.stages.cluster import Cluster
 from damageest.stages.cluster._density import measure_neighbour_distances, run_dbscan
 
-AROUND = 12
+NEIGHBOURHOOD = 12
 """Nearest scan points, itself included, among which a damage point looks for others like it."""
-LIKE_IT = 4
+MIN_DAMAGE = 4
 """How many of those, itself included, must be damage too. Where noise takes one point in 700 beyond the tolerance (a
 pose off by one standard deviation at a tolerance of four), one stray in two million has three more beside it."""
 
-WHOLE = 200_000
+MAX_WHOLE = 200_000
 """Scan points beyond which the gaps between them are looked at here and there only."""
 
 
@@ -60,7 +60,7 @@ class Dbscan(Cluster):
 
         cluster = run_dbscan(points, eps, dense)
         supported = _is_supported(aligned.points, damage, deviation.label == DAMAGE, bridging)
-        cluster = self._drop_chance(points, cluster, supported, tolerance)
+        cluster = self._drop_noise(points, cluster, supported, tolerance)
         found, first, inverse, count = np.unique(cluster, return_index=True, return_inverse=True, return_counts=True)
         order = [i for i in np.lexsort((first, -count)) if found[i] >= 0]
         number = np.zeros(len(found), np.int32)
@@ -88,7 +88,7 @@ class Dbscan(Cluster):
             return bridging, "the tolerance" if bridging == tolerance else "the scan's spacing"
         return self.eps, "set"
 
-    def _drop_chance(self, points: Floats, cluster: Ints, supported: NDArray[np.bool_], tolerance: float) -> Ints:
+    def _drop_noise(self, points: Floats, cluster: Ints, supported: NDArray[np.bool_], tolerance: float) -> Ints:
         """``cluster`` (M,) with -1 for the members of clusters too small, too short or too scattered to be damage."""
         inside = cluster >= 0
         if not inside.any():
@@ -129,12 +129,12 @@ def _measure_gaps(points: Floats, neighbours: int) -> tuple[float, float]:
 
     if len(points) <= neighbours:
         return 0.0, 0.0
-    dense = len(points) > WHOLE
+    dense = len(points) > MAX_WHOLE
     picked = points[_draw_evenly(len(points), 600 if dense else 5000)]
     reach = np.inf
     if dense:
         # Among some of the points the k-th is farther than among all, so it tells how far to look.
-        some = cKDTree(points[_draw_evenly(len(points), WHOLE)])
+        some = cKDTree(points[_draw_evenly(len(points), MAX_WHOLE)])
         reach = float(np.percentile(np.asarray(some.query(picked, k=[neighbours + 1], workers=2)[0]), 97))
         points = points[find_nearby(points, picked, reach)]
     tree = cKDTree(points)
@@ -152,7 +152,7 @@ def _is_supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], re
     from scipy.spatial import cKDTree
 
     here = find_nearby(points, points[damage], reach)
-    _, near = cKDTree(points[here]).query(points[damage], k=AROUND, distance_upper_bound=reach, workers=2)
+    _, near = cKDTree(points[here]).query(points[damage], k=NEIGHBOURHOOD, distance_upper_bound=reach, workers=2)
     padded = np.append(is_damage[here], False)  # the index of a missing neighbour is one past the last
-    result: NDArray[np.bool_] = padded[near].sum(axis=1) >= LIKE_IT
+    result: NDArray[np.bool_] = padded[near].sum(axis=1) >= MIN_DAMAGE
     return result

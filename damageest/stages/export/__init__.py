@@ -14,7 +14,7 @@ from damageest.stages import Stage, asked_by_name
 
 
 @dataclass(frozen=True)
-class Written:
+class ExportedFiles:
     """``files``: paths relative to the folder that they were written to. ``notes``: what became other than asked for.
 
     ``splines``: per site, how well a spline follows its inner damage surface; empty where none was asked for.
@@ -56,7 +56,7 @@ class Patch:
     rims: tuple[Floats, ...] = ()
 
 
-Write = Callable[[Path, str, Sequence[Body], str], Written]
+WriteFunction = Callable[[Path, str, Sequence[Body], str], ExportedFiles]
 """Of ``folder, stem, bodies, unit``: writes ``folder/stem.suffix``; ``stem`` may lead through folders that are there.
 ``unit`` is one of um, mm, cm, m, in, ft. The same bodies give the same bytes. What cannot be written well is left out,
 and a note says why."""
@@ -68,9 +68,9 @@ class Writer:
     much there that it gets simplified solids. ``patch`` writes a spline, of ``path, name, patch, unit``; None where the
     format has no such thing."""
 
-    write: Write
-    together: bool = False
-    costly: bool = False
+    write: WriteFunction
+    one_file: bool = False
+    simplify: bool = False
     patch: Callable[[Path, str, Patch, str], None] | None = None
 
 
@@ -86,4 +86,4 @@ class Export(Stage, ABC):
 
     @asked_by_name
     @abstractmethod
-    def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> Written: ...
+    def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles: ...

@@ -18,23 +18,23 @@ def _check_known(name: str, info: ValidationInfo) -> str:
     if registry is None or name in registry.writers:
         return name
     if plugin := PLUGINS.get(name):
-        raise _find_fault(
+        raise _make_error(
             f"'{name}' needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry
         )
     names = sorted(registry.writers)
-    raise _find_fault(f"no format '{name}'{suggest(name, names)}; there are: {', '.join(names)}", registry)
+    raise _make_error(f"no format '{name}'{suggest(name, names)}; there are: {', '.join(names)}", registry)
 
 
-def _find_fault(text: str, registry: Any) -> PydanticCustomError:
+def _make_error(text: str, registry: Any) -> PydanticCustomError:
     return PydanticCustomError("format", "{text}", {"text": text + registry.missing()})
 
 
-def find_spline_writer(wanted: bool, info: ValidationInfo) -> bool:
+def check_spline_writer(wanted: bool, info: ValidationInfo) -> bool:
     """Refuses a spline where nothing here can write one."""
     registry = (info.context or {}).get("registry")
     if wanted and registry is not None and not any(writer.patch for writer in registry.writers.values()):
         plugin = PLUGINS["step"]
-        raise _find_fault(
+        raise _make_error(
             f"a spline needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry
         )
     return wanted

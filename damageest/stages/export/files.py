@@ -15,8 +15,8 @@ from damageest.artefacts import Floats, Scan, Solid
 from damageest.geometry.simplification import simplify_within
 from damageest.geometry.transforms import invert_pose, move_mesh
 from damageest.io.meshes import write_ply, write_points
-from damageest.stages.export import Body, Export, Patch, Writer, Written
-from damageest.stages.export._options import Formats, find_spline_writer
+from damageest.stages.export import Body, Export, ExportedFiles, Patch, Writer
+from damageest.stages.export._options import Formats, check_spline_writer
 from damageest.stages.export._spline import fit_spline
 
 if TYPE_CHECKING:
@@ -44,58 +44,58 @@ class Files(Export):
         description="how far facets of STEP solids may lie off the surface, so that there are fewer of them, in the "
         "job's unit; default: a tenth of the tolerance",
     )
-    spline: Annotated[bool, AfterValidator(find_spline_writer)] = Field(
+    spline: Annotated[bool, AfterValidator(check_spline_writer)] = Field(
         False,
         description="each inner damage surface as B-spline in STEP too, where one fits within the tolerance (plugin "
         "cadquery)",
     )
 
-    def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> Written:
+    def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles:
         """Writes into ``folder`` and gives the paths relative to it. The same result gives the same bytes."""
         splines = {s.id: fit_spline(s.surface, result.tolerance) for s in result.sites} if self.spline else {}
         detail = result.tolerance / 10 if self.detail is None else self.detail
         bodies, coarse = _collect_bodies(result), {}
-        if detail and any(writers[name].costly for name in self.format):
+        if detail and any(writers[name].simplify for name in self.format):
             coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}
-        done: list[Written] = []
+        done: list[ExportedFiles] = []
         places = {"part": [""], "scan": ["scan_frame/"], "both": ["", "scan_frame/"]}
         for place in places[self.frame]:
             T = invert_pose(result.pose) if place else None
             for name in self.format:
-                chosen = coarse if coarse and writers[name].costly else bodies
+                chosen = coarse if coarse and writers[name].simplify else bodies
                 done += _write_solids(writers[name], folder, place, chosen, T, result.units)
-            done += self._others(result, folder, place, T)
+            done += self._write_surfaces(result, folder, place, T)
             if splines:
                 patches = {number: patch for number, (patch, _) in splines.items() if patch}
                 done += _write_patches(writers, folder, place, patches, T, result.units)
-        done.append(self._truth(result, folder, writers))
+        done.append(self._write_truth(result, folder, writers))
         files = dict.fromkeys(f for one in done for f in one.files)  # STL may have written a PLY already
         notes = tuple(n for one in done for n in one.notes)
-        return Written(tuple(files), notes, {number: spline for number, (_, spline) in splines.items()})
+        return ExportedFiles(tuple(files), notes, {number: spline for number, (_, spline) in splines.items()})
 
-    def _others(self, result: Result, folder: Path, place: str, T: Floats | None) -> list[Written]:
+    def _write_surfaces(self, result: Result, folder: Path, place: str, T: Floats | None) -> list[ExportedFiles]:
         """Surfaces and scan, below ``place``; ``T`` takes a point of the part to their frame."""
         done = []
         for site in result.sites:
-            path = _make_room(folder, f"{place}surface/site-{site.id}.ply")
+            path = _make_folder(folder, f"{place}surface/site-{site.id}.ply")
             write_ply(path, move_mesh(site.surface, T))
-            done.append(Written((path.relative_to(folder).as_posix(),)))
+            done.append(ExportedFiles((path.relative_to(folder).as_posix(),)))
         done.append(_write_scan(result, result.aligned if T is None else result.scan, folder, f"{place}scan.ply"))
         return done
 
-    def _truth(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> Written:
+    def _write_truth(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles:
         """What a virtual scanner knows, in the part's frame."""
         truth = result.scan.truth
         if truth is None:
-            return Written()
+            return ExportedFiles()
         pose = {"units": result.units, "T_part_scan": truth.T_part_scan.tolist()}
-        _make_room(folder, "truth/pose.json").write_text(json.dumps(pose, indent=1) + "\n")
+        _make_folder(folder, "truth/pose.json").write_text(json.dumps(pose, indent=1) + "\n")
         if truth.damage is None:
-            return Written(("truth/pose.json",))
+            return ExportedFiles(("truth/pose.json",))
         body = Body("true damage", truth.damage, DAMAGE)
         name = "ply" if "ply" in self.format else "stl"
         done = _write(writers[name], folder, "truth/damage", [body], result.units)
-        return Written((*done.files, "truth/pose.json"), done.notes)
+        return ExportedFiles((*done.files, "truth/pose.json"), done.notes)
 
 
 def _collect_bodies(result: Result) -> dict[str, Body]:
@@ -112,10 +112,10 @@ def _collect_bodies(result: Result) -> dict[str, Body]:
 
 def _write_solids(
     writer: Writer, folder: Path, place: str, bodies: Mapping[str, Body], T: Floats | None, unit: str
-) -> list[Written]:
+) -> list[ExportedFiles]:
     """One file for each body; or one of all, where the union of the damages would only double its pieces."""
     here = {stem: replace(body, solid=move_mesh(body.solid, T)) for stem, body in bodies.items()}
-    if writer.together:
+    if writer.one_file:
         pieces = [body for stem, body in here.items() if stem != "damage"]
         return [_write(writer, folder, f"{place}result", pieces, unit)]
     return [_write(writer, folder, f"{place}{stem}", [body], unit) for stem, body in here.items()]
@@ -123,29 +123,29 @@ def _write_solids(
 
 def _write_patches(
     writers: Mapping[str, Writer], folder: Path, place: str, patches: Mapping[int, Patch], T: Floats | None, unit: str
-) -> list[Written]:
+) -> list[ExportedFiles]:
     """The splines of the sites, by the first format that has such a thing."""
     suffix, write = next((name, writer.patch) for name, writer in sorted(writers.items()) if writer.patch)
     done = []
     for number, patch in patches.items():
         name = f"{place}surface/site-{number}.{suffix}"
         here = patch if T is None else replace(patch, poles=patch.poles @ T[:3, :3].T + T[:3, 3])
-        write(_make_room(folder, name), f"damage surface site-{number}", here, unit)
-        done.append(Written((name,)))
+        write(_make_folder(folder, name), f"damage surface site-{number}", here, unit)
+        done.append(ExportedFiles((name,)))
     return done
 
 
-def _write(writer: Writer, folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
-    _make_room(folder, stem)
+def _write(writer: Writer, folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> ExportedFiles:
+    _make_folder(folder, stem)
     return writer.write(folder, stem, bodies, unit)
 
 
-def _make_room(folder: Path, name: str) -> Path:
+def _make_folder(folder: Path, name: str) -> Path:
     (folder / name).parent.mkdir(parents=True, exist_ok=True)
     return folder / name
 
 
-def _write_scan(result: Result, scan: Scan, folder: Path, name: str) -> Written:
+def _write_scan(result: Result, scan: Scan, folder: Path, name: str) -> ExportedFiles:
     x, y, z = scan.points.T
     columns = {
         "x": x,
@@ -155,5 +155,5 @@ def _write_scan(result: Result, scan: Scan, folder: Path, name: str) -> Written:
         "label": result.deviation.label.astype(np.uint8),
         "site": result.site_label.astype(np.int32),
     }
-    write_points(_make_room(folder, name), columns)
-    return Written((name,))
+    write_points(_make_folder(folder, name), columns)
+    return ExportedFiles((name,))

@@ -1,6 +1,6 @@
 """3MF: one file with all solids, named, coloured, with their unit.
 
-Written here and not by lib3mf, which gives other bytes each time (random identifiers), keeps six decimals whatever the
+ExportedFiles here and not by lib3mf, which gives other bytes each time (random identifiers), keeps six decimals whatever the
 unit, and takes single precision only. What it and trimesh read of these files is tested.
 """
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from damageest.geometry.rounding import round_to_single
-from damageest.stages.export import Body, Written
+from damageest.stages.export import Body, ExportedFiles
 
 UNITS = {"um": "micron", "mm": "millimeter", "cm": "centimeter", "m": "meter", "in": "inch", "ft": "foot"}
 
@@ -31,10 +31,10 @@ _RELATIONS = (
 _NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 
 
-def write_threemf(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> Written:
+def write_threemf(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> ExportedFiles:
     """All bodies as objects of one 3MF file, each with a material of its name and colour, and an item of the build."""
     if not bodies:
-        return Written()
+        return ExportedFiles()
     materials = "".join(
         f'<base name={quoteattr(body.name)} displaycolor="#{bytes(body.colour).hex().upper()}FF"/>' for body in bodies
     )
@@ -51,7 +51,7 @@ def write_threemf(folder: Path, stem: str, bodies: Sequence[Body], unit: str) ->
             entry = zipfile.ZipInfo(name)  # its date is fixed: the same bodies give the same bytes
             entry.compress_type, entry.create_system = zipfile.ZIP_DEFLATED, 3
             archive.writestr(entry, text)
-    return Written((f"{stem}.3mf",))
+    return ExportedFiles((f"{stem}.3mf",))
 
 
 def _build_object(number: int, body: Body) -> str:

@@ -18,15 +18,15 @@ from damageest.io.scans import read_scan
 from damageest.stages import JobPath
 from damageest.stages.part import ReadPart
 
-FEWEST = 1000
-HELD = 20
-VOXELS = (1.0, 1.6, 2.5)
+MIN_POINTS = 1000
+HOLD_OUT = 20
+VOXEL_FACTORS = (1.0, 1.6, 2.5)
 """Factors by which the voxels that tell inside from outside grow where the points leave gaps between finer ones."""
-BRIDGED, REFUSED = 2.0, 3.5
+NOTED_GAP, MAX_GAP = 2.0, 3.5
 """Gaps, in circles of seven neighbours, that are mentioned, and that are too wide."""
 
 
-class Reconstructed(ReadPart):
+class PartFromScan(ReadPart):
     """A closed part through the points of a scan of an undamaged specimen, in that scan's frame: a screened Poisson
     surface. For want of CAD only: it has the scan's noise, and rounds sharp edges."""
 
@@ -52,8 +52,8 @@ class Reconstructed(ReadPart):
 
         paths = (self.path,) if isinstance(self.path, Path) else self.path
         scan = read_scan(paths, unit, self.unit)
-        if len(scan.points) < FEWEST:
-            raise InputError(f"part: {len(scan.points)} points are too few for a part; {FEWEST} at least")
+        if len(scan.points) < MIN_POINTS:
+            raise InputError(f"part: {len(scan.points)} points are too few for a part; {MIN_POINTS} at least")
         noise, spacing = measure_noise_and_spacing(scan.points)
         try:
             vertices, faces, cell, error = self._build_surface(scan.points, noise, spacing)
@@ -78,7 +78,7 @@ class Reconstructed(ReadPart):
         from damageest.geometry.neighbourhoods import measure_local_areas, thin_points
         from damageest.geometry.poisson import make_grid, solve_coarse_to_fine
 
-        held = np.arange(len(points)) % HELD == 0
+        held = np.arange(len(points)) % HOLD_OUT == 0
         span = np.ptp(points, axis=0)
         least = float(np.prod(span * 1.1) / self.most_cells) ** (1 / 3)
         cell = self.cell or max(spacing, 2 * noise, least)
@@ -101,10 +101,10 @@ class Reconstructed(ReadPart):
 
 def _turn_outward(cloud: Floats, normals: Floats, voxel: float) -> Floats:
     """Normals turned out, by the finest voxels that close the points' shell."""
-    from damageest.stages.part._sides import turn_outward
+    from damageest.stages.part._turn_outward import turn_outward
 
     first: InputError | None = None
-    for factor in VOXELS:
+    for factor in VOXEL_FACTORS:
         try:
             return turn_outward(cloud, normals, factor * voxel)
         except InputError as fault:
@@ -136,10 +136,10 @@ def _note_openings(vertices: Floats, faces: Ints, points: Floats) -> tuple[str, 
     gap = far / np.asarray(tree.query(points[near], 8, workers=2)[0])[at, -1]
     place, size = middle[gap.argmax()], 2 * float(far[gap.argmax()])
     text = f"of about {size:.2g} across at ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g})"
-    if gap.max() > REFUSED:
-        share = 100 * float((gap > BRIDGED).mean())
+    if gap.max() > MAX_GAP:
+        share = 100 * float((gap > NOTED_GAP).mean())
         raise InputError(
             f"the specimen's scan has an opening {text}, {share:.1f} % of the surface would be invented; "
             "scan it there too"
         )
-    return (f"closed over openings of the specimen's scan, the widest {text}",) if gap.max() > BRIDGED else ()
+    return (f"closed over openings of the specimen's scan, the widest {text}",) if gap.max() > NOTED_GAP else ()

@@ -29,7 +29,7 @@ class RandomField:
         number = 2 * np.pi / wavelength * 2.0**band * rng.uniform(0.8, 1.25, len(band))
         return cls(direction * number[:, None], rng.uniform(0, 2 * np.pi, len(band)), heights)
 
-    def at(self, points: Floats) -> Floats:
+    def evaluate(self, points: Floats) -> Floats:
         """(N,) the field at points (N,3)."""
         total = np.zeros(len(points))
         for wave, phase, height in zip(self.waves, self.phases, self.heights, strict=True):

@@ -63,8 +63,8 @@ def apply_tools(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None,
     if fallen:
         share = 100 * sum(p.volume() for p in fallen) / part.volume
         notes.append(f"cut loose and counted as damage: {share:.2g} % of the part, in {len(fallen)} piece(s)")
-    damage = _drop_specks(Manifold.batch_boolean([*lost, *fallen], OpType.Add), origin, part.volume)
-    return _drop_specks(Manifold.compose(kept), origin, part.volume), damage, tuple(notes)
+    damage = _drop_dust(Manifold.batch_boolean([*lost, *fallen], OpType.Add), origin, part.volume)
+    return _drop_dust(Manifold.compose(kept), origin, part.volume), damage, tuple(notes)
 
 
 def _build_cut(tool: Tool, number: int, origin: Floats, diagonal: float) -> Any:
@@ -104,7 +104,7 @@ def _split_bodies(solid: Any) -> list[Any]:
     return [Manifold.compose(group) if len(group) > 1 else group[0] for group in owned]
 
 
-def _drop_specks(body: Any, origin: Floats, volume: float) -> Solid:
+def _drop_dust(body: Any, origin: Floats, volume: float) -> Solid:
     """A Solid without the specks that rounding leaves."""
     from manifold3d import Manifold
 
@@ -115,12 +115,12 @@ def _drop_specks(body: Any, origin: Floats, volume: float) -> Solid:
     return Solid(*to_arrays(body, origin))
 
 
-Thin = Callable[[Floats], Floats]
+Weigh = Callable[[Floats], Floats]
 """Points (N,3) to weights (N,): how likely each is kept, 0 for never."""
 
 
 def sample_seen(
-    mesh: Mesh, faces: NDArray[np.bool_], count: int, rng: np.random.Generator, thin: Thin | None, spare: float
+    mesh: Mesh, faces: NDArray[np.bool_], count: int, rng: np.random.Generator, thin: Weigh | None, spare: float
 ) -> Floats:
     """(count,3) random points on the triangles that ``faces`` (F,) admits, uniform by area or as ``thin`` weighs them.
 
@@ -128,14 +128,14 @@ def sample_seen(
     """
     area = np.linalg.norm(mesh.cross, axis=1) * faces
     if not area.any():
-        raise _nothing_seen()
+        raise _make_unseen_error()
     if thin is None:
-        return _sample_on(mesh, area, count, rng)
+        return _sample_faces(mesh, area, count, rng)
     drawn: list[Floats] = []
     keys: list[Floats] = []
     have, tried = 0, 0
     while have < spare * count:
-        points = _sample_on(mesh, area, int(spare * count), rng)
+        points = _sample_faces(mesh, area, int(spare * count), rng)
         weights = thin(points)
         seen = weights > 0
         drawn.append(points[seen])
@@ -143,19 +143,19 @@ def sample_seen(
         keys.append(rng.exponential(size=int(seen.sum())) / weights[seen])
         have, tried = have + int(seen.sum()), tried + 1
         if have < 1e-3 * tried * count:
-            raise _nothing_seen()
+            raise _make_unseen_error()
     key = np.concatenate(keys)
     chosen = np.argpartition(key, count - 1)[:count]
     return np.asarray(np.concatenate(drawn)[chosen])
 
 
-def _nothing_seen() -> StageError:
+def _make_unseen_error() -> StageError:
     return StageError(
         "the virtual scanner sees nothing of the part: 'unseen' covers all of it", remedy="narrow 'unseen'"
     )
 
 
-def _sample_on(mesh: Mesh, area: Floats, count: int, rng: np.random.Generator) -> Floats:
+def _sample_faces(mesh: Mesh, area: Floats, count: int, rng: np.random.Generator) -> Floats:
     """(count,3) points, uniform over triangles of the given areas (F,)."""
     total = np.cumsum(area)
     face = np.searchsorted(total, rng.random(count) * total[-1], side="right")

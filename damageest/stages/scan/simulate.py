@@ -15,7 +15,7 @@ from damageest.stages.scan.scanner import apply_tools, sample_seen
 from damageest.stages.scan.tools import AnyTool, Direction, RigidMatrix, Vector
 
 
-class Unseen(BaseModel):
+class UnseenRegion(BaseModel):
     """A part of the surface that the virtual scanner does not see."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -45,7 +45,7 @@ class Simulate(ReadScan):
     density: float = Field(
         0.0, ge=0, le=1.5, description="unevenness: standard deviation of the logarithm of the points' density; 0: even"
     )
-    unseen: tuple[Unseen, ...] = Field((), description="directions or half-spaces without points")
+    unseen: tuple[UnseenRegion, ...] = Field((), description="directions or half-spaces without points")
     pose: Literal["identity", "random"] | Annotated[RigidMatrix, Field(description="4x4, rigid")] = Field(
         "identity", description="of the part in the scanner's frame: identity, random, or a 4x4 matrix"
     )
@@ -86,7 +86,7 @@ class Simulate(ReadScan):
         field = _random_field.RandomField.build(diagonal / 2, 1, self.seed, waves=8)
 
         def thin(points: Floats) -> Floats:
-            weights = np.exp(self.density * field.at(points)) if self.density else np.ones(len(points))
+            weights = np.exp(self.density * field.evaluate(points)) if self.density else np.ones(len(points))
             for toward, height in planes:
                 weights[points @ toward > height] = 0
             return weights

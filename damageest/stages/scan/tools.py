@@ -88,7 +88,7 @@ class BoxTool(Tool):
 
             # each coordinate is moved by a field whose slope stays below 1, so that faces cannot cross
             def uneven(points: Floats) -> Floats:
-                return points + self.roughness * np.column_stack([field.at(points) for field in fields])
+                return points + self.roughness * np.column_stack([field.evaluate(points) for field in fields])
 
             block = block.warp_batch(uneven)
         return block.rotate(self.rotation).translate(tuple(self.centre - origin))
@@ -139,7 +139,9 @@ class PlaneTool(Tool):
         x, y = (a.ravel() for a in np.meshgrid(line, line, indexing="ij"))
         flat = np.column_stack([x, y, np.zeros_like(x)])
         height = (
-            self.roughness * _random_field.RandomField.build(grain, 3, self.seed).at(flat) if self.roughness else 0 * x
+            self.roughness * _random_field.RandomField.build(grain, 3, self.seed).evaluate(flat)
+            if self.roughness
+            else 0 * x
         )
         tip = (0.0, 0.0, 12 * far)
         number = np.arange(len(x)).reshape(cells + 1, cells + 1)
@@ -175,7 +177,7 @@ class BlobTool(Tool):
         # the radius is a function of the direction alone and stays positive, so the lump cannot cut itself
         def uneven(points: Floats) -> Floats:
             out = points / np.linalg.norm(points, axis=1, keepdims=True)
-            return np.asarray(out * (self.radius * np.maximum(1 + share * field.at(out), 0.2))[:, None])
+            return np.asarray(out * (self.radius * np.maximum(1 + share * field.evaluate(out), 0.2))[:, None])
 
         segments = max(96, _count_segments(self.radius, diagonal))
         return Manifold.sphere(1.0, segments).warp_batch(uneven).translate(tuple(self.centre - origin))

@@ -11,9 +11,9 @@ from damageest.artefacts import ADDED, DAMAGE, INTACT, Deviation, Part, Scan
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.distance_by_cells import signed_distance_by_cells
 from damageest.stages.segment import Segment
-from damageest.stages.segment._averaged import find_worn
+from damageest.stages.segment._wear import find_wear
 
-MANY = 100_000
+MAX_SINGLE = 100_000
 """Scan points beyond which not each of them is searched for."""
 
 
@@ -31,7 +31,7 @@ class MeshDistance(Segment):
     def run(self, aligned: Scan, part: Part, tolerance: float) -> Deviation:
         """Distance (N,), positive outside, in the job's unit; nearest triangle (N,); label (N,)."""
         limit = self.threshold * tolerance
-        if len(aligned.points) > max(MANY, 4 * len(part.faces)):
+        if len(aligned.points) > max(MAX_SINGLE, 4 * len(part.faces)):
             points, near = aligned.points, 0.5 * min(limit, tolerance)
             distance, face = signed_distance_by_cells(points, part, near, lambda some: signed_distance(some, part))
         else:
@@ -41,7 +41,7 @@ class MeshDistance(Segment):
         label[distance > limit] = ADDED
         notes: tuple[str, ...] = ()
         if self.wear:
-            found = find_worn(aligned, part, distance, face, limit)
+            found = find_wear(aligned, part, distance, face, limit)
             label[found.worn] = DAMAGE
             notes = found.notes
         return Deviation(distance=distance, face=face, label=label, notes=notes)

@@ -27,4 +27,4 @@ def damageest_writers() -> Mapping[str, Writer]:
     from damageest_cadquery._patch import step_patch
     from damageest_cadquery._step import step
 
-    return {"step": Writer(step, costly=True, patch=step_patch)}
+    return {"step": Writer(step, simplify=True, patch=step_patch)}

@@ -12,7 +12,7 @@ import numpy as np
 from damageest.artefacts import Floats, Solid
 from damageest.geometry.bodies import split_shells
 from damageest.geometry.units import MILLIMETRES
-from damageest.stages.export import Body, Written
+from damageest.stages.export import Body, ExportedFiles
 from damageest_cadquery._facets import FLAT, Facet, facets, welded
 
 UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
@@ -20,20 +20,20 @@ MOST = 100_000
 """Planar faces above which a STEP file is left out; 60,000 took 11 s to write, 22 s to read, and 67 MB."""
 
 
-def step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> Written:
+def step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> ExportedFiles:
     """A STEP file of one solid, faceted; left out, with a note, where it would have too many faces to be of use."""
     (body,) = solids
     parts = [[_planar(each) for each in (outer, *cavities)] for outer, cavities in split_shells(body.solid)]
     count = sum(len(shell[1]) for part in parts for shell in part)
     if count > MOST:
-        return Written(
+        return ExportedFiles(
             notes=(
                 f"{stem}.step was not written: {count} planar faces are more than the {MOST} that such a file "
                 "can usefully have; a larger  detail  gives fewer, or take 3mf",
             )
         )
     write_shape(folder / f"{stem}.step", _shape(parts, MILLIMETRES[unit]), body.name, unit)
-    return Written((f"{stem}.step",))
+    return ExportedFiles((f"{stem}.step",))
 
 
 def _planar(solid: Solid) -> tuple[Floats, list[Facet]]:

@@ -11,10 +11,10 @@ from manifold3d import Manifold
 from damageest.artefacts import Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays
-from damageest.stages.allowance._booleans import join, take_touching, tidy
-from damageest.stages.allowance._selectors import StockTarget, Wanted
+from damageest.stages.allowance._booleans import join, keep_touching, simplify_exactly
+from damageest.stages.allowance._selectors import StockPlan, StockTarget
 from damageest.stages.allowance._skin import clip, take_skin
-from damageest.stages.allowance._verify import Worked, check
+from damageest.stages.allowance._verify import DepositGeometry, check_deposit
 from tests.stages.allowance.shapes import TOLERANCE, block, part_of
 
 BITE = Manifold.cube((8, 6, 4)).translate((10, 7, 8))
@@ -25,10 +25,10 @@ TOP = StockTarget(facing={"direction": (0, 0, 1)}, outer=1.0)
 def checked(stock: Any, hole: Any = BITE, target: StockTarget = TOP) -> tuple[float, float, float] | None:
     """The thickness of the stock on the bite, checked against what is wanted on its top."""
     part = part_of(block())
-    wanted = Wanted(0.0, (target,), ())
-    skin = take_skin(Solid(*to_arrays(BITE)), part, wanted, np.zeros(3))
-    work = Worked(hole + stock, BITE, block() - BITE, Manifold(), skin, None, np.zeros(3))
-    return check(work, part, TOLERANCE, [])
+    plan = StockPlan(0.0, (target,), ())
+    skin = take_skin(Solid(*to_arrays(BITE)), part, plan, np.zeros(3))
+    work = DepositGeometry(hole + stock, BITE, block() - BITE, Manifold(), skin, None, np.zeros(3))
+    return check_deposit(work, part, TOLERANCE, [])
 
 
 def slab(height: float, low: float = 0.0) -> Any:
@@ -68,12 +68,12 @@ def test_stock_where_none_is_wanted_is_refused() -> None:
 
 def test_pieces_that_do_not_touch_are_dropped() -> None:
     apart = Manifold.cube((2, 2, 2)).translate((40, 0, 0))
-    kept = take_touching(slab(1.0) + apart, BITE, TOLERANCE)
+    kept = keep_touching(slab(1.0) + apart, BITE, TOLERANCE)
     assert kept.volume() == pytest.approx(48)
 
 
 def test_a_union_adds_up() -> None:
-    whole = tidy(join(BITE, slab(1.0, -0.01)), 30.0)
+    whole = simplify_exactly(join(BITE, slab(1.0, -0.01)), 30.0)
     assert whole.volume() == pytest.approx(8 * 6 * 5)
     assert whole.num_tri() == 12
 

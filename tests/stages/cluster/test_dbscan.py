@@ -109,7 +109,7 @@ def test_gathering_dense_points_keeps_the_clusters(monkeypatch: pytest.MonkeyPat
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(c, 0.5, (3000, 3)) for c in (0, 9)])
     whole = run_dbscan(points, 0.8, 10)
-    monkeypatch.setattr(_density, "PAIRS", 1000)
+    monkeypatch.setattr(_density, "MAX_PAIRS", 1000)
     gathered = run_dbscan(points, 0.8, 10)
     same = (whole >= 0) & (gathered >= 0)
     assert same.mean() > 0.99

@@ -12,7 +12,7 @@ import damageest
 from damageest.artefacts import Part
 from damageest.errors import InputError
 from damageest.evaluate.scores import iou
-from damageest.stages.part.reconstruct import Reconstructed
+from damageest.stages.part.reconstruct import PartFromScan
 from damageest.stages.scan.simulate import Simulate
 from tests.damaged_box import TRUE_VOLUME, box, scan
 
@@ -24,36 +24,36 @@ def specimen(folder: Path, points: int = 25_000, **options: object) -> Path:
 
 
 def test_the_box_comes_back_closed_and_says_what_it_is(tmp_path: Path) -> None:
-    part = Reconstructed(path=specimen(tmp_path)).run("mm")
+    part = PartFromScan(path=specimen(tmp_path)).run("mm")
     assert isinstance(part, Part)
     assert iou([part], [box()]) > 0.98
     assert 0.03 < part.tessellation_error < 0.3
     assert "25000 points" in part.notes[-1]
     assert "rounded" in part.notes[-1]
-    again = Reconstructed(path=tmp_path / "specimen.npy").run("mm")
+    again = PartFromScan(path=tmp_path / "specimen.npy").run("mm")
     assert again.vertices.tobytes() == part.vertices.tobytes()
 
 
 def test_an_opening_is_refused_with_its_place(tmp_path: Path) -> None:
     path = specimen(tmp_path, unseen=[{"direction": [0, 0, -1], "angle": 40}])
     with pytest.raises(InputError, match="opening"):
-        Reconstructed(path=path).run("mm")
+        PartFromScan(path=path).run("mm")
 
 
 def test_a_small_opening_is_closed_over_and_said(tmp_path: Path) -> None:
     path = specimen(tmp_path)
     points = np.load(path)
     np.save(path, points[np.linalg.norm(points - [5, 3, 10], axis=1) > 1.8])
-    part = Reconstructed(path=path).run("mm")
+    part = PartFromScan(path=path).run("mm")
     assert iou([part], [box()]) > 0.98
     assert "closed over openings" in part.notes[-1]
     np.save(path, points[np.linalg.norm(points - [5, 3, 10], axis=1) > 4])
     with pytest.raises(InputError, match="opening"):
-        Reconstructed(path=path).run("mm")
+        PartFromScan(path=path).run("mm")
 
 
 def test_uneven_density_is_no_opening(tmp_path: Path) -> None:
-    part = Reconstructed(path=specimen(tmp_path, 60_000, density=0.7)).run("mm")
+    part = PartFromScan(path=specimen(tmp_path, 60_000, density=0.7)).run("mm")
     assert iou([part], [box()]) > 0.98
     assert not [note for note in part.notes if "openings" in note]
 
@@ -63,14 +63,14 @@ def test_walls_thinner_than_the_scan_resolves_are_refused(tmp_path: Path) -> Non
     scanner = Simulate.model_validate({"points": 8000, "noise": 0.03})
     np.save(tmp_path / "sheet.npy", scanner.run("mm", Part(sheet.vertices, sheet.faces)).points)
     with pytest.raises(InputError, match="thinner than"):
-        Reconstructed(path=tmp_path / "sheet.npy").run("mm")
+        PartFromScan(path=tmp_path / "sheet.npy").run("mm")
 
 
 def test_too_few_points_and_too_fine_a_cell_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="too few"):
-        Reconstructed(path=specimen(tmp_path, 500)).run("mm")
+        PartFromScan(path=specimen(tmp_path, 500)).run("mm")
     with pytest.raises(InputError, match="most_cells"):
-        Reconstructed(path=specimen(tmp_path), cell=0.02).run("mm")
+        PartFromScan(path=specimen(tmp_path), cell=0.02).run("mm")
 
 
 def test_a_job_without_cad_finds_the_damage(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ Flags = NDArray[np.bool_]
 
 NEIGHBOURS = 48
 """Points averaged for the verdict on one."""
-FEWEST = 12
+MIN_NEIGHBOURS = 12
 """With fewer of them, there is no verdict."""
 REACH = 6.0
 """How far the neighbours may lie, in spacings of the scan: an even scan has twice as many as asked for there."""
@@ -28,18 +28,18 @@ SAME_FACE = 0.6
 """Neighbours' normals differ by less than this, as a vector; 35 degrees."""
 CUBE = 4.0
 """Edge of the cubes that are averaged first, in spacings: some thirteen points on a face."""
-BY_NOISE = 2.5
+NOISE_SHARE = 2.5
 """Standard deviations of the noise that a tolerance is meant to cover and a mean need not keep clear of. A tolerance of
 four leaves one and a half: half the depth of wear of three, so that its rim comes out where it is."""
-LEAST = 0.35
+MIN_THRESHOLD = 0.35
 """Least threshold in tolerances, whatever the noise: it keeps clear of the pose's error."""
-CLEAR = 2.0
+SAFETY = 2.0
 """How many times what deviates outward, where nothing is worn, wear has to deviate inward."""
 NOISE = 2.0
 """Standard deviations that are taken for noise where neighbours are looked for."""
-SELDOM = 4.0
+MIN_SIGMAS = 4.0
 """Standard deviations below which a cube's mean is not by chance: of a million cubes, at thirty."""
-REGION = 100
+MIN_REGION = 100
 """Points of a worn region at least."""
 
 
@@ -52,7 +52,7 @@ class Wear:
     notes: tuple[str, ...] = ()
 
 
-def find_worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: float) -> Wear:
+def find_wear(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: float) -> Wear:
     """Which points lie in a region whose averaged distance shows it worn.
 
     Args:
@@ -61,7 +61,7 @@ def find_worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance
     none = np.zeros(len(distance), bool)
     # Without those that the noise takes beyond the tolerance, the mean would be too shallow.
     some = np.flatnonzero(np.abs(distance) < tolerance + 3 * aligned.noise)
-    if not (aligned.noise and aligned.spacing) or len(some) < REGION:
+    if not (aligned.noise and aligned.spacing) or len(some) < MIN_REGION:
         return Wear(none, tolerance)
     points, depth = aligned.points[some], distance[some]
     cross = part.cross[face[some]]
@@ -72,9 +72,9 @@ def find_worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance
     points = points - np.clip(depth, -noise, noise)[:, None] * normals
 
     cube, group, mean, count = _average_cubes(points, normals, depth, CUBE * aligned.spacing)
-    left = _measure_remaining(mean[count >= FEWEST], count[count >= FEWEST], aligned.noise)
-    usual = max(tolerance - BY_NOISE * aligned.noise, LEAST * tolerance, 1.5 * part.tessellation_error)
-    threshold = max(usual, CLEAR * left)
+    left = _measure_remaining(mean[count >= MIN_NEIGHBOURS], count[count >= MIN_NEIGHBOURS], aligned.noise)
+    usual = max(tolerance - NOISE_SHARE * aligned.noise, MIN_THRESHOLD * tolerance, 1.5 * part.tessellation_error)
+    threshold = max(usual, SAFETY * left)
     notes: tuple[str, ...] = ()
     if threshold > usual:
         notes = (
@@ -84,14 +84,16 @@ def find_worn(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance
     if threshold >= tolerance:
         return Wear(none, threshold, notes)
 
-    low = (count >= FEWEST // 2) & (mean < -np.maximum(0.6 * threshold, SELDOM * aligned.noise / np.sqrt(count)))
+    low = (count >= MIN_NEIGHBOURS // 2) & (
+        mean < -np.maximum(0.6 * threshold, MIN_SIGMAS * aligned.noise / np.sqrt(count))
+    )
     if not low.any():
         return Wear(none, threshold, notes)
     far = _count_cubes_away(cube, low)[group]
     asked, around = np.flatnonzero(far < 1.9), np.flatnonzero(far < 3.6)
     average, number = _average_neighbours(points, normals, depth, asked, around, REACH * aligned.spacing)
     below = average < -np.maximum(threshold, 4 * aligned.noise / np.sqrt(number))
-    found = asked[below & (number >= FEWEST)]
+    found = asked[below & (number >= MIN_NEIGHBOURS)]
     result = none.copy()
     result[some[found[_is_in_region(points[found], 2 * aligned.spacing)]]] = True
     return Wear(result, threshold, notes)
@@ -148,11 +150,11 @@ def _is_in_region(points: Floats, link: float) -> Flags:
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    if len(points) < REGION:
+    if len(points) < MIN_REGION:
         return np.zeros(len(points), bool)
     cell, key = number_cubes(points, link)
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
     pairs = cKDTree(cell[first]).query_pairs(1.9, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     region = connected_components(links, directed=False)[1][group]
-    return np.asarray(np.bincount(region)[region] >= REGION)
+    return np.asarray(np.bincount(region)[region] >= MIN_REGION)

@@ -8,7 +8,7 @@ from damageest.artefacts import Floats
 from damageest.errors import InputError
 from damageest.geometry.poisson import Grid
 
-MOST_VOXELS = 60_000_000
+MAX_VOXELS = 60_000_000
 
 
 def turn_outward(points: Floats, normals: Floats, voxel: float) -> Floats:
@@ -23,10 +23,10 @@ def turn_outward(points: Floats, normals: Floats, voxel: float) -> Floats:
 
     low = points.min(axis=0) - 4 * voxel
     shape = np.ceil((points.max(axis=0) - low) / voxel).astype(np.int64) + 5
-    if np.prod(shape.astype(float)) > MOST_VOXELS:
+    if np.prod(shape.astype(float)) > MAX_VOXELS:
         raise InputError(
             f"the specimen would need {np.prod(shape.astype(float)):.3g} voxels of {voxel:.3g}, "
-            f"{MOST_VOXELS:.3g} at most; set part.cell larger"
+            f"{MAX_VOXELS:.3g} at most; set part.cell larger"
         )
     grid = Grid(low, voxel, (int(shape[0]), int(shape[1]), int(shape[2])))
     shell = np.zeros(grid.shape, bool)

@@ -15,7 +15,7 @@ from damageest.artefacts import DAMAGE, Floats, Part, Scan
 from damageest.evaluate.parts import PARTS
 from damageest.geometry.solids import to_arrays
 from damageest.stages.scan.simulate import Simulate
-from damageest.stages.segment._averaged import Wear, find_worn
+from damageest.stages.segment._wear import Wear, find_wear
 from damageest.stages.segment.mesh_distance import MeshDistance, signed_distance
 
 SIGMA = 0.02
@@ -42,7 +42,7 @@ def scanned(shift: float = 0.0, bend: float = 0.0) -> Floats:
 def found(points: Floats, tolerance: float = TOLERANCE) -> Wear:
     scan = Scan(points, noise=SIGMA, spacing=1.1 / np.sqrt(PER_AREA))
     distance, face = signed_distance(points, plate())
-    return find_worn(scan, plate(), distance, face, tolerance)
+    return find_wear(scan, plate(), distance, face, tolerance)
 
 
 def worn_patch(depth: float) -> tuple[Floats, np.ndarray]:
