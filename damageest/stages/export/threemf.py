@@ -1,7 +1,7 @@
-"""3MF: one file with all solids, named, coloured, with their unit.
+"""3MF: one file with all solids, with names, colours and unit.
 
-ExportedFiles here and not by lib3mf, which gives other bytes each time (random identifiers), keeps six decimals whatever the
-unit, and takes single precision only. What it and trimesh read of these files is tested.
+Written here, not with lib3mf: lib3mf gives other bytes each time (random identifiers), keeps six decimals in every unit
+and takes single precision only. The tests read these files with lib3mf and with trimesh.
 """
 
 from __future__ import annotations
