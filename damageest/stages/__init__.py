@@ -18,7 +18,6 @@ from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
 
-from damageest import artefacts
 from damageest.errors import PluginError
 
 Given = TypeVar("Given")
@@ -102,6 +101,8 @@ def _read_hints(cls: type[Stage]) -> Mapping[str, Any]:
     try:
         return typing.get_type_hints(run)
     except NameError:
+        from damageest import artefacts
+
         known = vars(artefacts) | vars(sys.modules[_find_contract(cls).__module__])
         return typing.get_type_hints(run, localns=known)
 
@@ -156,6 +157,8 @@ def _show(name: str, kind: Any) -> str:
 
 def _text(kind: Any) -> str:
     """A type as one writes it."""
+    from damageest import artefacts
+
     if kind == artefacts.Floats:
         return "Floats"
     if kind is type(None):
