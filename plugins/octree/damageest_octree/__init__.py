@@ -1,4 +1,4 @@
-"""The octree difference of part and scan: method `octree`, for comparison with the default route."""
+"""Method `octree`: the octree of the part minus the octree of the damaged part. For comparison with other methods."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from damageest.stages import Stage
 
 @hookimpl
 def damageest_stages() -> list[type[Stage]]:
-    """What this plugin provides."""
+    """The implementations of this plugin."""
     from damageest_octree.octree import Octree
 
     return [Octree]

@@ -1,4 +1,4 @@
-"""Octree of the part, octree of the damaged part, their difference: the damage as cells."""
+"""The octree of the part minus the octree of the damaged part: the damage in cells."""
 
 from __future__ import annotations
 
@@ -10,83 +10,91 @@ from pydantic import Field, model_validator
 from damageest.artefacts import Deviation, Enclosure, Enclosures, Part, Samples, Scan, Sites
 from damageest.errors import StageError
 from damageest.stages.enclose import EncloseAll
-from damageest_octree.sides import LEAK, Cube, Sides, divided
+from damageest_octree.classify import LEAK, Cube, NodeFlags, classify_nodes
 
 MARGIN = 8
-"""Cells of void on each side of the part: a closing of three cells, and the way round it for the flood."""
+"""Empty cells on each side of the part: room for a closing of three cells and for the flood round it."""
 LEAVES_PER_CELL_AREA = 3.0
-"""Finest nodes for each cell's area of skin, siblings included (2.3 to 2.9 measured)."""
+"""Finest nodes per cell area of skin, siblings included (2.3 to 2.9 measured)."""
 GIB = 2**30
 BYTES_PER_LEAF, BYTES_PER_CELL = 600, 80
-"""At the peak; 440 to 590 measured for a leaf of the octree, 73 for a cell of the grid round a loss."""
+"""Largest memory use; measured: 440 to 590 for a leaf of the octree, 73 for a cell of the grid round a loss."""
 REACHES = (0, 1, 2, 3)
+"""Cells by which the shell of damaged points is thickened, in the order in which they are tried."""
 FINEST = 1 / 3
-"""Of the points' spacing: seven cells, the widest closing, then bridge little more than twice the spacing, and gaps
-between random points are wider."""
-UNSEEN = 1e-3
-"""Share of the skin without points that is worth a note."""
+"""Smallest cell, in point spacings: the widest closing, seven cells, then bridges about twice the spacing. Gaps between
+random points are not always smaller."""
+NOTED_UNSEEN = 1e-3
+"""Share of the skin without points above which a note says so."""
 
 
 class Octree(EncloseAll):
-    """Octree difference of part and scan, after DUOADD (Perini et al.; paper, section 4.1). For comparison, and where
-    a volume to within a cell's depth will do. Cells on surfaces, and so memory, grow fourfold with each level."""
+    """Octree of the part minus octree of the damaged part, after DUOADD (Perini et al.; paper, section 4.1).
+
+    For comparison with other methods. The damage volume is right to about the depth of one cell. Each further level
+    takes four times the memory.
+    """
 
     method: ClassVar[str] = "octree"
 
     use: Literal["octree"] = "octree"
     depth: int | None = Field(
-        None, ge=5, le=16, description="levels over the cube round the part; default: from the cell"
+        None,
+        ge=5,
+        le=16,
+        description="levels of the octree over the cube round the part; default: as many as `cell` needs",
     )
     cell: float | None = Field(
-        None, gt=0, description="edge of a finest cell, in the job's unit; default: the tolerance, or the spacing of "
-        "the scan's points where that is larger, or what fits into the memory"
+        None, gt=0, description="edge of the finest cells, in the job's unit; default: the larger of tolerance and "
+        "point spacing, or more where these would not fit into `memory`"
     )  # fmt: skip
     memory: float = Field(
-        2.0, ge=0.01, le=64, description="GiB that the octree, and after it the grid round each loss, may take"
+        2.0, ge=0.01, le=64, description="GiB that the octree may take, and after it the grid round each loss"
     )
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Octree:
         if self.depth is not None and self.cell is not None:
-            raise ValueError("depth and cell say the same thing; give one of them")
+            raise ValueError("depth and cell both set the size of the cells; give one of them")
         return self
 
     def run(
         self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
     ) -> Enclosures:
-        """Raises StageError where the cells would not fit into memory, are finer than the scan, or none is gone."""
-        from damageest_octree.solid import box_cells, closed, losses
+        """Raises StageError where the cells do not fit into memory, are too fine for the scan, or none is lost."""
+        from damageest_octree.solid import close_loss, count_box_cells, find_losses
 
         if not sites.count:
             return Enclosures(())
-        cube, notes = self._cube(part, aligned, tolerance)
-        sides = _divided(cube, part, aligned, deviation, sites)
-        if sides.reach:
-            notes += (f"the points' shell was closed over {2 * sides.reach} cells of {cube.cell:.3g}",)
-        if sides.unseen > UNSEEN:
-            notes += (f"{sides.unseen:.1%} of the part's skin bears no points and was taken for sound",)
-        found = losses(cube, sides, aligned, sites)
-        largest = max((box_cells(sides, nodes) for nodes, _ in found), default=0)
+        cube, notes = self._choose_cube(part, aligned, tolerance)
+        flags = _classify_without_leak(cube, part, aligned, deviation, sites)
+        if flags.reach:
+            notes += (f"gaps between the scan points were closed up to {2 * flags.reach} cells of {cube.cell:.3g}",)
+        if flags.unseen > NOTED_UNSEEN:
+            notes += (f"{flags.unseen:.1%} of the part's skin has no scan points and was taken as intact",)
+        losses = find_losses(cube, flags, aligned, sites)
+        largest = max((count_box_cells(flags, nodes) for nodes, _ in losses), default=0)
         if largest * BYTES_PER_CELL > self.memory * GIB:
             fits = 1.1 * cube.cell * (largest * BYTES_PER_CELL / GIB / self.memory) ** (1 / 3)
             raise StageError(
-                f"the box round a loss takes {largest:,} cells of {cube.cell:.3g}, "
-                f"{largest * BYTES_PER_CELL / GIB:.1f} GiB; memory is {self.memory:g}",
-                f"enclose.cell: {fits:.3g}, or more enclose.memory",
+                f"the grid round a loss needs {largest:,} cells of {cube.cell:.3g}, "
+                f"{largest * BYTES_PER_CELL / GIB:.1f} GiB; enclose.memory is {self.memory:g}",
+                f"enclose.cell: {fits:.3g}, or a larger enclose.memory",
             )
-        solids = [(closed(cube, sides, nodes), members) for nodes, members in found]
+        solids = [(close_loss(cube, flags, nodes), members) for nodes, members in losses]
         items = [Enclosure(solid, members, notes) for solid, members in solids if solid is not None]
         if not items:
             raise StageError(
-                f"no cell of {cube.cell:.3g} of the part is gone: the losses are shallower than the cells",
+                f"no cell of {cube.cell:.3g} is lost: the damage is shallower than the cells",
                 "method: implicit, or a smaller enclose.cell",
             )
-        # A site of no enclosure goes with the first one, where it bounds no piece and so becomes a failure of its own.
-        left = set(range(1, sites.count + 1)) - {site for item in items for site in item.sites}
-        items[0] = Enclosure(items[0].solid, (*items[0].sites, *sorted(left)), items[0].notes)
+        # A site without an enclosure is named with the first one. No piece there touches its points, so that it is
+        # reported as failed.
+        missing = set(range(1, sites.count + 1)) - {site for item in items for site in item.sites}
+        items[0] = Enclosure(items[0].solid, (*items[0].sites, *sorted(missing)), items[0].notes)
         return Enclosures(tuple(items))
 
-    def _cube(self, part: Part, aligned: Scan, tolerance: float) -> tuple[Cube, tuple[str, ...]]:
+    def _choose_cube(self, part: Part, aligned: Scan, tolerance: float) -> tuple[Cube, tuple[str, ...]]:
         span = float(np.ptp(part.bounds, axis=0).max())
         if self.depth is not None:
             wanted = span / (2**self.depth - 2 * MARGIN)
@@ -94,49 +102,50 @@ class Octree(EncloseAll):
             wanted = self.cell or max(tolerance, aligned.spacing)
         if wanted < FINEST * aligned.spacing:
             raise StageError(
-                f"cells of {wanted:.3g} are too fine for points {aligned.spacing:.3g} apart: holes would be left",
-                f"{_options(span, aligned.spacing)}, or a denser scan",
+                f"cells of {wanted:.3g} are too fine for points {aligned.spacing:.3g} apart: holes would stay open",
+                f"{_suggest_options(span, aligned.spacing)}, or a denser scan",
             )
         per_leaf = LEAVES_PER_CELL_AREA * part.area * BYTES_PER_LEAF / GIB
         fits = max(float(np.sqrt(per_leaf / self.memory)), span / (2**20 - 2 * MARGIN))
         if wanted >= fits:
-            return _around(part, wanted), ()
+            return _make_cube(part, wanted), ()
         if self.cell or self.depth:
             raise StageError(
-                f"cells of {wanted:.3g} take {per_leaf / wanted**2:.2g} GiB; memory is {self.memory:g}",
-                f"{_options(span, max(fits, aligned.spacing))}, or more enclose.memory",
+                f"cells of {wanted:.3g} need {per_leaf / wanted**2:.2g} GiB; enclose.memory is {self.memory:g}",
+                f"{_suggest_options(span, max(fits, aligned.spacing))}, or a larger enclose.memory",
             )
-        return _around(part, fits), (f"cells of {fits:.3g} instead of {wanted:.3g}, so as to fit into memory",)
+        return _make_cube(part, fits), (f"cells of {fits:.3g} instead of {wanted:.3g}, to fit into enclose.memory",)
 
 
-def _divided(cube: Cube, part: Part, aligned: Scan, deviation: Deviation, sites: Sites) -> Sides:
-    """With the least closing that keeps the flood out of the sound part."""
-    from damageest_octree.tree import touched
+def _classify_without_leak(cube: Cube, part: Part, aligned: Scan, deviation: Deviation, sites: Sites) -> NodeFlags:
+    """The flags with the smallest closing that keeps the flood out of the intact part. Raises StageError where even the
+    largest does not."""
+    from damageest_octree.tree import find_touched_cells
 
-    skin = touched((part.triangles - cube.origin) / cube.cell, cube.depth)
+    skin = find_touched_cells((part.triangles - cube.origin) / cube.cell, cube.depth)
     leak = 0.0
     for reach in REACHES:
-        sides = divided(cube, skin, part, aligned, deviation, sites, reach)
-        leak = sides.leak
+        flags = classify_nodes(cube, skin, part, aligned, deviation, sites, reach)
+        leak = flags.leak
         if leak <= LEAK:
-            return sides
+            return flags
     raise StageError(
-        f"cells of {cube.cell:.3g} leave holes between points {aligned.spacing:.3g} apart: outside leaks into "
-        f"{leak:.0%} of the sound part, even closed over {2 * REACHES[-1]} cells",
+        f"cells of {cube.cell:.3g} leave holes between points {aligned.spacing:.3g} apart: {leak:.0%} of the intact "
+        f"part counts as outside, even with gaps closed up to {2 * REACHES[-1]} cells",
         f"enclose.cell: {max(1.5 * cube.cell, 1.01 * aligned.spacing):.3g}, or a denser scan",
     )
 
 
-def _options(span: float, cell: float) -> str:
-    """Values of both options that make cells of at least this size."""
+def _suggest_options(span: float, cell: float) -> str:
+    """A remedy: values of both options that make cells of at least this size."""
     levels = int(np.log2(span / cell + 2 * MARGIN))
     return f"enclose.cell: {1.01 * cell:.3g}" + (f", enclose.depth: {levels}" if levels > 4 else "")
 
 
-def _around(part: Part, cell: float) -> Cube:
-    """The cube round the part, with MARGIN cells on each side; its depth follows."""
+def _make_cube(part: Part, cell: float) -> Cube:
+    """The cube round the part with cells of this edge, and MARGIN cells on each side of the part."""
     span = float(np.ptp(part.bounds, axis=0).max())
     depth = int(np.ceil(np.log2(span / cell + 2 * MARGIN - 1e-9)))
     origin = part.bounds.mean(axis=0) - cell * 2**depth / 2
-    # Cells in step with a plane of the part would let rounding choose its side.
+    # Shifted: where cell faces lie in a plane of the part, rounding would choose the side.
     return Cube(origin + cell * np.array([0.317, 0.413, 0.271]), cell, depth)

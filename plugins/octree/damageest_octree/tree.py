@@ -1,4 +1,4 @@
-"""A linear octree: all nodes of a cube as sorted Morton codes, and the cells that a surface touches."""
+"""A linear octree: the nodes of a cube as sorted Morton codes; and the cells that a surface touches."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ SPREAD = (
 )
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.int64)
 CHUNK = 20_000
-"""Triangles tested at a time, about 60 MiB."""
+"""Triangles tested at a time; they take about 60 MiB."""
 
 
 def encode(cells: Ints) -> Codes:
-    """Morton codes (N,) of cells (N,3), whose coordinates need at most 21 bits."""
+    """Morton codes (N,) of cells (N,3), whose coordinates have at most 21 bits."""
     code = np.zeros(len(cells), np.uint64)
     for axis in range(3):
         x = cells[:, axis].astype(np.uint64)
@@ -57,40 +57,41 @@ class Tree:
     size: Ints
 
     def locate(self, cells: Ints) -> Ints:
-        """The node (N,) that holds each of the cells (N,3); cells beyond the cube count as the nearest in it."""
+        """The node (N,) that contains each of the cells (N,3); a cell outside the cube counts as the nearest inside."""
         code = encode(np.clip(cells, 0, (1 << self.depth) - 1))
         return np.searchsorted(self.start, code, side="right") - 1
 
-    def links(self) -> Ints:
-        """(M,2) nodes that share a face, each pair at least once. The smaller of two finds the larger."""
+    def pair_neighbours(self) -> Ints:
+        """(M,2) pairs of nodes that share a face, each pair at least once."""
         nodes = np.arange(len(self.start))
-        found = []
+        pairs = []
         for axis in range(3):
+            # The smaller node of a pair always finds the larger one.
             for step in (np.full(len(nodes), -1), self.size):
                 beside = self.low.copy()
                 beside[:, axis] += step
                 inside = (beside[:, axis] >= 0) & (beside[:, axis] < 1 << self.depth)
-                found.append(np.stack([nodes[inside], self.locate(beside[inside])], axis=1))
-        return np.concatenate(found)
+                pairs.append(np.stack([nodes[inside], self.locate(beside[inside])], axis=1))
+        return np.concatenate(pairs)
 
 
-def plant(leaves: Codes, depth: int) -> Tree:
-    """The octree whose finest nodes are the leaves (N,) and their siblings; the rest of the cube in coarser ones."""
-    here = np.unique(leaves)
-    starts, sizes = [here], [np.ones(len(here), np.int64)]
+def build_tree(leaves: Codes, depth: int) -> Tree:
+    """The octree whose finest nodes are the leaves (N,) and their siblings; coarser nodes fill the rest of the cube."""
+    current = np.unique(leaves)
+    starts, sizes = [current], [np.ones(len(current), np.int64)]
     for level in range(depth):
-        above = np.unique(here >> np.uint64(3))
-        children = ((above << np.uint64(3))[:, None] | np.arange(8, dtype=np.uint64)).ravel()
-        empty = children[~np.isin(children, here, assume_unique=True)]
+        parents = np.unique(current >> np.uint64(3))
+        children = ((parents << np.uint64(3))[:, None] | np.arange(8, dtype=np.uint64)).ravel()
+        empty = children[~np.isin(children, current, assume_unique=True)]
         starts.append(empty << np.uint64(3 * level))
         sizes.append(np.full(len(empty), 1 << level))
-        here = above
+        current = parents
     start, size = np.concatenate(starts), np.concatenate(sizes)
     order = np.argsort(start)
     return Tree(depth, start[order], decode(start[order]), size[order])
 
 
-def dilated(cells: Ints, reach: int) -> Ints:
+def dilate(cells: Ints, reach: int) -> Ints:
     """The cells (N,3) and all within ``reach`` of them along each axis."""
     for axis in range(3):
         steps = np.zeros((2 * reach + 1, 3), np.int64)
@@ -100,9 +101,11 @@ def dilated(cells: Ints, reach: int) -> Ints:
     return cells
 
 
-def touched(triangles: Floats, depth: int) -> Ints:
-    """The cells (N,3) that triangles (F,3,3), in cells, touch: descended level by level with the separating-axis test
-    of a triangle and a box (Akenine-Moller 2001)."""
+def find_touched_cells(triangles: Floats, depth: int) -> Ints:
+    """The cells (N,3) that triangles (F,3,3) touch; the triangles are given in units of cells.
+
+    Descends level by level, with the separating-axis test of a triangle and a box (Akenine-Moller 2001).
+    """
     which, low = np.arange(len(triangles)), np.zeros((len(triangles), 3), np.int64)
     for level in range(depth, 0, -1):
         half = 0.5 * (1 << (level - 1))
@@ -111,15 +114,15 @@ def touched(triangles: Floats, depth: int) -> Ints:
             mine = np.repeat(which[begin : begin + CHUNK], 8)
             cells = (2 * low[begin : begin + CHUNK, None] + CORNERS).reshape(-1, 3)
             centres = np.asarray((cells + 0.5) * (2 * half), np.float64)
-            meets = _meets(triangles[mine], centres, half * (1 + 1e-9))
-            pieces.append((mine[meets], cells[meets]))
+            is_hit = _intersects(triangles[mine], centres, half * (1 + 1e-9))
+            pieces.append((mine[is_hit], cells[is_hit]))
         which = np.concatenate([piece[0] for piece in pieces])
         low = np.concatenate([piece[1] for piece in pieces])
     return decode(np.unique(encode(low)))
 
 
-def _meets(triangles: Floats, centres: Floats, half: float) -> NDArray[np.bool_]:
-    """Whether each triangle (N,3,3) meets the cube (N,3) of half the edge ``half``."""
+def _intersects(triangles: Floats, centres: Floats, half: float) -> NDArray[np.bool_]:
+    """(N,) whether each triangle (N,3,3) intersects its cube, of edge 2 ``half`` about ``centres`` (N,3)."""
     corners = triangles - centres[:, None]
     out = (corners.min(axis=1) <= half).all(axis=1) & (corners.max(axis=1) >= -half).all(axis=1)
     near = np.flatnonzero(out)

@@ -1,4 +1,4 @@
-"""The octree difference of part and scan: on losses of known truth, and at the limits of its cells."""
+"""The octree difference of part and scan: on damage of known truth, and at the limits of its cells."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ CELL = 0.32
 
 
 @lru_cache
-def enclosed(name: str, **options: Any) -> Enclosures:
+def enclose(name: str, **options: Any) -> Enclosures:
     return Octree(**options).run(**scene(name).inputs())
 
 
-def lost(case: Scene, enclosures: Enclosures) -> Solid:
+def intersect(case: Scene, enclosures: Enclosures) -> Solid:
     damage = to_solid(to_manifold(case.part) ^ unite(item.solid for item in enclosures.items))
     assert damage is not None
     return damage
 
 
-def advised(error: StageError, option: str) -> float:
+def read_advice(error: StageError, option: str) -> float:
     found = re.search(rf"enclose\.{option}: (\d+(\.\d+)?)", error.remedy)
     assert found, error.remedy
     return float(found[1])
@@ -49,26 +49,26 @@ def advised(error: StageError, option: str) -> float:
 )  # fmt: skip
 def test_the_part_inside_it_is_the_damage(name: str, least: float) -> None:
     case = scene(name)
-    damage = lost(case, enclosed(name))
+    damage = intersect(case, enclose(name))
     assert iou(damage, case.truth) > least
-    sound = case.aligned.points[(case.deviation.label == INTACT) & (case.sites.label == 0)]
-    depth = -np.ravel(igl.signed_distance(np.array(sound), np.array(damage.vertices), np.array(damage.faces))[0])
-    assert (depth > CELL).sum() <= 1e-3 * len(sound)
+    intact = case.aligned.points[(case.deviation.label == INTACT) & (case.sites.label == 0)]
+    depth = -np.ravel(igl.signed_distance(np.array(intact), np.array(damage.vertices), np.array(damage.faces))[0])
+    assert (depth > CELL).sum() <= 1e-3 * len(intact)
 
 
 def test_every_site_is_in_an_enclosure_and_enclosures_are_disjoint() -> None:
-    case, enclosures = scene("two"), enclosed("two")
+    case, enclosures = scene("two"), enclose("two")
     assert sorted(k for item in enclosures.items for k in item.sites) == list(range(1, case.sites.count + 1))
     first, second = (to_manifold(item.solid) for item in enclosures.items)
     assert (first ^ second).volume() == pytest.approx(0, abs=1e-6)
 
 
 def test_the_void_outside_the_part_is_only_taken_near_the_loss() -> None:
-    (item,), truth = enclosed("pit").items, scene("pit").truth
+    (item,), truth = enclose("pit").items, scene("pit").truth
     assert np.abs(item.solid.bounds - truth.bounds).max() < 6 * CELL
 
 
-def test_the_route_gives_the_half_ball_that_is_gone(tmp_path: Path) -> None:
+def test_the_route_gives_the_lost_half_ball(tmp_path: Path) -> None:
     result = damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "method: octree\n"))
     (site,) = result.sites
     assert site.damage.volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.08)
@@ -77,41 +77,41 @@ def test_the_route_gives_the_half_ball_that_is_gone(tmp_path: Path) -> None:
 
 def test_coarser_cells_give_a_coarser_volume() -> None:
     case = scene("end")
-    fine, middle, coarse = (iou(lost(case, enclosed("end", cell=cell)), case.truth) for cell in (CELL, 0.8, 1.6))
+    fine, middle, coarse = (iou(intersect(case, enclose("end", cell=cell)), case.truth) for cell in (CELL, 0.8, 1.6))
     assert fine > middle > coarse > 0.9
 
 
-def test_depth_is_another_word_for_the_cell() -> None:
-    by_depth, by_cell = enclosed("pit", depth=6), enclosed("pit", cell=30 / (2**6 - 16))
+def test_depth_sets_the_cell_too() -> None:
+    by_depth, by_cell = enclose("pit", depth=6), enclose("pit", cell=30 / (2**6 - 16))
     assert by_depth.items[0].solid.vertices.tobytes() == by_cell.items[0].solid.vertices.tobytes()
-    assert by_depth.items[0].solid.vertices.tobytes() != enclosed("pit").items[0].solid.vertices.tobytes()
+    assert by_depth.items[0].solid.vertices.tobytes() != enclose("pit").items[0].solid.vertices.tobytes()
     with pytest.raises(ValueError, match="give one of them"):
         Octree(depth=6, cell=1)
 
 
-def test_cells_that_do_not_fit_into_memory_are_refused_with_those_that_do() -> None:
+def test_cells_that_do_not_fit_into_memory_are_refused_and_those_that_fit_are_named() -> None:
     inputs = scene("pit").inputs()
-    with pytest.raises(StageError, match=r"take .* GiB; memory is 0\.02") as caught:
+    with pytest.raises(StageError, match=r"need .* GiB; enclose.memory is 0\.02") as caught:
         Octree(cell=0.3, memory=0.02).run(**inputs)
-    cell, depth = advised(caught.value, "cell"), int(advised(caught.value, "depth"))
+    cell, depth = read_advice(caught.value, "cell"), int(read_advice(caught.value, "depth"))
     assert cell > 0.4
     assert Octree(cell=cell, memory=0.02).run(**inputs).items
     assert Octree(depth=depth, memory=0.02).run(**inputs).items
 
 
-def test_the_default_cell_gives_way_to_the_memory_and_says_so() -> None:
+def test_the_default_cell_grows_to_fit_into_memory_and_a_note_says_so() -> None:
     case = scene("end")
     enclosures = Octree(memory=0.02).run(**case.inputs())
     assert "instead of 0.32" in enclosures.items[0].notes[0]
-    assert iou(lost(case, enclosures), case.truth) > 0.95
+    assert iou(intersect(case, enclosures), case.truth) > 0.95
 
 
-def test_a_box_round_a_loss_that_does_not_fit_into_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_grid_round_a_loss_that_does_not_fit_into_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     inputs = scene("end").inputs()
     monkeypatch.setattr(octree, "BYTES_PER_CELL", 20_000)
-    with pytest.raises(StageError, match=r"the box round a loss takes .* memory is 2") as caught:
+    with pytest.raises(StageError, match=r"the grid round a loss needs .* enclose.memory is 2") as caught:
         Octree().run(**inputs)
-    assert Octree(cell=advised(caught.value, "cell")).run(**inputs).items
+    assert Octree(cell=read_advice(caught.value, "cell")).run(**inputs).items
 
 
 @pytest.mark.parametrize("options", [{"cell": 0.05}, {"depth": 12}, {"cell": 0.13}])
@@ -119,11 +119,11 @@ def test_cells_finer_than_the_scan_are_refused(options: dict[str, Any]) -> None:
     case = scene("pit")
     with pytest.raises(StageError, match=r"points 0\.32 apart") as caught:
         Octree(**options).run(**case.inputs())
-    again = Octree(cell=advised(caught.value, "cell")).run(**case.inputs())
-    assert iou(lost(case, again), case.truth) > 0.9
+    again = Octree(cell=read_advice(caught.value, "cell")).run(**case.inputs())
+    assert iou(intersect(case, again), case.truth) > 0.9
 
 
-def test_losses_shallower_than_the_cells_are_refused() -> None:
+def test_damage_shallower_than_the_cells_is_refused() -> None:
     with pytest.raises(StageError, match="shallower than the cells") as caught:
         Octree(cell=3).run(**scene("pit").inputs())
     assert "method: implicit" in caught.value.remedy
@@ -133,13 +133,13 @@ def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
     case = scene("pit")
     partial = case.without(np.linalg.norm(case.aligned.points - [26, 3, 12], axis=1) < 3)
     enclosures = Octree().run(**partial.inputs())
-    assert iou(lost(partial, enclosures), case.truth) > 0.92
-    assert any("bears no points" in note for note in enclosures.items[0].notes)
-    assert enclosed("pit").items[0].notes == ("the points' shell was closed over 2 cells of 0.32",)
+    assert iou(intersect(partial, enclosures), case.truth) > 0.92
+    assert any("has no scan points" in note for note in enclosures.items[0].notes)
+    assert enclose("pit").items[0].notes == ("gaps between the scan points were closed up to 2 cells of 0.32",)
 
 
 def test_the_same_input_gives_the_same_bytes() -> None:
-    first, again = enclosed("two"), Octree().run(**scene("two").inputs())
+    first, again = enclose("two"), Octree().run(**scene("two").inputs())
     for one, other in zip(first.items, again.items, strict=True):
         assert one.solid.vertices.tobytes() == other.solid.vertices.tobytes()
         assert one.solid.faces.tobytes() == other.solid.faces.tobytes()
@@ -155,7 +155,7 @@ def test_far_from_the_origin_the_damage_is_the_same() -> None:
     }
     solid = Octree().run(**moved).items[0].solid
     back = Solid(solid.vertices - shift, solid.faces)
-    assert iou(back, enclosed("pit").items[0].solid) > 0.995
+    assert iou(back, enclose("pit").items[0].solid) > 0.995
 
 
 def test_no_site_no_enclosure() -> None:

@@ -1,4 +1,4 @@
-"""Shallow damage enclosed by a sweep. An example of a plugin, complete and small enough to copy."""
+"""Shallow damage enclosed by a sweep: a complete plugin, small enough to start your own from."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from damageest.stages import Stage
 
 @hookimpl
 def damageest_stages() -> list[type[Stage]]:
-    """What this plugin provides."""
+    """The implementations of this plugin."""
     from damageest_sweep.sweep import Sweep
 
     return [Sweep]

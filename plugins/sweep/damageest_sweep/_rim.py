@@ -1,4 +1,4 @@
-"""The rim of a damage surface: gaps inside it filled, the surface carried on beyond it, its outline checked."""
+"""The rim of a damage surface: fill the gaps inside it, extend the surface beyond it, check its outline."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh
 
 
-def filled(mesh: Mesh, rim: Ints) -> Mesh:
-    """The mesh with every gap closed but the one that ``rim`` (N,) runs round: a star from the middle of its edge."""
+def fill_gaps(mesh: Mesh, rim: Ints) -> Mesh:
+    """The mesh with every boundary loop closed except ``rim`` (N,): by a fan from the mean of the loop's nodes."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -29,46 +29,47 @@ def filled(mesh: Mesh, rim: Ints) -> Mesh:
     return Mesh(np.concatenate([mesh.vertices, middle]), np.concatenate([mesh.faces, star]))
 
 
-def carried_on(mesh: Mesh, rim: Ints, way: Floats, by: float, steepest: float) -> tuple[Mesh, Ints]:
-    """The mesh with a strip of width ``by`` along its rim (N,), and the new rim (N,).
+def extend_rim(mesh: Mesh, rim: Ints, direction: Floats, width: float, steepest: float) -> tuple[Mesh, Ints]:
+    """The mesh with a strip of ``width`` along its rim (N,), and the new rim (N,).
 
-    Damage is known from where it is a tolerance deep, so its surface ends below the skin. The strip goes on outward at
-    the slope that the surface has there, ``steepest`` degrees at most; directions and slopes are averaged along the rim
-    over the strip's width, so that the reconstruction's saw teeth do not fold it.
+    A damage surface ends about a tolerance below the skin, because only deeper points count as damage. The strip
+    continues it outward at the slope that it has at its rim, at most ``steepest`` degrees from the plane across
+    ``direction`` (3,). Directions and slopes are averaged along the rim over the width of the strip, because the rim of
+    a reconstruction is jagged and the strip would fold.
     """
     from scipy.ndimage import gaussian_filter1d
 
-    if by == 0:
+    if width == 0:
         return mesh, rim
     at = mesh.vertices[rim]
     step = float(np.median(np.linalg.norm(np.roll(at, -1, axis=0) - at, axis=1)))
-    nodes = float(np.clip(by / max(step, 1e-300), 1, len(rim) / 12))
+    nodes = float(np.clip(width / max(step, 1e-300), 1, len(rim) / 12))
 
-    def smooth(values: Floats) -> Floats:
+    def smooth_along_rim(values: Floats) -> Floats:
         return np.asarray(gaussian_filter1d(values, nodes, axis=0, mode="wrap"))
 
-    line = smooth(at)
-    out = np.cross(np.roll(line, -1, axis=0) - np.roll(line, 1, axis=0), way)
+    line = smooth_along_rim(at)
+    out = np.cross(np.roll(line, -1, axis=0) - np.roll(line, 1, axis=0), direction)
     out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
-    slope = smooth(mesh.vertex_cross[rim])
-    angle = np.arctan2(-np.einsum("ij,ij->i", slope, out), np.maximum(slope @ way, 1e-300))
+    slope = smooth_along_rim(mesh.vertex_cross[rim])
+    angle = np.arctan2(-np.einsum("ij,ij->i", slope, out), np.maximum(slope @ direction, 1e-300))
     angle = np.clip(angle, *np.deg2rad([-steepest, steepest]))[:, None]
-    far = at + by * (np.cos(angle) * out + np.sin(angle) * way)
+    far = at + width * (np.cos(angle) * out + np.sin(angle) * direction)
     new = np.arange(len(rim)) + len(mesh.vertices)
     after, new_after = np.roll(rim, -1), np.roll(new, -1)
     strip = [np.stack([after, rim, new], axis=1), np.stack([after, new, new_after], axis=1)]
     return Mesh(np.concatenate([mesh.vertices, far]), np.concatenate([mesh.faces, *strip])), new
 
 
-def overlap(loop: Floats, way: Floats) -> float:
-    """Share of the area within a loop (N,3), seen along ``way`` (3,), that it runs round more than once."""
+def measure_overlap(loop: Floats, direction: Floats) -> float:
+    """Share of the area inside a closed loop (N,3), seen along ``direction`` (3,), that it encircles more than once."""
     from manifold3d import CrossSection, FillRule
 
-    across = np.linalg.svd(way[None])[2][1:]
+    across = np.linalg.svd(direction[None])[2][1:]
     flat = (loop - loop.mean(axis=0)) @ across.T
     x, y = flat.T
-    turned = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) / 2
-    if turned < 0:  # the two axes across the way may be left-handed
-        flat, turned = flat[::-1], -turned
+    enclosed = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) / 2
+    if enclosed < 0:  # the two axes across the direction may be left-handed
+        flat, enclosed = flat[::-1], -enclosed
     covered = CrossSection([np.ascontiguousarray(flat)], FillRule.Positive).area()
-    return float(1 - covered / turned)
+    return float(1 - covered / enclosed)

@@ -1,4 +1,4 @@
-"""Shallow damage, enclosed by sweeping its surface out of the part."""
+"""Shallow damage enclosed by a sweep: its surface is moved out of the part."""
 
 from __future__ import annotations
 
@@ -12,54 +12,61 @@ from damageest.errors import StageError
 from damageest.geometry.distance import is_inside
 from damageest.stages.enclose import Enclose
 
-INSTEAD = "enclose: adaptive, or method: implicit"
-FLAW = 0.02
-"""Share, of area or of points, up to which something is taken for a flaw of the scan and not for the damage's shape."""
+REMEDY = "enclose: adaptive, or method: implicit"
+MOST_FLAWED = 0.02
+"""Share, of area or of points, up to which a check may fail: so much is a flaw of the scan, not the damage's shape."""
 
 
 class Sweep(Enclose):
-    """Sweeps the damage surface along its mean normal until it is clear of the part. For wear and shallow dents:
-    nothing is searched or refined, so it is fast; undercuts, deep pits and damage with several rims are refused."""
+    """Sweeps the damage surface along its mean normal until it is outside the part. Fast.
 
-    refines: ClassVar[bool] = True  # It takes no background at all, so a coarse one will do.
+    For wear and shallow dents. Undercuts, steep walls, deep pits and damage with several rims are refused.
+    """
+
+    refines: ClassVar[bool] = True  # A sweep uses no background, so a coarse one is enough.
 
     use: Literal["sweep"] = "sweep"
     overhang: float = Field(
-        3.0, ge=0, le=20, description="how far the rim is carried on along the surface, in tolerances"
+        3.0, ge=0, le=20, description="how far the surface is extended beyond its rim, in tolerances"
     )
     steepest: float = Field(
-        80.0, gt=0, lt=90, description="largest angle between the surface's normal and the sweep, in degrees"
+        80.0, gt=0, lt=90, description="largest angle between the normal of the surface and the sweep, in degrees"
     )
 
     def run(self, surface: Surface, rims: Rims, part: Part, intact: Floats, points: Floats, tolerance: float) -> Mesh:
-        """Raises StageError where a sweep cannot stand for the damage, and says which way can."""
-        from damageest_sweep._rim import carried_on, filled, overlap
+        """Raises StageError where a sweep cannot represent the damage; the remedy names a stage that can."""
+        from damageest_sweep._rim import extend_rim, fill_gaps, measure_overlap
 
         if len(rims.loops) != 1:
+            raise StageError(f"the damage surface has {len(rims.loops)} rims; a sweep can close only one", REMEDY)
+        faces, rim, direction = orient_to_skin(surface, rims.loops[0], part)
+        wide = fill_gaps(Mesh(surface.vertices, faces), rim)
+        if (share := measure_steep_share(wide, direction, self.steepest)) > MOST_FLAWED:
             raise StageError(
-                f"the damage surface meets the skin in {len(rims.loops)} rims, a sweep closes one", INSTEAD
+                f"{share:.0%} of the damage surface is steeper than {self.steepest:g} degrees to the sweep", REMEDY
             )
-        faces, rim, way = toward_skin(surface, rims.loops[0], part)
-        wide = filled(Mesh(surface.vertices, faces), rim)
-        if (share := steep(wide, way, self.steepest)) > FLAW:
-            raise StageError(
-                f"{share:.0%} of the damage surface is steeper than {self.steepest:g} degrees to the sweep", INSTEAD
-            )
-        wide, rim = carried_on(wide, rim, way, self.overhang * tolerance, self.steepest)
-        if (share := max(steep(wide, way, 90), overlap(wide.vertices[rim], way))) > FLAW:
-            raise StageError(f"{share:.0%} of the damage surface folds over itself when it is swept", INSTEAD)
-        mesh = swept(wide, rim, way * clear(wide.vertices, way, part, 2 * tolerance))
+        wide, rim = extend_rim(wide, rim, direction, self.overhang * tolerance, self.steepest)
+        if (
+            share := max(measure_steep_share(wide, direction, 90), measure_overlap(wide.vertices[rim], direction))
+        ) > MOST_FLAWED:
+            raise StageError(f"{share:.0%} of the damage surface overlaps itself along the sweep", REMEDY)
+        mesh = sweep_surface(wide, rim, direction * find_clear_distance(wide.vertices, direction, part, 2 * tolerance))
         if loose := open_edges(mesh.faces):
-            raise StageError(f"the damage surface is torn: {loose} edges of the sweep stay open", INSTEAD)
+            raise StageError(
+                f"the sweep is not watertight: {loose} of its edges are open, because the damage surface is torn",
+                REMEDY,
+            )
         beside = np.concatenate([surface.vertices, mesh.vertices[rim]])
-        if (count := held(mesh, intact, beside, (self.overhang + 1) * tolerance)) > FLAW * len(points):
-            raise StageError(f"the sweep holds {count} sound points of the scan", INSTEAD)
+        if (count := count_points_inside(mesh, intact, beside, (self.overhang + 1) * tolerance)) > MOST_FLAWED * len(
+            points
+        ):
+            raise StageError(f"{count} intact scan points lie inside the sweep", REMEDY)
         return mesh
 
 
-def toward_skin(surface: Surface, rim: Ints, part: Part) -> tuple[Ints, Ints, Floats]:
-    """Faces (F,3) and rim (N,), both turned so that the normals point to the nearest skin, beyond which a shallow loss
-    lies; and the mean normal (3,), of unit length.
+def orient_to_skin(surface: Surface, rim: Ints, part: Part) -> tuple[Ints, Ints, Floats]:
+    """Faces (F,3) and rim (N,), both oriented so that the normals point to the nearest skin; and their mean (3,) as a
+    unit vector.
 
     Raises StageError where the normals cancel out.
     """
@@ -70,46 +77,50 @@ def toward_skin(surface: Surface, rim: Ints, part: Part) -> tuple[Ints, Ints, Fl
     sign = 1 if np.einsum("ij,ij->", surface.cross, outward) > 0 else -1
     mean = sign * surface.cross.sum(axis=0)
     if not np.linalg.norm(mean) > 0.1 * 2 * surface.area:
-        raise StageError("the damage surface faces every way, so that there is none to sweep it", INSTEAD)
+        raise StageError(
+            "the normals of the damage surface cancel out, so that it has no direction to be swept along", REMEDY
+        )
     return surface.faces[:, ::sign], rim[::sign], mean / np.linalg.norm(mean)
 
 
-def steep(mesh: Mesh, way: Floats, limit: float) -> float:
-    """Share of a mesh's area that is turned from ``way`` (3,) by more than ``limit`` degrees."""
+def measure_steep_share(mesh: Mesh, direction: Floats, limit: float) -> float:
+    """Share of a mesh's area whose normals are more than ``limit`` degrees from ``direction`` (3,)."""
     size = np.linalg.norm(mesh.cross, axis=1)
-    return float(size[mesh.cross @ way < np.cos(np.deg2rad(limit)) * size].sum() / size.sum())
+    return float(size[mesh.cross @ direction < np.cos(np.deg2rad(limit)) * size].sum() / size.sum())
 
 
-def clear(vertices: Floats, way: Floats, part: Part, margin: float) -> float:
-    """How far ``vertices`` (V,3) have to go along ``way`` (3,) until all are outside the part, by at least half of
-    ``margin``.
+def find_clear_distance(vertices: Floats, direction: Floats, part: Part, margin: float) -> float:
+    """How far ``vertices`` (V,3) must move along ``direction`` (3,) until all are outside the part, at least half of
+    ``margin`` from it.
 
-    Raises StageError where they run into the part again.
+    Raises StageError where they enter the part again.
     """
     from damageest.geometry.distance import signed_distance
 
     far = margin
     while far < part.diagonal:
-        # Whatever is the deepest cannot be out before it has gone its depth.
-        lowest = float(signed_distance(vertices + far * way, part)[0].min())
+        # The deepest vertex must move by at least its depth.
+        lowest = float(signed_distance(vertices + far * direction, part)[0].min())
         if lowest > margin / 2:
             return far
         far += margin - lowest
-    raise StageError("the sweep does not come clear of the part", INSTEAD)
+    raise StageError("the swept surface does not leave the part", REMEDY)
 
 
-def swept(mesh: Mesh, rim: Ints, by: Floats) -> Mesh:
-    """The closed mesh between an open one and its copy moved ``by`` (3,), to where its normals point."""
+def sweep_surface(mesh: Mesh, rim: Ints, move: Floats) -> Mesh:
+    """The closed mesh between an open mesh and its copy, moved by ``move`` (3,) to the side of its normals."""
     count = len(mesh.vertices)
     after = np.roll(rim, -1)
     walls = [np.stack([rim, after, after + count], axis=1), np.stack([rim, after + count, rim + count], axis=1)]
     faces = np.concatenate([mesh.faces[:, ::-1], mesh.faces + count, *walls])
-    return Mesh(np.concatenate([mesh.vertices, mesh.vertices + by]), faces)
+    return Mesh(np.concatenate([mesh.vertices, mesh.vertices + move]), faces)
 
 
-def held(mesh: Mesh, intact: Floats, beside: Floats, reach: float) -> int:
-    """How many of the sound points (K,3) a closed mesh holds, but for those within ``reach`` of what lies ``beside``
-    (M,3) them: near the surface and its rim, noise decides whether a point counts as sound."""
+def count_points_inside(mesh: Mesh, intact: Floats, beside: Floats, reach: float) -> int:
+    """How many of the intact points (K,3) lie inside a closed mesh, without those within ``reach`` of ``beside`` (M,3).
+
+    Pass the surface and its rim as ``beside``: near them, noise decides whether a point counts as intact.
+    """
     from scipy.spatial import cKDTree
 
     low, high = mesh.bounds

@@ -1,4 +1,4 @@
-"""Shallow damage of known truth is right; what a sweep cannot represent is refused."""
+"""Shallow damage of known truth is right; damage that a sweep cannot represent is refused."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIGMA = 0.03
 BOX = trimesh.creation.box((40, 30, 20))
 
 
-def scanned(*tools: dict[str, Any]) -> tuple[Part, Scan]:
+def scan_box(*tools: dict[str, Any]) -> tuple[Part, Scan]:
     part = Part(BOX.vertices, BOX.faces)
     scan = Simulate.model_validate({"damage": tools, "points": 60_000, "noise": SIGMA, "seed": 3}).run("mm", part)
     return part, scan
@@ -52,7 +52,7 @@ def rod(*point: float, axis: list[float], length: float, radius: float) -> dict[
     ids=["dent", "wear from edge to edge", "edge", "corner", "two dents"],
 )
 def test_shallow_damage_is_right(tools: list[dict[str, Any]], least: float) -> None:
-    part, scan = scanned(*tools)
+    part, scan = scan_box(*tools)
     result = run(part, scan)
     assert isinstance(scan.truth, Truth)
     assert scan.truth.damage is not None
@@ -73,12 +73,12 @@ def test_shallow_damage_is_right(tools: list[dict[str, Any]], least: float) -> N
 )
 def test_what_a_sweep_cannot_represent_is_refused(tool: dict[str, Any]) -> None:
     with pytest.raises(StageError, match="enclose: sweep") as caught:
-        run(*scanned(tool))
+        run(*scan_box(tool))
     assert "adaptive" in caught.value.remedy
 
 
-def test_an_option_of_it_decides_what_is_too_steep() -> None:
-    part, scan = scanned(ball(3, 2, 28, radius=20))
+def test_an_option_decides_what_is_too_steep() -> None:
+    part, scan = scan_box(ball(3, 2, 28, radius=20))
     with pytest.raises(StageError, match="steeper than 10 degrees"):
         run(part, scan, steepest=10)
 
@@ -95,12 +95,12 @@ def test_several_rims_are_refused() -> None:
         Sweep().run(**{**wanted, "rims": Rims((loop, loop))})
 
 
-def test_sound_points_inside_are_refused() -> None:
+def test_intact_points_inside_are_refused() -> None:
     scene = TestSweep().inputs()
     wanted = {name: scene[name] for name in Sweep.needs()}
     enclosure = Sweep(steepest=89).run(**wanted)
     assert isinstance(enclosure, Mesh)
     centre = scene["surface"].vertices.mean(axis=0) + np.array([0, 0, 1.5])
     cloud = centre + 0.2 * np.random.default_rng(1).normal(size=(500, 3))
-    with pytest.raises(StageError, match="sound points of the scan"):
+    with pytest.raises(StageError, match="intact scan points lie inside"):
         Sweep(steepest=89).run(**{**wanted, "intact": np.concatenate([scene["intact"], cloud])})
