@@ -1,4 +1,4 @@
-"""The command line. One file per command; each imports what it needs when it is called, so that --help is quick."""
+"""The command line, with one module per command. Heavy imports are inside the commands, so that --help is quick."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ app = typer.Typer(
 )
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         typer.echo(f"damageest {__version__}")
         raise typer.Exit
 
 
 @app.callback()
 def _options(
-    version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Show the version."),
+    version: bool = typer.Option(False, "--version", callback=_print_version, is_eager=True, help="Show the version."),
 ) -> None:
     pass
 
 
-def _commands() -> None:
+def _add_commands() -> None:
     from damageest.cli import evaluate, faces, init, plugins, run, schema, stages, validate
 
     for module in (run, validate, init, faces, stages, plugins, schema):
@@ -42,21 +42,21 @@ def _commands() -> None:
     app.add_typer(evaluate.app, name="evaluate")
 
 
-_commands()
+_add_commands()
 
 
 def main() -> None:
-    """Runs the command line; exit status 0 done, 1 a stage failed or refused, 2 the job or an input is at fault."""
-    own = {command.name for command in app.registered_commands} | {group.name for group in app.registered_groups}
+    """Runs the command line. Exit status 0: done; 1: a stage failed or refused; 2: the job or an input is not valid."""
+    built_in = {command.name for command in app.registered_commands} | {group.name for group in app.registered_groups}
     word = next((argument for argument in sys.argv[1:] if not argument.startswith("-")), "")
     try:
-        if word not in own:
-            _plugin_commands()
+        if word not in built_in:
+            _add_plugin_commands()
         app()
     except DamageestError as error:
         fail(error)
     except KeyboardInterrupt:
-        typer.echo("interrupted; finished stages are kept, the same command goes on from there", err=True)
+        typer.echo("interrupted; finished stages are kept, and the same command continues after them", err=True)
         sys.exit(130)
     except BrokenPipeError:
         sys.stderr.close()
@@ -66,18 +66,20 @@ def main() -> None:
 
 
 def fail(error: Exception) -> None:
-    """Says what went wrong in a few lines and exits; the traceback shows with --debug."""
+    """Prints the error and exits with its status. With --debug, prints the traceback."""
     if "--debug" in sys.argv:
         traceback.print_exception(error)
     elif isinstance(error, DamageestError):
         typer.echo(f"error: {error}", err=True)
     else:
-        typer.echo(f"error: unexpected {type(error).__name__}: {error}\n  try: --debug for the traceback", err=True)
+        typer.echo(
+            f"error: unexpected {type(error).__name__}: {error}\n  try: add --debug to see the traceback", err=True
+        )
     sys.exit(getattr(error, "exit_status", 1))
 
 
-def _plugin_commands() -> None:
-    """Lets plugins add their commands. Only done where a built-in command does not answer."""
+def _add_plugin_commands() -> None:
+    """Adds the commands of plugins. Called only if no built-in command is named, because it loads all plugins."""
     from damageest.registry.loading import load
 
     load()[0].hook.damageest_commands(app=app)

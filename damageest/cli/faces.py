@@ -1,4 +1,4 @@
-"""`damageest faces`: the CAD faces of a part, by the numbers and names that a job may choose them by."""
+"""`damageest faces`: lists the CAD faces of a part, with the numbers and names by which a job selects them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 
 def command(
-    part: Annotated[Path, typer.Argument(help="The part as designed: STEP, IGES or BREP.")],
-    units: Annotated[str, typer.Option(help="Unit to show lengths in: um, mm, cm, m, in, ft.")] = "mm",
+    part: Annotated[Path, typer.Argument(help="CAD file of the part: STEP, IGES or BREP.")],
+    units: Annotated[str, typer.Option(help="Unit of the printed lengths: um, mm, cm, m, in, ft.")] = "mm",
     as_json: Annotated[bool, typer.Option("--json", help="Print the faces as JSON.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
@@ -28,7 +28,7 @@ def command(
     from damageest.stages.scan import ReadScan
 
     unit = canonical_unit(units)
-    try:  # as a job's part is found and checked; no scan is needed
+    try:  # the part is checked in the same way as in a job; no scan is needed
         job = load({"version": 1, "units": unit, "part": str(part)}, Registry.discover(), given={ReadScan: None})
     except JobError as error:
         raise JobError(error.faults, str(part)) from None
@@ -38,10 +38,10 @@ def command(
     if as_json:
         typer.echo(json.dumps({"part": str(part), "units": unit, "faces": [asdict(face) for face in faces]}, indent=1))
     else:
-        _table(faces, unit)
+        _print_table(faces, unit)
 
 
-def _table(faces: tuple[CadFace, ...], unit: str) -> None:
+def _print_table(faces: tuple[CadFace, ...], unit: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -55,23 +55,23 @@ def _table(faces: tuple[CadFace, ...], unit: str) -> None:
     table.add_column("normal, or axis and radius")
     for face in faces:
         row = (str(face.number), *((face.name,) if named else ()), face.kind)
-        table.add_row(*row, f"{face.area:.6g}", _numbers(face.centre), _shape(face, unit))
-    # wide enough for any row: a narrow terminal breaks lines itself
+        table.add_row(*row, f"{face.area:.6g}", _format_vector(face.centre), _describe_shape(face, unit))
+    # wider than any row, so that rich does not truncate cells
     Console(highlight=False, markup=False, width=240).print(table)
-    typer.echo(f"{len(faces)} faces; a job names them by number{' or name' if named else ''}")
+    typer.echo(f"{len(faces)} faces; select them in a job by number{' or name' if named else ''}")
 
 
-def _shape(face: CadFace, unit: str) -> str:
-    said = [
-        f"normal {_numbers(face.normal)}" if face.normal else "",
-        f"axis {_numbers(face.axis)}" if face.axis else "",
-        f"through {_numbers(face.point)}" if face.axis and face.point else "",
-        f"about {_numbers(face.point)}" if face.point and not face.axis else "",
+def _describe_shape(face: CadFace, unit: str) -> str:
+    texts = [
+        f"normal {_format_vector(face.normal)}" if face.normal else "",
+        f"axis {_format_vector(face.axis)}" if face.axis else "",
+        f"through {_format_vector(face.point)}" if face.axis and face.point else "",
+        f"centre {_format_vector(face.point)}" if face.point and not face.axis else "",
         f"radius {face.radius:.6g} {unit}" if face.radius else "",
         "hollow" if face.hollow else "",
     ]
-    return ", ".join(filter(None, said))
+    return ", ".join(filter(None, texts))
 
 
-def _numbers(vector: tuple[float, float, float] | None) -> str:
+def _format_vector(vector: tuple[float, float, float] | None) -> str:
     return "" if vector is None else "(" + ", ".join(f"{x if abs(x) >= 1e-9 else 0.0:.5g}" for x in vector) + ")"

@@ -1,4 +1,4 @@
-"""`damageest plugins`: what is installed, what it provides, and what is broken and why."""
+"""`damageest plugins`: lists the installed plugins, what they provide, and why a plugin is broken."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import typer
 
 
 def command() -> None:
-    """List installed plugins, with broken ones and the reason."""
+    """List installed plugins with licence and stages, and broken plugins with the reason."""
     from damageest.registry import Registry
 
     registry = Registry.discover()
@@ -18,5 +18,7 @@ def command() -> None:
         for item in broken:
             typer.echo(f"  broken: {item.reason}\n  try: {item.remedy}")
     for group in registry.clashes:
-        who = " and ".join(str(item.provider) for item in group)
-        typer.echo(f"clash: {group[0].contract.stage}: {group[0].name} is provided by {who}; uninstall all but one")
+        names = " and ".join(str(item.provider) for item in group)
+        typer.echo(
+            f"conflict: {group[0].contract.stage}: {group[0].name} is provided by {names}\n  try: uninstall all but one"
+        )

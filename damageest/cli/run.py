@@ -1,4 +1,4 @@
-"""`damageest run`: runs jobs, with progress on stderr and a short table at the end."""
+"""`damageest run`: runs jobs, with progress on stderr and a table of the sites at the end."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ if TYPE_CHECKING:
 
 def command(
     jobs: Annotated[list[Path], typer.Argument(metavar="JOB...", help="Job files.")],
-    output: Annotated[Path | None, typer.Option(help="Output folder (with one job); default: out/<name>.")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="Output folder; only with a single job. Default: out/<name>.")
+    ] = None,
     settings: Annotated[list[str] | None, typer.Option("--set", help="stage.option=value or field=value.")] = None,
-    no_cache: Annotated[bool, typer.Option("--no-cache", help="Compute every stage anew.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print result.json, one line per job, on stdout.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table; errors only.")] = False,
+    no_cache: Annotated[bool, typer.Option("--no-cache", help="Compute all stages again.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print result.json on stdout, one line per job.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, no progress and no table.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Run jobs: from part and scan to damage volumes."""
@@ -30,7 +32,9 @@ def command(
     from damageest.registry import Registry
 
     if output is not None and len(jobs) > 1:
-        raise JobError([Fault("takes one job; the jobs' own output folders are used with several")], "--output")
+        raise JobError(
+            [Fault("only valid with a single job; with several jobs, each job's own output folder is used")], "--output"
+        )
     progress = Progress(quiet)
     registry = Registry.discover([progress])
     status = 0
@@ -39,23 +43,23 @@ def command(
         try:
             loaded.append(load(path, registry, settings or []))
         except DamageestError as error:
-            status = max(status, _failed(error, str(path), as_json, debug))
+            status = max(status, _report_failure(error, str(path), as_json, debug))
     if status:
         raise typer.Exit(status)
     for job in loaded:
         from damageest.api import run
 
         try:
-            with progress.job(job.name), redirect_stdout(sys.stderr if as_json else sys.stdout):
+            with progress.show_job(job.name), redirect_stdout(sys.stderr if as_json else sys.stdout):
                 result = run(job, output=output or True, cache=not no_cache, registry=registry)
         except DamageestError as error:
-            status = max(status, _failed(error, job.source, as_json, debug))
+            status = max(status, _report_failure(error, job.source, as_json, debug))
             continue
         target = (output or job.output).resolve()
         if as_json:
             typer.echo(json.dumps(json.loads((target / "result.json").read_text())))
         elif not quiet:
-            _table(result, target)
+            _print_table(result, target)
         if result.failures:
             status = max(status, 1)
             for failure in result.failures if quiet or as_json else ():
@@ -63,7 +67,7 @@ def command(
     raise typer.Exit(status)
 
 
-def _failed(error: Exception, source: str, as_json: bool, debug: bool) -> int:
+def _report_failure(error: Exception, source: str, as_json: bool, debug: bool) -> int:
     import traceback
 
     status = int(getattr(error, "exit_status", 1))
@@ -75,8 +79,8 @@ def _failed(error: Exception, source: str, as_json: bool, debug: bool) -> int:
     return status
 
 
-def _table(result: Result, target: Path) -> None:
-    """The sites, what the check against the scan says of each, and where the files are."""
+def _print_table(result: Result, target: Path) -> None:
+    """Prints the sites with the result of the check against the scan, notes, and the path of the output folder."""
     from rich.console import Console
     from rich.table import Table
 
@@ -87,20 +91,22 @@ def _table(result: Result, target: Path) -> None:
         heads = ["site", f"volume {unit}³", f"area {unit}²", f"depth {unit}"]
         if any(site.deposit for site in result.sites):
             heads += [f"deposit {unit}³", f"stock {unit}³"]
-        for name in (*heads, "method", "scan agrees"):
-            table.add_column(name, justify="left" if name in ("method", "scan agrees") else "right")
+        for name in (*heads, "method", "check against scan"):
+            table.add_column(name, justify="left" if name in ("method", "check against scan") else "right")
         for site in result.sites:
-            agrees = "yes" if site.evidence.consistent else "NO: " + "; ".join(site.evidence.reasons)
+            check = "passed" if site.evidence.consistent else "FAILED: " + "; ".join(site.evidence.reasons)
             numbers = [f"{site.damage.volume:.6g}", f"{site.surface.area:.6g}", f"{site.max_depth:.4g}"]
             if len(heads) > 4:
                 stock = getattr(site.deposit, "stock_volume", None)
                 numbers += [f"{site.deposit.volume:.6g}" if site.deposit else "–"]
                 numbers += ["–" if stock is None else f"{stock:.6g}"]
-            table.add_row(str(site.id), *numbers, site.method, agrees)
+            table.add_row(str(site.id), *numbers, site.method, check)
         console.print(table)
-        console.print(f"damage {result.damage_volume:.6g} {unit}³ of the part's {result.part.volume:.6g} {unit}³")
+        console.print(
+            f"damage volume: {result.damage_volume:.6g} {unit}³; part volume: {result.part.volume:.6g} {unit}³"
+        )
     elif not result.failures:
-        console.print(f"no damage found beyond the tolerance of {result.tolerance:.4g} {unit}")
+        console.print(f"no damage deeper than the tolerance of {result.tolerance:.4g} {unit} was found")
     for text in result.failures:
         console.print(f"[red]failed:[/red] {text}")
     for text in (*result.warnings, *(f"site {site.id}: {note}" for site in result.sites for note in site.warnings)):

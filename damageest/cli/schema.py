@@ -1,4 +1,4 @@
-"""`damageest schema`: JSON Schemas for editors and for checks by others."""
+"""`damageest schema`: prints the JSON Schemas, for editors and for checks by other programs."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ from typing import Annotated
 import typer
 
 
-class Which(StrEnum):
+class SchemaName(StrEnum):
     job = "job"
     result = "result"
 
 
 def command(
-    which: Annotated[Which, typer.Argument(help="Schema of the job file or of result.json.")] = Which.job,
+    which: Annotated[
+        SchemaName, typer.Argument(help="job: schema of the job file; result: schema of result.json.")
+    ] = SchemaName.job,
 ) -> None:
-    """Print the JSON Schema of the job, for the plugins installed here, or of result.json."""
+    """Print the JSON Schema of the job file, with the options of all installed plugins, or of result.json."""
     from damageest.job.schema import job_schema
     from damageest.registry import Registry
     from damageest.report.result_json import result_schema
 
-    content = job_schema(Registry.discover()) if which is Which.job else result_schema()
+    content = job_schema(Registry.discover()) if which is SchemaName.job else result_schema()
     typer.echo(json.dumps(content, indent=2))

@@ -1,4 +1,4 @@
-"""`damageest stages`: what there is, what each option means, and who provides it."""
+"""`damageest stages`: lists the stages, their implementations and options, and which package provides them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ if TYPE_CHECKING:
 
 
 def command(
-    stage: Annotated[str | None, typer.Argument(help="Show one stage.")] = None,
-    name: Annotated[str | None, typer.Argument(help="Show one implementation, with its options.")] = None,
+    stage: Annotated[
+        str | None, typer.Argument(help="Show the implementations of one stage, with their options.")
+    ] = None,
+    name: Annotated[str | None, typer.Argument(help="Show one implementation, with its full description.")] = None,
 ) -> None:
     """List stages, their implementations and options."""
     from damageest.errors import Fault, JobError, PluginError
@@ -24,51 +26,55 @@ def command(
 
     registry = Registry.discover()
     if stage is not None and stage not in STAGES:
-        raise JobError([Fault(f"no stage '{stage}'{suggest(stage, STAGES)}; there are: {', '.join(STAGES)}")], "stages")
+        raise JobError(
+            [Fault(f"there is no stage '{stage}'{suggest(stage, STAGES)}; there are: {', '.join(STAGES)}")], "stages"
+        )
     if stage and name:
         try:
-            _options(registry.get(stage, name))
+            _print_implementation(registry.get(stage, name))
         except (KeyError, PluginError) as error:
             raise JobError([Fault(str(error.args[0]))], "stages") from None
         return
     for each in [stage] if stage else STAGES:
-        _stage(each, registry, with_options=bool(stage))
+        _print_stage(each, registry, with_options=bool(stage))
 
 
-def _stage(stage: str, registry: Registry, with_options: bool) -> None:
+def _print_stage(stage: str, registry: Registry, with_options: bool) -> None:
     from damageest.registry.contracts import DEFAULTS
 
     items = registry.of(stage)
     typer.secho(stage, bold=True)
     for item in items:
         default = " (default)" if DEFAULTS[item.contract] == item.name else ""
-        typer.echo(f"  {item.name + default:<26} {_first_line(item.cls)}  [{item.provider}]")
+        typer.echo(f"  {item.name + default:<26} {_get_first_line(item.cls)}  [{item.provider}]")
         if with_options:
-            _option_lines(item)
+            _print_options(item)
 
 
-def _options(item: Implementation) -> None:
+def _print_implementation(item: Implementation) -> None:
     typer.echo(f"{item.contract.stage}: {item.name}   by {item.provider}, {item.provider.licence}\n")
     typer.echo(inspect.getdoc(item.cls) or "")
     typer.echo("\noptions:" if len(item.cls.model_fields) > 1 else "\nno options")
-    _option_lines(item)
+    _print_options(item)
 
 
-def _option_lines(item: Implementation) -> None:
+def _print_options(item: Implementation) -> None:
     for name, field in item.cls.model_fields.items():
         if name == "use":
             continue
         default = (
-            "required" if field.is_required() else f"default {_shown(field.get_default(call_default_factory=True))}"
+            "required"
+            if field.is_required()
+            else f"default {_format_default(field.get_default(call_default_factory=True))}"
         )
         typer.echo(f"    {name:<20} {field.description or ''} ({default})")
 
 
-def _shown(value: Any) -> str:
+def _format_default(value: Any) -> str:
     if isinstance(value, tuple):
         return ", ".join(map(str, value)) or "none"
     return "none" if value is None else str(value)
 
 
-def _first_line(cls: type) -> str:
+def _get_first_line(cls: type) -> str:
     return (inspect.getdoc(cls) or "").splitlines()[0] if inspect.getdoc(cls) else ""

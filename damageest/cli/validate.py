@@ -13,7 +13,7 @@ def command(
     settings: Annotated[list[str] | None, typer.Option("--set", help="stage.option=value or field=value.")] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """Check jobs without computing; names every fault, with line and column."""
+    """Check jobs without computing, and list all errors with line and column."""
     from damageest.errors import JobError
     from damageest.job import load
     from damageest.registry import Registry
@@ -29,5 +29,5 @@ def command(
                 typer.echo(line, err=True)
             continue
         stages = ", ".join(f"{contract.stage} {stage.use}" for contract, stage in job.stages.items())
-        typer.echo(f"{path}: sound; method {job.method}: {stages}")
+        typer.echo(f"{path}: valid; method {job.method}: {stages}")
     raise typer.Exit(status)

@@ -1,1 +1,1 @@
-"""Accuracy against known truth: parts, random damages on them, scores, and the suite that brings them together."""
+"""Accuracy and cost against known truth: built-in parts, random damages on them, scores, and tables of the results."""

@@ -1,4 +1,4 @@
-"""Random damages of the kinds that parts come back with, repeatable from a seed."""
+"""Random damages of kinds that occur on used parts. Equal seeds give equal damages."""
 
 from __future__ import annotations
 
@@ -11,43 +11,44 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
-from damageest.evaluate.scores import depth, surface_points
+from damageest.evaluate.scores import measure_depth, sample_surface
 from damageest.geometry.solids import to_manifold
 from damageest.stages.scan.scanner import apply_tools
 from damageest.stages.scan.tools import BlobTool, BoxTool, CylinderTool, PlaneTool, SphereTool, Tool
 
 SHARE = (0.002, 0.33)
-"""Least and largest share of the part's volume that a damage takes."""
+"""Least and largest share of the part's volume that a damage removes."""
 
 
-class DamagePlace:
-    """A part with what the kinds of damage ask of it; all figures are shares of its ``size``, the diagonal."""
+class PlacePicker:
+    """Draws random places and sizes for damages. Sizes are shares of ``size``, which starts as the part's diagonal."""
 
     def __init__(self, part: Part, rng: np.random.Generator) -> None:
         self.part, self.rng, self.size = part, rng, part.diagonal
-        self.points, self.normals = surface_points(part, 3000)
+        self.points, self.normals = sample_surface(part, 3000)
 
-    def pick(self, allowed: Any = None) -> tuple[Floats, Floats]:
-        """A random point on the surface and the outward normal there, of those ``allowed`` (N,)."""
+    def pick_point(self, allowed: Any = None) -> tuple[Floats, Floats]:
+        """A random surface point (3,) and its outward normal (3,); only of those ``allowed`` (N,), if given."""
         numbers = np.arange(len(self.points)) if allowed is None else np.flatnonzero(allowed)
         if not len(numbers):
-            raise LookupError("the part has no such place")
+            raise LookupError("the part has no place for this kind of damage")
         k = self.rng.choice(numbers)
         return self.points[k], self.normals[k]
 
-    def uniform(self, low: float, high: float) -> float:
+    def draw(self, low: float, high: float) -> float:
         return float(self.rng.uniform(low, high))
 
-    def seed(self) -> int:
+    def draw_seed(self) -> int:
         return int(self.rng.integers(1 << 30))
 
-    def turn(self) -> tuple[float, float, float]:
+    def draw_rotation(self) -> tuple[float, float, float]:
+        """Three random angles in degrees."""
         a, b, c = self.rng.uniform(0, 360, 3)
         return float(a), float(b), float(c)
 
     @cached_property
-    def edges(self) -> tuple[Floats, Floats]:
-        """Points (M,3) on convex edges sharper than 40 degrees, and the directions (M,3) that bisect them outward."""
+    def edge_points(self) -> tuple[Floats, Floats]:
+        """Points (M,3) on convex edges sharper than 40 degrees, and the outward bisectors (M,3) of their faces."""
         import trimesh
 
         mesh = trimesh.Trimesh(self.part.vertices, self.part.faces, process=False)
@@ -60,12 +61,13 @@ class DamagePlace:
         points = ends[k, 0] + rng.random((600, 1)) * (ends[k, 1] - ends[k, 0])
         return np.asarray(points), np.asarray(out[k] / np.linalg.norm(out[k], axis=1, keepdims=True))
 
-    def edge(self) -> tuple[Floats, Floats]:
-        k = self.rng.integers(len(self.edges[0]))
-        return self.edges[0][k], self.edges[1][k]
+    def pick_edge_point(self) -> tuple[Floats, Floats]:
+        """A random point (3,) on an edge, and the outward bisector (3,) there."""
+        k = self.rng.integers(len(self.edge_points[0]))
+        return self.edge_points[0][k], self.edge_points[1][k]
 
-    def _reach(self, sign: float) -> Floats:
-        """(N,) from each surface point along its normal (sign 1) or against it (-1) to the next surface."""
+    def _measure_reach(self, sign: float) -> Floats:
+        """(N,) distance from each surface point to the next surface, along its normal (sign 1) or against it (-1)."""
         origin = self.part.bounds.mean(0)
         body = to_manifold(self.part, origin)
         start = self.points - origin + sign * 1e-6 * self.size * self.normals
@@ -75,160 +77,185 @@ class DamagePlace:
 
     @cached_property
     def thickness(self) -> Floats:
-        return self._reach(-1)
+        """(N,) thickness of the wall below each surface point."""
+        return self._measure_reach(-1)
 
     @cached_property
     def gap(self) -> Floats:
-        return self._reach(1)
+        """(N,) width of the gap above each surface point."""
+        return self._measure_reach(1)
 
 
-def _tuple(point: Floats) -> tuple[float, float, float]:
+def _to_tuple(point: Floats) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in point)
     return x, y, z
 
 
-def _lump(site: DamagePlace, centre: Floats, radius: float) -> Tool:
-    if site.rng.random() < 0.3:
-        return SphereTool(centre=_tuple(centre), radius=radius)
-    return BlobTool(centre=_tuple(centre), radius=radius, seed=site.seed())
+def _make_lump(picker: PlacePicker, centre: Floats, radius: float) -> Tool:
+    """A ball or a blob."""
+    if picker.rng.random() < 0.3:
+        return SphereTool(centre=_to_tuple(centre), radius=radius)
+    return BlobTool(centre=_to_tuple(centre), radius=radius, seed=picker.draw_seed())
 
 
-def chip(site: DamagePlace) -> list[Tool]:
-    """A chip off an edge or corner: a lump, or a rough break across it."""
-    point, out = site.edge()
-    if site.rng.random() < 0.6:
-        return [_lump(site, point, site.size * site.uniform(0.04, 0.13))]
-    tilt = out + 0.25 * site.rng.normal(size=3)
+def make_chip(picker: PlacePicker) -> list[Tool]:
+    """A chip broken off an edge or a corner: a ball or blob, or a rough plane."""
+    point, out = picker.pick_edge_point()
+    if picker.rng.random() < 0.6:
+        return [_make_lump(picker, point, picker.size * picker.draw(0.04, 0.13))]
+    tilt = out + 0.25 * picker.rng.normal(size=3)
     tilt /= np.linalg.norm(tilt)
-    depth, within = site.size * site.uniform(0.015, 0.05), site.size * site.uniform(0.08, 0.2)
-    rough = site.size * site.uniform(0.0005, 0.003)
+    depth, within = picker.size * picker.draw(0.015, 0.05), picker.size * picker.draw(0.08, 0.2)
+    rough = picker.size * picker.draw(0.0005, 0.003)
     return [
         PlaneTool(
-            point=_tuple(point - depth * tilt), normal=_tuple(tilt), within=within, roughness=rough, seed=site.seed()
+            point=_to_tuple(point - depth * tilt),
+            normal=_to_tuple(tilt),
+            within=within,
+            roughness=rough,
+            seed=picker.draw_seed(),
         )
     ]
 
 
-def pit(site: DamagePlace) -> list[Tool]:
+def make_pit(picker: PlacePicker) -> list[Tool]:
     """A pit in a face, deeper than a quarter of its width."""
-    point, normal = site.pick()
-    radius = site.size * site.uniform(0.04, 0.12)
-    return [_lump(site, point + site.uniform(-0.1, 0.5) * radius * normal, radius)]
+    point, normal = picker.pick_point()
+    radius = picker.size * picker.draw(0.04, 0.12)
+    return [_make_lump(picker, point + picker.draw(-0.1, 0.5) * radius * normal, radius)]
 
 
-def cut(site: DamagePlace) -> list[Tool]:
-    """A box or a wedge taken out of an edge or a face."""
-    point = (site.edge() if site.rng.random() < 0.7 else site.pick())[0]
-    a, b, c = site.size * site.rng.uniform(0.06, 0.22, 3)
-    rough = site.size * site.uniform(0.0005, 0.002) if site.rng.random() < 0.4 else 0.0
+def make_cut(picker: PlacePicker) -> list[Tool]:
+    """A box or a wedge cut out of an edge or a face."""
+    point = (picker.pick_edge_point() if picker.rng.random() < 0.7 else picker.pick_point())[0]
+    a, b, c = picker.size * picker.rng.uniform(0.06, 0.22, 3)
+    rough = picker.size * picker.draw(0.0005, 0.002) if picker.rng.random() < 0.4 else 0.0
     return [
         BoxTool(
-            centre=_tuple(point),
+            centre=_to_tuple(point),
             size=(float(a), float(b), float(c)),
-            rotation=site.turn() if site.rng.random() < 0.6 else (0.0, 0.0, 0.0),
+            rotation=picker.draw_rotation() if picker.rng.random() < 0.6 else (0.0, 0.0, 0.0),
             roughness=rough,
-            seed=site.seed(),
+            seed=picker.draw_seed(),
         )
     ]
 
 
-def end(site: DamagePlace) -> list[Tool]:
+def break_off_end(picker: PlacePicker) -> list[Tool]:
     """An end broken off, 5 to 30 % of the volume."""
-    origin = site.part.bounds.mean(0)
-    body = to_manifold(site.part, origin)
-    if site.rng.random() < 0.6:
-        normal = site.rng.choice([-1.0, 1.0]) * np.eye(3)[site.rng.integers(3)] + 0.15 * site.rng.normal(size=3)
+    origin = picker.part.bounds.mean(0)
+    body = to_manifold(picker.part, origin)
+    if picker.rng.random() < 0.6:
+        normal = picker.rng.choice([-1.0, 1.0]) * np.eye(3)[picker.rng.integers(3)] + 0.15 * picker.rng.normal(size=3)
     else:
-        normal = site.rng.normal(size=3)
+        normal = picker.rng.normal(size=3)
     normal /= np.linalg.norm(normal)
-    wanted = site.uniform(0.05, 0.3) * site.part.volume
-    low, high = -site.size, site.size
+    wanted = picker.draw(0.05, 0.3) * picker.part.volume
+    low, high = -picker.size, picker.size
     for _ in range(40):
         offset = (low + high) / 2
-        taken = body.trim_by_plane(_tuple(normal), offset).volume()
+        taken = body.trim_by_plane(_to_tuple(normal), offset).volume()
         low, high = (offset, high) if taken > wanted else (low, offset)
-    rough = site.size * site.uniform(0, 0.004)
-    return [PlaneTool(point=_tuple(origin + offset * normal), normal=_tuple(normal), roughness=rough, seed=site.seed())]
+    rough = picker.size * picker.draw(0, 0.004)
+    return [
+        PlaneTool(
+            point=_to_tuple(origin + offset * normal),
+            normal=_to_tuple(normal),
+            roughness=rough,
+            seed=picker.draw_seed(),
+        )
+    ]
 
 
-def hole(site: DamagePlace) -> list[Tool]:
-    """A round hole through all that lies behind a point, more or less square to the surface."""
-    point, normal = site.pick()
-    axis = -normal + 0.15 * site.rng.normal(size=3)
+def make_hole(picker: PlacePicker) -> list[Tool]:
+    """A round through hole, nearly square to the surface."""
+    point, normal = picker.pick_point()
+    axis = -normal + 0.15 * picker.rng.normal(size=3)
     axis /= np.linalg.norm(axis)
-    radius = site.size * site.uniform(0.025, 0.06)
-    back = 0.05 * site.size
-    return [CylinderTool(point=_tuple(point - back * axis), axis=_tuple(axis), radius=radius, length=3 * site.size)]
+    radius = picker.size * picker.draw(0.025, 0.06)
+    back = 0.05 * picker.size
+    return [
+        CylinderTool(point=_to_tuple(point - back * axis), axis=_to_tuple(axis), radius=radius, length=3 * picker.size)
+    ]
 
 
-def worn_through(site: DamagePlace) -> list[Tool]:
-    """A thin wall worn through by something round, so that the loss has two rims."""
-    wall = site.thickness
-    place = np.flatnonzero(wall < 0.12 * site.size)
+def wear_through(picker: PlacePicker) -> list[Tool]:
+    """A hole worn through a thin wall by a round body, with a rim on either side."""
+    wall = picker.thickness
+    place = np.flatnonzero(wall < 0.12 * picker.size)
     if not len(place):
         raise LookupError("the part has no thin wall")
-    k = site.rng.choice(place)
-    radius = max(wall[k], 0.02 * site.size) * site.uniform(1.1, 2.0)
-    middle = site.points[k] + (radius - 1.25 * wall[k]) * site.normals[k] * site.uniform(0.0, 0.8)
-    return [_lump(site, middle, float(radius))]
+    k = picker.rng.choice(place)
+    radius = max(wall[k], 0.02 * picker.size) * picker.draw(1.1, 2.0)
+    middle = picker.points[k] + (radius - 1.25 * wall[k]) * picker.normals[k] * picker.draw(0.0, 0.8)
+    return [_make_lump(picker, middle, float(radius))]
 
 
-def groove(site: DamagePlace) -> list[Tool]:
-    """A long, narrow groove scored into a face, open at its ends or not."""
-    point, normal = site.pick()
-    along = np.cross(normal, site.rng.normal(size=3))
+def make_groove(picker: PlacePicker) -> list[Tool]:
+    """A long, narrow groove in a face, with open or closed ends."""
+    point, normal = picker.pick_point()
+    along = np.cross(normal, picker.rng.normal(size=3))
     along /= np.linalg.norm(along)
-    depth, width = site.size * site.uniform(0.015, 0.05), site.size * site.uniform(0.02, 0.06)
+    depth, width = picker.size * picker.draw(0.015, 0.05), picker.size * picker.draw(0.02, 0.06)
     from scipy.spatial.transform import Rotation
 
     turn = Rotation.from_matrix(np.column_stack([along, np.cross(normal, along), normal])).as_euler("xyz", degrees=True)
-    size = (site.size * site.uniform(0.25, 0.7), width, 2 * depth)
-    return [BoxTool(centre=_tuple(point), size=size, rotation=_tuple(turn))]
+    size = (picker.size * picker.draw(0.25, 0.7), width, 2 * depth)
+    return [BoxTool(centre=_to_tuple(point), size=size, rotation=_to_tuple(turn))]
 
 
-def beside_gap(site: DamagePlace) -> list[Tool]:
-    """A lump out of a wall that faces another one closely: in a bore, between teeth, in a slot."""
-    point, normal = site.pick(site.gap < 0.15 * site.size)
-    radius = site.size * site.uniform(0.04, 0.1)
-    return [_lump(site, point - site.uniform(0.0, 0.5) * radius * normal, radius)]
+def make_damage_beside_gap(picker: PlacePicker) -> list[Tool]:
+    """A ball or blob out of a wall that is close to another wall: in a bore, between teeth, in a slot."""
+    point, normal = picker.pick_point(picker.gap < 0.15 * picker.size)
+    radius = picker.size * picker.draw(0.04, 0.1)
+    return [_make_lump(picker, point - picker.draw(0.0, 0.5) * radius * normal, radius)]
 
 
-def touching(site: DamagePlace) -> list[Tool]:
-    """Two lumps whose rims meet or overlap, or that a thin web of sound surface parts."""
-    point, normal = site.edge() if site.rng.random() < 0.3 else site.pick()
-    radii = site.size * site.rng.uniform(0.04, 0.09, 2)
-    apart = radii.sum() * site.uniform(0.75, 1.05)
-    off = site.points - point
-    level = np.abs(np.linalg.norm(off, axis=1) - apart)
-    other = site.rng.choice(np.argsort(level, kind="stable")[:40])
-    first = point - site.uniform(-0.3, 0.3) * radii[0] * normal
-    second = site.points[other] - site.uniform(-0.3, 0.3) * radii[1] * site.normals[other]
-    return [_lump(site, first, float(radii[0])), _lump(site, second, float(radii[1]))]
+def make_touching_pair(picker: PlacePicker) -> list[Tool]:
+    """Two balls or blobs whose rims touch or overlap, or that are separated by a thin web of intact surface."""
+    point, normal = picker.pick_edge_point() if picker.rng.random() < 0.3 else picker.pick_point()
+    radii = picker.size * picker.rng.uniform(0.04, 0.09, 2)
+    gap = radii.sum() * picker.draw(0.75, 1.05)
+    off = picker.points - point
+    level = np.abs(np.linalg.norm(off, axis=1) - gap)
+    other = picker.rng.choice(np.argsort(level, kind="stable")[:40])
+    first = point - picker.draw(-0.3, 0.3) * radii[0] * normal
+    second = picker.points[other] - picker.draw(-0.3, 0.3) * radii[1] * picker.normals[other]
+    return [_make_lump(picker, first, float(radii[0])), _make_lump(picker, second, float(radii[1]))]
 
 
-KINDS: dict[str, Callable[[DamagePlace], list[Tool]]] = {
-    make.__name__: make for make in (chip, pit, cut, end, hole, worn_through, groove, beside_gap, touching)
+KINDS: dict[str, Callable[[PlacePicker], list[Tool]]] = {
+    "chip": make_chip,
+    "pit": make_pit,
+    "cut": make_cut,
+    "end": break_off_end,
+    "hole": make_hole,
+    "worn_through": wear_through,
+    "groove": make_groove,
+    "beside_gap": make_damage_beside_gap,
+    "touching": make_touching_pair,
 }
-"""Name to maker of one random loss."""
+"""Name of a kind of damage: the function that makes one at random."""
 
 
 @dataclass(frozen=True, eq=False)
-class Damaged:
-    """``tools`` for the stage `scan: simulate`, the ``kinds`` they were made as, and the true ``damage``."""
+class RandomDamage:
+    """``tools``: option ``damage`` of `scan: simulate`; ``kinds``: one for each damage; ``damage``: the true volume."""
 
     tools: tuple[Tool, ...]
     kinds: tuple[str, ...]
     damage: Solid
 
 
-def random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), losses: int | None = None) -> Damaged:
-    """One to three losses on a part, each at least 0.008 of the diagonal deep and together within ``SHARE``.
+def make_random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), count: int | None = None) -> RandomDamage:
+    """One to three damages on a part, each at least 0.008 of the diagonal deep, and together within ``SHARE``.
 
-    ``kinds``: of the first losses, the rest at random; a kind the part has no place for is replaced by another.
+    ``kinds``: of the first damages; the others are random. ``count``: how many; None: random. If the part has no place
+    for a kind, another kind replaces it. Raises LookupError if no damage fits.
     """
     rng = np.random.default_rng([6173, seed])
-    site = DamagePlace(part, rng)
-    wanted = losses or max(len(kinds), int(rng.choice([1, 2, 3], p=[0.6, 0.25, 0.15])))
+    picker = PlacePicker(part, rng)
+    wanted = count or max(len(kinds), int(rng.choice([1, 2, 3], p=[0.6, 0.25, 0.15])))
     tools: list[Tool] = []
     made: list[str] = []
     damage: Solid | None = None
@@ -237,25 +264,25 @@ def random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), losses: in
         for attempt in range(60):
             if attempt and attempt % 20 == 0:
                 name = str(rng.choice(list(KINDS)))
-            found = _try(site, name, tools)
+            found = _try_damage(picker, name, tools)
             if found is not None:
                 tools, damage = found
                 made.append(name)
                 break
     if damage is None:
         raise LookupError(f"no damage fits the part with seed {seed}")
-    return Damaged(tuple(tools), tuple(made), damage)
+    return RandomDamage(tuple(tools), tuple(made), damage)
 
 
-def _try(site: DamagePlace, name: str, before: list[Tool]) -> tuple[list[Tool], Solid] | None:
-    """The tools with one more loss, and the damage of all; None where it does not suit."""
-    part = site.part
+def _try_damage(picker: PlacePicker, name: str, before: list[Tool]) -> tuple[list[Tool], Solid] | None:
+    """The tools with one more damage, and the volume of all; None if it is too small, too large or does not fit."""
+    part = picker.part
     try:
-        more = KINDS[name](site)
+        more = KINDS[name](picker)
         alone = apply_tools(part, more)[1]
         if alone is None or not SHARE[0] * part.volume < alone.volume < SHARE[1] * part.volume:
             return None
-        if depth(alone, part) < 0.008 * part.diagonal:
+        if measure_depth(alone, part) < 0.008 * part.diagonal:
             return None
         tools = [*before, *more]
         damage = apply_tools(part, tools)[1] if before else alone

@@ -1,4 +1,4 @@
-"""How well damage of a given size will be found on the user's own part, with a scanner like theirs."""
+"""The cases of `damageest evaluate job`: random damages of given depths on the user's part, with a similar scanner."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import Any
 from damageest.artefacts import Part
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.errors import InputError
-from damageest.evaluate._case import Case, save_part
-from damageest.evaluate._vary import Base, Variant, Wanted, variants
+from damageest.evaluate.case import DamageCase, save_part
 from damageest.evaluate.damages import KINDS
 from damageest.evaluate.sized import SIZED
+from damageest.evaluate.variants import Baseline, Variant, VariationRequest, make_variants
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.io.files import file_sha256
 from damageest.job import Job, load
@@ -26,57 +26,59 @@ from damageest.stages.scan import ReadScan
 from damageest.stages.scan.simulate import Simulate
 
 SIZES = (0, 2, 4, 8, 16)
-"""Depths tried where none are asked for, in tolerances; 0: a sound part."""
+"""Default depths of the damage, in tolerances; 0: an intact part."""
 DEEPEST = 0.1
-"""Of the part's diagonal: default depths stay below."""
+"""Largest default depth, as a share of the part's diagonal."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """The cases, and in ``notes`` what part and scanner they stand for."""
+    """The cases of a job, and in ``notes`` a description of the part and the scanner."""
 
-    cases: list[Case]
+    cases: list[DamageCase]
     unit: str
     notes: tuple[str, ...]
 
 
-def study(path: Path, wanted: Wanted, seeds: int, registry: Registry, place: Path) -> Study:
-    """The cases for a job, its part saved in the folder ``place``. Raises JobError or InputError where the job, its
-    files, or what is to be varied is at fault."""
-    job = load(path, registry, wanted.settings)
-    part, scanner, notes = _read(job, registry)
-    tolerance = job.tolerance or _automatic(part, scanner)
-    if not wanted.size:
+def plan_study(path: Path, request: VariationRequest, seeds: int, registry: Registry, folder: Path) -> Study:
+    """Plans the cases of a job and saves its part in ``folder``.
+
+    Raises JobError or InputError if the job, its files or the variation is invalid.
+    """
+    job = load(path, registry, request.settings)
+    part, scanner, notes = _read_inputs(job, registry)
+    tolerance = job.tolerance or _choose_tolerance(part, scanner)
+    if not request.size:
         fitting = [size for size in SIZES if size * tolerance <= DEEPEST * part.diagonal]
-        wanted = replace(wanted, size=",".join(f"{size}x" for size in fitting))
+        request = replace(request, size=",".join(f"{size}x" for size in fitting))
     uses = {contract.stage: item.name for contract, item in job.implementations.items()}
-    base = Base(job.units, scanner, tolerance, job.tolerance is None, False, uses)
-    ways = variants(wanted, base)
+    base = Baseline(job.units, scanner, tolerance, job.tolerance is None, False, uses)
+    ways = make_variants(request, base)
     for way in ways:
-        checked(path, way, part, registry)
-    save_part(part, place / "part.npz")
-    source = digest(code(registry), file_sha256(path), part.vertices, part.faces)
-    cases = [_case(way, seed, job, path, source, place) for seed in range(seeds) for way in ways]
-    told = (
+        check_variant(path, way, part, registry)
+    save_part(part, folder / "part.npz")
+    source = digest(fingerprint_code(registry), file_sha256(path), part.vertices, part.faces)
+    cases = [_make_case(way, seed, job, path, source, folder) for seed in range(seeds) for way in ways]
+    scanner_text = (
         f"{scanner['points']} points, noise {scanner['noise']:.4g} {job.units}, tolerance {tolerance:.4g} {job.units}"
     )
-    return Study(cases, job.units, (f"{job.name}: part {part.diagonal:.4g} {job.units} across, {told}", *notes))
+    return Study(cases, job.units, (f"{job.name}: part {part.diagonal:.4g} {job.units} across, {scanner_text}", *notes))
 
 
-def code(registry: Registry) -> str:
-    """Stands for the code of damageest and its plugins: rows that other code gave are not gone on from."""
+def fingerprint_code(registry: Registry) -> str:
+    """A digest of the code of damageest and its plugins. Rows that other code computed are not used again."""
     return digest(*(provider.fingerprint for provider in registry.providers))
 
 
-def checked(job: Path | dict[str, Any], way: Variant, part: Part, registry: Registry) -> None:
-    """Raises JobError where the variant makes no valid job, before hours of work."""
+def check_variant(job: Path | dict[str, Any], way: Variant, part: Part, registry: Registry) -> None:
+    """Raises JobError if the variant gives no valid job. Called for all variants before the first run."""
     scan = "scan=" + json.dumps({"use": "simulate", **way.scanner})
     load(job, registry, [*way.settings, scan], {ReadPart: part})
 
 
-def _case(way: Variant, seed: int, job: Job, path: Path, source: str, place: Path) -> Case:
+def _make_case(way: Variant, seed: int, job: Job, path: Path, source: str, folder: Path) -> DamageCase:
     kinds = SIZED if way.size else tuple(KINDS)
-    return Case(
+    return DamageCase(
         part=job.name,
         seed=seed,
         first=kinds[seed % len(kinds)],
@@ -87,34 +89,35 @@ def _case(way: Variant, seed: int, job: Job, path: Path, source: str, place: Pat
         varied=way.varied,
         source=source,
         job=str(path.resolve()),
-        file=str(place / "part.npz"),
+        file=str(folder / "part.npz"),
     )
 
 
-def _automatic(part: Part, scanner: dict[str, Any]) -> float:
+def _choose_tolerance(part: Part, scanner: dict[str, Any]) -> float:
     from damageest.artefacts import Scan
 
     empty = Scan(part.vertices[:1], noise=scanner["noise"])
     return choose_tolerance(None, empty, part)[0]
 
 
-def _read(job: Job, registry: Registry) -> tuple[Part, dict[str, Any], tuple[str, ...]]:
-    """The part, the options of a virtual scanner like the job's, and what to know about them."""
+def _read_inputs(job: Job, registry: Registry) -> tuple[Part, dict[str, Any], tuple[str, ...]]:
+    """The part, the options of a virtual scanner similar to the job's scan, and notes."""
     engine = Engine(job, registry)
     state = engine.call(ReadPart, start(job).job)
     part = state.part
-    own = job.stages[ReadScan]
-    if isinstance(own, Simulate):
-        scanner = own.model_dump(mode="json", exclude={"use", "damage", "seed"})
-        return part, {**scanner, "noise": 0.0005 * part.diagonal if own.noise is None else own.noise}, ()
+    reader = job.stages[ReadScan]
+    if isinstance(reader, Simulate):
+        scanner = reader.model_dump(mode="json", exclude={"use", "damage", "seed"})
+        return part, {**scanner, "noise": 0.0005 * part.diagonal if reader.noise is None else reader.noise}, ()
     points = engine.call(ReadScan, state).scan.points
     noise, spacing = measure_noise_and_spacing(points)
     if not spacing:
-        raise InputError(f"scan: {len(points)} points are too few to measure its noise and spacing")
+        raise InputError(f"scan: noise and spacing cannot be measured, {len(points)} points are too few")
     known = job.implementations[Align].name != "register"
     scanner = {"points": len(points), "noise": float(f"{noise:.4g}"), "pose": "identity" if known else "random"}
-    # as many points as lie so far apart on this part: the job's scan may show half of it, or a fixture as well
-    tried = Simulate.model_validate(scanner).run(part.unit, part).points
-    scanner["points"] = round(len(points) * (measure_noise_and_spacing(tried)[1] / spacing) ** 2)
-    note = f"the scan's points measure a noise of {noise:.3g} and lie {spacing:.3g} {job.units} apart"
-    return part, scanner, (f"{note}; what it does not show of the part is taken as seen",)
+    # the number of points that gives this spacing on the whole part: the job's scan may cover only a half of it, or
+    # a fixture too
+    trial = Simulate.model_validate(scanner).run(part.unit, part).points
+    scanner["points"] = round(len(points) * (measure_noise_and_spacing(trial)[1] / spacing) ** 2)
+    note = f"measured in the job's scan: noise {noise:.3g} {job.units}, spacing {spacing:.3g} {job.units}"
+    return part, scanner, (f"{note}; the virtual scans cover the whole part, also where the job's scan has no points",)

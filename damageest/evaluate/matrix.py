@@ -1,6 +1,7 @@
-"""Every implementation of every stage on given jobs, all other stages as the job has them: accuracy, time and memory.
+"""Accuracy, time and memory of every implementation of every stage, with the job's implementations in all other stages.
 
-The jobs' scans are simulated, so that the truth is known; each run has a process of its own, for its memory's sake.
+The scans of the jobs are simulated, so that the truth is known. Each run has a process of its own, so that its peak
+memory can be measured.
 """
 
 from __future__ import annotations
@@ -19,47 +20,50 @@ import numpy as np
 
 from damageest.artefacts import Part, Scan, Solid, Truth
 from damageest.errors import DamageestError, Fault, JobError
-from damageest.evaluate._run import MARK, apart
-from damageest.evaluate._scene import Scene, prepared, settings_for
+from damageest.evaluate.matrix_job import MatrixJob, make_settings, prepare_matrix_job
+from damageest.evaluate.memory import PeakMemory
+from damageest.evaluate.processes import MARK, run_in_process
 from damageest.evaluate.scores import score
 from damageest.registry import Implementation, Registry
 from damageest.registry.contracts import STAGES
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One implementation on one job. ``refused`` says why there is no result (``iou`` NaN) or none for some sites;
-    ``doubtful``: the result itself says that it is. ``stage_seconds`` are the stage's own, ``seconds`` the run's,
-    ``megabytes`` the process's peak."""
+class MatrixCell:
+    """One implementation on one job.
+
+    ``refused``: the reason if there is no result (``iou`` is NaN), or none for some sites. ``flagged``: the result's
+    own checks failed. ``stage_seconds``: time in the stage; ``seconds``: time of the run; ``megabytes``: peak memory.
+    """
 
     stage: str
     use: str
     job: str
     iou: float
-    doubtful: bool = False
+    flagged: bool = False
     refused: str = ""
     stage_seconds: float = float("nan")
     seconds: float = float("nan")
     megabytes: float = float("nan")
 
 
-def matrix(
+def run_matrix(
     jobs: Sequence[Path],
     registry: Registry,
     stages: Sequence[str] = (),
     workers: int = 1,
     timeout: float = 300,
-    tell: Callable[[Cell], None] = lambda cell: None,
-) -> list[Cell]:
-    """All cells, by stage, implementation and job. Raises JobError for a job at fault or one whose truth is unknown."""
+    tell: Callable[[MatrixCell], None] = lambda cell: None,
+) -> list[MatrixCell]:
+    """All cells, ordered by stage, implementation and job. Raises JobError for an invalid job or an unknown truth."""
     if unknown := [stage for stage in stages if stage not in STAGES]:
         raise JobError([Fault(f"no stage '{unknown[0]}'; there are: {', '.join(STAGES)}")], "matrix")
-    with tempfile.TemporaryDirectory(prefix="damageest-matrix-") as place:
-        scenes = [prepared(path, registry, Path(place) / str(k)) for k, path in enumerate(jobs)]
+    with tempfile.TemporaryDirectory(prefix="damageest-matrix-") as folder:
+        scenes = [prepare_matrix_job(path, registry, Path(folder) / str(k)) for k, path in enumerate(jobs)]
         items = [item for stage in STAGES if not stages or stage in stages for item in registry.of(stage)]
         with ThreadPoolExecutor(workers) as pool:
             pairs = [(item, scene) for item in items for scene in scenes]
-            futures = [pool.submit(_cell, item, scene, timeout) for item, scene in pairs]
+            futures = [pool.submit(_run_cell, item, scene, timeout) for item, scene in pairs]
             cells = []
             for future in futures:
                 cells.append(future.result())
@@ -67,21 +71,24 @@ def matrix(
     return cells
 
 
-def _cell(item: Implementation, scene: Scene, timeout: float) -> Cell:
-    """Runs one implementation on one job in a process of its own."""
+def _run_cell(item: Implementation, scene: MatrixJob, timeout: float) -> MatrixCell:
+    """One implementation on one job, run in a process of its own."""
     name = (item.contract.stage, item.name, scene.name)
-    settings = settings_for(item, scene)
+    settings = make_settings(item, scene)
     if isinstance(settings, str):
-        return Cell(*name, float("nan"), refused=settings)
+        return MatrixCell(*name, float("nan"), refused=settings)
     case = {"folder": str(scene.folder), "stage": item.contract.stage, "use": item.name, **settings}
-    row = apart("damageest.evaluate.matrix", case, timeout)
-    return Cell(*name, **row) if isinstance(row, dict) else Cell(*name, float("nan"), refused=row)
+    row = run_in_process("damageest.evaluate.matrix", case, timeout)
+    return MatrixCell(*name, **row) if isinstance(row, dict) else MatrixCell(*name, float("nan"), refused=row)
 
 
 def run_one(case: dict[str, Any]) -> dict[str, Any]:
-    """The row of one run, in this process."""
-    import resource
+    """The fields of a cell, from a run in this process."""
+    with PeakMemory() as memory:
+        return _run_measured(case, memory)
 
+
+def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
     import damageest
 
     folder = Path(case["folder"])
@@ -97,23 +104,23 @@ def run_one(case: dict[str, Any]) -> dict[str, Any]:
         given["scan"] = Scan(data["points"], unit=str(data["unit"])).move(move)
         pose = pose @ np.linalg.inv(move)
     try:
-        found = damageest.run(case["job"], output=folder / "out" if case["stage"] == "export" else False, **given)
+        result = damageest.run(case["job"], output=folder / "out" if case["stage"] == "export" else False, **given)
     except DamageestError as error:
-        row["refused"] = _reason(str(error))
+        row["refused"] = _shorten_reason(str(error))
         return row | {"seconds": time.perf_counter() - start}
     row["seconds"] = time.perf_counter() - start
-    row["stage_seconds"] = sum(record.seconds for record in found.stages if record.stage == case["stage"])
-    row["megabytes"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    solids = [site.damage for site in found.sites]
-    row["iou"] = score(part, solids, truth.damage, found.tolerance, found.pose.T_part_scan, pose).iou
-    row["doubtful"] = found.status != "ok" or not all(site.evidence.consistent for site in found.sites)
-    if found.failures:
-        row["refused"] = _reason(found.failures[0])
+    row["stage_seconds"] = sum(record.seconds for record in result.stages if record.stage == case["stage"])
+    row["megabytes"] = memory.take_peak()
+    solids = [site.damage for site in result.sites]
+    row["iou"] = score(part, solids, truth.damage, result.tolerance, result.pose.T_part_scan, pose).iou
+    row["flagged"] = result.status != "ok" or not all(site.evidence.consistent for site in result.sites)
+    if result.failures:
+        row["refused"] = _shorten_reason(result.failures[0])
     return row
 
 
-def _reason(text: str) -> str:
-    """The message alone, without the stage and implementation, which its row names, and the remedy."""
+def _shorten_reason(text: str) -> str:
+    """The message without its remedy, and without stage and implementation, which the table's row names."""
     return text.splitlines()[0].split(": ", 2)[-1]
 
 

@@ -1,4 +1,4 @@
-"""How right a result is: solids compared by Booleans in float64, poses by what they do to the part."""
+"""Scores of a result: solids are compared by Booleans in float64, poses by the displacement of the part's surface."""
 
 from __future__ import annotations
 
@@ -14,20 +14,23 @@ from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import to_manifold, to_solid
 
 MATCH = 0.1
-"""Share of a loss that has to lie in found sites for it to count as found, and of a site in the losses for it not to
-count as invented. How well it was found is for the distances to say."""
+"""Least share of a true damage's volume inside found sites, for it to count as found; and least share of a site's
+volume inside true damage, for it not to count as a false site. The distances measure how well it was found."""
 SAMPLES = 10_000
-"""Points on each inner damage surface whose distance to the other is measured."""
+"""Points on each inner damage surface whose distance to the other surface is measured."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """``iou`` of found and true damage; ``volume_error`` found over true, less 1; ``surface_error``: volume of the
-    symmetric difference per area of the true inner damage surface, in units of the tolerance; ``pose_error``: rms
-    distance of the part's surface, moved by the pose's error, to the part. ``distance_median``, ``_95`` and ``_max``:
-    of points on the found inner damage surface to the true one, and the other way round, together, where they are
-    deeper than the tolerance. NaN where there is nothing to compare. ``found`` and ``missed`` of the true losses,
-    ``invented`` sites."""
+    """The score of a result; a value is NaN if there is nothing to compare.
+
+    ``iou``: intersection over union of found and true damage. ``volume_error``: found volume / true volume - 1.
+    ``surface_error``: volume of the symmetric difference / area of the true inner damage surface, in tolerances.
+    ``pose_error``: rms distance to the part of the part's surface, moved by the error of the pose. ``distance_median``,
+    ``distance_95``, ``distance_max``: distances between the found and the true inner damage surface, in both
+    directions, of points deeper than the tolerance. ``found``, ``missed``: numbers of true damages. ``false_sites``:
+    number of found sites without true damage.
+    """
 
     iou: float
     volume_error: float
@@ -38,33 +41,28 @@ class Score:
     distance_max: float = float("nan")
     found: int = 0
     missed: int = 0
-    invented: int = 0
+    false_sites: int = 0
 
 
-def union(solids: Sequence[Solid], origin: Floats) -> Any:
-    """The ``manifold3d.Manifold`` of all solids together, relative to ``origin`` (3,)."""
+def unite_solids(solids: Sequence[Solid], origin: Floats) -> Any:
+    """The union of solids as a ``manifold3d.Manifold``, relative to ``origin`` (3,)."""
     from manifold3d import Manifold, OpType
 
     return Manifold.batch_boolean([to_manifold(solid, origin) for solid in solids], OpType.Add)
 
 
 def iou(found: Sequence[Solid], true: Sequence[Solid]) -> float:
-    """Intersection over union of two sets of solids, each taken as its union; 1 where both are empty."""
+    """Intersection over union of two sets of solids, each taken as its union; 1 if both are empty."""
     if not found or not true:
         return float(not found and not true)
     origin = true[0].bounds.mean(0)
-    a, b = union(found, origin), union(true, origin)
+    a, b = unite_solids(found, origin), unite_solids(true, origin)
     common = (a ^ b).volume()
     return float(common / (a.volume() + b.volume() - common))
 
 
-def off_part(points: Floats, part: Mesh) -> Floats:
-    """(N,) unsigned distance of points (N,3) to the part's surface."""
-    return distance_to_mesh(points, part)
-
-
-def surface_points(part: Mesh, count: int, seed: int = 0) -> tuple[Floats, Floats]:
-    """(count,3) points, uniform by area, and the (count,3) outward normals there."""
+def sample_surface(part: Mesh, count: int, seed: int = 0) -> tuple[Floats, Floats]:
+    """Random points (count,3), uniform by area, and their outward normals (count,3)."""
     rng = np.random.default_rng([811, seed])
     length = np.linalg.norm(part.cross, axis=1)
     face = rng.choice(len(length), count, p=length / length.sum())
@@ -72,39 +70,45 @@ def surface_points(part: Mesh, count: int, seed: int = 0) -> tuple[Floats, Float
     return np.einsum("ij,ijk->ik", share, part.triangles[face]), part.cross[face] / length[face, None]
 
 
-def pose_error(part: Mesh, found: Floats, true: Floats) -> tuple[float, float]:
-    """rms distance (after, way): of the part's surface, moved by the error of pose ``found`` (4,4), to the part, and to
-    where it was. On a symmetric part a right pose may have a long way, but ends on the part."""
-    points = surface_points(part, 4000)[0]
+def measure_pose_error(part: Mesh, found: Floats, true: Floats) -> tuple[float, float]:
+    """(residual, path): rms distances of the part's surface, moved by the error of pose ``found`` (4,4).
+
+    ``residual``: to the part; ``path``: to where it was. On a symmetric part, the path of a right pose may be long, but
+    its residual is small.
+    """
+    points = sample_surface(part, 4000)[0]
     D = found @ np.linalg.inv(true)
     moved = points @ D[:3, :3].T + D[:3, 3]
-    way = np.linalg.norm(moved - points, axis=1)
-    return float(np.sqrt((off_part(moved, part) ** 2).mean())), float(np.sqrt((way**2).mean()))
+    path = np.linalg.norm(moved - points, axis=1)
+    return float(np.sqrt((distance_to_mesh(moved, part) ** 2).mean())), float(np.sqrt((path**2).mean()))
 
 
-def depth(damage: Mesh, part: Mesh) -> float:
-    """How far the damage reaches below the part's surface."""
-    points = np.concatenate([damage.vertices, surface_points(damage, 2000)[0]])
-    return float(off_part(points, part).max())
+def measure_depth(damage: Mesh, part: Mesh) -> float:
+    """The largest depth of the damage below the part's surface."""
+    points = np.concatenate([damage.vertices, sample_surface(damage, 2000)[0]])
+    return float(distance_to_mesh(points, part).max())
 
 
-def distances(found: Mesh, true: Mesh, part: Mesh, tolerance: float) -> Floats:
-    """(M,) distances of points, uniform by area, on each of two surfaces to the other.
+def measure_distances(found: Mesh, true: Mesh, part: Mesh, tolerance: float) -> Floats:
+    """(M,) distances between two surfaces, in both directions, at points that are uniform by area.
 
-    Of ``SAMPLES`` points on each, those that lie deeper than the tolerance below the part's skin: what lies shallower,
-    as the damage does along its rim, is sound by definition, and where it ends is anyone's guess.
+    Only those of ``SAMPLES`` points on each surface that are deeper than the tolerance below the part's skin. Shallower
+    points, as along the rim, are intact by definition, so that the end of the surface is not determined there.
     """
-    apart = []
+    values = []
     for seed, (mesh, other) in enumerate(((found, true), (true, found)), 1):
-        points = surface_points(mesh, SAMPLES, seed)[0]
-        apart.append(off_part(points[off_part(points, part) > tolerance], other))
-    return np.concatenate(apart)
+        points = sample_surface(mesh, SAMPLES, seed)[0]
+        values.append(distance_to_mesh(points[distance_to_mesh(points, part) > tolerance], other))
+    return np.concatenate(values)
 
 
-def matched(found: Sequence[Any], true: Any, part: Mesh, tolerance: float, origin: Floats) -> tuple[int, int, int]:
-    """How many connected losses of the ``true`` damage were found and missed, and how many sites were invented.
+def count_matches(
+    found: Sequence[Any], true: Any, part: Mesh, tolerance: float, origin: Floats
+) -> tuple[int, int, int]:
+    """(found, missed, false_sites): connected bodies of the true damage found and missed, and sites without damage.
 
-    Args are Manifolds relative to ``origin`` (3,). A loss no deeper than the tolerance is none by definition.
+    ``found`` and ``true`` are Manifolds relative to ``origin`` (3,). A body no deeper than the tolerance is no damage
+    by definition.
     """
     from manifold3d import Manifold, OpType
 
@@ -112,10 +116,10 @@ def matched(found: Sequence[Any], true: Any, part: Mesh, tolerance: float, origi
     hits = []
     for piece in true.decompose():
         solid = to_solid(piece, origin)
-        if solid is not None and depth(solid, part) > tolerance:
+        if solid is not None and measure_depth(solid, part) > tolerance:
             hits.append((piece ^ everything).volume() >= MATCH * piece.volume())
-    invented = sum((site ^ true).volume() < MATCH * site.volume() for site in found)
-    return sum(hits), len(hits) - sum(hits), invented
+    false_sites = sum((site ^ true).volume() < MATCH * site.volume() for site in found)
+    return sum(hits), len(hits) - sum(hits), false_sites
 
 
 def score(
@@ -126,36 +130,38 @@ def score(
     found_pose: Floats | None = None,
     true_pose: Floats | None = None,
 ) -> Score:
-    """Scores the ``found`` damage, taken together, against the ``true`` one; poses are ``T_part_scan`` (4,4).
+    """Compares the union of ``found`` with the ``true`` damage. Poses are ``T_part_scan`` (4,4).
 
-    Where the pose's error brings the part onto itself but elsewhere, as a symmetric part allows, the truth is moved
-    along; the poses' small errors count against the damage otherwise.
+    If the found pose maps a symmetric part onto itself in another position, the true damage is moved to that position.
+    Small errors of the pose are not corrected: they increase the errors of the damage.
     """
     nan = float("nan")
-    after, way, D = nan, nan, np.eye(4)
+    residual, path, D = nan, nan, np.eye(4)
     if found_pose is not None and true_pose is not None:
-        after, way = pose_error(part, found_pose, true_pose)
-        if after < tolerance and way > max(4 * after, tolerance / 4):
+        residual, path = measure_pose_error(part, found_pose, true_pose)
+        if residual < tolerance and path > max(4 * residual, tolerance / 4):
             D = found_pose @ np.linalg.inv(true_pose)
     origin = part.bounds.mean(0)
     if true is None:
-        return Score(float(not found), nan, nan, after, invented=len(found))
+        return Score(float(not found), nan, nan, residual, false_sites=len(found))
     moved = Solid(true.vertices @ D[:3, :3].T + D[:3, 3], true.faces)
     expected, sites = to_manifold(moved, origin), [to_manifold(solid, origin) for solid in found]
-    counts = matched(sites, expected, part, tolerance, origin)
+    counts = count_matches(sites, expected, part, tolerance, origin)
     if not found:
-        return Score(0.0, -1.0, nan, after, nan, nan, nan, *counts)
-    actual = union(found, origin)
+        return Score(0.0, -1.0, nan, residual, nan, nan, nan, *counts)
+    actual = unite_solids(found, origin)
     common = (expected ^ actual).volume()
     a, b = expected.volume(), actual.volume()
     differs = max(a + b - 2 * common, 0.0)
-    # which faces are the part's skin is told in the frame where they lie on it
-    inner = extract_ids(true, part)
-    left = extract_ids(whole, part) if (whole := to_solid(actual, origin)) else None
-    far = (nan, nan, nan)
-    if left is not None and len(left.faces) and len(inner.faces):
-        other = Mesh(inner.vertices @ D[:3, :3].T + D[:3, 3], inner.faces)
-        apart = distances(left, other, part, tolerance)
-        far = (float(np.median(apart)), float(np.quantile(apart, 0.95)), float(apart.max())) if len(apart) else far
-    surface = differs / inner.area / tolerance if inner.area else nan
-    return Score(common / (a + b - common), b / a - 1, surface, after, *far, *counts)
+    # faces on the skin are recognised in the frame in which they lie on the part
+    true_ids = extract_ids(true, part)
+    found_ids = extract_ids(whole, part) if (whole := to_solid(actual, origin)) else None
+    quantiles = (nan, nan, nan)
+    if found_ids is not None and len(found_ids.faces) and len(true_ids.faces):
+        other = Mesh(true_ids.vertices @ D[:3, :3].T + D[:3, 3], true_ids.faces)
+        gaps = measure_distances(found_ids, other, part, tolerance)
+        quantiles = (
+            (float(np.median(gaps)), float(np.quantile(gaps, 0.95)), float(gaps.max())) if len(gaps) else quantiles
+        )
+    surface = differs / true_ids.area / tolerance if true_ids.area else nan
+    return Score(common / (a + b - common), b / a - 1, surface, residual, *quantiles, *counts)

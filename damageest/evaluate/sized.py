@@ -1,4 +1,4 @@
-"""Random damages of a given depth, repeatable from a seed."""
+"""Random damages of a given depth. Equal seeds give equal damages."""
 
 from __future__ import annotations
 
@@ -6,46 +6,46 @@ import numpy as np
 
 from damageest.artefacts import Part
 from damageest.errors import StageError
-from damageest.evaluate.damages import KINDS, Damaged, DamagePlace
-from damageest.evaluate.scores import depth
+from damageest.evaluate.damages import KINDS, PlacePicker, RandomDamage
+from damageest.evaluate.scores import measure_depth
 from damageest.stages.scan.scanner import apply_tools
 
 SIZED = ("chip", "pit", "cut", "groove")
-"""Kinds whose depth goes with their size; how deep the others go, the part decides."""
-CLOSE = 0.05
-"""By how much of it the depth may differ from the one asked for."""
+"""Kinds whose depth depends on their size. The depth of the other kinds depends on the part."""
+DEPTH_ERROR = 0.05
+"""Largest relative difference between the depth and the requested depth."""
 
 
-def sized_damage(part: Part, seed: int, deep: float, first: str = SIZED[0]) -> Damaged:
-    """One loss that reaches ``deep`` below the part's surface, of kind ``first`` where the part has a place for it.
+def make_sized_damage(part: Part, seed: int, depth: float, first: str = SIZED[0]) -> RandomDamage:
+    """One damage with a depth of ``depth`` below the part's surface, of kind ``first`` if the part has a place for it.
 
-    The same seed gives the same place and shape at every depth, as far as the part allows. Raises LookupError where
-    none fits, as where the part's walls are thinner.
+    The same seed gives the same place and shape at every depth, as far as the part allows. Raises LookupError if no
+    damage fits, for example because the walls are thinner.
     """
     rng = np.random.default_rng([5381, seed])
-    site = DamagePlace(part, rng)
+    picker = PlacePicker(part, rng)
     for attempt in range(24):
         name = first if attempt < 8 else str(rng.choice(SIZED))
-        made = _scaled(site, name, deep)
-        if made is not None:
-            return made
-    raise LookupError(f"no damage {deep:.4g} deep fits the part")
+        damage = _scale_damage(picker, name, depth)
+        if damage is not None:
+            return damage
+    raise LookupError(f"no damage with a depth of {depth:.4g} fits the part")
 
 
-def _scaled(site: DamagePlace, name: str, deep: float) -> Damaged | None:
-    """The next random loss of a kind, made larger or smaller until it is as deep as asked for; None if it cannot."""
-    state = site.rng.bit_generator.state
-    site.size = 20 * deep
+def _scale_damage(picker: PlacePicker, name: str, depth: float) -> RandomDamage | None:
+    """The next random damage of a kind, scaled to the requested depth; None if it does not reach it."""
+    state = picker.rng.bit_generator.state
+    picker.size = 20 * depth
     try:
         for _ in range(12):
-            site.rng.bit_generator.state = state
-            tools = KINDS[name](site)
-            lost = apply_tools(site.part, tools)[1]
-            reached = depth(lost, site.part) if lost else 0.0
-            if lost is not None and abs(reached / deep - 1) < CLOSE:
-                return Damaged(tuple(tools), (name,), lost)
-            site.size *= float(np.clip(deep / max(reached, 1e-12), 0.3, 3))
-            if site.size > 8 * site.part.diagonal:
+            picker.rng.bit_generator.state = state
+            tools = KINDS[name](picker)
+            volume = apply_tools(picker.part, tools)[1]
+            reached = measure_depth(volume, picker.part) if volume else 0.0
+            if volume is not None and abs(reached / depth - 1) < DEPTH_ERROR:
+                return RandomDamage(tuple(tools), (name,), volume)
+            picker.size *= float(np.clip(depth / max(reached, 1e-12), 0.3, 3))
+            if picker.size > 8 * picker.part.diagonal:
                 return None
     except (StageError, LookupError):
         return None

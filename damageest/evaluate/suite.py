@@ -7,49 +7,57 @@ from functools import cache
 
 from damageest.artefacts import Part
 from damageest.errors import InputError, suggest
-from damageest.evaluate._case import Case
-from damageest.evaluate._vary import Base, Wanted, variants
+from damageest.evaluate.case import DamageCase
 from damageest.evaluate.damages import KINDS
-from damageest.evaluate.job import checked, code
+from damageest.evaluate.job import check_variant, fingerprint_code
 from damageest.evaluate.parts import PARTS
 from damageest.evaluate.sized import SIZED
+from damageest.evaluate.variants import Baseline, VariationRequest, make_variants
 from damageest.pipeline.cache import digest
 from damageest.registry import Registry
 
 SIGMA = 0.0005
-"""Noise of the scan as a share of the part's diagonal."""
+"""Noise of the scan, as a share of the part's diagonal."""
 DENSITY = 0.4
+"""Unevenness of the scan's density: the option `density` of `scan: simulate`."""
 POINTS = 150_000
+"""Points of the scan."""
 
 
 @cache
-def _part(name: str) -> Part:
+def _make_part(name: str) -> Part:
     return PARTS[name]()
 
 
-def cases(count: int, seed: int, parts: Sequence[str], pose: str, wanted: Wanted, registry: Registry) -> list[Case]:
-    """``count`` damages that go through the parts in turn, each in every variant. Raises InputError or JobError for a
-    part that there is not, or for what cannot be varied so."""
+def make_cases(
+    count: int, seed: int, parts: Sequence[str], pose: str, request: VariationRequest, registry: Registry
+) -> list[DamageCase]:
+    """The cases: ``count`` random damages, on each of the parts in turn, and each in all variants.
+
+    Raises InputError or JobError for an unknown part or an invalid variation.
+    """
     for name in parts:
         if name not in PARTS:
-            raise InputError(f"--parts: no part '{name}'{suggest(name, list(PARTS))}; there are: {', '.join(PARTS)}")
+            raise InputError(
+                f"--parts: there is no part '{name}'{suggest(name, list(PARTS))}; there are: {', '.join(PARTS)}"
+            )
     if count < 1:
-        raise InputError(f"--cases: give 1 or more, not {count}")
-    made, computed = [], code(registry)
+        raise InputError(f"--cases: {count} is too few; at least 1 is needed")
+    cases, code = [], fingerprint_code(registry)
     for number in range(count):
-        part = _part(parts[number % len(parts)])
+        part = _make_part(parts[number % len(parts)])
         noise = float(f"{SIGMA * part.diagonal:.6g}")
         scanner = {"points": POINTS, "noise": noise, "density": DENSITY, "pose": pose}
-        ways = variants(wanted, Base("mm", scanner, 4 * noise, False, True))
+        ways = make_variants(request, Baseline("mm", scanner, 4 * noise, False, True))
         if number == 0:
             for way in ways:
-                checked({"version": 1}, way, part, registry)
+                check_variant({"version": 1}, way, part, registry)
         for way in ways:
-            # the first loss goes through the kinds in turn, shifted for each round of the parts
+            # the first damage is of each kind in turn, with another kind in each round of the parts
             kinds = SIZED if way.size else tuple(KINDS)
             first = kinds[(number + number // len(PARTS)) % len(kinds)]
-            made.append(
-                Case(
+            cases.append(
+                DamageCase(
                     part=parts[number % len(parts)],
                     seed=1000 * seed + number,
                     first=first,
@@ -58,7 +66,7 @@ def cases(count: int, seed: int, parts: Sequence[str], pose: str, wanted: Wanted
                     scanner=way.scanner,
                     settings=way.settings,
                     varied=way.varied,
-                    source=digest(computed, part.vertices, part.faces),
+                    source=digest(code, part.vertices, part.faces),
                 )
             )
-    return made
+    return cases

@@ -25,7 +25,7 @@ def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
     done = call("run", damaged_box.write(tmp_path))
     assert done.returncode == 0, done.stderr
     assert "implicit" in done.stdout
-    assert "yes" in done.stdout
+    assert "passed" in done.stdout
     assert [line.split(":")[0].strip() for line in done.stderr.splitlines()[1:3]] == ["part", "scan"]
     written = {p.name for p in (tmp_path / "out/job").iterdir()}
     assert {

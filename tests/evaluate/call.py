@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from damageest.evaluate._case import TIMES
+from damageest.evaluate.case import TIMES
 
 
 def evaluate(*words: object) -> subprocess.CompletedProcess[str]:

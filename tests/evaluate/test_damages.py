@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from damageest.evaluate.damages import KINDS, SHARE, random_damage
+from damageest.evaluate.damages import KINDS, SHARE, make_random_damage
 from damageest.evaluate.parts import PARTS
-from damageest.evaluate.scores import depth, iou
+from damageest.evaluate.scores import iou, measure_depth
 from damageest.geometry.solids import to_manifold
 from damageest.stages.scan.simulate import Simulate
 
@@ -13,16 +13,16 @@ from damageest.stages.scan.simulate import Simulate
 @pytest.mark.parametrize("name", ["tube", "lever"])
 def test_each_kind_makes_a_loss_of_its_size(kind: str, name: str) -> None:
     part = PARTS[name]()
-    made = random_damage(part, 1, (kind,), losses=1)
+    made = make_random_damage(part, 1, (kind,), count=1)
     assert made.kinds == (kind,)
     assert SHARE[0] < made.damage.volume / part.volume < SHARE[1]
-    assert depth(made.damage, part) >= 0.008 * part.diagonal
+    assert measure_depth(made.damage, part) >= 0.008 * part.diagonal
     assert (to_manifold(made.damage) - to_manifold(part)).volume() < 1e-9 * part.volume
 
 
 def test_a_damage_repeats_and_is_what_the_virtual_scanner_takes_off() -> None:
     part = PARTS["coupling"]()
-    a, b, other = random_damage(part, 7), random_damage(part, 7), random_damage(part, 8)
+    a, b, other = make_random_damage(part, 7), make_random_damage(part, 7), make_random_damage(part, 8)
     assert a.tools == b.tools != other.tools
     assert a.damage.vertices.tobytes() == b.damage.vertices.tobytes()
     scan = Simulate(damage=a.tools, points=1000).run("mm", part)
@@ -32,6 +32,6 @@ def test_a_damage_repeats_and_is_what_the_virtual_scanner_takes_off() -> None:
 
 
 def test_the_number_of_losses() -> None:
-    made = random_damage(PARTS["block"](), 3, ("pit", "chip"), losses=2)
+    made = make_random_damage(PARTS["block"](), 3, ("pit", "chip"), count=2)
     assert made.kinds == ("pit", "chip")
     assert len(made.tools) == 2

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from damageest.errors import DamageestError
-from damageest.evaluate import _case
-from damageest.evaluate._vary import Wanted
-from damageest.evaluate.job import study
+from damageest.evaluate import case as case_module
+from damageest.evaluate.job import plan_study
+from damageest.evaluate.variants import VariationRequest
 from damageest.registry import Registry
 from tests import damaged_box
 from tests.evaluate.call import evaluate, rows_of, timeless
@@ -34,18 +34,20 @@ def test_depths_found_and_not_found_are_told_kept_and_gone_on_from(tmp_path: Pat
     for row in first.values():
         assert not row["error"]
         assert 50 < row["megabytes"] < 5000
-        assert (row["found"], row["missed"], row["invented"]) == (int(row["size"] > 0), 0, 0)
+        assert (row["found"], row["missed"], row["false_sites"]) == (int(row["size"] > 0), 0, 0)
         if row["size"]:
             assert row["iou"] > 0.9
             assert row["distance_median"] < row["distance_95"] < row["distance_max"] < 2
             assert row["depth"] == pytest.approx(4, rel=0.05)
             assert {"segment", "enclose"} < set(row["stage_seconds"])
     head, *body = [text.split() for text in done.stdout.splitlines() if text.startswith(("depth", "0", "4"))][:3]
-    assert head[:5] == ["depth,", "mm", "cases", "right", "IoU"]
+    assert head[:5] == ["depth,", "mm", "cases", "IoU", ">="]
     assert [text[:2] for text in body] == [["0", "2"], ["4", "2"]]
     last = done.stdout.splitlines()[-1]
-    assert last.startswith("Found in at least 95 % of the cases was damage from 4 mm deep (1 of 1) with noise 0.02; ")
-    assert last.endswith("; on 0 of 2 scans of the sound part it saw damage.")
+    assert last.startswith(
+        "Damage was found in at least 95 % of the cases: from a depth of 4 mm (1 of 1) with noise 0.02; "
+    )
+    assert last.endswith("; on 0 of 2 scans of the intact part, damage was reported.")
 
     summary = json.loads((out / "summary.json").read_text())
     assert summary["sentence"] == last
@@ -81,15 +83,15 @@ def test_cases_that_fail_or_do_not_fit_stop_nothing(tmp_path: Path) -> None:
     assert refused["error"].startswith("background: build_volume")
     assert (refused["flagged"], refused["found"], refused["missed"]) == (True, 0, 1)
     assert rows[25, "bbox"]["skipped"]
-    assert "left out: 2, as no damage 25 deep fits the part" in done.stdout
+    assert "skipped cases: 2; the first: no damage with a depth of 25 fits the part" in done.stdout
 
 
 def test_a_case_that_takes_too_long_is_a_row_with_an_error(tmp_path: Path) -> None:
     job = damaged_box.write(tmp_path, SIMULATED)
     done = evaluate("job", job, "--seeds", 1, "--size", "4", "--timeout", 0.01)
     assert done.returncode == 0, done.stderr
-    assert "not done after 0.01 s" in done.stderr
-    assert "No depth was found in at least 95 % of the cases (0 of 1 at 4 mm, the deepest tried)" in done.stdout
+    assert "stopped: not finished after 0.01 s" in done.stderr
+    assert "Damage of no depth was found in at least 95 % of the cases (0 of 1 at 4 mm, the deepest)" in done.stdout
 
 
 @pytest.fixture
@@ -98,16 +100,16 @@ def real(tmp_path: Path) -> Path:
 
 
 def test_the_virtual_scanner_is_like_the_jobs_scan(real: Path, tmp_path: Path, registry: Registry) -> None:
-    found = study(real, Wanted(), 3, registry, tmp_path)
+    found = plan_study(real, VariationRequest(), 3, registry, tmp_path)
     case = found.cases[-1]
     assert case.scanner["noise"] == pytest.approx(0.04, rel=0.1)
     assert case.scanner["points"] == pytest.approx(20_000, rel=0.1)
     assert case.scanner["pose"] == "identity"
     # depths of 0, 2, 4, 8 and 16 tolerances; the last, 3.2, within a tenth of the part
     assert [c.size for c in found.cases[:5]] == pytest.approx([0, 0.4, 0.8, 1.6, 3.2])
-    assert len({c.key() for c in found.cases}) == len(found.cases) == 15
-    part = _case.part_of(case)
-    a, b = _case.scanned(case, part)[0], _case.scanned(case, part)[0]
+    assert len({c.compute_key() for c in found.cases}) == len(found.cases) == 15
+    part = case_module.load_part(case)
+    a, b = case_module.simulate_scan(case, part)[0], case_module.simulate_scan(case, part)[0]
     assert a.points.tobytes() == b.points.tobytes()
     assert a.truth is not None
     assert np.array_equal(a.truth.T_part_scan, np.eye(4))
@@ -116,11 +118,14 @@ def test_the_virtual_scanner_is_like_the_jobs_scan(real: Path, tmp_path: Path, r
 def test_the_key_does_not_depend_on_where_the_files_lie(real: Path, tmp_path: Path, registry: Registry) -> None:
     other = damaged_box.write(tmp_path / "moved")
     (tmp_path / "place").mkdir()
-    here = study(real, Wanted(), 1, registry, tmp_path).cases
-    there = study(other, Wanted(), 1, registry, tmp_path / "place").cases
-    assert [case.key() for case in here] == [case.key() for case in there]
+    here = plan_study(real, VariationRequest(), 1, registry, tmp_path).cases
+    there = plan_study(other, VariationRequest(), 1, registry, tmp_path / "place").cases
+    assert [case.compute_key() for case in here] == [case.compute_key() for case in there]
     other.write_text(damaged_box.JOB + "allowance: none\n")
-    assert study(other, Wanted(), 1, registry, tmp_path / "place").cases[0].key() != here[0].key()
+    assert (
+        plan_study(other, VariationRequest(), 1, registry, tmp_path / "place").cases[0].compute_key()
+        != here[0].compute_key()
+    )
 
 
 @pytest.mark.parametrize(
@@ -130,14 +135,14 @@ def test_the_key_does_not_depend_on_where_the_files_lie(real: Path, tmp_path: Pa
         ({"vary": ["cluster.neighbors=5,10"]}, "did you mean 'neighbours'?"),
         ({"vary": ["cluster.use=dbscan,dbscam"]}, "did you mean 'dbscan'?"),
         ({"vary": ["scan.densty=0.1,0.2"]}, "did you mean 'density'?"),
-        ({"size": "-1"}, "--size: '-1' is no length"),
+        ({"size": "-1"}, "--size: '-1' is not a length"),
     ],
 )
 def test_faults_are_named_before_anything_runs(
     real: Path, tmp_path: Path, registry: Registry, wanted: dict[str, Any], said: str
 ) -> None:
     with pytest.raises(DamageestError) as caught:
-        study(real, Wanted(**wanted), 1, registry, tmp_path)
+        plan_study(real, VariationRequest(**wanted), 1, registry, tmp_path)
     assert said in str(caught.value)
     assert caught.value.exit_status == 2
 
@@ -147,6 +152,6 @@ def test_a_jobs_cut_back_is_no_error_of_its_damage(tmp_path: Path) -> None:
     ious = []
     for text in (SIMULATED, SIMULATED + stock):
         path = damaged_box.write(tmp_path, text)
-        (case,) = study(path, Wanted(size="4"), 1, Registry.discover(), tmp_path).cases
-        ious.append(_case.run_case(case)["iou"])
+        (case,) = plan_study(path, VariationRequest(size="4"), 1, Registry.discover(), tmp_path).cases
+        ious.append(case_module.run_case(case)["iou"])
     assert ious[0] == ious[1] > 0.9

@@ -9,13 +9,13 @@ import pytest
 import trimesh
 
 from damageest.errors import InputError, JobError
-from damageest.evaluate._table import marks, placed, table
-from damageest.evaluate.matrix import Cell, matrix
+from damageest.evaluate.matrix import MatrixCell, run_matrix
+from damageest.evaluate.readme import make_marks, make_matrix_table, replace_between_marks
 from damageest.registry import Registry
 from damageest.registry.contracts import STAGES
 from tests import damaged_box
 
-BEGIN, END = marks("matrix")
+BEGIN, END = make_marks("matrix")
 README = Path(__file__).parents[2] / "README.md"
 JOB = """\
 version: 1
@@ -39,8 +39,8 @@ def job(tmp_path: Path) -> Path:
 
 
 def test_every_implementation_of_a_stage_is_run(job: Path, registry: Registry) -> None:
-    told: list[Cell] = []
-    cells = matrix([job], registry, ["boundary", "align", "export"], workers=2, tell=told.append)
+    told: list[MatrixCell] = []
+    cells = run_matrix([job], registry, ["boundary", "align", "export"], workers=2, tell=told.append)
     assert [(cell.stage, cell.use) for cell in cells] == [
         (stage, item.name) for stage in ("align", "boundary", "export") for item in registry.of(stage)
     ]
@@ -54,23 +54,23 @@ def test_every_implementation_of_a_stage_is_run(job: Path, registry: Registry) -
 
 def test_a_refusal_is_shown_with_its_reason(job: Path, registry: Registry) -> None:
     job.write_text(JOB.replace("radius: 6}", "radius: 6}\n    - {tool: sphere, centre: [-20, 0, 0], radius: 0.9}"))
-    text = table(matrix([job], registry, ["repair"]))
+    text = make_matrix_table(run_matrix([job], registry, ["repair"]))
     assert re.search(r"\| repair \| none \| 0\.9\d\d, partly refused \[1\] \|", text)
     assert re.search(r"^1\. .*points.* too few", text, re.MULTILINE)
 
 
 def test_a_job_without_a_truth_is_refused(tmp_path: Path, registry: Registry) -> None:
-    with pytest.raises(JobError, match="truth is not known"):
-        matrix([damaged_box.write(tmp_path)], registry)
+    with pytest.raises(JobError, match="true damage is not known"):
+        run_matrix([damaged_box.write(tmp_path)], registry)
 
 
 def test_the_table_goes_between_the_marks_and_nowhere_else(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
-    assert placed(page, "new", "matrix") == f"before\n{BEGIN}\n\nnew\n\n{END}\nafter\n"
+    assert replace_between_marks(page, "new", "matrix") == f"before\n{BEGIN}\n\nnew\n\n{END}\nafter\n"
     page.write_text("no marks\n")
     with pytest.raises(InputError, match="matrix: begin"):
-        placed(page, "new", "matrix")
+        replace_between_marks(page, "new", "matrix")
 
 
 def test_the_readmes_matrix_has_every_implementation(registry: Registry) -> None:
@@ -85,7 +85,7 @@ def test_the_readmes_matrix_has_every_implementation(registry: Registry) -> None
         stage = row[0] or stage
         listed.add((stage, row[1]))
         for value in row[2:-3]:
-            assert re.fullmatch(r"[01]\.\d{3}(, partly refused \[\d+\]| \(doubted\))?|refused \[\d+\]", value)
+            assert re.fullmatch(r"[01]\.\d{3}(, partly refused \[\d+\]| \(flagged\))?|refused \[\d+\]", value)
     shipped = ("damageest", "damageest-")
     there = {(s, i.name) for s in STAGES for i in registry.of(s) if i.provider.name.startswith(shipped)}
     assert there <= listed

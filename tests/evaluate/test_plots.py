@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from damageest.errors import InputError
-from damageest.evaluate._plots import draw, require
+from damageest.evaluate.plots import draw_plots, require_matplotlib
 from tests.evaluate.rows import MISSED, row
 
 
@@ -17,7 +17,7 @@ def test_what_was_varied_is_drawn_and_the_errors(tmp_path: Path) -> None:
         for n, p, t, s in [(1, 1000, 0.1, 0.5), (2, 1000, 0.2, 1.0), (2, 4000, 0.1, 1.0)]
     ]
     rows.append(row(varied=rows[0]["varied"], size=0.5, **MISSED))
-    made = draw(rows, "mm", tmp_path)
+    made = draw_plots(rows, "mm", tmp_path)
     assert {path.stem for path in made} == {
         "error_by_noise",
         "time_by_points",
@@ -31,7 +31,7 @@ def test_what_was_varied_is_drawn_and_the_errors(tmp_path: Path) -> None:
         else:
             assert Xml.parse(path).getroot().tag.endswith("svg")
     before = {path: path.read_bytes() for path in made}
-    draw(rows, "mm", tmp_path)
+    draw_plots(rows, "mm", tmp_path)
     assert {path: path.read_bytes() for path in made} == before
 
 
@@ -45,23 +45,23 @@ def test_ways_to_compare_are_lines_of_their_own(tmp_path: Path) -> None:
             ("method=octree enclose.depth=9", 1000, 20.0),
         ]
     ]
-    made = {path.name: path for path in draw(rows, "mm", tmp_path)}
+    made = {path.name: path for path in draw_plots(rows, "mm", tmp_path)}
     assert {"error_by_time.svg", "time_by_points.svg", "errors.svg"} <= set(made)
     # the rival's settings are one line, with one name
     assert made["error_by_time.svg"].read_text().count("<!-- method=octree -->") == 1
     (tmp_path / "one").mkdir()
-    alone = {path.name: path for path in draw(rows[:2], "mm", tmp_path / "one")}
+    alone = {path.name: path for path in draw_plots(rows[:2], "mm", tmp_path / "one")}
     for name in ("error_by_time.svg", "time_by_points.svg"):
         assert made[name].read_bytes() != alone[name].read_bytes()
 
 
 def test_nothing_varied_and_nothing_found_draws_nothing(tmp_path: Path) -> None:
-    assert draw([row(**MISSED)], "mm", tmp_path) == []
-    assert [path.stem for path in draw([row()], "mm", tmp_path)] == ["errors", "errors"]
+    assert draw_plots([row(**MISSED)], "mm", tmp_path) == []
+    assert [path.stem for path in draw_plots([row()], "mm", tmp_path)] == ["errors", "errors"]
 
 
 def test_without_matplotlib_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    require()
+    require_matplotlib()
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(InputError, match=r"pip install 'damageest\[evaluate\]', or --no-plots"):
-        require()
+        require_matplotlib()

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from damageest.evaluate import _run
-from damageest.evaluate._case import Case, blank
+from damageest.evaluate import processes
+from damageest.evaluate.case import DamageCase, make_blank_row
 
 CASES = [
-    Case("cuboid", seed, "pit", 0.2, scanner={"noise": noise, "points": 10}, varied={"noise": noise})
+    DamageCase("cuboid", seed, "pit", 0.2, scanner={"noise": noise, "points": 10}, varied={"noise": noise})
     for seed in (0, 1)
     for noise in (0.1, 0.2)
 ]
@@ -24,37 +24,37 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The keys of the cases that were run, in place of running them."""
     keys: list[str] = []
 
-    def row(case: Case, timeout: float) -> dict[str, Any]:
-        keys.append(case.key())
-        return blank(case) | {"seconds": timeout}
+    def row(case: DamageCase, timeout: float) -> dict[str, Any]:
+        keys.append(case.compute_key())
+        return make_blank_row(case) | {"seconds": timeout}
 
-    monkeypatch.setattr(_run, "_row", row)
+    monkeypatch.setattr(processes, "_compute_row", row)
     return keys
 
 
 def test_rows_on_file_are_not_run_again_and_new_ones_are_appended(tmp_path: Path, ran: list[str]) -> None:
     out, told = tmp_path / "cases.jsonl", []
-    out.write_text(json.dumps(blank(CASES[1]) | {"iou": 0.5}) + '\n{"key": "cut sh')
-    rows = _run.run_all(CASES, out, 2, 10, told.append)
-    assert sorted(ran) == sorted(CASES[k].key() for k in (0, 2, 3))
-    assert [row["key"] for row in rows] == [case.key() for case in CASES]
+    out.write_text(json.dumps(make_blank_row(CASES[1]) | {"iou": 0.5}) + '\n{"key": "cut sh')
+    rows = processes.run_all(CASES, out, 2, 10, told.append)
+    assert sorted(ran) == sorted(CASES[k].compute_key() for k in (0, 2, 3))
+    assert [row["key"] for row in rows] == [case.compute_key() for case in CASES]
     assert [row["iou"] for row in rows] == [0, 0.5, 0, 0]
     assert len(told) == 4
-    assert _run.run_all(CASES, out, 2, 99, told.append) == rows
+    assert processes.run_all(CASES, out, 2, 99, told.append) == rows
     assert len(ran) == 3
     assert len(out.read_text().splitlines()) == 4
 
 
 def test_what_a_row_stands_for_is_up_to_the_run(tmp_path: Path, ran: list[str]) -> None:
     out = tmp_path / "cases.jsonl"
-    _run.run_all(CASES[:1], out, 1, 10, lambda row: None)
+    processes.run_all(CASES[:1], out, 1, 10, lambda row: None)
     same = [replace(CASES[0], varied={"size": "any"}), replace(CASES[0], varied={"size": "all"})]
-    rows = _run.run_all(same, out, 1, 10, lambda row: None)
+    rows = processes.run_all(same, out, 1, 10, lambda row: None)
     assert [row["varied"] for row in rows] == [{"size": "any"}, {"size": "all"}]
     assert len(ran) == 1
 
 
 def test_a_process_that_crashes_says_so() -> None:
-    said = _run.apart("damageest.evaluate._case", {"part": "cuboid"}, 60)
-    assert isinstance(said, str)
-    assert said.startswith("crashed (1): TypeError")
+    message = processes.run_in_process("damageest.evaluate.case", {"part": "cuboid"}, 60)
+    assert isinstance(message, str)
+    assert message.startswith("the process crashed with exit status 1: TypeError")

@@ -99,17 +99,17 @@ def test_what_is_shallower_than_the_tolerance_does_not_count_as_apart() -> None:
     assert score(part, [true, sliver], true, 0.1).distance_max == pytest.approx(25, rel=0.03)
 
 
-def test_losses_found_and_missed_and_sites_invented() -> None:
+def test_losses_found_and_missed_and_false_sites() -> None:
     part = PARTS["cuboid"]()
     west, east = box((-35, -25, -15), (-30, 25, 15)), box((30, -25, -15), (35, 25, 15))
     both = Solid(np.concatenate([west.vertices, east.vertices]), np.concatenate([west.faces, east.faces + 8]))
     half, elsewhere = box((30, -25, -15), (35, 0, 15)), box((-5, 20, -15), (5, 25, 15))
     result = score(part, [half, elsewhere], both, 0.5)
-    assert (result.found, result.missed, result.invented) == (1, 1, 1)
+    assert (result.found, result.missed, result.false_sites) == (1, 1, 1)
     # one site over both losses finds both; a loss within the tolerance is none
     assert score(part, [box((-35, -25, -15), (35, 25, 15))], both, 0.5).found == 2
     thin = box((34.8, -25, -15), (35, 25, 15))
     assert score(part, [], thin, 0.5).missed == 0
     assert score(part, [], thin, 0.1).missed == 1
     nothing = score(part, [half], None, 0.5)
-    assert (nothing.found, nothing.missed, nothing.invented) == (0, 0, 1)
+    assert (nothing.found, nothing.missed, nothing.false_sites) == (0, 0, 1)

@@ -10,23 +10,23 @@ import pytest
 
 from damageest.errors import InputError
 from damageest.evaluate import suite
-from damageest.evaluate._report import COLUMNS
-from damageest.evaluate._table import marks
-from damageest.evaluate._vary import Wanted
 from damageest.evaluate.damages import KINDS
 from damageest.evaluate.parts import PARTS
+from damageest.evaluate.readme import make_marks
+from damageest.evaluate.report import COLUMNS
+from damageest.evaluate.variants import VariationRequest
 from damageest.job import load
 from damageest.registry import Registry
 from damageest.stages.part import ReadPart
 from tests.evaluate.call import evaluate, rows_of, timeless
 
 README = Path(__file__).parents[2] / "README.md"
-BEGIN, END = marks("suite")
+BEGIN, END = make_marks("suite")
 
 
 def tables(text: str, name: str = "suite") -> list[list[list[str]]]:
     """The Markdown tables between the marks, as lines of words."""
-    begin, end = marks(name)
+    begin, end = make_marks(name)
     lines = text.partition(begin)[2].partition(end)[0].splitlines()
     found: list[list[list[str]]] = []
     for before, line in zip(["", *lines], lines, strict=False):
@@ -62,7 +62,7 @@ def test_two_methods_on_a_part_twice_over_and_the_table_in_a_page(tmp_path: Path
     check(methods, {"implicit", "surface", "all"})
     assert methods[0][0] == "method"
     assert re.search(r"`damageest evaluate suite --cases 1 .* --no-plots`\. Measured \d{4}-\d\d-\d\d: Python", text)
-    assert done.stdout.splitlines()[-1].startswith("Found in at least 95 % of the cases was damage ")
+    assert done.stdout.splitlines()[-1].startswith("Damage was found in at least 95 % of the cases: ")
 
     assert evaluate("suite", *words, "--jobs", 1, "--out", tmp_path / "b").returncode == 0
     a, b = rows_of(tmp_path / "a"), rows_of(tmp_path / "b")
@@ -72,23 +72,23 @@ def test_two_methods_on_a_part_twice_over_and_the_table_in_a_page(tmp_path: Path
 
 
 def test_cases_go_through_parts_and_kinds_in_turn_and_their_seeds_differ(registry: Registry) -> None:
-    cases = suite.cases(40, 2, list(PARTS), "random", Wanted(tolerance="4"), registry)
+    cases = suite.make_cases(40, 2, list(PARTS), "random", VariationRequest(tolerance="4"), registry)
     assert [case.part for case in cases] == [list(PARTS)[k % 13] for k in range(40)]
     assert {case.first for case in cases} == set(KINDS)
     # the second round has other damages on the parts
     assert all(a.first != b.first for a, b in zip(cases[:13], cases[13:26], strict=True))
     assert [case.seed for case in cases] == list(range(2000, 2040))
     assert all(case.tolerance == pytest.approx(4 * case.scanner["noise"]) for case in cases)
-    assert len({case.key() for case in cases}) == 40
+    assert len({case.compute_key() for case in cases}) == 40
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--parts", "cubiod"], "no part 'cubiod' (did you mean 'cuboid'?)"),
+        (["--parts", "cubiod"], "there is no part 'cubiod' (did you mean 'cuboid'?)"),
         (["--method", "implizit"], "did you mean 'implicit'?"),
-        (["--pose", "unknown"], "--pose: random or identity"),
-        (["--cases", "0"], "--cases: give 1 or more"),
+        (["--pose", "unknown"], "give random or identity"),
+        (["--cases", "0"], "at least 1 is needed"),
     ],
 )
 def test_faults_are_named(words: list[str], said: str) -> None:
@@ -137,11 +137,11 @@ def test_the_readmes_tables_of_cost_name_what_there_is(name: str, registry: Regi
 
 def test_an_unknown_part_is_an_error_of_its_own(registry: Registry) -> None:
     with pytest.raises(InputError, match="there are: block"):
-        suite.cases(1, 0, ["nothing"], "random", Wanted(), registry)
+        suite.make_cases(1, 0, ["nothing"], "random", VariationRequest(), registry)
 
 
 def test_rows_of_other_code_are_not_gone_on_from(registry: Registry) -> None:
     other = replace(registry, providers=registry.providers[:1])
-    a, b = (suite.cases(1, 0, ["cuboid"], "random", Wanted(), code)[0] for code in (registry, other))
-    assert a.key() != b.key()
-    assert replace(a, source=b.source).key() == b.key()
+    a, b = (suite.make_cases(1, 0, ["cuboid"], "random", VariationRequest(), code)[0] for code in (registry, other))
+    assert a.compute_key() != b.compute_key()
+    assert replace(a, source=b.source).compute_key() == b.compute_key()

@@ -3,29 +3,29 @@ from __future__ import annotations
 import pytest
 
 from damageest.errors import InputError
-from damageest.evaluate._vary import Base, Wanted, variants
+from damageest.evaluate.variants import Baseline, VariationRequest, make_variants
 
-MINE = Base("mm", {"noise": 0.02, "points": 5000}, 0.1, False, False, {"cluster": "dbscan"})
-SUITE = Base("mm", {"noise": 0.05, "points": 5000}, 0.2, False, True)
+MINE = Baseline("mm", {"noise": 0.02, "points": 5000}, 0.1, False, False, {"cluster": "dbscan"})
+SUITE = Baseline("mm", {"noise": 0.05, "points": 5000}, 0.2, False, True)
 
 
 def test_nothing_varied_is_one_variant() -> None:
-    (only,) = variants(Wanted(), MINE)
+    (only,) = make_variants(VariationRequest(), MINE)
     assert (only.varied, only.size, only.scanner, only.settings) == ({}, None, MINE.scanner, ("tolerance=0.1",))
 
 
 def test_lengths_are_in_the_unit_of_the_job_or_their_own_or_multiples() -> None:
-    sizes = [way.size for way in variants(Wanted(size="0,0.3,4x,500um,0.1in"), MINE)]
+    sizes = [way.size for way in make_variants(VariationRequest(size="0,0.3,4x,500um,0.1in"), MINE)]
     assert sizes == pytest.approx([0, 0.3, 0.4, 0.5, 2.54])
-    noises = [way.scanner["noise"] for way in variants(Wanted(noise="0.5,2x,0.03mm"), MINE)]
+    noises = [way.scanner["noise"] for way in make_variants(VariationRequest(noise="0.5,2x,0.03mm"), MINE)]
     assert noises == pytest.approx([0.01, 0.04, 0.03])
-    tolerances = variants(Wanted(tolerance="0.3,2x,auto"), MINE)
+    tolerances = make_variants(VariationRequest(tolerance="0.3,2x,auto"), MINE)
     assert [way.settings[-1] for way in tolerances] == ["tolerance=0.3", "tolerance=0.2", 'tolerance="auto"']
     assert [way.tolerance for way in tolerances] == pytest.approx([0.3, 0.2, 0.08])
 
 
 def test_for_several_parts_tolerances_follow_the_noise_and_labels_are_multiples() -> None:
-    ways = variants(Wanted(noise="1,2", tolerance="4,6"), SUITE)
+    ways = make_variants(VariationRequest(noise="1,2", tolerance="4,6"), SUITE)
     assert [way.varied for way in ways] == [
         {"noise": noise, "tolerance": tolerance} for noise in (1, 2) for tolerance in (4, 6)
     ]
@@ -33,7 +33,9 @@ def test_for_several_parts_tolerances_follow_the_noise_and_labels_are_multiples(
 
 
 def test_all_combinations_of_options_and_implementations() -> None:
-    ways = variants(Wanted(vary=["cluster.use=dbscan,other", "scan.outliers=0,0.1"], settings=["method=auto"]), MINE)
+    ways = make_variants(
+        VariationRequest(vary=["cluster.use=dbscan,other", "scan.outliers=0,0.1"], settings=["method=auto"]), MINE
+    )
     assert [way.varied for way in ways] == [
         {"cluster": use, "scan.outliers": share} for use in ("dbscan", "other") for share in (0, 0.1)
     ]
@@ -45,7 +47,7 @@ def test_all_combinations_of_options_and_implementations() -> None:
 
 def test_ways_to_compare_are_settings_beside_the_jobs_own() -> None:
     rival = "method=octree enclose.depth=8"
-    ways = variants(Wanted(tolerance="0.1,0.2", against=[rival, rival], settings=["method=auto"]), MINE)
+    ways = make_variants(VariationRequest(tolerance="0.1,0.2", against=[rival, rival], settings=["method=auto"]), MINE)
     assert [way.varied for way in ways] == [
         {"tolerance": tolerance, "way": name} for tolerance in (0.1, 0.2) for name in ("default", rival)
     ]
@@ -54,30 +56,30 @@ def test_ways_to_compare_are_settings_beside_the_jobs_own() -> None:
 
 
 def test_values_may_be_lists() -> None:
-    ways = variants(Wanted(vary=["background.size=[1,2,3],[4,5,6]"]), MINE)
+    ways = make_variants(VariationRequest(vary=["background.size=[1,2,3],[4,5,6]"]), MINE)
     assert [way.settings[-1] for way in ways] == ["background.size=[1, 2, 3]", "background.size=[4, 5, 6]"]
 
 
 @pytest.mark.parametrize(
     ("wanted", "said"),
     [
-        (Wanted(noise="1,much"), "--noise: 'much' is no length"),
-        (Wanted(size="0.4parsec"), "unknown unit 'parsec'"),
-        (Wanted(points="0"), "--points"),
-        (Wanted(tolerance="0"), "--tolerance: 0: has to be above 0"),
-        (Wanted(vary=["cluster.eps"]), "--vary takes stage.option=a,b,c"),
-        (Wanted(vary=["scan.noise=0.1,0.2"]), "there is an option of its own for this: --noise 0.1,0.2"),
-        (Wanted(vary=["scan.damage=1"]), "--vary scan.damage: cannot be varied"),
-        (Wanted(vary=["part.unit=mm,cm"]), "--vary part.unit: cannot be varied"),
-        (Wanted(vary=["method=auto", "method=surface"]), "'method' is varied already"),
+        (VariationRequest(noise="1,much"), "--noise: 'much' is not a length"),
+        (VariationRequest(size="0.4parsec"), "unknown unit 'parsec'"),
+        (VariationRequest(points="0"), "--points"),
+        (VariationRequest(tolerance="0"), "--tolerance: '0' is not above 0"),
+        (VariationRequest(vary=["cluster.eps"]), "--vary cluster.eps: not valid; give stage.option=a,b,c"),
+        (VariationRequest(vary=["scan.noise=0.1,0.2"]), "use the option --noise 0.1,0.2"),
+        (VariationRequest(vary=["scan.damage=1"]), "--vary scan.damage: cannot be varied"),
+        (VariationRequest(vary=["part.unit=mm,cm"]), "--vary part.unit: cannot be varied"),
+        (VariationRequest(vary=["method=auto", "method=surface"]), "'method' is given twice"),
     ],
 )
-def test_faults_are_named(wanted: Wanted, said: str) -> None:
+def test_faults_are_named(wanted: VariationRequest, said: str) -> None:
     with pytest.raises(InputError) as caught:
-        variants(wanted, MINE)
+        make_variants(wanted, MINE)
     assert said in str(caught.value)
 
 
 def test_multiples_of_no_noise_are_refused() -> None:
-    with pytest.raises(InputError, match=r"multiple of 0; give lengths, as 0\.01mm"):
-        variants(Wanted(noise="1,2"), Base("mm", {"noise": 0.0, "points": 10}, 0.1, False, False))
+    with pytest.raises(InputError, match=r"multiple of 0; give a length with its unit, as 0\.01mm"):
+        make_variants(VariationRequest(noise="1,2"), Baseline("mm", {"noise": 0.0, "points": 10}, 0.1, False, False))

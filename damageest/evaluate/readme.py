@@ -1,4 +1,4 @@
-"""Measurements as tables for a README, and their place there."""
+"""Measurements as Markdown tables, and their insertion into a text file such as a README."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ import numpy as np
 from damageest.errors import InputError
 
 if TYPE_CHECKING:
-    from damageest.evaluate.matrix import Cell
+    from damageest.evaluate.matrix import MatrixCell
 
 
-def marks(kind: str) -> tuple[str, str]:
-    """The lines between which a table goes: of kind matrix or suite."""
+def make_marks(kind: str) -> tuple[str, str]:
+    """The lines that enclose a table in the text file. ``kind``: as matrix or suite."""
     return f"<!-- {kind}: begin -->", f"<!-- {kind}: end -->"
 
 
 MATRIX = (
-    "Intersection over union with the truth; medians of the stage's and of the whole run's seconds, the largest peak "
-    "memory of a process"
+    "Columns with a job's name: intersection over union of found and true damage; flagged: a check of the result "
+    "failed. stage, s and run, s: median seconds of the stage and of the whole run. peak, MB: the largest peak memory "
+    "of a run"
 )
 
 
-def table(cells: Sequence[Cell]) -> str:
-    """A Markdown table of cells: a row for each implementation, a column for each job, below why some refused."""
+def make_matrix_table(cells: Sequence[MatrixCell]) -> str:
+    """A Markdown table: a row for each implementation, a column for each job. The reasons of refusals follow it."""
     jobs = list(dict.fromkeys(cell.job for cell in cells))
     rows = list(dict.fromkeys((cell.stage, cell.use) for cell in cells))
     found = {(cell.stage, cell.use, cell.job): cell for cell in cells}
@@ -40,48 +41,48 @@ def table(cells: Sequence[Cell]) -> str:
     lines = [head]
     before = ""
     for stage, use in rows:
-        mine = [found[stage, use, job] for job in jobs]
-        shown = [_shown(cell, reasons) for cell in mine]
+        row = [found[stage, use, job] for job in jobs]
+        shown = [_format_cell(cell, reasons) for cell in row]
         figures = [
-            _number([cell.stage_seconds for cell in mine], "{:.2f}"),
-            _number([cell.seconds for cell in mine if not math.isnan(cell.iou)], "{:.1f}"),
-            _number([cell.megabytes for cell in mine], "{:.0f}", np.max),
+            _format_number([cell.stage_seconds for cell in row], "{:.2f}"),
+            _format_number([cell.seconds for cell in row if not math.isnan(cell.iou)], "{:.1f}"),
+            _format_number([cell.megabytes for cell in row], "{:.0f}", np.max),
         ]
         lines.append([stage if stage != before else "", use, *shown, *figures])
         before = stage
     notes = [f"{number}. {reason}" for number, reason in enumerate(reasons, 1)]
-    return "\n".join([markdown(lines, 2), "", about(MATRIX), *(["", *notes] if notes else [])])
+    return "\n".join([format_markdown(lines, 2), "", describe_measurement(MATRIX), *(["", *notes] if notes else [])])
 
 
-def markdown(lines: Sequence[Sequence[str]], names: int = 1) -> str:
-    """A Markdown table, its head first; all columns but the first ``names`` to the right."""
+def format_markdown(lines: Sequence[Sequence[str]], names: int = 1) -> str:
+    """A Markdown table; the first line is the head. All columns after the first ``names`` are aligned to the right."""
     rule = ["---"] * names + ["---:"] * (len(lines[0]) - names)
     return "\n".join("| " + " | ".join(words) + " |" for words in (lines[0], rule, *lines[1:]))
 
 
-def _shown(cell: Cell, reasons: list[str]) -> str:
+def _format_cell(cell: MatrixCell, reasons: list[str]) -> str:
     if cell.refused and cell.refused not in reasons:
         reasons.append(cell.refused)
     why = f"refused [{reasons.index(cell.refused) + 1}]" if cell.refused else ""
     if math.isnan(cell.iou):
         return why or "–"
-    return f"{cell.iou:.3f}" + (f", partly {why}" if why else " (doubted)" if cell.doubtful else "")
+    return f"{cell.iou:.3f}" + (f", partly {why}" if why else " (flagged)" if cell.flagged else "")
 
 
-def _number(values: Sequence[float], form: str, of: object = np.median) -> str:
+def _format_number(values: Sequence[float], form: str, of: object = np.median) -> str:
     known = [value for value in values if not math.isnan(value)]
     return form.format(of(known)) if known and callable(of) else "–"
 
 
-def about(what: str) -> str:
-    """``what`` was measured, when, with which versions and on what machine."""
-    found = versions()
+def describe_measurement(what: str) -> str:
+    """``what``, followed by the date, the versions and the machine of the measurement."""
+    found = collect_versions()
     libraries = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
     return f"{what}. Measured {found['date']}: {libraries}; {found['machine']}."
 
 
-def versions() -> dict[str, Any]:
-    """Today's date, the versions of what computes, and the machine."""
+def collect_versions() -> dict[str, Any]:
+    """Today's date, the versions of the libraries that compute, and the machine."""
     names = ("damageest", "numpy", "pyvista", "manifold3d", "libigl")
     return {
         "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
@@ -90,9 +91,9 @@ def versions() -> dict[str, Any]:
     }
 
 
-def placed(path: Path, text: str | None, kind: str) -> str:
-    """The file's text with the lines between the marks replaced. Raises InputError where it has no such marks."""
-    first, last = marks(kind)
+def replace_between_marks(path: Path, text: str | None, kind: str) -> str:
+    """The file's text with ``text`` between the marks; None: unchanged. Raises InputError if the marks are missing."""
+    first, last = make_marks(kind)
     try:
         old = path.read_text()
     except (OSError, UnicodeDecodeError) as error:
@@ -100,5 +101,7 @@ def placed(path: Path, text: str | None, kind: str) -> str:
     before, begin, rest = old.partition(first)
     _, end, after = rest.partition(last)
     if not begin or not end:
-        raise InputError(f"{path}: the table goes between the lines  {first}  and  {last}, which are not there")
+        raise InputError(
+            f"{path}: the lines that enclose the table are missing\n  try: add the lines  {first}  and  {last}"
+        )
     return old if text is None else f"{before}{first}\n\n{text}\n\n{last}{after}"

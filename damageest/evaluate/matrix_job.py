@@ -1,4 +1,4 @@
-"""A job made ready for runs with one stage swapped: its part, scan and truth as arrays and files."""
+"""The input files of a job for the matrix, and the job's settings with the implementation of one stage replaced."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 
 OFF_DEGREES, OFF_SHARE = 3.0, 0.01
-"""By how much the scan is turned and shifted, of the part's diagonal, for an `align` that needs a start."""
+"""Rotation, and shift as a share of the part's diagonal, of the scan for an `align` that needs a start pose."""
 
 
 @dataclass(frozen=True)
-class Scene:
-    """A job and what was made of it in ``folder``: scene.npz, part.stl, scan.ply, specimen.ply (a scan of the undamaged
-    part). ``values`` is the job as a mapping; ``pose`` (4,4) the true ``T_part_scan``."""
+class MatrixJob:
+    """A job and its files in ``folder``: scene.npz, part.stl, scan.ply, specimen.ply (a scan of the intact part).
+
+    ``values``: the job as a mapping. ``bounds`` (2,3): of the part. ``pose`` (4,4): the true ``T_part_scan``.
+    """
 
     name: str
     folder: Path
@@ -38,40 +40,40 @@ class Scene:
     pose: Floats
 
 
-def prepared(path: Path, registry: Registry, folder: Path) -> Scene:
-    """Raises JobError where the job is at fault or its scan is not simulated."""
+def prepare_matrix_job(path: Path, registry: Registry, folder: Path) -> MatrixJob:
+    """Reads a job and writes its files. Raises JobError if the job is invalid or its scan is not simulated."""
     job = load(path, registry)
     part, scan = read_inputs(job, registry)
     if scan.truth is None or scan.truth.damage is None:
         raise JobError(
-            [Fault("the truth is not known; give a job with  scan: {use: simulate, damage: [...]}")], str(path)
+            [Fault("the true damage is not known; use a job with  scan: {use: simulate, damage: [...]}")], str(path)
         )
     folder.mkdir(parents=True)
-    lost = scan.truth.damage
+    damage = scan.truth.damage
     np.savez(
         folder / "scene.npz",
         vertices=part.vertices,
         faces=part.faces,
         unit=part.unit,
         points=scan.points,
-        lost=lost.vertices,
-        lost_faces=lost.faces,
+        lost=damage.vertices,
+        lost_faces=damage.faces,
         pose=scan.truth.T_part_scan,
     )
     write_stl(folder / "part.stl", part)
     noise = measure_noise_and_spacing(scan.points)[0]
-    for name, points in (("scan", scan.points), ("specimen", _specimen(part, len(scan.points), noise))):
+    for name, points in (("scan", scan.points), ("specimen", _scan_specimen(part, len(scan.points), noise))):
         x, y, z = points.T
         write_points(folder / f"{name}.ply", {"x": x, "y": y, "z": z})
     values = {"version": 1, "units": job.units, "tolerance": job.tolerance or "auto"}
     values["scan"] = job.stages[ReadScan].model_dump(mode="json")
-    return Scene(
+    return MatrixJob(
         job.name, folder, values, str(getattr(job.stages[ReadPart], "path", "")), part.bounds, scan.truth.T_part_scan
     )
 
 
-def settings_for(item: Implementation, scene: Scene) -> dict[str, Any] | str:
-    """The job with this implementation in it, and what is handed in beside it; a sentence where it does not apply."""
+def make_settings(item: Implementation, scene: MatrixJob) -> dict[str, Any] | str:
+    """The inputs of `matrix.run_one` with this implementation, or the reason if it does not apply to the job."""
     stage, use = item.contract.stage, item.name
     options: dict[str, Any] = {"use": use}
     job: dict[str, Any] = {key: value for key, value in scene.values.items() if key != "scan"}
@@ -79,7 +81,7 @@ def settings_for(item: Implementation, scene: Scene) -> dict[str, Any] | str:
     if stage == "part":
         choices = {"file": "part.stl", "reconstruct": "specimen.ply"}
         if use not in choices and not scene.part_path.endswith(tuple(item.cls.reads) or "\0"):
-            return "the job's part is no file of that kind"
+            return "does not read the file format of the job's part"
         options["path"] = str(scene.folder / choices[use]) if use in choices else scene.part_path
     elif stage == "scan":
         options = {**scene.values["scan"]} if use == "simulate" else {**options, "path": str(scene.folder / "scan.ply")}
@@ -87,10 +89,10 @@ def settings_for(item: Implementation, scene: Scene) -> dict[str, Any] | str:
         middle, extent = scene.bounds.mean(axis=0), 1.5 * np.ptp(scene.bounds, axis=0) + 10
         options |= {"size": extent.tolist(), "corner": (middle - extent / 2).tolist()}
     elif stage == "align" and use != "register":
-        moved = _off(scene) @ scene.pose if use == "icp" else scene.pose
+        moved = _make_small_motion(scene) @ scene.pose if use == "icp" else scene.pose
     missing = [name for name, field in item.cls.model_fields.items() if field.is_required() and name not in options]
     if missing:
-        return f"needs {', '.join(missing)}"
+        return f"has no default for: {', '.join(missing)}"
     if item.contract in SURFACE_ONLY:
         job["method"] = "surface"
     elif item.contract is EncloseAll:
@@ -103,8 +105,8 @@ def settings_for(item: Implementation, scene: Scene) -> dict[str, Any] | str:
     }
 
 
-def _off(scene: Scene) -> Floats:
-    """A small rigid move about the part's centre."""
+def _make_small_motion(scene: MatrixJob) -> Floats:
+    """A small rotation about the part's centre and a small shift, as (4,4)."""
     from scipy.spatial.transform import Rotation
 
     T = np.eye(4)
@@ -115,7 +117,8 @@ def _off(scene: Scene) -> Floats:
     return T
 
 
-def _specimen(part: Part, points: int, noise: float) -> Floats:
+def _scan_specimen(part: Part, points: int, noise: float) -> Floats:
+    """(N,3) points of a scan of the intact part."""
     from damageest.stages.scan.simulate import Simulate
 
     return Simulate(points=points, noise=noise, seed=77).run("mm", part).points

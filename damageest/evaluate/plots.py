@@ -1,4 +1,4 @@
-"""Plots of an evaluation, each as PNG and SVG. Needs matplotlib."""
+"""Plots of an evaluation, each as PNG and as SVG. They need matplotlib."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from damageest.errors import InputError
-from damageest.evaluate._figures import axes_of, crossed, title
-from damageest.evaluate._run import Row
+from damageest.evaluate.figures import collect_axes, group_by_combination, make_title
+from damageest.evaluate.processes import Row
 
 Point = tuple[float, float]
 
@@ -18,86 +18,92 @@ SIZE = (6.0, 4.0)
 """Inches."""
 
 
-def require() -> None:
-    """Raises InputError where matplotlib is missing; for before the runs, not after."""
+def require_matplotlib() -> None:
+    """Raises InputError if matplotlib is missing. Call it before the runs start."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:
         raise InputError(
-            "the plots need matplotlib, which is not installed\n  try: pip install 'damageest[evaluate]', or --no-plots"
+            "the plots need matplotlib, and matplotlib is not installed\n"
+            "  try: pip install 'damageest[evaluate]', or --no-plots"
         ) from None
 
 
-def draw(rows: Sequence[Row], unit: str, folder: Path) -> list[Path]:
-    """The histogram of surface errors, and a plot for each of noise, points, tolerance and depth that was varied."""
+def draw_plots(rows: Sequence[Row], unit: str, folder: Path) -> list[Path]:
+    """Draws a histogram of surface errors, and a plot for each of noise, points, tolerance, depth and way if varied.
+
+    Gives the paths of the files.
+    """
     rows = [row for row in rows if not row["skipped"]]
     damaged = [row for row in rows if row["size"] != 0]
-    whole = [row for row in damaged if row.get("surface_error") is not None]
+    complete = [row for row in damaged if row.get("surface_error") is not None]
     made: list[Path] = []
 
-    def plot(name: str, x: str, y: str, some: Sequence[Row], point: Callable[[Row], Point], **look: Any) -> None:
+    def plot(name: str, x: str, y: str, chosen: Sequence[Row], point: Callable[[Row], Point], **style: Any) -> None:
         lines: dict[str, list[Point]] = {}
-        for row in some:
+        for row in chosen:
             lines.setdefault(str(row["varied"].get("way", "")), []).append(point(row))
         if lines:
-            made.extend(_saved(folder / name, x, y, lambda axes: _against(axes, lines, **look)))
+            made.extend(_save_plot(folder / name, x, y, lambda axes: _plot_lines(axes, lines, **style)))
 
-    varied = axes_of(rows)
+    varied = collect_axes(rows)
     if "noise" in varied:
 
-        def error(row: Row) -> Point:
+        def to_error_by_noise(row: Row) -> Point:
             return row["varied"]["noise"], row["surface_error"] * row["tolerance"]
 
-        plot("error_by_noise", title("noise", rows, unit), f"surface error, {unit}", whole, error)
+        plot("error_by_noise", make_title("noise", rows, unit), f"surface error, {unit}", complete, to_error_by_noise)
     if "points" in varied:
-        plot("time_by_points", "points of the scan", "seconds", rows, _by_points, scale="log")
+        plot("time_by_points", "points of the scan", "seconds", rows, _to_time_by_points, scale="log")
     if "tolerance" in varied:
-        own = title("tolerance", rows, unit).endswith(unit)
+        in_unit = make_title("tolerance", rows, unit).endswith(unit)
 
-        def time(row: Row) -> Point:
-            return (1 if own else row["noise"]) / row["tolerance"], row["seconds"]
+        def to_time_by_tolerance(row: Row) -> Point:
+            return (1 if in_unit else row["noise"]) / row["tolerance"], row["seconds"]
 
-        name = f"1 / tolerance, 1/{unit}" if own else "noise / tolerance"
-        plot("time_by_tolerance", name, "seconds", rows, time, scale="log")
+        name = f"1 / tolerance, 1/{unit}" if in_unit else "noise / tolerance"
+        plot("time_by_tolerance", name, "seconds", rows, to_time_by_tolerance, scale="log")
     if "size" in varied:
 
-        def hit(row: Row) -> Point:
+        def is_found(row: Row) -> Point:
             return row["size"], float(row["found"] > 0 and not row["missed"])
 
         deep = [row for row in damaged if row["size"]]
-        plot("found_by_depth", f"depth of the damage, {unit}", "share found", deep, hit, of=np.mean, dots=False)
+        plot("found_by_depth", f"depth of the damage, {unit}", "share found", deep, is_found, of=np.mean, dots=False)
     if "way" in varied:
 
-        def cost(axes: Any) -> None:
-            _ways(axes, {way: [row for row in whole if row["varied"]["way"] == way] for way in varied["way"]})
+        def plot_cost(axes: Any) -> None:
+            _plot_ways(axes, {way: [row for row in complete if row["varied"]["way"] == way] for way in varied["way"]})
 
-        made.extend(_saved(folder / "error_by_time", "seconds", "surface error, tolerances", cost))
-    errors = np.array([row["surface_error"] for row in whole])
+        made.extend(_save_plot(folder / "error_by_time", "seconds", "surface error, tolerances", plot_cost))
+    errors = np.array([row["surface_error"] for row in complete])
     if len(errors):
 
-        def bars(axes: Any) -> None:
+        def plot_histogram(axes: Any) -> None:
             axes.hist(errors, bins=min(40, max(10, len(errors) // 4)), color="0.6", edgecolor="0.3")
             axes.yaxis.get_major_locator().set_params(integer=True)
             axes.axvline(np.median(errors), color="C3", label=f"median {np.median(errors):.3g}")
             axes.legend()
 
-        made.extend(_saved(folder / "errors", "surface error, tolerances", "cases", bars))
+        made.extend(_save_plot(folder / "errors", "surface error, tolerances", "cases", plot_histogram))
     return made
 
 
-def _by_points(row: Row) -> Point:
+def _to_time_by_points(row: Row) -> Point:
     return row["varied"]["points"], row["seconds"]
 
 
-def _against(
+def _plot_lines(
     axes: Any,
     lines: Mapping[str, Sequence[Point]],
     of: Callable[..., Any] = np.median,
     dots: bool = True,
     scale: str = "linear",
 ) -> None:
-    """All cases as dots, and for each way a line through ``of`` those with the same x. A log scale is one of both
-    axes, so that a power of x is a straight line."""
+    """Draws all cases as dots, and for each way a line through ``of`` (as the median) of the cases with the same x.
+
+    A log scale applies to both axes, so that a power of x is a straight line.
+    """
     for number, (way, points) in enumerate(lines.items()):
         x, y = np.array(points).T
         places = np.unique(x)
@@ -111,11 +117,11 @@ def _against(
     axes.legend()
 
 
-def _ways(axes: Any, ways: Mapping[str, Sequence[Row]]) -> None:
-    """What accuracy costs: a line for each implementation, through the medians of its settings."""
+def _plot_ways(axes: Any, ways: Mapping[str, Sequence[Row]]) -> None:
+    """Draws error over time: a line for each implementation, through the medians of its settings."""
     lines: dict[str, list[Point]] = {}
     for way, rows in ways.items():
-        for group in crossed(rows).values():
+        for group in group_by_combination(rows).values():
             x, y = (float(np.median([row[name] for row in group])) for name in ("seconds", "surface_error"))
             lines.setdefault(way.split()[0], []).append((x, y))
     for number, (name, points) in enumerate(lines.items()):
@@ -125,7 +131,7 @@ def _ways(axes: Any, ways: Mapping[str, Sequence[Row]]) -> None:
     axes.legend()
 
 
-def _saved(stem: Path, x: str, y: str, content: Callable[[Any], None]) -> list[Path]:
+def _save_plot(stem: Path, x: str, y: str, content: Callable[[Any], None]) -> list[Path]:
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -140,5 +146,5 @@ def _saved(stem: Path, x: str, y: str, content: Callable[[Any], None]) -> list[P
         axes.grid(alpha=0.3)
         paths = [stem.with_suffix(".png"), stem.with_suffix(".svg")]
         figure.savefig(paths[0], dpi=150)
-        figure.savefig(paths[1], metadata={"Date": None})  # the same plot, the same bytes
+        figure.savefig(paths[1], metadata={"Date": None})  # without a date, the same plot has the same bytes
     return paths

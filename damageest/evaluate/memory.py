@@ -1,0 +1,87 @@
+"""Peak memory of this process, sampled by psutil in a second process.
+
+A thread of this process could not sample: it stops while a C++ library holds the interpreter lock, and that is when the
+most memory is in use. The second process is ``python memory.py PID``. For each line that it reads, it prints the peak
+in bytes since its last answer. It ends when its input ends.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+import time
+
+INTERVAL = 0.02
+"""Seconds between two samples."""
+
+
+def require_psutil() -> None:
+    """Raises InputError if psutil is missing. Call it before the runs start."""
+    try:
+        import psutil  # noqa: F401
+    except ImportError:
+        from damageest.errors import InputError  # here, so that the second process starts quickly
+
+        raise InputError(
+            "damageest evaluate needs psutil to measure memory, and psutil is not installed\n"
+            "  try: pip install 'damageest[evaluate]'"
+        ) from None
+
+
+class PeakMemory:
+    """Samples the resident memory of this process until the end of the ``with`` block."""
+
+    def __enter__(self) -> PeakMemory:
+        self._sampler = subprocess.Popen(
+            [sys.executable, "-P", __file__, str(os.getpid())],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        self.take_peak()  # returns as soon as the sampler runs
+        return self
+
+    def take_peak(self) -> float:
+        """The peak in MB since the last call; in the first call, since the start of the block."""
+        assert self._sampler.stdin is not None
+        assert self._sampler.stdout is not None
+        self._sampler.stdin.write("\n")
+        self._sampler.stdin.flush()
+        return int(self._sampler.stdout.readline()) / 2**20
+
+    def __exit__(self, *error: object) -> None:
+        self._sampler.communicate()
+
+
+def _serve_peaks(process_id: int) -> None:
+    """Prints the peak since the last answer, in bytes, for each line of the standard input."""
+    import psutil
+
+    process = psutil.Process(process_id)
+    lock, peak = threading.Lock(), 0
+
+    def sample() -> int:
+        nonlocal peak
+        with lock:
+            now = process.memory_info().rss
+            peak = max(peak, now)
+        return int(now)
+
+    def sample_always() -> None:
+        while True:
+            sample()
+            time.sleep(INTERVAL)
+
+    threading.Thread(target=sample_always, daemon=True).start()
+    for _ in sys.stdin:
+        now = sample()
+        with lock:
+            answer, peak = peak, now
+        print(answer, flush=True)
+
+
+if __name__ == "__main__":
+    _serve_peaks(int(sys.argv[1]))
