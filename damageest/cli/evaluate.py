@@ -167,8 +167,8 @@ def _prepare(out: Path | None, plots: bool) -> None:
 
 
 def _run_cases(cases: Sequence[DamageCase], jobs: int, timeout: float, out: Path | None) -> list[dict[str, Any]]:
-    from damageest.evaluate.processes import run_all
     from damageest.evaluate.report import format_row
+    from damageest.evaluate.rows import run_all
 
     count = 0
 

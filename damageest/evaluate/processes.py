@@ -1,19 +1,11 @@
-"""Runs each case in a process of its own, several at a time, and keeps the rows in a JSON Lines file to resume from."""
+"""One run in a process of its own."""
 
 from __future__ import annotations
 
-import contextlib
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from damageest.evaluate.case import DamageCase
+from typing import Any
 
 MARK = "@row "
 """Prefix of the line with the row. It separates the row from anything that libraries print."""
@@ -34,61 +26,3 @@ def run_in_process(module: str, inputs: Row, timeout: float) -> Row | str:
             return row
     messages = done.stderr.strip().splitlines()
     return f"the process crashed with exit status {done.returncode}: {messages[-1] if messages else 'no message'}"
-
-
-def run_all(
-    cases: Sequence[DamageCase], out: Path | None, jobs: int, timeout: float, tell: Callable[[Row], None]
-) -> list[Row]:
-    """The rows of all cases, in the order of the cases.
-
-    Rows that the file ``out`` already holds are read from it. New rows are appended to it. At most ``jobs`` cases run
-    at a time. ``tell`` is called with each row.
-    """
-    rows_by_key = {row["key"]: row for row in read_rows(out)}
-    waiting = {case.compute_key(): case for case in cases if case.compute_key() not in rows_by_key}
-    for row in _collect_rows(cases, rows_by_key):
-        tell(row)
-    with ThreadPoolExecutor(jobs) as pool:
-        futures = [pool.submit(_compute_row, case, timeout) for case in waiting.values()]
-        try:
-            for future in as_completed(futures):
-                row = future.result()
-                rows_by_key[row["key"]] = row
-                tell(row)
-                if out:
-                    with out.open("a") as stream:
-                        stream.write(json.dumps(row) + "\n")
-        except BaseException:  # as Ctrl-C: do not start the cases that wait
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return _collect_rows(cases, rows_by_key)
-
-
-def _collect_rows(cases: Sequence[DamageCase], rows_by_key: Mapping[str, Row]) -> list[Row]:
-    """The stored rows in the order of the cases, each with the ``varied`` of its case, which may have changed."""
-    return [
-        rows_by_key[case.compute_key()] | {"varied": dict(case.varied)}
-        for case in cases
-        if case.compute_key() in rows_by_key
-    ]
-
-
-def _compute_row(case: DamageCase, timeout: float) -> Row:
-    """The case's row. A crash or a timeout gives a row with ``error``, not flagged."""
-    from damageest.evaluate.case import make_blank_row
-
-    row = run_in_process("damageest.evaluate.case", asdict(case), timeout)
-    return row if isinstance(row, dict) else make_blank_row(case) | {"error": row, "seconds": timeout}
-
-
-def read_rows(out: Path | None) -> list[Row]:
-    """The complete rows of a file. A truncated row, left by a run that was killed, is removed from the file."""
-    if out is None or not out.is_file():
-        return []
-    rows, lines = [], out.read_text().splitlines(keepends=True)
-    for text in lines:
-        with contextlib.suppress(json.JSONDecodeError):
-            rows.append(json.loads(text))
-    if len(rows) < len(lines) or (lines and not lines[-1].endswith("\n")):
-        out.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    return rows

@@ -56,7 +56,7 @@ def test_a_refusal_is_shown_with_its_reason(job: Path, registry: Registry) -> No
     job.write_text(JOB.replace("radius: 6}", "radius: 6}\n    - {tool: sphere, centre: [-20, 0, 0], radius: 0.9}"))
     text = make_matrix_table(run_matrix([job], registry, ["repair"]))
     assert re.search(r"\| repair \| none \| 0\.9\d\d, partly refused \[1\] \|", text)
-    assert re.search(r"^1\. .*points.* too few", text, re.MULTILINE)
+    assert re.search(r"^1\. .*points.* are needed", text, re.MULTILINE)
 
 
 def test_a_job_without_a_truth_is_refused(tmp_path: Path, registry: Registry) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from damageest.evaluate import processes
+from damageest.evaluate import rows as rows_module
 from damageest.evaluate.case import DamageCase, make_blank_row
 
 CASES = [
@@ -28,28 +29,28 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         keys.append(case.compute_key())
         return make_blank_row(case) | {"seconds": timeout}
 
-    monkeypatch.setattr(processes, "_compute_row", row)
+    monkeypatch.setattr(rows_module, "_compute_row", row)
     return keys
 
 
 def test_rows_on_file_are_not_run_again_and_new_ones_are_appended(tmp_path: Path, ran: list[str]) -> None:
     out, told = tmp_path / "cases.jsonl", []
     out.write_text(json.dumps(make_blank_row(CASES[1]) | {"iou": 0.5}) + '\n{"key": "cut sh')
-    rows = processes.run_all(CASES, out, 2, 10, told.append)
+    rows = rows_module.run_all(CASES, out, 2, 10, told.append)
     assert sorted(ran) == sorted(CASES[k].compute_key() for k in (0, 2, 3))
     assert [row["key"] for row in rows] == [case.compute_key() for case in CASES]
     assert [row["iou"] for row in rows] == [0, 0.5, 0, 0]
     assert len(told) == 4
-    assert processes.run_all(CASES, out, 2, 99, told.append) == rows
+    assert rows_module.run_all(CASES, out, 2, 99, told.append) == rows
     assert len(ran) == 3
     assert len(out.read_text().splitlines()) == 4
 
 
 def test_what_a_row_stands_for_is_up_to_the_run(tmp_path: Path, ran: list[str]) -> None:
     out = tmp_path / "cases.jsonl"
-    processes.run_all(CASES[:1], out, 1, 10, lambda row: None)
+    rows_module.run_all(CASES[:1], out, 1, 10, lambda row: None)
     same = [replace(CASES[0], varied={"size": "any"}), replace(CASES[0], varied={"size": "all"})]
-    rows = processes.run_all(same, out, 1, 10, lambda row: None)
+    rows = rows_module.run_all(same, out, 1, 10, lambda row: None)
     assert [row["varied"] for row in rows] == [{"size": "any"}, {"size": "all"}]
     assert len(ran) == 1
 
