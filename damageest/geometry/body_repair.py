@@ -98,7 +98,10 @@ def _to_manifold(vertices: Floats, faces: Ints) -> Any:
     """The mesh as a manifold3d body, whose status the caller checks; coordinates should be near the origin."""
     import manifold3d as m3
 
-    return m3.Manifold(m3.Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(faces.astype(np.uint64))))
+    # copies, because manifold3d rejects read-only arrays, as those of artefacts are
+    return m3.Manifold(
+        m3.Mesh64(np.array(vertices, dtype=np.float64, order="C"), np.array(faces, dtype=np.uint64, order="C"))
+    )
 
 
 def _to_arrays(body: Any) -> tuple[Floats, Ints]:

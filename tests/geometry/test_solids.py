@@ -5,8 +5,7 @@ import pytest
 import trimesh
 
 from damageest.artefacts import Mesh, Solid
-from damageest.geometry.bodies import split_bodies
-from damageest.geometry.solids import subtract_lost, to_arrays, to_manifold, to_solid
+from damageest.geometry.solids import subtract_lost, to_arrays, to_manifold
 
 
 def test_there_and_back_far_from_the_origin_in_float64() -> None:
@@ -58,14 +57,3 @@ class Crooked:
 
 def test_a_difference_that_does_not_balance_is_made_another_way() -> None:
     assert subtract_lost(Crooked(10), Crooked(3, 1 / 3)).volume() == pytest.approx(7)
-
-
-def test_bodies_are_those_of_manifold3d() -> None:
-    from manifold3d import Manifold
-
-    whole = sum((Manifold.sphere(1 + 0.1 * k, 24).translate((3.0 * k, 0, 0)) for k in range(6)), Manifold())
-    solid = to_solid(whole)
-    assert solid is not None
-    expected = sorted(body.volume() for body in whole.decompose())
-    assert sorted(body.volume for body in split_bodies(solid)) == pytest.approx(expected)
-    assert [body.volume for body in split_bodies(split_bodies(solid)[0])] == [split_bodies(solid)[0].volume]

@@ -97,12 +97,6 @@ def test_a_cavity_stays_one(tmp_path: Path) -> None:
     assert len(back.Shells()) == 2
 
 
-def test_a_cavity_goes_to_the_body_around_it() -> None:
-    hollow = Manifold.cube((10, 10, 10)) - Manifold.cube((2, 3, 4)).translate((3, 3, 3))
-    pairs = split_shells(solid(hollow + Manifold.cube((4, 4, 4)).translate((-9, 0, 0))))
-    assert {round(outer.volume): len(inner) for outer, inner in pairs} == {64: 0, 1000: 1}
-
-
 def test_fewer_faces_within_the_detail(tmp_path: Path) -> None:
     rough = solid(Manifold.cube((20, 20, 20)) - Manifold.sphere(6, 256).translate((10, 10, 20)))
     less = simplify_within(rough, 0.02)

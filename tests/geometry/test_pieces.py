@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from damageest.artefacts import Part, Solid, open_edges
+from damageest.artefacts import Solid, open_edges
 from damageest.geometry.pieces import find_pieces, join_pieces
-from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import to_arrays
-from tests.scenes import scene, spread
+from tests.scenes import spread
 
 ONE = Manifold.cube((4, 4, 4))
 OTHER = Manifold.cube((4, 4, 4)).translate((10, 0, 0))
@@ -63,17 +62,3 @@ def test_pieces_that_overlap_are_united() -> None:
 
 def test_no_piece_no_site() -> None:
     assert join_pieces([]) == []
-
-
-def test_the_damage_surface_is_what_lies_inside_the_part_and_faces_the_loss() -> None:
-    case = scene("pit")
-    surface = extract_ids(case.truth, case.part)
-    # a cap of a sphere of radius 4 about (9, 9, 14), 2 deep: 2 pi r h
-    assert surface.area == pytest.approx(2 * np.pi * 4 * 2, rel=0.01)
-    toward = np.array([9, 9, 14]) - surface.triangles.mean(axis=1)
-    assert (np.einsum("ij,ij->i", surface.cross, toward) > 0).all()
-
-
-def test_a_damage_that_is_all_skin_has_no_damage_surface() -> None:
-    whole = solid(ONE)
-    assert len(extract_ids(whole, Part(whole.vertices, whole.faces)).faces) == 0

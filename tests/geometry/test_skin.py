@@ -1,0 +1,34 @@
+"""Which faces of a damage volume lie on the skin of the part, and which inside the part."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from damageest.artefacts import Part
+from damageest.geometry.skin import extract_ids, find_inner_faces
+from tests.geometry.shapes import FAR, box
+from tests.scenes import scene
+
+
+def test_the_damage_surface_is_what_lies_inside_the_part_and_faces_the_loss() -> None:
+    case = scene("pit")
+    surface = extract_ids(case.truth, case.part)
+    # a cap of a sphere of radius 4 about (9, 9, 14), 2 deep: 2 pi r h
+    assert surface.area == pytest.approx(2 * np.pi * 4 * 2, rel=0.01)
+    toward = np.array([9, 9, 14]) - surface.triangles.mean(axis=1)
+    assert (np.einsum("ij,ij->i", surface.cross, toward) > 0).all()
+
+
+def test_a_damage_that_is_all_skin_has_no_damage_surface() -> None:
+    whole = box()
+    assert len(extract_ids(whole, Part(whole.vertices, whole.faces)).faces) == 0
+
+
+@pytest.mark.parametrize("away", [np.zeros(3), FAR])
+def test_faces_that_touch_the_skin_along_an_edge_are_inside(away: np.ndarray) -> None:
+    part, corner = box(10, away), box(4, np.add(away, 3))
+    inner = find_inner_faces(corner, Part(part.vertices, part.faces))
+    # three sides of the corner lie on the skin, three inside
+    assert np.array_equal(inner, corner.cross.sum(axis=1) < 0)
+    assert extract_ids(corner, Part(part.vertices, part.faces)).area == pytest.approx(3 * 16)
