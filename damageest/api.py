@@ -11,6 +11,7 @@ import numpy as np
 
 from damageest.artefacts import Part, Scan
 from damageest.errors import InputError
+from damageest.io.files import expand_home
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
@@ -49,7 +50,7 @@ def run(
         job = load(source, registry, settings, given)
     if output is False:
         return follow(route_of(job.method), Engine(job, registry), start(job)).job.result
-    target = job.output if output is True else Path(output).expanduser().resolve()
+    target = job.output if output is True else expand_home(Path(output)).resolve()
     with open_workspace(target, cache) as place:
         engine = Engine(job, registry, place.cache)
         work = follow(route_of(job.method), engine, start(job))

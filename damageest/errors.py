@@ -7,6 +7,7 @@ line: 2 where the job or an input is at fault, 1 where the job is right but a st
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -87,3 +88,37 @@ def suggest(name: str, valid: Sequence[str]) -> str:
     """A clause that names the valid word nearest to a wrong one: `` (did you mean 'x'?)``; empty where none is near."""
     close = difflib.get_close_matches(name, valid, n=1, cutoff=0.6)
     return f" (did you mean '{close[0]}'?)" if close else ""
+
+
+def is_interrupt(error: BaseException) -> bool:
+    """Whether an error comes from an interrupt (Ctrl-C). A compiled module that is interrupted while it is imported
+    raises ImportError with the interrupt as its cause."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, KeyboardInterrupt):
+        cause = cause.__cause__
+    return cause is not None
+
+
+def find_missing_library(error: BaseException) -> str:
+    """The shared library that an error says is missing, as in ``libGL.so.1``; empty for another error."""
+    # ctypes raises OSError without a number
+    if isinstance(error, ImportError) or (type(error) is OSError and error.errno is None):
+        found = re.match(r"(\S+\.so\S*): cannot open shared object file", str(error))
+        return found[1] if found else ""
+    return ""
+
+
+def describe_missing_library(error: BaseException) -> StageError | None:
+    """The error in words for the user where a Python module or a shared library does not load; None for another."""
+    if library := find_missing_library(error):
+        return StageError(
+            f"the system library {library} is missing",
+            f"install the package that has {library}; `damageest plugins` names those that the plugins need",
+        )
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        module = error.name.partition(".")[0]
+        return StageError(f"the Python module {error.name} is not installed", f"pip install {module}")
+    if isinstance(error, ImportError):
+        text = " ".join(str(error).split())[:400]
+        return StageError(f"a Python module cannot be loaded: {text}", "--debug shows which; install it again")
+    return None

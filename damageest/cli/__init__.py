@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import sys
 import traceback
+from typing import NoReturn
 
 import typer
 
 from damageest import __version__
-from damageest.errors import DamageestError
+from damageest.errors import DamageestError, describe_missing_library, is_interrupt
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells give it."""
 
 app = typer.Typer(
     name="damageest",
@@ -53,16 +57,26 @@ def main() -> None:
         if word not in built_in:
             _add_plugin_commands()
         app()
+    except SystemExit as end:
+        if end.code == INTERRUPTED:  # typer turns KeyboardInterrupt into it
+            _stop_interrupted()
+        raise
     except DamageestError as error:
         fail(error)
     except KeyboardInterrupt:
-        typer.echo("interrupted; finished stages are kept, and the same command continues after them", err=True)
-        sys.exit(130)
+        _stop_interrupted()
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(141)
     except Exception as error:
-        fail(error)
+        if is_interrupt(error):
+            _stop_interrupted()
+        fail(describe_missing_library(error) or error)
+
+
+def _stop_interrupted() -> NoReturn:
+    typer.echo("interrupted; finished stages are kept, and the same command continues after them", err=True)
+    sys.exit(INTERRUPTED)
 
 
 def fail(error: Exception) -> None:

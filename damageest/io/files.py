@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from damageest.errors import InputError
+from damageest.errors import DamageestError, InputError, describe_missing_library, is_interrupt
 
 
 def check_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
@@ -40,3 +40,22 @@ def shorten_error(error: BaseException) -> str:
     """An error of a library in one line."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= 160 else text[:157] + "..."
+
+
+def raise_environment_fault(error: BaseException) -> None:
+    """Raises what is not the fault of the file that is read: an interrupt, a library that does not load, and errors
+    that damageest raised on purpose. A reader calls this before it says that a file is not readable."""
+    if is_interrupt(error):
+        raise KeyboardInterrupt from error
+    if isinstance(error, DamageestError):
+        raise error
+    if fault := describe_missing_library(error):
+        raise fault from error
+
+
+def expand_home(path: Path) -> Path:
+    """The path with a leading ``~`` or ``~user`` replaced by that home folder, unless there is no such user."""
+    try:
+        return path.expanduser()
+    except RuntimeError:
+        return path

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.errors import InputError
-from damageest.io.files import check_file, shorten_error
+from damageest.io.files import check_file, raise_environment_fault, shorten_error
 
 MESH_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf")
 
@@ -38,6 +38,7 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
         ]
         unit = str(scene.units) if suffix == ".3mf" and scene.units else None
     except Exception as error:
+        raise_environment_fault(error)
         raise InputError(f"{path}: not a readable {suffix} mesh ({shorten_error(error)})") from None
     if not meshes:
         raise InputError(f"{path}: holds no triangles; a part must be a closed mesh")

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from damageest.errors import Fault, JobError, PluginError, suggest
+from damageest.io.files import expand_home
 from damageest.job import yamlfile
 from damageest.job.model import Header, Job
 from damageest.job.wording import describe_fault
@@ -98,7 +99,7 @@ class _Check:
             method=method,
             stages={c: s for c, s in stages.items() if s is not None},
             implementations={c: pair[0] for c, pair in pairs.items() if pair},
-            output=(self.folder / output.expanduser()).resolve(),
+            output=(self.folder / expand_home(output)).resolve(),
             source=self.source,
             given=self.given,
         )
@@ -163,10 +164,7 @@ class _Check:
         suffix = Path(str(paths[0] if isinstance(paths, list) and paths else paths)).suffix.lower()
         readers = [item for item in self.registry.of(key) if suffix in item.cls.reads]
         if not readers and suffix in (".step", ".stp", ".iges", ".igs", ".brep") and key == "part":
-            plugin = "the plugin damageest-cadquery, which is not usable here"
-            self.add_fault(
-                f"'{suffix}' needs {plugin}: pip install damageest-cadquery{self.registry.missing()}", key, "path"
-            )
+            self.add_fault(f"'{suffix}' needs {self.registry.describe_plugin('damageest-cadquery')}", key, "path")
         elif not readers:
             valid = sorted({s for item in self.registry.of(key) for s in item.cls.reads})
             self.add_fault(f"no reader for '{suffix}' files; valid are: {', '.join(valid)}", key, "path")

@@ -16,6 +16,8 @@ def describe_fault(fault: Any, values: Any, valid: Sequence[str] = (), owner: st
         return f"'{owner}' has no option '{name}'{suggest(name, valid)}; {options}"
     if fault["type"] == "missing":
         return f"'{owner}' needs  {name}: ..."
+    if fault["type"] == "format":  # its text names what was given
+        return str(fault["msg"])
     given = fault.get("input")
     shown = f", not {given!r}" if isinstance(given, (str, int, float, bool, type(None))) else ""
     message = str(fault["msg"]).removeprefix("Value error, ")

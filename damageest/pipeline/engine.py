@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from damageest.artefacts import ArtefactError
-from damageest.errors import DamageestError, InputError, StageError
+from damageest.errors import DamageestError, InputError, StageError, describe_missing_library, is_interrupt
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache, digest
 from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
@@ -53,6 +53,8 @@ class Engine:
                 keep=contract.stage != "export",
             )
         except Exception as error:
+            if is_interrupt(error):
+                raise KeyboardInterrupt from error
             _tell(hooks.damageest_stage_failed, **named, error=error)
             raise _locate(error, item, state.number) from error
         seconds = time.perf_counter() - start
@@ -139,6 +141,8 @@ def _locate(error: Exception, item: Implementation, site: int) -> DamageestError
     stage = item.contract.stage
     if isinstance(error, DamageestError) and not isinstance(error, StageError):
         return error
+    if not isinstance(error, StageError) and (missing := describe_missing_library(error)):
+        error = missing
     if isinstance(error, OSError) and stage in ("part", "scan"):
         return InputError(f"{stage}: {item.name}: {error}")
     placed = error if isinstance(error, StageError) else _explain(error, f"{item.provider}")

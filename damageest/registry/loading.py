@@ -16,7 +16,7 @@ from typing import Any
 
 import pluggy
 
-from damageest.errors import PluginError
+from damageest.errors import PluginError, find_missing_library, is_interrupt
 from damageest.registry import hookspecs
 
 GROUP = "damageest"
@@ -102,10 +102,11 @@ def _describe_provider(point: EntryPoint, dist: Distribution | None) -> Provider
 
 
 def describe_broken(error: BaseException, provider: Provider) -> Broken:
-    """The plugin as broken by an error, with what to do about it."""
-    return Broken(
-        provider, f"{type(error).__name__}: {error}{_locate(error, provider)}", _suggest_remedy(error, provider)
-    )
+    """The plugin as broken by an error, with what to do about it. Raises KeyboardInterrupt for an interrupt."""
+    if is_interrupt(error):
+        raise KeyboardInterrupt from error
+    kind = "" if type(error) is PluginError else f"{type(error).__name__}: "
+    return Broken(provider, f"{kind}{error}{_locate(error, provider)}", _suggest_remedy(error, provider))
 
 
 def _locate(error: BaseException, provider: Provider) -> str:
@@ -120,4 +121,6 @@ def _suggest_remedy(error: BaseException, provider: Provider) -> str:
         return error.remedy
     if isinstance(error, ModuleNotFoundError) and error.name:
         return f"pip install {error.name}, or reinstall {provider.name}"
+    if library := find_missing_library(error):
+        return f"install the system package that has {library}"
     return f"update or uninstall {provider.name}"

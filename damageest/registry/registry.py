@@ -114,6 +114,14 @@ class Registry:
             f"stage '{stage}' has no '{name}'{suggest(name, names)}; there are: {', '.join(names)}{self.missing()}"
         )
 
+    def describe_plugin(self, name: str) -> str:
+        """A clause for what needs a plugin that cannot be used here: the plugin, the reason, and what to do."""
+        for broken in self.broken:
+            if broken.provider.name == name:
+                reason = broken.reason.splitlines()[0]
+                return f"the plugin {name}, which cannot be used here ({reason}); try: {broken.remedy}"
+        return f"the plugin {name}, which is not installed: pip install {name}"
+
     def missing(self) -> str:
         """A clause on plugins that are installed but broken, empty where there are none."""
         parts = [f"{b.provider} is broken ({b.reason.splitlines()[0]}; {b.remedy})" for b in self.broken]

@@ -31,6 +31,6 @@ def require(owner: str, packages: Mapping[str, str], load: Callable[[str], None]
     if missing:
         raise PluginError(
             f"{owner} needs {', '.join(missing)} from the system; missing here",
-            f"apt-get install {' '.join(packages[library] for library in missing)}, "
+            f"apt-get install {' '.join(dict.fromkeys(packages[library] for library in missing))}, "
             "or the packages that have these files on this system",
         )

@@ -12,6 +12,7 @@ import pytest
 
 from damageest.registry.contracts import STAGES
 from tests import damaged_box
+from tests.needs import PLUGINS, needs_plugin
 
 ROOT = Path(__file__).parents[2]
 
@@ -103,9 +104,13 @@ def test_stages_lists_everything_and_each_option() -> None:
     assert "did you mean 'cluster'?" in call("stages", "clutser").stderr
 
 
-def test_plugins_and_schema() -> None:
-    assert "damageest-cadquery" in call("plugins").stdout
+@needs_plugin(*PLUGINS)
+def test_the_schema_of_jobs() -> None:
     assert json.loads(call("schema").stdout) == json.loads((ROOT / "schemas/job.schema.json").read_text())
+
+
+def test_plugins_and_the_schema_of_results() -> None:
+    assert "damageest-cadquery" in call("plugins").stdout
     assert json.loads(call("schema", "result").stdout)["title"] == "damageest result"
 
 

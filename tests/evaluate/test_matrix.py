@@ -14,6 +14,7 @@ from damageest.evaluate.readme import make_marks, make_matrix_table, replace_bet
 from damageest.registry import Registry
 from damageest.registry.contracts import STAGES
 from tests import damaged_box
+from tests.needs import PLUGINS, needs_plugin
 
 BEGIN, END = make_marks("matrix")
 README = Path(__file__).parents[2] / "README.md"
@@ -73,6 +74,7 @@ def test_the_table_goes_between_the_marks_and_nowhere_else(tmp_path: Path) -> No
         replace_between_marks(page, "new", "matrix")
 
 
+@needs_plugin(*PLUGINS)
 def test_the_readmes_matrix_has_every_implementation(registry: Registry) -> None:
     text = README.read_text().partition(BEGIN)[2].partition(END)[0]
     rows = [[word.strip() for word in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]

@@ -19,6 +19,7 @@ from damageest.job import load
 from damageest.registry import Registry
 from damageest.stages.part import ReadPart
 from tests.evaluate.call import evaluate, rows_of, timeless
+from tests.needs import needs_plugin
 
 README = Path(__file__).parents[2] / "README.md"
 BEGIN, END = make_marks("suite")
@@ -119,7 +120,7 @@ def test_the_readmes_table_is_of_this_suite(registry: Registry) -> None:
         check(table, names)
 
 
-@pytest.mark.parametrize("name", ["points", "fineness", "rivals", "dense"])
+@pytest.mark.parametrize("name", ["points", "fineness", pytest.param("rivals", marks=needs_plugin("open3d")), "dense"])
 def test_the_readmes_tables_of_cost_name_what_there_is(name: str, registry: Registry) -> None:
     (table,) = tables(README.read_text(), name)
     head, _, *body = table

@@ -15,6 +15,7 @@ from damageest.job import yamlfile
 from damageest.job.schema import job_schema
 from damageest.registry import Registry
 from damageest.report.result_json import result_schema
+from tests.needs import PLUGINS, needs_plugin
 
 ROOT = Path(__file__).parents[2]
 
@@ -31,6 +32,7 @@ def own(registry: Registry) -> Registry:
     return dataclasses.replace(registry, implementations=kept)
 
 
+@needs_plugin(*PLUGINS)
 def test_job_schema_is_current(registry: Registry) -> None:
     current = json.loads(json.dumps(job_schema(own(registry))))
     remedy = "run: uv run damageest schema job > schemas/job.schema.json"

@@ -14,6 +14,7 @@ from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS
 from damageest.registry.hookspecs import hookimpl
 from tests import damaged_box
+from tests.needs import PLUGINS, find_obstacle, needs_plugin
 
 HEAD = "from typing import Literal\nfrom damageest.registry.hookspecs import hookimpl\n"
 GROWN = '''
@@ -63,8 +64,18 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Site]:
 def test_every_default_is_there(registry: Registry) -> None:
     for contract, name in DEFAULTS.items():
         assert registry.get(contract.stage, name).contract is contract
-    assert not registry.broken
     assert not registry.clashes
+
+
+def test_no_plugin_is_broken_but_for_a_missing_system_library(registry: Registry) -> None:
+    hindered = {f"damageest-{plugin}" for plugin in PLUGINS if find_obstacle(plugin)}
+    assert {fault.provider.name for fault in registry.broken} == hindered
+
+
+@pytest.mark.parametrize("plugin", [pytest.param(plugin, marks=needs_plugin(plugin)) for plugin in PLUGINS])
+def test_every_plugin_provides_stages(plugin: str, registry: Registry) -> None:
+    """Tests made for each implementation found, as of conformance, include the plugins' own."""
+    assert any(item.provider.name == f"damageest-{plugin}" for item in registry.implementations)
 
 
 def test_a_plugins_stage_runs(site: Site, tmp_path: Path) -> None:
@@ -89,8 +100,8 @@ FAULTS = {
 def test_a_broken_plugin_stops_nothing(source: str, site: Site, tmp_path: Path) -> None:
     site.add("acme-broken", source)
     registry = Registry.discover()
-    assert len(registry.broken) == 1
-    assert FAULTS[source] in registry.broken[0].reason + registry.broken[0].remedy
+    (fault,) = [fault for fault in registry.broken if fault.provider.name == "acme-broken"]
+    assert FAULTS[source] in fault.reason + fault.remedy
     assert damageest.run(damaged_box.write(tmp_path), registry=registry).status == "ok"
     with pytest.raises(JobError, match=r"acme-broken 1\.2 is broken"):
         damageest.run(tmp_path / "job.yaml", settings=["allowance=doubled"], registry=registry)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from damageest.artefacts import Floats
 from damageest.errors import InputError
-from damageest.io.files import check_file, shorten_error
+from damageest.io.files import check_file, raise_environment_fault, shorten_error
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,12 @@ def read_points(path: Path, columns: str | None = None) -> PointFile:
     module = importlib.import_module(f"{__name__}.{READERS[suffix]}")
     try:
         cloud: PointFile = module.read(path, columns)
-    except InputError:
-        raise
     except FormatError as error:
         raise InputError(f"{path}: {error}") from None
     except (KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
     except BaseException as error:  # the readers' libraries raise anything on a broken file, some outside Exception
+        raise_environment_fault(error)
         raise InputError(f"{path}: not a readable {suffix} file ({shorten_error(error)})") from None
     if not len(cloud.points):
         raise InputError(f"{path}: holds no points")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
@@ -18,25 +18,20 @@ def _check_known(name: str, info: ValidationInfo) -> str:
     if registry is None or name in registry.writers:
         return name
     if plugin := PLUGINS.get(name):
-        raise _make_error(
-            f"'{name}' needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry
-        )
+        raise _make_error(f"'{name}' needs {registry.describe_plugin(plugin)}")
     names = sorted(registry.writers)
-    raise _make_error(f"no format '{name}'{suggest(name, names)}; there are: {', '.join(names)}", registry)
+    raise _make_error(f"no format '{name}'{suggest(name, names)}; there are: {', '.join(names)}{registry.missing()}")
 
 
-def _make_error(text: str, registry: Any) -> PydanticCustomError:
-    return PydanticCustomError("format", "{text}", {"text": text + registry.missing()})
+def _make_error(text: str) -> PydanticCustomError:
+    return PydanticCustomError("format", "{text}", {"text": text})
 
 
 def check_spline_writer(wanted: bool, info: ValidationInfo) -> bool:
     """Refuses a spline where nothing here can write one."""
     registry = (info.context or {}).get("registry")
     if wanted and registry is not None and not any(writer.patch for writer in registry.writers.values()):
-        plugin = PLUGINS["step"]
-        raise _make_error(
-            f"a spline needs the plugin {plugin}, which is not usable here: pip install {plugin}", registry
-        )
+        raise _make_error(f"a spline needs {registry.describe_plugin(PLUGINS['step'])}")
     return wanted
 
 

@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 @hookimpl
 def damageest_stages() -> list[type[Stage]]:
-    """What this plugin provides."""
+    """What this plugin provides. Raises PluginError where a system library that OpenCASCADE loads is missing."""
+    from damageest_cadquery._system import check
+
+    check()
     from damageest_cadquery.brep import Brep
 
     return [Brep]

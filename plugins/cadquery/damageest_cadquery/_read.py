@@ -9,6 +9,7 @@ from typing import Any
 
 from damageest.errors import InputError
 from damageest.geometry.units import MILLIMETRES, canonical_unit
+from damageest_cadquery._system import check
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,9 @@ class Model:
 
 
 def read(path: Path, suffix: str) -> Model:
-    """The solids of a file. Raises InputError where it is unreadable or holds no solid, even sewn together."""
+    """The solids of a file. Raises InputError where it is unreadable or holds no solid, even sewn together, PluginError
+    where a system library that OpenCASCADE loads is missing."""
+    check()
     from OCP.Message import Message
 
     Message.DefaultMessenger_s().ChangePrinters().Clear()  # else OpenCASCADE writes into the program's own output

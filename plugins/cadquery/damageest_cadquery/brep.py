@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -10,7 +13,7 @@ from damageest.artefacts import Part
 from damageest.errors import InputError
 from damageest.geometry.make_part import make_part
 from damageest.geometry.units import Unit, canonical_unit, unit_factor
-from damageest.io.files import check_file, file_sha256, shorten_error
+from damageest.io.files import check_file, file_sha256, raise_environment_fault, shorten_error
 from damageest.stages import JobPath
 from damageest.stages.part import CadFace, ReadPart
 
@@ -40,17 +43,13 @@ class Brep(ReadPart):
         from damageest_cadquery._read import read
         from damageest_cadquery._tessellate import diagonal, tessellate
 
-        try:
+        with _name_faults(self.path, suffix):
             model = read(self.path, suffix)
             source = self.unit or model.unit or unit
             # what OpenCASCADE's own lengths have to be multiplied by to be in the job's unit
             scale = unit_factor(source, unit) / model.length
             chord = self.chord or (tolerance / 8 if tolerance else 5e-5 * diagonal(model.solids) * scale)
             mesh = tessellate(model.solids, chord / scale, self.angle, model.name_of)
-        except InputError as error:
-            raise InputError(f"{self.path}: {error}") from None
-        except Exception as error:  # OpenCASCADE's exceptions share no base of their own
-            raise InputError(f"{self.path}: not a readable {suffix} file ({shorten_error(error)})") from None
         notes = list(model.notes)
         if canonical_unit(source) != canonical_unit(unit):
             notes.append(f"converted from {canonical_unit(source)} to {canonical_unit(unit)}")
@@ -77,11 +76,19 @@ class Brep(ReadPart):
         from damageest_cadquery._faces import faces
         from damageest_cadquery._read import read
 
-        try:
+        with _name_faults(self.path, suffix):
             model = read(self.path, suffix)
             source = self.unit or model.unit or unit
             return faces(model, unit_factor(source, unit) / model.length)
-        except InputError as error:
-            raise InputError(f"{self.path}: {error}") from None
-        except Exception as error:  # OpenCASCADE's exceptions share no base of their own
-            raise InputError(f"{self.path}: not a readable {suffix} file ({shorten_error(error)})") from None
+
+
+@contextmanager
+def _name_faults(path: Path, suffix: str) -> Iterator[None]:
+    """Turns the errors of reading into InputError that names the file. Interrupts and missing libraries pass."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except Exception as error:  # OpenCASCADE's exceptions share no base of their own
+        raise_environment_fault(error)
+        raise InputError(f"{path}: not a readable {suffix} file ({shorten_error(error)})") from None

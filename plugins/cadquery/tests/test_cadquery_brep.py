@@ -13,8 +13,10 @@ from damageest_cadquery.brep import Brep
 
 from damageest.artefacts import open_edges
 from damageest.errors import InputError
+from tests.needs import import_for, needs_plugin
 
-cq: Any = pytest.importorskip("cadquery")
+pytestmark = needs_plugin("cadquery")
+cq = import_for("cadquery", "cadquery")
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +13,10 @@ from typer.testing import CliRunner
 
 from damageest.cli import app
 from damageest.errors import InputError, JobError
+from tests.needs import import_for, needs_plugin
 
-cq: Any = pytest.importorskip("cadquery")
+pytestmark = needs_plugin("cadquery")
+cq = import_for("cadquery", "cadquery")
 
 
 @pytest.fixture(scope="module")

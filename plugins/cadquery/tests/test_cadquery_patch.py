@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +12,10 @@ from damageest.artefacts import Surface
 from damageest.geometry.units import MILLIMETRES
 from damageest.stages.export import Patch
 from damageest.stages.export._spline import fit_spline
+from tests.needs import import_for, needs_plugin
 
-cq: Any = pytest.importorskip("cadquery")
+pytestmark = needs_plugin("cadquery")
+cq = import_for("cadquery", "cadquery")
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 

@@ -18,8 +18,10 @@ from damageest.geometry.simplification import simplify_within
 from damageest.geometry.solids import to_solid
 from damageest.geometry.units import MILLIMETRES
 from damageest.stages.export import Body
+from tests.needs import import_for, needs_plugin
 
-cq: Any = pytest.importorskip("cadquery")
+pytestmark = needs_plugin("cadquery")
+cq = import_for("cadquery", "cadquery")
 
 
 def solid(body: Any) -> Solid:

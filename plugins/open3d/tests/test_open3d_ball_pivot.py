@@ -1,32 +1,21 @@
-"""Ball pivoting: a bowl from noisy points, a whole job against known truth, and what happens without the libraries."""
+"""Ball pivoting: a bowl from noisy points, a whole job against known truth."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from typing import Any
-
-import damageest_open3d
 import numpy as np
 import pytest
 import trimesh
-from damageest_open3d import _system
 from damageest_open3d.ball_pivot import BallPivot
 
 import damageest
 from damageest.artefacts import Part, Surface
-from damageest.errors import PluginError, StageError
-from damageest.registry import Registry
+from damageest.errors import StageError
 from damageest.stages.scan.simulate import Simulate
+from tests.needs import needs_plugin
 
 RADIUS, TOP, NOISE, TOLERANCE = 6.0, 10.0, 0.05, 0.2
 
-
-def needed() -> None:
-    try:
-        _system.check()
-    except PluginError as error:
-        pytest.skip(f"{error}; {error.remedy}")
+pytestmark = needs_plugin("open3d")
 
 
 def box() -> Part:
@@ -46,7 +35,6 @@ def bowl(n: int = 6000) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def surface() -> Surface:
-    needed()
     return BallPivot().run(bowl(), box(), TOLERANCE, 0.15, NOISE)
 
 
@@ -77,7 +65,6 @@ def test_same_points_same_bytes(surface: Surface) -> None:
 
 
 def test_far_from_the_origin() -> None:
-    needed()
     away, part = np.array([1e5, -2e5, 3e5]), box()
     moved = BallPivot().run(bowl() + away, Part(part.vertices + away, part.faces), TOLERANCE, 0.15, NOISE)
     off = np.linalg.norm(moved.vertices - away - [0, 0, TOP], axis=1) - RADIUS
@@ -85,7 +72,6 @@ def test_far_from_the_origin() -> None:
 
 
 def test_a_ball_that_falls_through_everywhere_gives_no_surface() -> None:
-    needed()
     with pytest.raises(StageError, match="no surface") as caught:
         BallPivot(radii=(0.01,)).run(bowl(), box(), TOLERANCE, 0.15, NOISE)
     assert "spacing" in caught.value.remedy
@@ -99,7 +85,6 @@ def test_too_few_points_are_refused() -> None:
 
 @pytest.mark.parametrize("density", [0.0, 1.0])
 def test_a_whole_job_comes_near_the_truth(density: float, capfd: pytest.CaptureFixture[str]) -> None:
-    needed()
     part = box()
     tool = {"tool": "sphere", "centre": [0, 0, TOP], "radius": RADIUS}
     scanner = Simulate.model_validate({"damage": [tool], "points": 20_000, "noise": 0.04, "density": density})
@@ -108,49 +93,3 @@ def test_a_whole_job_comes_near_the_truth(density: float, capfd: pytest.CaptureF
     assert result.truth is not None
     assert result.truth[1] > 0.95
     assert capfd.readouterr().out == ""
-
-
-def test_a_missing_system_library_leaves_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    load = _system.load
-
-    def without(library: str) -> None:
-        if library in ("libEGL.so.1", "libGL.so.1"):
-            raise OSError(f"{library}: cannot open shared object file")
-        load(library)
-
-    monkeypatch.setattr(_system, "load", without)
-    with pytest.raises(PluginError, match=r"libEGL\.so\.1, libGL\.so\.1") as caught:
-        damageest_open3d.damageest_stages()
-    assert "apt-get install libegl1 libgl1" in caught.value.remedy
-    registry = Registry.discover()
-    assert [b.remedy for b in registry.broken if b.provider.name == "damageest-open3d"] == [caught.value.remedy]
-    assert any(item.name == "pyvista" for item in registry.of("reconstruct"))
-    with pytest.raises(KeyError, match="apt-get install libegl1"):
-        registry.get("reconstruct", "ball_pivot")
-
-
-def test_libusb_comes_from_its_package_where_the_system_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
-
-    def bare(library: str) -> None:
-        asked.append(library)
-        if library == "libusb-1.0.so.0":
-            raise OSError
-
-    monkeypatch.setattr(_system, "load", bare)
-    _system.check()
-    assert asked[-1].endswith("libusb-1.0.so")
-    monkeypatch.setattr(_system, "_bundled_usb", lambda: "libusb-1.0.so.0")
-    with pytest.raises(PluginError, match="libusb") as caught:
-        _system.check()
-    assert "libusb-package" in caught.value.remedy
-
-
-def test_the_stages_are_listed_without_importing_open3d() -> None:
-    code: Any = (
-        "import sys, damageest_open3d as d\n"
-        "try: d.damageest_stages()\n"
-        "except d._system.PluginError: pass\n"
-        "sys.exit('open3d' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_open3d import _system
 from damageest_open3d.poisson_subtract import PoissonSubtract
 from manifold3d import Manifold
 
 import damageest
 from damageest.artefacts import Enclosures, Floats, Mesh, Part, Samples, Scan, Solid
-from damageest.errors import JobError, PluginError, StageError
+from damageest.errors import JobError, StageError
 from damageest.geometry.solids import iou, to_arrays, to_manifold, to_solid, unite
 from damageest.job import load
 from damageest.registry import Registry
@@ -22,6 +21,7 @@ from damageest.stages.cluster.dbscan import Dbscan
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.scan.simulate import Simulate
 from damageest.stages.segment.mesh_distance import MeshDistance
+from tests.needs import needs_plugin
 
 SIZE, NOISE, TOLERANCE, SPACING = np.array([30.0, 20.0, 12.0]), 0.03, 0.15, 0.32
 TOOLS: dict[str, Any] = {
@@ -31,13 +31,7 @@ TOOLS: dict[str, Any] = {
 }
 NO_SAMPLES = Samples(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, int), np.empty(0, np.uint8), 1.0)
 
-
-@pytest.fixture(autouse=True)
-def _needed() -> None:
-    try:
-        _system.check()
-    except PluginError as error:
-        pytest.skip(f"{error}; {error.remedy}")
+pytestmark = needs_plugin("open3d")
 
 
 def box() -> Part:

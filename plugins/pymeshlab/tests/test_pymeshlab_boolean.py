@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damageest_pymeshlab import _system
 from damageest_pymeshlab.boolean import PyMeshLabBoolean
 from manifold3d import Manifold as Body
 
 from damageest.artefacts import Part, Solid, open_edges
-from damageest.errors import PluginError, StageError
+from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays
 from damageest.stages.boolean.manifold import Manifold
+from tests.needs import needs_plugin
 
-
-@pytest.fixture(autouse=True)
-def _needed() -> None:
-    try:
-        _system.check()
-    except PluginError as error:
-        pytest.skip(f"{error}; {error.remedy}")
+pytestmark = needs_plugin("pymeshlab")
 
 
 def solid(body: Body) -> Solid:

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from typing import Any
 
-import damageest_pymeshlab
 import numpy as np
 import pytest
 import trimesh
-from damageest_pymeshlab import _system
 from damageest_pymeshlab.reconstruct import PyMeshLabReconstruct
 
 import damageest
 from damageest.artefacts import Part, Surface
-from damageest.errors import PluginError, StageError
-from damageest.registry import Registry
+from damageest.errors import StageError
 from damageest.stages.scan.simulate import Simulate
+from tests.needs import needs_plugin
 
 RADIUS, TOP, NOISE, TOLERANCE = 6.0, 10.0, 0.05, 0.2
 FILTERS = ["screened_poisson", "apss", "rimls", "ball_pivoting"]
 
-
-def needed() -> None:
-    try:
-        _system.check()
-    except PluginError as error:
-        pytest.skip(f"{error}; {error.remedy}")
+pytestmark = needs_plugin("pymeshlab")
 
 
 def box() -> Part:
@@ -53,7 +44,6 @@ def reconstructed(name: str, away: Any = (0.0, 0.0, 0.0)) -> Surface:
 
 @pytest.fixture(scope="module", params=FILTERS)
 def made(request: pytest.FixtureRequest) -> tuple[str, Surface]:
-    needed()
     return request.param, reconstructed(request.param)
 
 
@@ -89,7 +79,6 @@ def test_same_points_same_surface_and_not_a_word(made: tuple[str, Surface], capf
 
 
 def test_far_from_the_origin() -> None:
-    needed()
     away = np.array([1e5, -2e5, 3e5])
     off = np.linalg.norm(reconstructed("screened_poisson", away).vertices - away - [0, 0, TOP], axis=1) - RADIUS
     assert np.sqrt((off**2).mean()) < 0.6 * NOISE
@@ -102,7 +91,6 @@ def test_too_few_points_are_refused() -> None:
 
 
 def test_a_ball_that_falls_through_everywhere_gives_no_surface() -> None:
-    needed()
     with pytest.raises(StageError, match="no surface"):
         PyMeshLabReconstruct(filter="ball_pivoting", radius=0.501, spacing=0.02).run(
             bowl(400), box(), TOLERANCE, 0.15, NOISE
@@ -111,7 +99,6 @@ def test_a_ball_that_falls_through_everywhere_gives_no_surface() -> None:
 
 @pytest.mark.parametrize("density", [0.0, 1.0])
 def test_a_whole_job_comes_near_the_truth(density: float, capfd: pytest.CaptureFixture[str]) -> None:
-    needed()
     part = box()
     tool = {"tool": "sphere", "centre": [0, 0, TOP], "radius": RADIUS}
     scanner = Simulate.model_validate({"damage": [tool], "points": 20_000, "noise": 0.04, "density": density})
@@ -120,32 +107,3 @@ def test_a_whole_job_comes_near_the_truth(density: float, capfd: pytest.CaptureF
     assert result.truth is not None
     assert result.truth[1] > 0.95
     assert capfd.readouterr().out == ""
-
-
-def test_a_missing_system_library_leaves_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    load = _system.load
-
-    def without(library: str) -> None:
-        if library == "libGL.so.1":
-            raise OSError(f"{library}: cannot open shared object file")
-        load(library)
-
-    monkeypatch.setattr(_system, "load", without)
-    with pytest.raises(PluginError, match=r"libGL\.so\.1") as caught:
-        damageest_pymeshlab.damageest_stages()
-    assert "apt-get install libgl1" in caught.value.remedy
-    registry = Registry.discover()
-    assert [b.remedy for b in registry.broken if b.provider.name == "damageest-pymeshlab"] == [caught.value.remedy]
-    with pytest.raises(KeyError, match="apt-get install libgl1"):
-        registry.get("boolean", "pymeshlab")
-    assert registry.get("boolean", "manifold")
-
-
-def test_the_stages_are_listed_without_importing_pymeshlab() -> None:
-    code = (
-        "import sys, damageest_pymeshlab as d\n"
-        "try: d.damageest_stages()\n"
-        "except d._system.PluginError: pass\n"
-        "sys.exit('pymeshlab' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

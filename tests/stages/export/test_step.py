@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +13,11 @@ from damageest.geometry.units import MILLIMETRES
 from damageest.registry import Registry
 from damageest.report.result_json import build_report
 from damageest.stages.export.files import Files
+from tests.needs import import_for, needs_plugin
 from tests.stages.export import results
 
-cq: Any = pytest.importorskip("cadquery")
+pytestmark = needs_plugin("cadquery")
+cq = import_for("cadquery", "cadquery")
 
 
 @pytest.mark.parametrize("units", ["mm", "in"])
