@@ -10,9 +10,44 @@ from damageest.stages import Stage, asked_by_name
 
 
 class Align(Stage, ABC):
-    """Gives the pose of the scan in the part's frame (paper 3.1 step 3).
+    """Finds the pose of the scan: the rigid motion that takes it into the part's frame (paper 3.1 step 3).
 
-    Raises StageError where no pose explains the scan; says in the pose where several do.
+    Args of ``run``, lengths in the job's unit:
+        scan: N points (N,3) in the scanner's frame, with their normals or None; ``noise`` and ``spacing`` are measured.
+        part: the part as designed. A scan also covers damage, and may cover only some of the skin.
+        samples: points on all of the part's skin, with normals.
+        tolerance: distance from the skin up to which a point counts as intact.
+
+    Returns:
+        ``T_part_scan`` (4,4), a rotation and a translation without scale or mirror: x_part = R x_scan + t. ``rms`` and
+        ``inliers`` say how well it fits; ``alternatives`` (K,4,4) lists other poses that fit as well, as on a symmetric
+        part, and ``notes`` describe them.
+
+    Raises:
+        StageError: where no pose explains the scan, or it has too few points.
+
+    Example::
+
+        from typing import Literal
+        import numpy as np
+        from damageest.artefacts import Part, Pose, Scan
+        from damageest.errors import StageError
+        from damageest.geometry.distance import distance_to_mesh
+        from damageest.stages.align import Align
+
+        class Centre(Align):
+            "Moves the middle of the scan to the middle of the part; for scans that are turned the right way already."
+            use: Literal["centre"] = "centre"
+
+            def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
+                if not len(scan.points) or not np.isfinite(scan.points).all():
+                    raise StageError("the scan has no points, or some that are not finite", "give another file")
+                T = np.eye(4)
+                T[:3, 3] = part.bounds.mean(axis=0) - (scan.points.min(axis=0) + scan.points.max(axis=0)) / 2
+                distance = distance_to_mesh(scan.points + T[:3, 3], part)
+                near = distance <= tolerance
+                rms = float(np.sqrt((distance[near] ** 2).mean())) if near.any() else 0.0
+                return Pose(T, rms, float(near.mean()))
     """
 
     stage: ClassVar[str] = "align"

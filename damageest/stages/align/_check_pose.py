@@ -1,4 +1,4 @@
-"""Whether a fitted pose explains the scan at all."""
+"""Checks whether a fitted pose explains the scan."""
 
 from __future__ import annotations
 
@@ -13,17 +13,21 @@ from damageest.stages.align._fine import Fit, move_points
 from damageest.stages.align._points import draw_stratified, orient_surface
 
 MIN_ON_PART, MIN_ON_PART_IF_COVERED, MIN_COVER = 0.38, 0.15, 0.45
-"""The share of the scanned area that must lie on the part; less will do where that much of the part's surface is
-covered, as when the part stands on a fixture that was scanned along."""
+"""Share of the scanned area that must lie on the part. The second, smaller share is enough where points cover
+`MIN_COVER` of the part's surface, as when a fixture was scanned with the part."""
 
 CHECKED_POINTS = 15_000
-"""Points that each share is counted on: right to half a percent."""
+"""Number of points that each share is estimated from; enough for half a percent."""
 
 
 @dataclass(frozen=True)
 class PoseCheck:
-    """Shares of the scanned area ``on`` the part's surface, ``inside`` it and ``outside``; ``cover``: the share of the
-    part's surface near points that lie on it; ``rms`` of the inliers' distance, ``inliers`` their share by number."""
+    """How well a pose explains a scan.
+
+    ``on``, ``inside``, ``outside``: shares of the scanned area on the part's surface, inside the part and outside it.
+    ``cover``: share of the part's surface that has scan points on it. ``rms``: of the distances of the inliers, the
+    points on the surface. ``inliers``: their share of all scan points.
+    """
 
     on: float
     inside: float
@@ -34,21 +38,25 @@ class PoseCheck:
 
     @property
     def is_acceptable(self) -> bool:
+        """Whether enough of the scan lies on the part."""
         return self.on >= MIN_ON_PART or (self.on >= MIN_ON_PART_IF_COVERED and self.cover >= MIN_COVER)
 
     def build_error(self, remedy: str) -> StageError:
+        """The error for a pose that is not acceptable."""
         return StageError(
-            f"no pose found that explains the scan: at best {self.on:.0%} of the scanned surface lies on the part "
-            f"(with {self.inside:.0%} inside it and {self.outside:.0%} outside), covering {self.cover:.0%} of the "
-            f"part's; at least {MIN_ON_PART:.0%} should lie on it",
+            f"no pose found that explains the scan: in the best pose {self.on:.0%} of the scanned surface lies on the "
+            f"part ({self.inside:.0%} inside it, {self.outside:.0%} outside) and covers {self.cover:.0%} of the part's "
+            f"surface; at least {MIN_ON_PART:.0%} should lie on the part",
             remedy,
         )
 
 
 def check_pose(target: PartSurface, best: Fit, even: Floats, raw: Floats, tolerance: float) -> PoseCheck:
-    """``even`` (N,3): points spread evenly over the scanned area; ``raw`` (M,3): any unbiased subset; in diagonals.
+    """Measures how well the pose of ``best`` explains the scan.
 
-    A point counts as on the surface within the tolerance, or within the fit's own band where noise makes that wider.
+    ``even`` (N,3): points spread evenly over the scanned area, for shares of area; ``raw`` (M,3): any unbiased subset
+    of the scan, for the inliers. All lengths in diagonals of the part. A point within the tolerance lies on the
+    surface; where noise makes the band of the fit wider, a point within that band.
     """
     from scipy.spatial import cKDTree
 
@@ -63,9 +71,9 @@ def check_pose(target: PartSurface, best: Fit, even: Floats, raw: Floats, tolera
     if on.sum() > 10:
         gap = 3 * float(np.sqrt(target.mesh.area / len(even)))
         cover = float(np.isfinite(cKDTree(at[on]).query(surface, distance_upper_bound=max(gap, 0.02))[0]).mean())
-    loose = target.closest(move_points(best.pose, raw))[0]
-    hit = np.abs(loose) <= band
-    rms = float(np.sqrt((loose[hit] ** 2).mean())) if hit.any() else float("inf")
+    raw_distance = target.closest(move_points(best.pose, raw))[0]
+    hit = np.abs(raw_distance) <= band
+    rms = float(np.sqrt((raw_distance[hit] ** 2).mean())) if hit.any() else float("inf")
     return PoseCheck(
         float(on.mean()),
         float((distance < -band).mean()),

@@ -1,4 +1,4 @@
-"""Which of several poses the scan speaks for, and which of them it cannot tell apart."""
+"""Chooses the pose that fits the scan best, and lists the others that fit as well."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from damageest.stages.align._search import make_motion, refine, score, select_di
 from damageest.stages.align._turns import Axis, find_common_axis, group_turns
 
 MAX_POSES = 40
-"""Poses fitted exactly at most: all those of a gear of twenty teeth, either way up."""
+"""Largest number of poses fitted to the triangles: enough for a gear of twenty teeth, either way up."""
 
 COARSE = 0.008
-"""Band, in diagonals, that hands over from the grid to the triangles."""
+"""Width of the band, in diagonals, at which the fit changes from the grid to the triangles."""
 
 FAR = 4 * COARSE
-"""Beyond that, what a point costs no longer depends on how far exactly it is off."""
+"""Distance, in diagonals, from which on the cost of a point no longer depends on its exact distance."""
 
-FEW, SOME = 1500, 10_000
-"""Points of the fits that are only compared and of their first comparison, and of the second."""
+FIRST_POINTS, SECOND_POINTS = 1500, 10_000
+"""Number of points for the first comparison of poses and the fits before it, and for the second comparison."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The best ``pose`` (4,4), the ``others`` (K,4,4) that fit as well, an ``axis`` about which any turn does, and the
-    ``band`` within which a point lies on the surface."""
+    """The best ``pose`` (4,4); the ``others`` (K,4,4) that fit as well; the ``axis`` about which the part may be turned
+    by any angle, or None; the ``band``: distance within which a point lies on the surface."""
 
     pose: Floats
     others: Floats
@@ -41,18 +41,22 @@ class Choice:
 def choose_pose(
     poses: Floats, target: PartSurface, field: PlaneGrid, scan: OrientedPoints, points: Floats, noise: float
 ) -> Choice:
-    """Fits the promising ones of the poses (H,4,4) and their counterparts exactly and compares them point by point.
+    """Fits the promising poses among ``poses`` (H,4,4), and these turned about a common axis, to the triangles and
+    compares them point by point.
 
-    ``points`` (N,3) well spread and in random order, for the exact fit; ``scan`` for the lookups; lengths in diagonals.
+    ``points`` (N,3): spread evenly over the scan and in random order, for the fit to the triangles. ``scan``: for the
+    lookups in the grid. Lengths in diagonals of the part.
     """
     poses, axis = _add_counterparts(poses, field, scan)
-    fits = [fit(target, _keep_near(field, points[:FEW], pose), pose, COARSE, noise, 12) for pose in poses]
+    fits = [fit(target, _keep_near(field, points[:FIRST_POINTS], pose), pose, COARSE, noise, 12) for pose in poses]
     poses = np.array([one.pose for one in fits])
-    few = [_measure_distance(target, field, points[:FEW], pose) for pose in poses]
-    band = fits[int(np.argmin([robust_cost(distance, 0.75 * COARSE).sum() for distance in few]))].band
-    poses = poses[_select_equal([robust_cost(distance, band) for distance in few])]
+    distances = [_measure_distance(target, field, points[:FIRST_POINTS], pose) for pose in poses]
+    band = fits[int(np.argmin([robust_cost(distance, 0.75 * COARSE).sum() for distance in distances]))].band
+    poses = poses[_select_equal([robust_cost(distance, band) for distance in distances])]
     poses = poses[
-        _select_equal([robust_cost(_measure_distance(target, field, points[:SOME], pose), band) for pose in poses])
+        _select_equal(
+            [robust_cost(_measure_distance(target, field, points[:SECOND_POINTS], pose), band) for pose in poses]
+        )
     ]
     poses = poses[select_distinct(poses, np.zeros(len(poses)), 0.25 * COARSE, MAX_POSES)]
 
@@ -62,31 +66,31 @@ def choose_pose(
     equal[best] = False
     pose, others = poses[best], poses[equal]
     if axis is not None:
-        # Fitted again, since the axis is known no better than the candidates were.
+        # Fitted again: the axis is only as exact as the poses that it was computed from.
         turned = axis.make_turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose
         turned = np.array(
-            [fit(target, _keep_near(field, points[:FEW], one), one, 2 * band, noise, 6).pose for one in turned]
+            [fit(target, _keep_near(field, points[:FIRST_POINTS], one), one, 2 * band, noise, 6).pose for one in turned]
         )
         if any(
             is_worse(robust_cost(_measure_distance(target, field, points, one), band), costs[best]) for one in turned
         ):
             axis = None
     if axis is not None:
-        # One of each set of turns, then a quarter turn of each: endlessly many cannot be listed.
-        every = np.concatenate([pose[None], others])
-        heads = every[group_turns(every, axis, 8)]
+        # The number of poses is infinite: of each set of poses that differ by a turn, list one and its quarter turns.
+        candidates = np.concatenate([pose[None], others])
+        heads = candidates[group_turns(candidates, axis, 8)]
         quarter = axis.make_turns(np.radians([0, 90.0, 180.0, 270.0]))
         others = (quarter[:, None] @ heads[None]).reshape(-1, 4, 4)[1:]
     return Choice(pose, others, axis, band)
 
 
 def _keep_near(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
-    """Those of the points that a pose puts near the surface; exact queries of the others are slow and of no use."""
+    """The points (N,3) that a pose puts near the surface; exact distances of the others are slow and not needed."""
     return points[np.abs(field.distance[field.find_cell(move_points(pose, points).astype(np.float32))]) < FAR]
 
 
 def _measure_distance(target: PartSurface, field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
-    """Signed distances (N,) of the moved points: exact near the surface, by the grid far from it."""
+    """Signed distances (N,) of the moved points: exact near the surface, from the grid far from it."""
     at = move_points(pose, points)
     distance = field.distance[field.find_cell(at.astype(np.float32))].astype(np.float64)
     near = np.abs(distance) < FAR
@@ -95,10 +99,10 @@ def _measure_distance(target: PartSurface, field: PlaneGrid, points: Floats, pos
 
 
 def _add_counterparts(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Axis | None]:
-    """The promising poses, joined by those turned about the axis by which they differ, and the axis.
+    """The promising poses, these poses turned about the axis by which they differ, and the axis, or None.
 
-    A pose one tooth off differs from the right one only at a keyway, and a shaft's keyway is a few degrees wide: the
-    search would have to be lucky, steps of a degree need not be.
+    A pose that is one tooth off differs from the right one only at a keyway, and the keyway of a shaft is a few degrees
+    wide. The random search may miss it; steps of one degree do not.
     """
     poses, scores = _rank(poses, field, scan)
     poses = poses[_select_promising(scores)]
@@ -125,16 +129,16 @@ def _select_promising(scores: Floats) -> NDArray[np.bool_]:
 
 
 def _select_equal(costs: list[Floats]) -> NDArray[np.bool_]:
-    """Which of the poses, by what each point costs, are not decidedly worse than the best."""
+    """Which poses are not significantly worse than the best. ``costs``: for each pose, the cost of each point (N,)."""
     best = costs[int(np.argmin([cost.sum() for cost in costs]))]
     return np.array([not is_worse(cost, best) for cost in costs])
 
 
 def is_worse(cost: Floats, best: Floats) -> bool:
-    """Whether points (N,) costing ``cost`` are explained decidedly worse than at ``best``, compared point by point.
+    """Whether a pose with costs ``cost`` (N,) of the points is significantly worse than one with costs ``best`` (N,).
 
-    Decidedly: by more than chance (five standard errors) and by more than what fitting and tessellation leave, which
-    over exactly symmetric parts is below a ten-thousandth a point; a keyway makes a hundred times that.
+    Significantly: by more than chance (five standard errors), and by more than the errors of fit and tessellation.
+    These are below 0.0001 per point on exactly symmetric parts; a keyway changes the cost by a hundred times that.
     """
     more = cost - best
     total = float(more.sum())
@@ -142,8 +146,11 @@ def is_worse(cost: Floats, best: Floats) -> bool:
 
 
 def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[str, ...]:
-    """A note where the scan leaves the part free to slide: a bar of which both ends are missing or unseen fits anywhere
-    along itself. Every slide or turn that the points' planes hardly resist is tried, a few bands far, either way."""
+    """A note where the scan does not fix the pose; empty where it does.
+
+    A bar with both ends missing or unseen fits at any place along its axis. Each motion that hardly changes the points'
+    distances to their planes is tried, by a few bands in both directions.
+    """
     at = move_points(pose, points)
     distance, _, face = target.closest(at)
     on = np.abs(distance) < band
@@ -158,25 +165,26 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
                 robust_cost(target.closest(move_points(D @ pose, points))[0], band), here
             ):
                 return (
-                    "the scan does not fix the pose: the part can be slid or turned a little and fit as well: "
-                    "what would hold it is missing or was not seen; where the pose is known, give it to align: none",
+                    "the scan does not fix the pose: the part can be moved or turned a little and fits as well, "
+                    "because the surface that would prevent it is missing or was not seen; where the pose is known, "
+                    "give it to align: none",
                 )
     return ()
 
 
 def describe_choice(choice: Choice, target: PartSurface) -> tuple[str, ...]:
-    """What a user should know about the other poses; nothing where there are none."""
+    """Notes for the user about the other poses; empty where there are none."""
     notes: list[str] = []
     if choice.axis is not None:
         x, y, z = choice.axis.direction + 0.0
         notes.append(
-            f"the part fits in any turn about the axis ({x:.3f}, {y:.3f}, {z:.3f}) of its own frame "
-            "(continuous symmetry): the pose is one of endlessly many right ones; the alternatives list quarter turns"
+            f"the part fits at any angle about the axis ({x:.3f}, {y:.3f}, {z:.3f}) of its own frame "
+            "(continuous symmetry): the pose is one of infinitely many correct ones; the alternatives list quarter "
+            "turns"
         )
     elif len(choice.others):
         notes.append(
-            f"the part fits {len(choice.others) + 1} ways equally well: the pose is one of several right ones, "
-            "listed as alternatives"
+            f"the part fits in {len(choice.others) + 1} poses equally well; the others are listed as alternatives"
         )
     if len(choice.others):
         surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
@@ -184,8 +192,8 @@ def describe_choice(choice: Choice, target: PartSurface) -> tuple[str, ...]:
         apart = max(float((np.abs(target.closest(move_points(D, surface))[0]) > choice.band).mean()) for D in motions)
         if apart > 0.002:
             notes.append(
-                f"these ways are not all symmetries of the part (up to {apart:.1%} of its surface differs): "
-                "what would tell them apart is missing or was not seen, so the damage depends on the way taken; "
-                "where the pose is known, give it to align: icp or align: none"
+                f"these poses are not all symmetries of the part (up to {apart:.1%} of its surface differs): the "
+                "surface that would distinguish them is missing or was not seen, so the damage found depends on the "
+                "pose; where the pose is known, give it to align: icp or align: none"
             )
     return tuple(notes)

@@ -1,4 +1,4 @@
-"""Where the part's surface is, as seen from anywhere: one lookup instead of one search."""
+"""A grid of planes around the part: the distance of a point to the surface by one lookup, without a search."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from damageest.geometry.distance import SurfaceTree
 Floats32 = NDArray[np.float32]
 
 CELLS = 220_000
-"""Cells of the field: about 1/100 of the diagonal each on a compact part."""
+"""Number of cells of the grid; on a compact part each is about 1/100 of the diagonal."""
 
 
 @dataclass(frozen=True)
 class PartSurface:
-    """The part, centred and scaled to a diagonal of 1, ready for exact closest-point queries."""
+    """The part, centred and scaled to a diagonal of 1, for exact closest-point queries."""
 
     mesh: Mesh
 
@@ -36,7 +36,7 @@ class PartSurface:
     def closest(self, points: Floats) -> tuple[Floats, Floats, Ints]:
         """Signed distance (N,), positive outside, closest points (N,3) and the faces (N,) that they lie on.
 
-        The sign is the nearest face's. On a saddle-shaped corner that can be the wrong one, which a robust fit bears.
+        The sign is that of the nearest face. At a saddle-shaped corner it can be wrong; a robust fit tolerates that.
         """
         distance, face, foot = self._tree.closest(points)
         outward = np.einsum("ij,ij->i", points - foot, self.normals[face])
@@ -45,10 +45,11 @@ class PartSurface:
 
 @dataclass(frozen=True)
 class PlaneGrid:
-    """A grid over the part's surroundings; each cell knows its centre's closest point and that point's plane.
+    """A grid around the part. Each cell holds the tangent plane at the surface point closest to the cell's centre.
 
-    A point's distance to that plane is exact on flat parts and good to second order elsewhere, so a coarse grid does.
-    All arrays are float32: ``plane`` (X*Y*Z,4) the plane's unit normal and offset, ``distance`` (X*Y*Z,) signed.
+    The distance of a point to that plane is exact on flat faces and right to second order elsewhere, so a coarse grid
+    is enough. ``low`` (3,): lowest corner; ``cell``: edge of a cell; ``plane`` (X*Y*Z,4): unit normal and offset;
+    ``distance`` (X*Y*Z,): signed, of the cell's centre. All arrays are float32.
     """
 
     low: Floats32
@@ -72,7 +73,7 @@ class PlaneGrid:
         return cls(low.astype(np.float32), cell, size, plane, distance.astype(np.float32))
 
     def find_cell(self, points: Floats32) -> Ints:
-        """The cell of each of (...,3) points; those beyond the grid get the outermost cell, which is far outside."""
+        """The cell (...) of each of points (...,3); points beyond the grid get the outermost cell, far off the part."""
         at = (points - self.low) * np.float32(1 / self.cell)
         x, y, z = (np.clip(at[..., k], 0, self.shape[k] - 1).astype(np.int64) for k in range(3))
         cell: Ints = (x * self.shape[1] + y) * self.shape[2] + z

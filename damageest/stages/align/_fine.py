@@ -1,4 +1,4 @@
-"""The robust fit of scan points to the part's exact triangles, and what is left over of it."""
+"""Robust fit of scan points to the triangles of the part."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from damageest.stages.align._field import PartSurface
 from damageest.stages.align._search import make_motion
 
 REACH = 3.5
-"""Where the kernel ends, in standard deviations of the points off the surface."""
+"""Half-width of the kernel, in standard deviations of the points' distances to the surface."""
 
 MAX_DRIFT = 0.1
-"""How far the points may move, in bands, before their closest points are looked up again: until then their planes do.
-"""
+"""How far the points may move, in bands, before their closest points are searched again; until then their planes are
+used."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted ``pose`` (4,4); ``band``: how far off the surface a point may be and still have had a say; ``residue``:
-    by how much (rms) the last step still changed the points' distances from the surface."""
+    """A fitted ``pose`` (4,4). ``band``: distance from the surface beyond which points had no weight. ``residue``: rms
+    change of the points' distances to the surface in the last step."""
 
     pose: Floats
     band: float
@@ -29,23 +29,24 @@ class Fit:
 
 
 def move_points(pose: Floats, points: Floats) -> Floats:
+    """The points (N,3) moved by a pose (4,4)."""
     return points @ pose[:3, :3].T + pose[:3, 3]
 
 
 def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: float, rounds: int) -> Fit:
     """Point-to-plane Gauss-Newton steps on the closest points of the triangles, weighted by Tukey's biweight.
 
-    The kernel starts ``band`` wide and narrows to `REACH` standard deviations, measured on the points within it and at
-    least ``noise``: at the end damage and dirt have no weight at all, where least squares would give them the most.
-    All lengths in diagonals of the part.
+    The kernel starts ``band`` wide and narrows to `REACH` standard deviations of the points within it, of at least
+    ``noise`` each. At the end damage and dirt have no weight. ``points`` (N,3), ``pose`` (4,4), at most ``rounds``
+    steps; all lengths in diagonals of the part.
     """
     narrowest = max(REACH * noise, 2e-5)
     step = residue = drift = np.inf
-    for turn in range(rounds):
+    for step_number in range(rounds):
         at = move_points(pose, points)
         if drift > MAX_DRIFT * band:
             distance, foot, face = target.closest(at)
-            if turn == 0:  # the pose will not move by more than a few bands: what is farther off need not be seen again
+            if step_number == 0:  # the pose moves by a few bands at most: points farther off are not needed
                 close = np.abs(distance) < 4 * band
                 points, at, distance, foot, face = points[close], at[close], distance[close], foot[close], face[close]
             normals, drift = target.normals[face], 0.0
@@ -72,16 +73,21 @@ def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: f
 
 
 def solve_gauss_newton(at: Floats, normals: Floats, weight: Floats, offset: Floats) -> tuple[Floats, Floats]:
-    """The twist (6,) that brings points (N,3) nearest to planes, from whose ``normals`` (N,3) and ``offset`` (N,) of
-    the points, each with its ``weight`` (N,); and what each point's offset gains by it (N,6)."""
+    """One Gauss-Newton step of points ``at`` (N,3) toward planes.
+
+    ``normals`` (N,3): of the planes; ``offset`` (N,): signed distances of the points to them; ``weight`` (N,).
+
+    Returns:
+        The twist (6,), a rotation vector and a translation, and the Jacobian (N,6) of the offsets.
+    """
     jacobian = np.column_stack([np.cross(at, normals), normals])
     hessian = jacobian.T @ (jacobian * weight[:, None])
-    # A little damping holds the motions that the surface does not fix, such as a shaft's turning.
+    # A little damping for motions that the surface does not fix, such as the rotation of a shaft.
     hessian += np.diag(np.full(6, 1e-6 * max(float(np.trace(hessian)), 1e-12)))
     return np.asarray(-np.linalg.solve(hessian, jacobian.T @ (weight * offset))), jacobian
 
 
 def robust_cost(distance: Floats, band: float) -> Floats:
-    """What each point of signed ``distance`` costs: 0 on the surface, 1 beyond the band inside (damage explains it),
-    up to 2 outside (nothing does)."""
+    """The cost (N,) of points at signed ``distance`` (N,): 0 on the surface, 1 deeper inside than the band (it may be
+    damage), up to 2 outside (no damage explains it)."""
     return np.minimum((distance / band) ** 2, 1) + np.clip((distance - band) / (2 * band), 0, 1)

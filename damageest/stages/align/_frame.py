@@ -1,4 +1,4 @@
-"""Scan and part, centred and scaled so that the part's diagonal is 1; and poses given by the user."""
+"""Scan and part, centred and scaled so that the diagonal of the part is 1; and the option for a pose."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from damageest.errors import StageError
 from damageest.stages.align._field import PartSurface
 
 MIN_POINTS = 200
-"""Scan points without which an alignment would be guesswork."""
+"""Number of scan points that an alignment needs."""
 
 Row = tuple[float, float, float, float]
 
@@ -35,8 +35,8 @@ RigidPose = Annotated[tuple[Row, Row, Row, Row], AfterValidator(_check_rigid)]
 
 @dataclass(frozen=True)
 class Frame:
-    """The ``target`` and what leads to it: the part's ``size`` (its diagonal) and ``centre`` (3,), and the
-    scan's ``middle`` (3,)."""
+    """The scaled part, ``target``, and the numbers to scale with: the part's ``size`` (its diagonal) and ``centre``
+    (3,), and the scan's ``middle`` (3,)."""
 
     target: PartSurface
     size: float
@@ -50,11 +50,11 @@ class Frame:
 
         if len(scan.points) < MIN_POINTS:
             raise StageError(
-                f"the scan has {len(scan.points)} points; to align it takes {MIN_POINTS} at least",
-                "give a denser scan, or align: none with the pose, if it is known",
+                f"the scan has {len(scan.points)} points; an alignment needs at least {MIN_POINTS}",
+                "give a denser scan; where the pose is known, give it to align: none",
             )
         if not np.isfinite(scan.points).all():
-            raise StageError("the scan has points that are not finite", "remove them from the file")
+            raise StageError("the scan has points that are not finite", "remove these points from the file")
         if wrong := diagnose_scale(scan.points, part.vertices, part.unit):
             raise StageError(wrong, "set the unit of scan or part, or crop the scan to the part")
         size, centre = part.diagonal, part.bounds.mean(0)
@@ -62,17 +62,18 @@ class Frame:
         return cls(PartSurface(Mesh((part.vertices - centre) / size, part.faces)), size, centre, middle)
 
     def scale_points(self, scan: Scan) -> Floats:
+        """The scan's points (N,3), centred, in diagonals of the part."""
         return (scan.points - self.middle) / self.size
 
     def scale_pose(self, T: Floats) -> Floats:
-        """A pose (4,4) of the job's frames as one of the scaled ones."""
+        """A pose (4,4) in the job's unit as a pose of the scaled scan and part."""
         pose = np.eye(4)
         pose[:3, :3] = T[:3, :3]
         pose[:3, 3] = (T[:3, 3] + T[:3, :3] @ self.middle - self.centre) / self.size
         return pose
 
     def unscale_pose(self, pose: Floats) -> Floats:
-        """The reverse of `scale_pose`, with the rotation made exactly one (products of many steps drift)."""
+        """The inverse of `scale_pose`; the rotation is made orthonormal, since rounding errors of many steps add up."""
         u, _, v = np.linalg.svd(pose[:3, :3])
         T = np.eye(4)
         T[:3, :3] = u @ v

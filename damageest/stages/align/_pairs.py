@@ -1,9 +1,9 @@
-"""Poses to try, from pairs of oriented points that look alike on scan and part.
+"""Candidate poses, from pairs of oriented points that are congruent on scan and part.
 
-Two oriented points have four figures that no motion changes: their distance, the angle of each normal with the line
-between them, and the angle between the normals round that line. A pair on the scan and a pair on the part with the
-same four figures give a full pose. The figures of the part's pairs are hashed once (Drost et al. 2010; pairs drawn at
-random as by Papazov and Burschka 2010).
+Two oriented points have four invariants: their distance, the angle of each normal with the line between them, and the
+angle between the normals about that line. A pair on the scan and a pair on the part with the same four invariants
+determine a pose. The invariants of the part's pairs are hashed once (Drost et al. 2010); pairs are drawn at random
+(Papazov and Burschka 2010).
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ MODEL_POINTS, MODEL_PAIRS = 1600, 1_600_000
 SCAN_POINTS, SCAN_PAIRS, KEPT_PAIRS = 1200, 40_000, 6000
 SHORTEST = 0.12
 BINS = (26, 18, 18, 24)
-"""Of the distance (0 to 1, in diagonals), the two angles with the line, the angle round the line."""
+"""Number of bins of the distance (0 to 1 diagonal), of the two angles with the line, of the angle about the line."""
 
 
 def propose_poses(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: np.random.Generator) -> Floats:
-    """About ``wanted`` poses (H,4,4) from scan to part, of which some are near the true one.
+    """About ``wanted`` poses (H,4,4) from scan to part; a few of them are near the true pose.
 
-    Where the scan's normals have no sign, every pair is tried with both signs at either end.
+    Where the sign of the scan's normals is unknown, each pair is tried with both signs at both points.
     """
     part_points = draw_by_direction(part, MODEL_POINTS, rng)
     scan_points = draw_by_direction(scan, SCAN_POINTS, rng)
@@ -39,10 +39,10 @@ def propose_poses(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: 
     ones = np.ones(SCAN_PAIRS)
     signs = [(1, 1)] if scan.signed else [(1, 1), (1, -1), (-1, 1), (-1, -1)]
     tried = [(p, q, ones * a, ones * b, *_hash_pairs(scan_points, p, q, ones * a, ones * b)) for a, b in signs]
-    p, q, a, b, wish, good = (np.concatenate(column) for column in zip(*tried, strict=True))
-    first, last = np.searchsorted(key, wish, "left"), np.searchsorted(key, wish, "right")
+    p, q, a, b, target_key, good = (np.concatenate(column) for column in zip(*tried, strict=True))
+    first, last = np.searchsorted(key, target_key, "left"), np.searchsorted(key, target_key, "right")
     count = np.where(good, last - first, 0)
-    # A pair that looks like a thousand others says little: each pair has an equal share of the trials.
+    # A pair with a thousand matches is less useful than one with few: each pair gets the same number of trials.
     chance = np.where(count > 0, 1 / np.maximum(count, 12), 0)
     if not chance.any():
         return np.eye(4)[None]
@@ -64,30 +64,33 @@ def propose_poses(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: 
 
 
 def _hash_pairs(cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, NDArray[np.bool_]]:
-    """The hash (M,) of each pair's four figures, and whether they are well defined. ``a``, ``b``: signs of normals."""
+    """The hash (M,) of each pair's four invariants, and whether these are well defined (M,).
+
+    ``i``, ``j`` (M,): the points of each pair; ``a``, ``b`` (M,): signs of their normals.
+    """
     points, normals = cloud.points.astype(np.float32), cloud.normals.astype(np.float32)
     line = points[j] - points[i]
     length = np.linalg.norm(line, axis=1)
     line /= np.maximum(length, np.float32(1e-12))[:, None]
     n, m = normals[i] * a[:, None].astype(np.float32), normals[j] * b[:, None].astype(np.float32)
     along, beside = np.einsum("ij,ij->i", n, line), np.einsum("ij,ij->i", m, line)
-    # Round a line that both normals follow, nothing is fixed.
+    # Normals along the line do not fix the angle about it.
     good = (length > SHORTEST) & (np.abs(along) < 0.94) & (np.abs(beside) < 0.94)
     n, m, line, length, along, beside = (each[good] for each in (n, m, line, length, along, beside))
     (n0, n1, n2), (m0, m1, m2), (x, y, z) = n.T, m.T, line.T
     # of the normals without their parts along the line: the product that turns, and the one that does not
     across = x * (n1 * m2 - n2 * m1) + y * (n2 * m0 - n0 * m2) + z * (n0 * m1 - n1 * m0)
     turn = np.arctan2(across, np.einsum("ij,ij->i", n, m) - along * beside)
-    figures = (
+    invariants = (
         length,
         np.arccos(along) / np.pi,
         np.arccos(beside) / np.pi,
         (turn / (2 * np.pi) + 0.5 / BINS[3]) % 1.0,
     )
     key = np.zeros(len(length), np.int64)
-    for figure, bins in zip(figures, BINS, strict=True):
-        # Half a bin's offset keeps the commonest figures, multiples of a right angle, in the middle of a bin.
-        key = key * (bins + 1) + np.clip(figure * bins + (0.5 if figure is not figures[3] else 0.0), 0, bins).astype(
+    for figure, bins in zip(invariants, BINS, strict=True):
+        # Half a bin's offset keeps the commonest invariants, multiples of a right angle, in the middle of a bin.
+        key = key * (bins + 1) + np.clip(figure * bins + (0.5 if figure is not invariants[3] else 0.0), 0, bins).astype(
             np.int64
         )
     every = np.zeros(len(i), np.int64)
@@ -100,8 +103,8 @@ def _build_frames(
 ) -> tuple[Floats, Floats]:
     """A right-handed frame (M,3,3), columns the axes, and an origin (M,3) that move with the pair.
 
-    From the two normals where they differ enough by ``cosine`` (M,), since they are better known than the line; else
-    from their mean and the line.
+    Computed from the two normals where ``cosine`` (M,) shows that they differ enough, since normals are more exact than
+    the line between the points; else from their mean and the line.
     """
     n, m = cloud.normals[i] * a[:, None], cloud.normals[j] * b[:, None]
     line = cloud.points[j] - cloud.points[i]

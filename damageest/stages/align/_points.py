@@ -1,4 +1,4 @@
-"""Few, well-spread, oriented points out of a scan of any size and density."""
+"""Draws few, evenly spread, oriented points from a scan of any size and density."""
 
 from __future__ import annotations
 
@@ -10,24 +10,25 @@ from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.sampling import sample_by_area
 
 MAX_DENSE = 120_000
-"""Scan points that the density and the normals are measured on; more of them cost time and teach nothing new."""
+"""Number of scan points that density and normals are measured on; more only cost time."""
 
 
 @dataclass(frozen=True)
 class OrientedPoints:
-    """Oriented points: ``points`` (N,3), unit ``normals`` (N,3). ``signed`` tells whether the normals point outward or
-    only lie along the surface's normal, either way round."""
+    """``points`` (N,3) and unit ``normals`` (N,3). ``signed``: whether all normals point outward; if not, their sign is
+    arbitrary."""
 
     points: Floats
     normals: Floats
     signed: bool
 
     def take(self, index: Ints) -> OrientedPoints:
+        """The points at the indices ``index``."""
         return OrientedPoints(self.points[index], self.normals[index], self.signed)
 
 
 def draw_stratified(count: int, wanted: int, rng: np.random.Generator) -> Ints:
-    """About ``wanted`` of ``count`` indices, one drawn from each of as many equal stretches."""
+    """About ``wanted`` of ``count`` indices, by stratified sampling: one from each of ``wanted`` equal intervals."""
     if wanted >= count:
         return np.arange(count)
     edges = np.linspace(0, count, wanted + 1)
@@ -35,10 +36,10 @@ def draw_stratified(count: int, wanted: int, rng: np.random.Generator) -> Ints:
 
 
 def draw_evenly(points: Floats, weights: Floats, wanted: int, rng: np.random.Generator) -> Ints:
-    """Draws about ``wanted`` indices with chance proportional to ``weights`` (N,), evenly in space.
+    """Draws about ``wanted`` different indices with probability proportional to ``weights`` (N,), evenly in space.
 
-    Systematic sampling along a Morton curve: neighbours in the curve are neighbours in space, so equal steps of the
-    summed weight leave neither clumps nor holes. No index comes twice.
+    Systematic sampling along a Morton curve: neighbours on the curve are neighbours in space, so equal steps of the
+    summed weight leave neither clusters nor gaps.
     """
     if wanted >= len(points):
         return np.arange(len(points))
@@ -59,17 +60,17 @@ def orient_scan(
 ) -> tuple[Floats, Floats, OrientedPoints]:
     """The dense subset (D,3), the weight of each of its points (D,), and about ``wanted`` oriented points.
 
-    ``points`` (N,3) and ``noise`` in units of the part's diagonal. A point's weight is the area that it stands for, so
-    that the density of the scan does not matter; a point far from its neighbours is an outlier and weighs nothing.
-    Normals come from the neighbourhood's principal axes, wide enough for the noise; they are signed only where the scan
-    brings normals of its own.
+    ``points`` (N,3) and ``noise`` in diagonals of the part. The weight of a point is the area that it represents, so
+    that the density of the scan does not matter; a point far from its neighbours is an outlier and has weight 0.
+    Normals are principal axes of neighbourhoods that are wide enough for the noise. Their sign is known only where the
+    scan has ``normals`` (N,3).
     """
     from scipy.spatial import cKDTree
 
     index = draw_stratified(len(points), MAX_DENSE, rng)
     every = points[index]
     tree = cKDTree(every)
-    # neighbours among all of them, but of every second only where they are many
+    # neighbours are searched among all points, but only for every second point where there are many
     index = index[:: 1 + (len(index) > MAX_DENSE // 2)]
     dense = points[index]
     reach = np.asarray(tree.query(dense, k=min(9, len(every)), workers=-1)[0])[:, -1]
@@ -102,8 +103,8 @@ def orient_surface(part: Mesh, wanted: int, rng: np.random.Generator) -> Oriente
 
 
 def draw_by_direction(cloud: OrientedPoints, wanted: int, rng: np.random.Generator) -> OrientedPoints:
-    """``wanted`` points of a cloud, rare directions of the normal over-represented: a plate's rim says more about its
-    pose than another thousand points on its faces."""
+    """``wanted`` points of a cloud, with rare directions of the normal drawn more often: the edge faces of a plate fix
+    its pose better than more points on its large faces."""
     count = 128
     step = np.arange(count) + 0.5
     polar, azimuth = np.arccos(1 - 2 * step / count), np.pi * (1 + 5**0.5) * step

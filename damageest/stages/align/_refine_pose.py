@@ -1,4 +1,5 @@
-"""The last of the fit: whole patches that deviate, though their single points do not, lose their say."""
+"""The last step of the fit: patches whose mean deviates get no weight, even where their single points do not
+deviate."""
 
 from __future__ import annotations
 
@@ -13,15 +14,15 @@ from damageest.stages.align._fine import REACH, Fit, move_points, solve_gauss_ne
 from damageest.stages.align._search import make_motion
 
 PATCH = 4.0
-"""Edge of the cubes in mean gaps of the points: some sixteen points on a face."""
+"""Edge of the cubes, in mean distances between points: about sixteen points on a face."""
 MIN_POINTS = 6
 
 
 def refine_pose(target: PartSurface, points: Floats, best: Fit, rounds: int = 8) -> Fit:
-    """As `fit`, on from ``best``, each point weighted by the mean distance of its patch as well.
+    """Continues the fit from ``best``, with each point also weighted by the mean distance of its patch.
 
-    Wear of three standard deviations of the noise is within the kernel for single points and pulls the pose; the mean
-    of k points is a k-th as uncertain, so the kernel for patches is that much narrower and leaves the wear out.
+    Wear of three standard deviations of the noise is within the kernel for single points and shifts the pose. The mean
+    over a patch of k points has 1/k of the variance, so the kernel for patches is narrower and excludes the wear.
     """
     pose = best.pose
     edge = PATCH * float(np.sqrt(target.mesh.area / len(points)))

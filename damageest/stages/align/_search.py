@@ -1,4 +1,4 @@
-"""From many rough poses to the few that could be true, all of them refined and judged side by side."""
+"""Selects few good poses from many rough ones; all are refined and scored at once."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from damageest.stages.align._field import Floats32, PlaneGrid
 from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
 CHUNK = 2_000_000
-"""Points looked up at a time, for the memory's sake."""
+"""Number of points looked up at once, to limit memory."""
 
 
 def score(poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float) -> Floats:
-    """How well each of the poses (H,4,4) explains the scan: 1 where all points lie on the surface.
+    """How well each of the poses (H,4,4) explains the scan, (H,): 1 where all points lie on the surface.
 
-    A point within ``band`` of the surface and facing its way counts for it, the more the closer. A point inside the
-    part is damage and counts nothing. A point outside is what no pose of this part explains: it counts against.
+    A point within ``band`` of the surface, with a normal that agrees, adds up to 1, the more the closer. A point inside
+    the part may be damage and adds 0. A point outside subtracts up to 0.7: damage does not explain it.
     """
     result = np.empty(len(poses))
     step = max(1, CHUNK // len(scan.points))
@@ -35,7 +35,7 @@ def score(poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float) ->
 def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats) -> Floats:
     """Robust point-to-plane steps, one per entry of ``bands``, for all poses (H,4,4) at once.
 
-    Weights are Tukey's with the band as their reach, so that points on damage have no say.
+    Weights are Tukey's, 0 beyond the band, so that points on damage have no weight.
     """
     poses = poses.copy()
     step = max(1, CHUNK // 4 // len(scan.points))
@@ -55,7 +55,7 @@ def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats)
 
 
 def make_motion(twist: Floats) -> Floats:
-    """Rigid motions (H,4,4) by rotation vectors and translations (H,6)."""
+    """Rigid motions (H,4,4) from rotation vectors and translations (H,6)."""
     from scipy.spatial.transform import Rotation
 
     result = np.tile(np.eye(4), (len(twist), 1, 1))
@@ -65,12 +65,12 @@ def make_motion(twist: Floats) -> Floats:
 
 
 def select_distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:
-    """Indices of the best ``wanted`` poses, none within ``apart`` of a better one, best first.
+    """Indices of the at most ``wanted`` best poses, best first; none is within ``apart`` of a better one.
 
     The distance of two poses is the rms over the corners of a cube as large as the part.
     """
     corner = np.array([[x, y, z, 1.0] for x in (-0.3, 0.3) for y in (-0.3, 0.3) for z in (-0.3, 0.3)])
-    # Corners in the part's frame, taken back to the scan's by each pose: a pose's inverse is as telling as the pose.
+    # Compared by the inverse poses, which move the corners from the part's frame to the scan's.
     where = (np.linalg.inv(poses)[:, :3] @ corner.T).reshape(len(poses), -1) / np.sqrt(len(corner))
     chosen: list[int] = []
     free = np.ones(len(poses), bool)
@@ -86,8 +86,12 @@ def select_distinct(poses: Floats, scores: Floats, apart: float, wanted: int) ->
 def _look_up(
     poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float, planes: bool = False
 ) -> tuple[Floats32, Floats32, NDArray[np.bool_], Floats32, NDArray[Any]]:
-    """Moved points (H,M,3), their offsets from the nearest plane, whether that plane is near, how well the normals
-    agree (0 to 1), and the cells' signed distances, or with ``planes`` the cells."""
+    """Looks the scan's M points up in the grid, moved by each of H poses.
+
+    Returns:
+        The moved points (H,M,3), their signed distances to the nearest plane (H,M), whether that plane is near, how
+        well the normals agree (0 to 1), and the signed distances of the cells, or with ``planes`` the cells' numbers.
+    """
     turn = np.swapaxes(poses[:, :3, :3], 1, 2).astype(np.float32)
     moved = scan.points.astype(np.float32) @ turn + poses[:, None, :3, 3].astype(np.float32)
     facing = scan.normals.astype(np.float32) @ turn
@@ -101,7 +105,7 @@ def _look_up(
 
 
 def search(poses: Floats, scan: OrientedPoints, field: PlaneGrid, rng: np.random.Generator) -> Floats:
-    """The at most 80 poses (K,4,4), best first, that are left of the rough ones (H,4,4) after refining."""
+    """Refines and selects: at most 80 poses (K,4,4), best first, from the rough ``poses`` (H,4,4)."""
     few, some, many = (draw_by_direction(scan, count, rng) for count in (100, 250, 600))
     poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:3000]]
     poses = refine(poses, few, field, np.array([0.06, 0.05, 0.04, 0.03]))

@@ -1,4 +1,4 @@
-"""Turns about an axis of the part that (nearly) leave it as it is."""
+"""Rotations of the part about an axis that map it (nearly) onto itself."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PARALLEL, NEAR = 0.995, 0.02
 
 @dataclass(frozen=True)
 class Axis:
-    """A line in the part's frame: unit ``direction`` (3,), and ``point`` (3,), its point nearest to the origin."""
+    """A line in the part's frame: its unit ``direction`` (3,) and its ``point`` (3,) nearest to the origin."""
 
     direction: Floats
     point: Floats
@@ -27,7 +27,7 @@ class Axis:
         return result
 
     def is_turn(self, motions: Floats) -> NDArray[np.bool_]:
-        """Which of the rigid motions (K,4,4) are turns about this axis, nearly (K,)."""
+        """(K,) whether each of the rigid motions (K,4,4) is, nearly, a rotation about this axis."""
         direction, angle, point, slide = _find_screw(motions)
         same = (np.abs(direction @ self.direction) > PARALLEL) & (
             _measure_gap(point, self.point, self.direction) < NEAR
@@ -37,7 +37,7 @@ class Axis:
 
 
 def find_common_axis(poses: Floats) -> Axis | None:
-    """The axis about which most of the poses (K,4,4) differ from the first by a turn; None where fewer than two do."""
+    """The axis of the rotations by which most of the poses (K,4,4) differ from the first; None for fewer than two."""
     motions = poses[1:] @ np.linalg.inv(poses[0])
     direction, angle, point, slide = _find_screw(motions)
     turn = (angle > 0.1) & (np.abs(slide) < NEAR)
@@ -49,7 +49,7 @@ def find_common_axis(poses: Floats) -> Axis | None:
     members = alike[np.argmax(alike.sum(1))]
     if members.sum() < 2:
         return None
-    # The larger the angle, the better it fixes the axis.
+    # A larger angle gives a more exact axis.
     weight = np.sin(angle[members] / 2) ** 2
     scatter = np.linalg.eigh((direction[members] * weight[:, None]).T @ direction[members])[1][:, 2]
     middle = np.average(point[members], axis=0, weights=weight)
@@ -57,19 +57,20 @@ def find_common_axis(poses: Floats) -> Axis | None:
 
 
 def group_turns(poses: Floats, axis: Axis, wanted: int) -> list[int]:
-    """Indices of at most ``wanted`` poses, one of each set that turns about ``axis`` carry into one another."""
-    heads: list[int] = []
+    """Indices of at most ``wanted`` poses: one of each set of poses that differ by rotations about ``axis``."""
+    firsts: list[int] = []
     for index in range(len(poses)):
-        if heads and axis.is_turn(poses[index][None] @ np.linalg.inv(poses[heads])).any():
+        if firsts and axis.is_turn(poses[index][None] @ np.linalg.inv(poses[firsts])).any():
             continue
-        heads.append(index)
-        if len(heads) == wanted:
+        firsts.append(index)
+        if len(firsts) == wanted:
             break
-    return heads
+    return firsts
 
 
 def _find_screw(motions: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Direction (K,3), angle (K,) in radians, the axis' point (K,3) nearest to the origin, slide (K,) along it."""
+    """The screws of motions (K,4,4): direction (K,3), angle (K,) in radians, the point (K,3) of the axis nearest to the
+    origin, and the translation (K,) along the axis."""
     from scipy.spatial.transform import Rotation
 
     vector = Rotation.from_matrix(motions[:, :3, :3]).as_rotvec()
@@ -83,5 +84,6 @@ def _find_screw(motions: Floats) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 def _measure_gap(point: Floats, other: Floats, direction: Floats) -> Floats:
+    """(K,) distance between parallel lines of a ``direction`` (3,), through points (K,3) and ``other`` (3,)."""
     across = point - other
     return np.asarray(np.linalg.norm(across - (across @ direction)[:, None] * direction, axis=1))

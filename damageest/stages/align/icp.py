@@ -1,4 +1,4 @@
-"""Alignment from a pose that is already nearly right."""
+"""Alignment from a known rough pose."""
 
 from __future__ import annotations
 
@@ -14,27 +14,31 @@ from damageest.stages.align._frame import RigidPose
 
 
 class Icp(Align):
-    """Robust point-to-plane ICP to the exact triangles, from a rough pose (paper 3.1 step 3).
+    """Robust point-to-plane ICP on the part's triangles, from a rough pose (paper 3.1 step 3).
 
-    Unlike plain ICP it is not drawn towards the damage: points off the surface lose their weight as the fit closes in.
+    Unlike plain ICP it is not shifted by damage: points off the surface get less weight with each step, at the end
+    none.
     """
 
     use: Literal["icp"] = "icp"
     T_part_scan: RigidPose | None = Option(
-        None, description="initial pose, 4x4, scanner's frame to the part's, in the job's unit; default: no motion"
+        None,
+        description="initial pose T_part_scan, 4x4, from the scan's frame to the part's, in the job's unit; default: "
+        "identity",
     )
     max_distance: float | None = Option(
         None,
         gt=0,
-        description="how far off a scan point may lie at first, in the job's unit; default: 3 % of the diagonal",
+        description="largest distance of a scan point from the part in the first step, in the job's unit; default: 3 % "
+        "of the part's diagonal",
     )
-    iterations: int = Option(60, ge=1, description="steps of the fit at most")
+    iterations: int = Option(60, ge=1, description="largest number of steps of the fit")
     seed: int = Option(
-        0, ge=0, description="seed of the choice of points; the same seed gives the same pose, bit by bit"
+        0, ge=0, description="seed of the random choice of points; the same seed gives the same pose, bit for bit"
     )
 
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
-        """Raises StageError where the fit does not settle or what it settles on does not explain the scan."""
+        """The fitted pose. Raises StageError where the fit does not converge, or its pose does not explain the scan."""
         from damageest.stages.align._check_pose import check_pose
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import Frame
@@ -48,17 +52,17 @@ class Icp(Align):
         start = frame.scale_pose(np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan))
         band = 0.03 if self.max_distance is None else self.max_distance / frame.size
         best = fit(frame.target, points, start, band, noise, self.iterations)
-        verdict = check_pose(frame.target, best, points, dense, tolerance / frame.size)
-        if not verdict.is_acceptable:
-            raise verdict.build_error(
-                "align: register needs no initial pose; or give a closer T_part_scan, or a larger max_distance "
-                f"(now {band * frame.size:.4g} {part.unit})"
+        result = check_pose(frame.target, best, points, dense, tolerance / frame.size)
+        if not result.is_acceptable:
+            raise result.build_error(
+                "use align: register, which needs no initial pose; or give a closer T_part_scan, or a larger "
+                f"max_distance (now {band * frame.size:.4g} {part.unit})"
             )
-        # Half the noise: a slippery part, such as a shaft, may go on turning without end and be right all the same.
+        # Only above half the noise: a part that is free to rotate, such as a shaft, may rotate in every step.
         if best.residue > 0.5 * max(noise, 1e-4):
             raise StageError(
-                f"the fit did not settle in {self.iterations} iterations: its last step still moved the scan's points "
-                f"by {best.residue * frame.size:.3g} {part.unit} off the surface",
+                f"the fit did not converge in {self.iterations} iterations: the last step still changed the distances "
+                f"of the scan points to the surface by {best.residue * frame.size:.3g} {part.unit} (rms)",
                 "raise iterations, or use align: register",
             )
-        return Pose(frame.unscale_pose(best.pose), verdict.rms * frame.size, verdict.inliers)
+        return Pose(frame.unscale_pose(best.pose), result.rms * frame.size, result.inliers)

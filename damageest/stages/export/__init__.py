@@ -1,4 +1,4 @@
-"""Stage `export`: its contract, and what a writer of a file format gets and gives."""
+"""Stage `export`: its contract, and the interface of writers of file formats."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ from damageest.stages import Stage, asked_by_name
 
 @dataclass(frozen=True)
 class ExportedFiles:
-    """``files``: paths relative to the folder that they were written to. ``notes``: what became other than asked for.
+    """What an export wrote.
 
-    ``splines``: per site, how well a spline follows its inner damage surface; empty where none was asked for.
+    ``files``: paths relative to the output folder. ``notes``: what was written otherwise than asked for, or left out.
+    ``splines``: for each site, by its number, how well a spline fits its inner damage surface; empty where the job asks
+    for none.
     """
 
     files: tuple[str, ...] = ()
@@ -27,8 +29,12 @@ class ExportedFiles:
 
 @dataclass(frozen=True)
 class Spline:
-    """``deviation``: the largest distance between surface and spline, either way, None where there is no spline;
-    ``trimmed``: whether it ends at the surface's rim; ``reason``: why it was not written, empty where it was."""
+    """How well a spline fits an inner damage surface.
+
+    ``deviation``: the largest distance from the surface to the spline or back, None where there is no spline.
+    ``trimmed``: whether the spline ends at the rim of the surface. ``reason``: why it was not written; empty where it
+    was written.
+    """
 
     deviation: float | None = None
     trimmed: bool = False
@@ -37,7 +43,7 @@ class Spline:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A solid to be written: ``name`` for whoever opens the file, ``colour`` red, green, blue from 0 to 255."""
+    """A solid to write: ``name`` as shown by programs that open the file; ``colour``: red, green, blue, 0 to 255."""
 
     name: str
     solid: Solid
@@ -46,9 +52,12 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A B-spline surface, clamped: ``degree`` in both directions, ``knots`` with their repetitions (U + degree + 1,)
-    and (V + degree + 1,), ``poles`` (U,V,3). ``rims``: closed loops (K,2) of parameters that bound it, the outer one
-    first; none where it ends at the poles' edges."""
+    """A clamped B-spline surface.
+
+    ``degree``: in both directions. ``knots``: (U + degree + 1,) and (V + degree + 1,), each as often as its
+    multiplicity. ``poles``: (U,V,3). ``rims``: closed loops (K,2) in the surface's parameters that bound it, the outer
+    one first; empty where it ends at the edges of its parameter range.
+    """
 
     degree: int
     knots: tuple[Floats, Floats]
@@ -57,16 +66,20 @@ class Patch:
 
 
 WriteFunction = Callable[[Path, str, Sequence[Body], str], ExportedFiles]
-"""Of ``folder, stem, bodies, unit``: writes ``folder/stem.suffix``; ``stem`` may lead through folders that are there.
-``unit`` is one of um, mm, cm, m, in, ft. The same bodies give the same bytes. What cannot be written well is left out,
-and a note says why."""
+"""A function of ``folder, stem, bodies, unit`` that writes ``folder/stem.suffix``.
+
+``stem`` may contain existing folders. ``unit`` is one of um, mm, cm, m, in, ft. The same bodies give the same bytes.
+What the format cannot hold is left out, and a note says why."""
 
 
 @dataclass(frozen=True)
 class Writer:
-    """How a format is written. ``together``: all bodies of a result go into one file. ``costly``: each facet costs so
-    much there that it gets simplified solids. ``patch`` writes a spline, of ``path, name, patch, unit``; None where the
-    format has no such thing."""
+    """How a format is written.
+
+    ``write``: writes solids. ``one_file``: whether all solids of a result go into one file. ``simplify``: whether it
+    gets simplified solids, because each facet makes the file much larger. ``patch``: writes a spline, with the
+    arguments ``path, name, patch, unit``; None where the format cannot hold one.
+    """
 
     write: WriteFunction
     one_file: bool = False
@@ -75,10 +88,35 @@ class Writer:
 
 
 class Export(Stage, ABC):
-    """Writes the result into a folder that the engine made and will move into place (end of paper 3.2).
+    """Writes the result to files (end of paper 3.2).
 
-    ``result``: everything computed. ``folder``: an existing, empty folder. ``writers``: those of the built-ins and the
-    plugins, by format.
+    Args of ``run``:
+        result: all that was computed, in the part's frame and in ``result.units``.
+        folder: an existing, empty folder. The engine moves it to its final place when all files are written.
+        writers: the writers of file formats, of damageest and of the plugins, by the format's name.
+
+    Returns:
+        The paths of all files written, relative to ``folder`` and with forward slashes; the same result gives the same
+        bytes. ``notes`` say what was written otherwise than asked for, or left out.
+
+    Raises:
+        OSError: where a file cannot be written.
+
+    Example::
+
+        from pathlib import Path
+        from typing import Literal
+        from damageest.result import Result
+        from damageest.stages.export import Export, ExportedFiles
+
+        class Volumes(Export):
+            "A text file with the volume of each damage site."
+            use: Literal["volumes"] = "volumes"
+
+            def run(self, result: Result, folder: Path) -> ExportedFiles:
+                rows = [f"site {site.id}: {site.damage.volume:.6g} {result.units}^3" for site in result.sites]
+                (folder / "volumes.txt").write_text("".join(row + "\\n" for row in rows))
+                return ExportedFiles(("volumes.txt",))
     """
 
     stage: ClassVar[str] = "export"

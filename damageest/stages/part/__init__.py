@@ -15,11 +15,13 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class CadFace:
-    """A face of a CAD model. ``number`` and ``name`` are those of `Part.faces_brep` and `Part.face_names`.
+    """A face of a CAD model. What does not apply to its kind of surface is None.
 
-    ``centre`` is that of its area. ``normal`` of a plane, outward; ``axis`` (a direction) of a cylinder, cone, torus or
-    surface of revolution, through ``point``, which for a sphere is its centre; ``radius`` of a cylinder, sphere, or a
-    torus's larger one. ``hollow``: of a cylinder or sphere, whether the metal lies outside, as round a bore.
+    ``number``, ``name``: as in `Part.faces_brep` and `Part.face_names`. ``kind``: of its surface, as in
+    `Part.face_kinds`. ``area`` and ``centre``: of the face. ``normal``: of a plane, outward. ``axis``: direction of the
+    axis of a cylinder, cone, torus or surface of revolution. ``point``: a point on that axis; the centre of a sphere.
+    ``radius``: of a cylinder or sphere; the larger one of a torus. ``hollow``: of a cylinder or sphere, whether the
+    metal is on the outside, as around a bore.
     """
 
     number: int
@@ -35,12 +37,49 @@ class CadFace:
 
 
 class ReadPart(Stage, ABC):
-    """Gives the part as designed, in the job's unit.
+    """Reads the part as designed.
 
-    ``unit``: the job's unit. ``tolerance``: lambda, or None where it is still to be measured from the scan.
-    ``reads`` names the file suffixes (lower case, with the dot) that an implementation with a ``path`` option
-    reads: a bare path in the job picks the implementation by it. Raises InputError for a file that is not a solid
-    and cannot safely be made one.
+    ``reads``: the file suffixes, in lower case with the dot, that an implementation with an option ``path`` reads. A
+    bare path in the job chooses the implementation by its suffix.
+
+    Args of ``run``:
+        unit: the job's unit, one of um, mm, cm, m, in, ft.
+        tolerance: the job's tolerance in that unit; None where it is yet to be measured from the scan.
+
+    Returns:
+        A watertight part in ``unit``, in its own frame, which all later stages use. A reader of CAD files gives the
+        number of each triangle's CAD face in ``faces_brep``, the faces' names and kinds, and in ``tessellation_error``
+        the largest distance between the CAD surface and the triangles. ``notes`` say what was repaired or converted.
+
+    Raises:
+        InputError: where the file cannot be read, or is not a solid and cannot safely be made one. Begin the message
+            with the file's name.
+
+    Example::
+
+        from typing import ClassVar, Literal
+        from zipfile import BadZipFile
+        import numpy as np
+        from pydantic import Field
+        from damageest.artefacts import Part
+        from damageest.errors import InputError
+        from damageest.geometry.make_part import make_part
+        from damageest.stages import JobPath
+        from damageest.stages.part import ReadPart
+
+        class NumpyPart(ReadPart):
+            "A part from a NumPy archive with arrays vertices and faces, in the job's unit."
+            use: Literal["numpy"] = "numpy"
+            reads: ClassVar[tuple[str, ...]] = (".npz",)
+            path: JobPath = Field(description="the file, relative to the job's folder")
+
+            def run(self, unit: str) -> Part:
+                try:
+                    data = np.load(self.path)
+                    vertices, faces = data["vertices"], data["faces"]
+                except (OSError, EOFError, ValueError, LookupError, BadZipFile) as error:
+                    raise InputError(f"{self.path}: no archive with vertices and faces ({error})") from None
+                return make_part(vertices, faces, unit, path=str(self.path))  # repairs, or raises InputError
     """
 
     stage: ClassVar[str] = "part"
@@ -51,8 +90,8 @@ class ReadPart(Stage, ABC):
     def run(self, unit: str, tolerance: float | None) -> Part: ...
 
     def cad_faces(self, unit: str) -> tuple[CadFace, ...]:
-        """The CAD model's faces, lengths in ``unit``. Raises InputError where what is read has none."""
+        """The faces of the CAD model, lengths in ``unit``. Raises InputError where the part has none."""
         raise InputError(
-            f"{getattr(self, 'path', 'this part')}: a mesh has triangles, and no CAD faces to name; give the part as "
-            "STEP, IGES or BREP (plugin damageest-cadquery), or choose by box or normal direction instead"
+            f"{getattr(self, 'path', 'this part')}: a mesh has triangles but no CAD faces; give the part as STEP, "
+            "IGES or BREP (plugin damageest-cadquery), or choose skin by a box or by the direction of its normal"
         )

@@ -10,10 +10,48 @@ from damageest.stages import Stage, asked_by_name
 
 
 class ReadScan(Stage, ABC):
-    """Gives the scan, in the scanner's frame and the job's unit.
+    """Reads the scan from files, or makes one.
 
-    ``unit``: the job's unit. ``part``: for virtual scanners only; a reader of files has no use for it. Raises
-    InputError for a file that cannot be read or holds no points.
+    ``reads``: the file suffixes, in lower case with the dot, that an implementation with an option ``path`` reads. A
+    bare path in the job chooses the implementation by its suffix.
+
+    Args of ``run``:
+        unit: the job's unit, one of um, mm, cm, m, in, ft.
+        part: the part as designed, for a virtual scanner. A reader of files does not ask for it.
+
+    Returns:
+        N points (N,3), finite, in the scanner's frame and in ``unit``; outward ``normals`` (N,3), or None where the
+        file has none. Leave ``noise`` and ``spacing`` at 0: they are measured afterwards. A virtual scanner adds the
+        ``truth``: the true damage in the part's frame, and the true pose.
+
+    Raises:
+        InputError: where a file cannot be read or holds no points. Begin the message with the file's name.
+        StageError: where a virtual scanner cannot scan what it is asked to.
+
+    Example::
+
+        from typing import ClassVar, Literal
+        import numpy as np
+        from pydantic import Field
+        from damageest.artefacts import Scan
+        from damageest.errors import InputError
+        from damageest.stages import JobPath
+        from damageest.stages.scan import ReadScan
+
+        class GzipText(ReadScan):
+            "A scan from compressed text with columns x, y and z, in the job's unit."
+            use: Literal["gzip_text"] = "gzip_text"
+            reads: ClassVar[tuple[str, ...]] = (".gz",)
+            path: JobPath = Field(description="the file, relative to the job's folder")
+
+            def run(self, unit: str) -> Scan:
+                try:
+                    points = np.loadtxt(self.path, usecols=(0, 1, 2), ndmin=2)
+                except (OSError, EOFError, ValueError) as error:
+                    raise InputError(f"{self.path}: not readable as compressed text ({error})") from None
+                if not len(points) or not np.isfinite(points).all():
+                    raise InputError(f"{self.path}: holds no points, or points that are not finite")
+                return Scan(points, unit=unit, paths=(str(self.path),))
     """
 
     stage: ClassVar[str] = "scan"

@@ -16,8 +16,8 @@ def scene(
     name: str, seed: int, missing: float = 0.0, unseen: float = 0.0, clutter: float = 0.02, points: int = 30_000
 ) -> tuple[Part, Scan]:
     """A part, and a scan of it in a random pose: a plane in a random direction takes the share ``missing`` of its
-    volume, the share ``unseen`` of the surface faces away from the scanner, a share ``clutter`` lies anywhere.
-    The noise is 0.0005 of the diagonal."""
+    volume, the share ``unseen`` of the surface faces away from the scanner, the share ``clutter`` is spread over the
+    bounds. The noise is 0.0005 of the diagonal."""
     import manifold3d
 
     rng = np.random.default_rng(seed)
@@ -48,8 +48,8 @@ def scene(
 
 
 def error(part: Part, T: Floats, scan: Scan) -> float:
-    """The pose's error modulo the part's symmetries, in standard deviations of the noise: rms distance to the part of
-    its own surface, moved by what the pose is wrong by."""
+    """The error of the pose, modulo symmetries of the part, in standard deviations of the noise: rms distance to the
+    part of the part's own surface, moved by the error of the pose."""
     assert scan.truth is not None
     wrong = T @ np.linalg.inv(scan.truth.T_part_scan)
     surface: NDArray[np.float64] = orient_surface(part, 3000, np.random.default_rng(0)).points

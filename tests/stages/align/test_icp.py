@@ -23,7 +23,7 @@ def near(part: Part, scan: Scan, degrees: float, shift: float) -> list[list[floa
 
 
 @pytest.mark.parametrize("name", ["block", "blade"])
-def test_damage_does_not_draw_the_fit(name: str) -> None:
+def test_damage_does_not_shift_the_fit(name: str) -> None:
     part, scan = scene(name, seed=1, missing=0.33)
     stage = Icp.model_validate({"T_part_scan": near(part, scan, 1.0, 0.004)})
     pose = stage.run(scan, part, 4 * scan.noise)

@@ -1,4 +1,4 @@
-"""No alignment: the pose given, reported honestly."""
+"""No alignment: the given pose, and how well the scan lies on the part in it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_identity_on_a_scan_in_place() -> None:
     assert not pose.notes
 
 
-def test_given_pose_is_taken_and_checked_against_the_scan() -> None:
+def test_given_pose_is_used_and_compared_with_the_scan() -> None:
     part, scan = scene("block", seed=1, clutter=0.0)
     assert scan.truth is not None
     T = scan.truth.T_part_scan

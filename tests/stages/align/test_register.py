@@ -1,4 +1,4 @@
-"""Alignment with no initial guess finds the pose to a fraction of the noise, or says why not."""
+"""Alignment without an initial pose finds the pose to a fraction of the noise, or raises an error."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_keyway_decides() -> None:
     assert error(part, pose.T_part_scan, scan) < 0.5
 
 
-def test_continuous_symmetry_is_said_and_all_alternatives_are_right() -> None:
+def test_continuous_symmetry_is_noted_and_all_alternatives_are_right() -> None:
     part, scan = scene("cylinder", seed=6, missing=0.1)
     pose = Register().run(scan, part, 4 * scan.noise)
     assert any("continuous" in note for note in pose.notes)
@@ -40,7 +40,7 @@ def test_continuous_symmetry_is_said_and_all_alternatives_are_right() -> None:
     assert max(error(part, T, scan) for T in [pose.T_part_scan, *pose.alternatives]) < 1
 
 
-def test_a_scan_that_leaves_the_part_free_to_slide_says_so() -> None:
+def test_a_scan_that_does_not_fix_the_pose_is_noted() -> None:
     part, scan = scene("cylinder", seed=6, clutter=0.0)
     assert scan.truth is not None
     height = (scan.move(scan.truth.T_part_scan).points - part.bounds.mean(0))[:, 2] / (part.bounds[1] - part.bounds[0])[
@@ -53,12 +53,12 @@ def test_a_scan_that_leaves_the_part_free_to_slide_says_so() -> None:
     assert not any("does not fix" in note for note in whole.notes)
 
 
-def test_discrete_symmetry_is_said() -> None:
+def test_discrete_symmetry_is_noted() -> None:
     part, scan = scene("cuboid", seed=7, missing=0.05)
     pose = Register().run(scan, part, 4 * scan.noise)
     assert pose.alternatives is not None
     assert len(pose.alternatives) == 3
-    assert any("4 ways" in note for note in pose.notes)
+    assert any("4 poses" in note for note in pose.notes)
     assert max(error(part, T, scan) for T in pose.alternatives) < 1
 
 
@@ -81,10 +81,10 @@ def test_another_part_is_refused() -> None:
     scale = part.diagonal / other.diagonal
     with pytest.raises(StageError, match=r"no pose found.*%") as caught:
         Register().run(Scan(scan.points * scale, noise=scan.noise * scale), part, 4 * scan.noise * scale)
-    assert "belong together" in caught.value.remedy
+    assert "shows this part" in caught.value.remedy
 
 
-def test_inches_read_as_millimetres_are_named() -> None:
+def test_inches_read_as_millimetres_are_reported() -> None:
     part, scan = scene("block", seed=2)
     with pytest.raises(StageError, match="unit"):
         Register().run(Scan(scan.points / 25.4), part, 0.1)
