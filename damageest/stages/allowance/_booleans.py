@@ -1,4 +1,5 @@
-"""Booleans whose volumes are balanced: what manifold3d loses where faces coincide is noticed, and done another way."""
+"""Boolean operations with a check of volumes: where manifold3d loses volume at coincident faces, another way is
+tried."""
 
 from __future__ import annotations
 
@@ -10,57 +11,58 @@ import numpy as np
 from damageest.artefacts import Floats, Solid
 
 SLACK = 1e-5
-"""Share of a solid's volume by which it may change without a word; a tenth of what the check of a deposit bears."""
+"""Largest accepted change of a solid's volume, as a share of it; a tenth of what the check of a deposit accepts."""
 SAME = 5e-7
-"""Distance, in the largest coordinate, within which a reader in single precision takes two points for one."""
+"""Distance, as a share of the largest coordinate, within which single precision makes two points one."""
 DUST = 1e-9
-"""Share of the stock's volume below which a piece of it is rounding."""
+"""Share of the stock's volume below which a piece of it is a rounding error."""
 
 
 def simplify_exactly(body: Any, diagonal: float) -> Any:
-    """A Manifold without what it needs not to have its shape. As it was, where that would change its volume: manifold3d
-    was seen to take a facet along."""
+    """A Manifold without vertices and edges that do not change its shape.
+
+    Returned unchanged where this would change its volume: in rare cases manifold3d also removes a facet.
+    """
     simple = body.as_original().simplify(1e-9 * diagonal)
     return simple if abs(simple.volume() - body.volume()) <= SLACK * abs(body.volume()) else body
 
 
-def keep_touching(proud: Any, filled: Any, tolerance: float) -> Any:
-    """Without the pieces of stock that do not touch what is filled, as behind a thin wall that cuts them off, and
-    without the dust of the Boolean."""
+def keep_touching(stock: Any, filled: Any, tolerance: float) -> Any:
+    """The pieces of ``stock`` that touch the cavity ``filled``; others, cut off by a thin wall, are dropped, and
+    so are rounding errors of the Boolean operation."""
     from manifold3d import Manifold
 
-    least = DUST * proud.volume()
-    pieces = [piece for piece in proud.decompose() if abs(piece.volume()) > least]
-    if len(pieces) > 1:  # a void has a negative volume, and belongs to the piece round it
+    least = DUST * stock.volume()
+    pieces = [piece for piece in stock.decompose() if abs(piece.volume()) > least]
+    if len(pieces) > 1:  # a cavity has a negative volume and belongs to the piece around it
         pieces = [p for p in pieces if p.volume() < 0 or p.min_gap(filled, tolerance) <= 1e-3 * tolerance]
     return Manifold.compose(pieces) if pieces else Manifold()
 
 
-def join(filled: Any, proud: Any) -> Any:
-    """The union, by the first of several ways that leaves no volume unaccounted for, else the nearest; as
-    `damageest.geometry.solids.remainder`."""
-    whole = filled.volume() + proud.volume() - (filled ^ proud).volume()
+def join(filled: Any, stock: Any) -> Any:
+    """The union of cavity and stock: the first of several ways whose volume adds up, else the one nearest to that."""
+    expected = filled.volume() + stock.volume() - (filled ^ stock).volume()
     nudge = 1e-9 * max(abs(bound) for bound in filled.bounding_box())
     ways: tuple[Callable[[], Any], ...] = (
-        lambda: filled + proud,
-        lambda: filled + (proud - (proud ^ filled)),
-        lambda: filled + proud.translate((nudge, 0.7 * nudge, -0.3 * nudge)),
+        lambda: filled + stock,
+        lambda: filled + (stock - (stock ^ filled)),
+        lambda: filled + stock.translate((nudge, 0.7 * nudge, -0.3 * nudge)),
     )
     tried: list[tuple[float, Any]] = []
     for way in ways:
         body = way()
-        tried.append((abs(whole - body.volume()), body))
-        if tried[-1][0] <= SLACK * whole:
+        tried.append((abs(expected - body.volume()), body))
+        if tried[-1][0] <= SLACK * expected:
             break
     return min(tried, key=lambda item: item[0])[1]
 
 
 def separate_sheets(body: Any, origin: Floats, by: float) -> Solid | None:
-    """A Manifold as a Solid that closes for readers who know vertices by their place alone, in single precision too.
+    """A Manifold as a Solid that stays closed when a reader merges vertices at one place, in single precision too.
 
-    A Boolean may leave lines along which sheets touch, each with vertices of its own; merged, their edges have four
-    triangles. Such vertices are drawn in by ``by``, and where details finer than that are in the way, those go first.
-    None where the Manifold is empty; as it was where nothing helps.
+    A Boolean operation may leave lines along which two sheets touch, each with its own vertices. Merged, the edges
+    there have four triangles. Such vertices are moved inward by ``by``; where that is not enough, finer details are
+    removed first. None where the Manifold is empty; not changed where nothing helps.
     """
     from damageest.geometry.rounding import round_to_single
     from damageest.geometry.solids import to_solid
@@ -81,14 +83,14 @@ def separate_sheets(body: Any, origin: Floats, by: float) -> Solid | None:
 
 
 def _move_inward(body: Solid, by: float) -> Solid | None:
-    """The solid with those vertices drawn in that stand where another stands; None where it is none any more."""
+    """The solid with coincident vertices moved inward by ``by``; None where the result is not a solid."""
     from scipy.spatial import cKDTree
 
     points = body.vertices
     pairs = cKDTree(points).query_pairs(SAME * float(np.abs(points).max()), output_type="ndarray")
-    alike = np.unique(pairs)
+    coincident = np.unique(pairs)
     moved = points.copy()
-    moved[alike] -= by * body.vertex_normals[alike]
+    moved[coincident] -= by * body.vertex_normals[coincident]
     try:
         return Solid(moved, body.faces)
     except ValueError:

@@ -1,4 +1,4 @@
-"""What the deposit must not enter, as one solid."""
+"""The regions that the deposit must not enter, as one solid."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from damageest.stages.allowance._skin import SkinFaces, label_skin
 from damageest.stages.allowance._stock import build_stock
 
 MAX_ENTERED = 1e-3
-"""Share of a damage volume that may lie in a solid to keep free."""
+"""Largest share of a damage volume that may lie in a solid to keep free."""
 SIDES = 256
-"""Of a round bar: it is drawn around the true one, 0.01 % wider at its corners."""
+"""Number of sides of a round bar; its polygon is drawn around the circle, at most 0.01 % wider."""
 
 
 def build_keep_out(
@@ -31,9 +31,10 @@ def build_keep_out(
     origin: Floats,
     tolerance: float,
 ) -> Any:
-    """A Manifold relative to ``origin``: the solids, and the space within ``reach`` over skin, to keep free.
+    """A Manifold relative to ``origin`` (3,): the solids to keep free, and the space up to ``reach`` above skin to keep
+    free.
 
-    Raises StageError where what is ``filled`` takes part in one of the solids, or a file is no solid.
+    Raises StageError where the cavity ``filled`` overlaps one of the solids, or a file holds no solid.
     """
     from manifold3d import Manifold, OpType
 
@@ -46,20 +47,20 @@ def build_keep_out(
         if entered > MAX_ENTERED:
             raise StageError(
                 f"{entered:.1%} of the damage volume, {entered * filled.volume():.4g}, lies in keep_out {number + 1}, "
-                "and the deposit has to hold all of it",
-                "a smaller solid there, or skin (faces, facing, kind) instead, which only keeps the stock away",
+                "but the deposit has to fill all of it",
+                "use a smaller solid there, or conditions on skin (faces, facing, kind), which only exclude the stock",
             )
         bodies.append(body)
     if plan.skin_to_keep_free():
-        bodies.append(build_stock(replace(skin, height=np.where(skin.free, reach, 0.0)), tolerance, drawn_in=0))
+        bodies.append(build_stock(replace(skin, height=np.where(skin.free, reach, 0.0)), tolerance, inset=0))
         around = _take_skin_near(skin, part, plan, reach, origin)
         if around is not None:
-            bodies.append(build_stock(replace(around, height=np.where(around.free, reach, 0.0)), tolerance, drawn_in=0))
+            bodies.append(build_stock(replace(around, height=np.where(around.free, reach, 0.0)), tolerance, inset=0))
     return Manifold.batch_boolean(bodies, OpType.Add) if bodies else Manifold()
 
 
 def _take_skin_near(skin: SkinFaces, part: Part, plan: StockPlan, reach: float, origin: Floats) -> SkinFaces | None:
-    """The part's own skin near the damage."""
+    """The skin of the part near the damage; None where there is none."""
     corners = part.triangles - origin
     low, high = skin.vertices.min(axis=0) - 2 * reach, skin.vertices.max(axis=0) + 2 * reach
     near = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
@@ -99,4 +100,4 @@ def _read_mesh(path: Path, part: Part, origin: Floats) -> Any:
         solid: Solid = read_part(path, part.unit)
         return to_manifold(solid, origin)
     except (DamageestError, ValueError, OSError) as error:
-        raise StageError(f"keep_out: {path}: {error}", "a watertight STL, PLY, OBJ, OFF or 3MF") from None
+        raise StageError(f"keep_out: {path}: {error}", "give a watertight STL, PLY, OBJ, OFF or 3MF file") from None

@@ -1,4 +1,4 @@
-"""Where there is no room for the stock: bores it would close, walls it would run into."""
+"""Finds places without room for the stock: bores that it would close, walls that it would run into."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ from damageest.geometry.solids import to_manifold
 from damageest.stages.allowance._skin import ON_PART, SkinFaces
 
 OPPOSITE, NARROW = -0.5, -0.87
-"""Cosine between the normals of skin and wall from which on the wall faces the skin, and from which on it does so even
-where the two meet: a concave corner of 30 degrees."""
+"""Cosine between the normals of skin and wall below which the wall is opposite, and below which it is opposite even
+where the two meet: a concave corner of less than 30 degrees."""
 SAMPLES = 3000
 
 
 @dataclass(frozen=True, eq=False)
 class StockConflict:
-    """Points of the skin whose stock has no room: ``points`` (N,3) relative to the origin, the ``free`` way (N,) along
-    the normal to the opposite wall, the stock ``wanted`` (N,) on this side and on the ``other`` (N,)."""
+    """Points of the skin where the stock has no room.
+
+    ``points``: (N,3) in part coordinates. ``clearance``: (N,) free distance along the normal, to the opposite wall.
+    ``height``: (N,) of the stock on this side. ``opposite``: (N,) height of the stock on the opposite wall.
+    """
 
     points: Floats
     clearance: Floats
@@ -34,8 +37,8 @@ class StockConflict:
         x, y, z = self.points[worst]
         both = f" and {self.opposite[worst]:.4g} on the opposite wall" if self.opposite[worst] else ""
         return (
-            f"no room for the stock at ({x:.4g}, {y:.4g}, {z:.4g}): {self.clearance[worst]:.4g} is free there, and "
-            f"{self.height[worst]:.4g} is wanted{both}"
+            f"no room for the stock at ({x:.4g}, {y:.4g}, {z:.4g}): {self.clearance[worst]:.4g} is free there, but "
+            f"the stock is {self.height[worst]:.4g} high{both}"
         )
 
 
@@ -47,14 +50,15 @@ def place_probes(skin: SkinFaces, seed: int = 11) -> tuple[Floats, NDArray[np.in
 
 
 def find_stock_conflict(skin: SkinFaces, part: Part, tolerance: float, origin: Floats) -> StockConflict | None:
-    """Places where the stock meets an opposite wall of the part, or that wall's own stock; None where it has room.
-    ``skin`` with what is wanted on it, relative to ``origin`` (3,)."""
+    """Places where the stock meets an opposite wall of the part, or the stock on that wall; None where it has room.
 
-    wanted = skin.select(skin.height > 0)
-    if not len(wanted.faces):
+    ``skin``: with the heights of its stock, relative to ``origin`` (3,).
+    """
+    tall = skin.select(skin.height > 0)
+    if not len(tall.faces):
         return None
-    points, face = place_probes(wanted)
-    normal, height = wanted.normal[face], wanted.height[face]
+    points, face = place_probes(tall)
+    normal, height = tall.normal[face], tall.height[face]
     most = float(height.max())
     away = 10 * ON_PART * part.diagonal
     body = to_manifold(part, origin)
@@ -63,8 +67,8 @@ def find_stock_conflict(skin: SkinFaces, part: Part, tolerance: float, origin: F
     hit = hit[~_is_corner(points[hit], normal[hit], place[hit], facing[hit], part, tolerance, origin)]
     if not len(hit):
         return None
-    distance, opposite, _ = closest_on_mesh(place[hit], Mesh(wanted.vertices, wanted.faces))
-    other = np.where(distance <= away, wanted.height[opposite], 0.0)
+    distance, opposite, _ = closest_on_mesh(place[hit], Mesh(tall.vertices, tall.faces))
+    other = np.where(distance <= away, tall.height[opposite], 0.0)
     short = free[hit] + away < height[hit] + other
     if not short.any():
         return None
@@ -75,8 +79,12 @@ def find_stock_conflict(skin: SkinFaces, part: Part, tolerance: float, origin: F
 def _is_corner(
     points: Floats, normal: Floats, place: Floats, facing: Floats, part: Part, tolerance: float, origin: Floats
 ) -> NDArray[np.bool_]:
-    """(N,) whether skin and wall are those of one concave corner: their planes meet on the part's surface. Between the
-    flanks of a gap with a floor they meet below it."""
+    """(N,) whether skin and wall belong to one concave corner.
+
+    The planes of the two then meet on the part's surface. The planes of the flanks of a gap with a floor meet below the
+    floor, inside the metal. ``points``, ``normal`` (N,3): of the skin; ``place``, ``facing`` (N,3): point and normal of
+    the wall; points relative to ``origin`` (3,).
+    """
     if not len(points):
         return np.zeros(0, bool)
     across = facing - np.einsum("ij,ij->i", facing, normal)[:, None] * normal
@@ -88,8 +96,12 @@ def _is_corner(
 
 
 def _measure_clearance(body: Any, start: Floats, direction: Floats, reach: Floats) -> tuple[Floats, Floats, Floats]:
-    """The free way (N,) from each start to the first wall that faces it, inf where that is beyond reach or the first
-    wall does not face it; the place (N,3) where it ends, and the wall's normal (N,3)."""
+    """Casts a ray from each ``start`` (N,3) along its ``direction`` (N,3), up to ``reach`` (N,).
+
+    Returns:
+        The free distance (N,) to the first wall, inf where there is none within reach or it is not opposite; the place
+        (N,3) on the wall; the wall's normal (N,3).
+    """
     free, place, facing = np.full(len(start), np.inf), np.zeros((len(start), 3)), np.zeros((len(start), 3))
     for k, (a, d, far) in enumerate(zip(start, direction, reach, strict=True)):
         hits = body.ray_cast(tuple(a), tuple(a + far * d))

@@ -1,4 +1,4 @@
-"""Skin round the rim of a damage that the stock runs over."""
+"""Finds the intact skin around the rim of a damage that the stock overlaps."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from damageest.stages.allowance._skin import ON_PART, SkinFaces, clip, label_ski
 def grow_over_rim(
     skin: SkinFaces, part: Part, plan: StockPlan, overlap: float, tolerance: float, origin: Floats
 ) -> SkinFaces | None:
-    """The part's skin within ``overlap`` of the rim, on both sides of it, as far as it hangs together with it; with the
-    same stock as anywhere. None where there is nothing to run over."""
+    """The part's skin within ``overlap`` of the rim, on both sides of it, where it is connected to the rim.
+
+    Its stock is that of the plan. None where no skin is overlapped.
+    """
     from manifold3d import Manifold
 
     rim = _find_rim(skin)
@@ -25,7 +27,7 @@ def grow_over_rim(
     margin = overlap + tolerance
     low, high = ends.min(axis=(0, 1)) - margin, ends.max(axis=(0, 1)) + margin
     near = to_manifold(part, origin) ^ Manifold.cube(tuple(high - low)).translate(tuple(low))
-    # fine enough that distance, linear on each triangle, is right to a fraction of the tolerance
+    # so fine that the distance, linear on each triangle, is right within a fraction of the tolerance
     near = near.refine_to_length(max(overlap / 2, tolerance / 2))
     vertices, faces = to_arrays(near)
     value = overlap - distance_to_edges(vertices, skin.vertices, rim)
@@ -40,7 +42,7 @@ def grow_over_rim(
 
 
 def _find_rim(skin: SkinFaces) -> Ints:
-    """(E,2) edges where skin with stock meets intact skin: those that no other skin of the damage shares."""
+    """(E,2) edges between skin with stock and intact skin: edges of one face of the damage's skin only."""
     border = skin.find_border_edges()
     if not len(border):
         return border
@@ -51,7 +53,7 @@ def _find_rim(skin: SkinFaces) -> Ints:
 
 
 def _keep_connected(vertices: Floats, faces: Ints, places: Floats, part: Part) -> Ints:
-    """Those faces that hang together, by their corners, with one that one of the places (M,3) lies on."""
+    """The faces that are connected, by their corners, to a face on which one of ``places`` (M,3) lies."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

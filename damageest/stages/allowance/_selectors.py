@@ -1,4 +1,4 @@
-"""Which skin of the part is meant: by place, by direction, by CAD face, by kind of surface."""
+"""Options that select skin of the part: by place, by direction, by CAD face, by kind of surface."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Plane = tuple[Floats, float]
 """Unit normal (3,) and offset: points x with ``normal . x > offset`` are beyond it."""
 
 MAX_LISTED = 12
-"""Valid names that an error lists at most."""
+"""Largest number of valid names that an error lists."""
 
 
 def _check_direction(value: Vector) -> Vector:
@@ -40,7 +40,7 @@ Corners = Annotated[tuple[Vector, Vector], AfterValidator(_check_order)]
 
 
 class StrictMapping(BaseModel):
-    """A mapping in a job that says which keys it takes when it gets another."""
+    """Base of mappings in a job: an unknown key is refused with a list of the valid ones."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, serialize_by_alias=True)
 
@@ -59,31 +59,35 @@ class StrictMapping(BaseModel):
 
 
 class HalfSpace(StrictMapping):
-    """Everything on the side of a plane that its normal points to."""
+    """The space on the side of a plane to which its normal points."""
 
-    point: Vector = Field(description="on the plane, in part coordinates, in the job's unit")
-    normal: Direction = Field(description="toward the side that is meant; its length does not matter")
+    point: Vector = Field(description="a point on the plane, in part coordinates, in the job's unit")
+    normal: Direction = Field(description="direction to the selected side; its length does not matter")
 
 
 class Facing(StrictMapping):
     """Skin whose outward normal is close to a direction."""
 
     direction: Direction = Field(description="in part coordinates; its length does not matter")
-    angle: float = Field(30.0, gt=0, le=180, description="degrees between it and the skin's outward normal, at most")
+    angle: float = Field(
+        30.0, gt=0, le=180, description="largest angle between it and the outward normal of the skin, in degrees"
+    )
 
 
 class Selector(StrictMapping):
-    """Skin of the part. Of several conditions, all have to hold."""
+    """Conditions that select skin of the part; of several conditions all must hold."""
 
     box: Corners | None = Field(None, description="lowest and highest corner in part coordinates, in the job's unit")
     half_space: HalfSpace | None = Field(
-        None, description="point and normal of a plane; the side it points to is meant"
+        None, description="point and normal of a plane; the side to which the normal points is selected"
     )
     facing: Facing | None = Field(
-        None, description="direction of the outward normal, and the angle about it in degrees"
+        None, description="direction of the outward normal, and largest angle from it in degrees"
     )
-    faces: tuple[int | str, ...] = Field((), description="numbers or names of CAD faces, as the part's file gives them")
-    kind: Literal["plane", "cylinder", "other"] | None = Field(None, description="of the CAD face's surface")
+    faces: tuple[int | str, ...] = Field(
+        (), description="numbers or names of CAD faces, as listed by `damageest faces`"
+    )
+    kind: Literal["plane", "cylinder", "other"] | None = Field(None, description="kind of the CAD face's surface")
 
     @model_validator(mode="after")
     def _check_conditions(self) -> Self:
@@ -92,15 +96,15 @@ class Selector(StrictMapping):
         return self
 
     def find_fault(self) -> str:
-        """What is wrong with the conditions together; empty where nothing is."""
-        return "" if self.conditions() else f"says no skin; give one or more of: {', '.join(Selector.model_fields)}"
+        """What is wrong with the conditions as a whole; empty where nothing is."""
+        return "" if self.conditions() else f"selects no skin; give one or more of: {', '.join(Selector.model_fields)}"
 
     def conditions(self) -> list[str]:
-        """Names of the conditions that are given."""
+        """Names of the given conditions."""
         return [name for name in Selector.model_fields if getattr(self, name) not in (None, ())]
 
     def planes(self, origin: Floats) -> list[Plane]:
-        """Planes that bound what is meant; skin has to be cut along them first. Relative to ``origin`` (3,)."""
+        """The planes that bound the selection, relative to ``origin`` (3,); skin has to be cut along them first."""
         found: list[Plane] = []
         if self.box is not None:
             for corner in self.box:
@@ -111,54 +115,63 @@ class Selector(StrictMapping):
         return found
 
     def matches(self, points: Floats, normals: Floats, parents: Ints, part: Part) -> Mask:
-        """(N,) whether skin at points (N,3) in part coordinates, with outward normals (N,3), on the part's triangles
-        ``parents`` (N,), is meant. Raises StageError where the part does not know the face."""
-        meant = np.ones(len(points), bool)
+        """(N,) whether skin is selected.
+
+        ``points`` (N,3) of the skin in part coordinates, its outward ``normals`` (N,3), and the part's triangles
+        ``parents`` (N,) there. Raises StageError where the part has no such CAD face.
+        """
+        selected = np.ones(len(points), bool)
         if self.box is not None:
-            meant &= ((points >= self.box[0]) & (points <= self.box[1])).all(axis=1)
+            selected &= ((points >= self.box[0]) & (points <= self.box[1])).all(axis=1)
         if self.half_space is not None:
-            meant &= (points - np.array(self.half_space.point)) @ np.array(self.half_space.normal) >= 0
+            selected &= (points - np.array(self.half_space.point)) @ np.array(self.half_space.normal) >= 0
         if self.facing is not None:
             direction = np.array(self.facing.direction) / np.linalg.norm(self.facing.direction)
-            meant &= normals @ direction >= np.cos(np.radians(self.facing.angle)) - 1e-12
+            selected &= normals @ direction >= np.cos(np.radians(self.facing.angle)) - 1e-12
         if self.faces:
-            meant &= np.isin(_require_brep(part, "faces")[parents], [_find_number(part, face) for face in self.faces])
+            selected &= np.isin(
+                _require_brep(part, "faces")[parents], [_find_number(part, face) for face in self.faces]
+            )
         if self.kind is not None:
             numbers = _require_brep(part, "kind")
             kinds = np.array([kind if kind in ("plane", "cylinder") else "other" for kind in part.face_kinds])
-            meant &= (kinds == self.kind)[numbers[parents]]
-        return meant
+            selected &= (kinds == self.kind)[numbers[parents]]
+        return selected
 
 
 class StockTarget(Selector):
-    """Skin that gets stock of its own."""
+    """Skin with its own height of stock."""
 
-    outer: float = Field(ge=0, allow_inf_nan=False, description="stock beyond this skin, in the job's unit; 0: none")
+    outer: float = Field(
+        ge=0, allow_inf_nan=False, description="height of the stock on this skin, in the job's unit; 0: none"
+    )
 
 
 class Bar(StrictMapping):
-    """A round bar."""
+    """A solid round bar."""
 
     start: Vector = Field(alias="from", description="centre of one end, in part coordinates, in the job's unit")
     end: Vector = Field(alias="to", description="centre of the other end")
-    radius: float = Field(gt=0, allow_inf_nan=False, description="in the job's unit")
+    radius: float = Field(gt=0, allow_inf_nan=False, description="radius, in the job's unit")
 
     @model_validator(mode="after")
     def _check_length(self) -> Self:
         if not np.linalg.norm(np.subtract(self.end, self.start)) > 0:
-            raise ValueError("from and to are the same point; a bar has a length")
+            raise ValueError("from and to are the same point; give two different points")
         return self
 
 
 class KeepOut(Selector):
-    """A solid, or skin, that the deposit must not enter. A box alone is a solid; beside another condition it narrows
-    the skin."""
+    """A solid that the deposit must not enter, or skin that gets no stock.
+
+    A box alone is a solid; with other conditions it selects skin.
+    """
 
     cylinder: Bar | None = Field(None, description="a solid round bar: from, to, radius")
     mesh: JobPath | None = Field(None, description="a watertight mesh file in part coordinates, in the job's unit")
 
     def find_fault(self) -> str:
-        """As of skin, or of a solid."""
+        """What is wrong with the conditions and solids as a whole; empty where nothing is."""
         solids = [name for name in ("cylinder", "mesh") if getattr(self, name) is not None]
         one = len(solids) + bool(self.conditions()) == 1
         return (
@@ -166,12 +179,13 @@ class KeepOut(Selector):
         )
 
     def is_solid(self) -> bool:
+        """Whether it describes a solid, not skin."""
         return self.conditions() in ([], ["box"])
 
 
 @dataclass(frozen=True)
 class StockPlan:
-    """What a job asks for: stock of ``outer`` where no target matches, and what to keep free."""
+    """The stock that a job asks for: ``outer`` where none of ``targets`` matches, and what to keep free."""
 
     outer: float
     targets: tuple[StockTarget, ...]
@@ -179,25 +193,26 @@ class StockPlan:
 
     @property
     def max_height(self) -> float:
-        """The largest stock that skin may get."""
+        """The largest height of stock."""
         return max([self.outer, *(target.outer for target in self.targets)])
 
     def skin_to_keep_free(self) -> tuple[KeepOut, ...]:
+        """The items of ``keep_out`` that select skin."""
         return tuple(item for item in self.keep_out if not item.is_solid())
 
     def planes(self, origin: Floats) -> list[Plane]:
-        """All planes along which skin is to be cut before it is sorted."""
+        """All planes along which skin has to be cut before its stock is looked up; relative to ``origin`` (3,)."""
         return [plane for item in (*self.targets, *self.skin_to_keep_free()) for plane in item.planes(origin)]
 
     def is_kept_free(self, points: Floats, normals: Floats, parents: Ints, part: Part) -> Mask:
-        """(N,) skin that must stay without stock; as `Selector.matches`."""
+        """(N,) whether skin must have no stock; arguments as of `Selector.matches`."""
         found = np.zeros(len(points), bool)
         for item in self.skin_to_keep_free():
             found |= item.matches(points, normals, parents, part)
         return found
 
     def heights(self, points: Floats, normals: Floats, parents: Ints, part: Part) -> Floats:
-        """(N,) stock wanted on skin; as `Selector.matches`."""
+        """(N,) height of the stock on skin; arguments as of `Selector.matches`."""
         height = np.full(len(points), self.outer)
         for target in reversed(self.targets):
             height[target.matches(points, normals, parents, part)] = target.outer
@@ -208,26 +223,28 @@ class StockPlan:
 def _require_brep(part: Part, option: str) -> Ints:
     if part.faces_brep is None:
         raise StageError(
-            f"'{option}' picks CAD faces, and the part is a mesh, which has none",
-            "a part from STEP, IGES or BREP; or pick skin by box, half_space or facing",
+            f"'{option}' selects CAD faces, but the part is a mesh and has none",
+            "give the part as STEP, IGES or BREP; or select skin by box, half_space or facing",
         )
     return part.faces_brep
 
 
 def _find_number(part: Part, face: int | str) -> int:
-    """The number of a CAD face given by number or name."""
+    """The number of a CAD face, given by number or name. Raises StageError where the part has no such face."""
     assert part.faces_brep is not None
     count = max(int(part.faces_brep.max()) + 1, len(part.face_kinds))
     if isinstance(face, int):
         if not 0 <= face < count:
-            raise StageError(f"the part has no CAD face {face}", f"a number from 0 to {count - 1}")
+            raise StageError(f"the part has no CAD face {face}", f"give a number from 0 to {count - 1}")
         return face
     names: Sequence[str] = [name for name in part.face_names if name]
     if face in names:
         return part.face_names.index(face)
     if not names:
-        raise StageError(f"no CAD face '{face}': the part's faces have no names", f"a number from 0 to {count - 1}")
+        raise StageError(
+            f"no CAD face '{face}': the part's faces have no names", f"give a number from 0 to {count - 1}"
+        )
     listed = ", ".join(names[:MAX_LISTED]) + (f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else "")
     raise StageError(
-        f"no CAD face '{face}'{suggest(face, names)}", f"a name of: {listed}; or a number up to {count - 1}"
+        f"no CAD face '{face}'{suggest(face, names)}", f"give one of the names {listed}; or a number up to {count - 1}"
     )

@@ -1,4 +1,4 @@
-"""Stock over smooth patches of skin, each as one solid: many times quicker to unite than a piece for each triangle."""
+"""Builds stock on smooth patches of skin, each as one solid: much faster to unite than one piece for each triangle."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints
 
 SLIVER = 1e-9
-"""Area of a triangle, in squares of the skin's extent, below which it does not matter which way it faces."""
+"""Area of a triangle, in squares of the skin's extent, below which its direction is not checked."""
 
 
 def build_shells(
     lows: Floats, tops: Floats, group: Ints, pairs: Ints, shared: NDArray[np.bool_]
 ) -> tuple[list[Any], Ints]:
-    """Manifolds between the skin and the top of its stock, one for each patch where that does not fold.
+    """Manifolds between the skin and the top of its stock, one for each patch where the top does not fold.
 
     Args:
         lows, tops: (F,3,3) lower and upper corners over each triangle.
         group: (3F,) corners of one group have one lower and one upper point.
-        pairs: (E,2) triangles beside one another; ``shared`` (E,) whether they have both upper corners in common.
+        pairs: (E,2) neighbouring triangles.
+        shared: (E,) whether these have both upper corners in common.
 
     Returns:
         The Manifolds, and the triangles that are in none of them.
@@ -57,8 +58,8 @@ def build_shells(
 
 
 def _is_folded(lows: Floats, tops: Floats) -> NDArray[np.bool_]:
-    """(F,) whether the upper triangle faces another way than the lower one, or is less than a tenth of it: the skin
-    bends about as sharply as the stock is high."""
+    """(F,) whether the upper triangle faces the other way than the lower one, or is smaller than a tenth of it: there
+    the radius of the skin is about the height of the stock."""
 
     def cross(corners: Floats) -> Floats:
         return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -67,12 +68,12 @@ def _is_folded(lows: Floats, tops: Floats) -> NDArray[np.bool_]:
     size = np.einsum("ij,ij->i", below, below)
     sliver = (
         size < (SLIVER * np.ptp(lows, axis=(0, 1)).max() ** 2) ** 2
-    )  # rounding turns these, and nothing comes of it
+    )  # rounding errors turn these; they do not matter
     return np.asarray(~sliver & (np.einsum("ij,ij->i", below, above) < 0.1 * size))
 
 
 def _find_border(corner: Ints) -> tuple[Ints, Ints]:
-    """Start and end (B,) of the edges that only one triangle has, in its sense."""
+    """Start and end (B,) of the edges of one triangle only, in the direction of that triangle."""
     start, stop = corner.ravel(), corner[:, [1, 2, 0]].ravel()
     size = int(corner.max()) + 1
     lone = ~np.isin(start * size + stop, stop * size + start)

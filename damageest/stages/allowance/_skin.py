@@ -1,4 +1,4 @@
-"""The nominal skin that a repair has to restore: the faces of a damage volume that lie on the part."""
+"""Finds the skin that a repair has to restore: the faces of a damage volume that lie on the part."""
 
 from __future__ import annotations
 
@@ -17,9 +17,12 @@ ON_PART = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class SkinFaces:
-    """``vertices`` (V,3) relative to the caller's origin, ``faces`` (F,3); ``parent`` (F,) the part's triangle below
-    each, ``normal`` (F,3) that triangle's, outward; ``height`` (F,) the stock wanted on each; ``free`` (F,) those that
-    must stay without."""
+    """Triangles of skin, with the stock to build on them.
+
+    ``vertices``: (V,3) relative to the caller's origin. ``faces``: (F,3). ``parent``: (F,) the triangle of the part on
+    which each face lies. ``normal``: (F,3) of that triangle, outward. ``height``: (F,) of the stock. ``free``: (F,)
+    whether the face must have no stock.
+    """
 
     vertices: Floats
     faces: Ints
@@ -30,6 +33,7 @@ class SkinFaces:
 
     @property
     def triangles(self) -> Floats:
+        """(F,3,3) corners."""
         return self.vertices[self.faces]
 
     @property
@@ -39,20 +43,20 @@ class SkinFaces:
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
     def select(self, faces: NDArray[np.bool_]) -> SkinFaces:
-        """The same skin with some of its faces."""
+        """The same skin with the faces (F,) that are selected."""
         return SkinFaces(
             self.vertices, self.faces[faces], self.parent[faces], self.normal[faces], self.height[faces],
             self.free[faces],
         )  # fmt: skip
 
     def find_border_edges(self) -> Ints:
-        """(E,2) edges that only one face has."""
+        """(E,2) the edges of one face only."""
         edges = np.sort(np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]]), axis=1)
         unique, count = np.unique(edges, axis=0, return_counts=True)
         return np.asarray(unique[count == 1])
 
     def sample(self, count: int, seed: int) -> tuple[Floats, Ints]:
-        """``count`` random points (N,3), even by area, and the face (N,) of each."""
+        """``count`` random points (N,3), uniform by area, and the face (N,) of each."""
         rng = np.random.default_rng(seed)
         total = np.cumsum(self.areas)
         if not len(total) or not total[-1] > 0:
@@ -64,13 +68,13 @@ class SkinFaces:
 
 
 def take_skin(body: Mesh, part: Part, plan: StockPlan, origin: Floats) -> SkinFaces:
-    """The faces of a solid in the part that lie on the part's surface, cut along the planes of the selectors and told
-    apart by the stock wanted on them."""
+    """The faces of a solid inside the part that lie on the part's surface, cut along the planes of the selectors, with
+    the height of their stock. Relative to ``origin`` (3,)."""
     return label_skin(body.vertices - origin, body.faces, part, plan, origin)
 
 
 def label_skin(vertices: Floats, faces: Ints, part: Part, plan: StockPlan, origin: Floats) -> SkinFaces:
-    """Of a mesh relative to ``origin``, the faces that lie on the part, cut and told apart."""
+    """As `take_skin`, of a mesh that is already relative to ``origin`` (3,)."""
     on, parent = find_on_part(vertices, faces, part, origin)
     faces, parent = faces[on], parent[on]
     for normal, offset in plan.planes(origin):
@@ -84,8 +88,8 @@ def label_skin(vertices: Floats, faces: Ints, part: Part, plan: StockPlan, origi
 
 
 def find_on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> tuple[NDArray[np.bool_], Ints]:
-    """Which faces (F,) lie on the part and face the same way, and the part's triangle (F,) below the middle of each."""
-    # three points near the corners and the middle: a face of a cut may touch the skin along an edge
+    """Whether each face (F,) lies on the part and faces the same way, and the part's triangle (F,) at its middle."""
+    # points near the corners and in the middle, not the corners: a face of a cut may touch the skin along an edge
     weights = np.array([[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [1 / 3, 1 / 3, 1 / 3]])
     corners = vertices[faces]
     probes = np.einsum("pk,fkj->fpj", weights, corners).reshape(-1, 3)
@@ -93,23 +97,23 @@ def find_on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> t
     near = distance.reshape(-1, 4).max(axis=1) <= ON_PART * part.diagonal
     parent = np.asarray(parent.reshape(-1, 4)[:, 3], np.int64)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # slivers face anywhere, and left out they would leave slits
+    # the direction of a sliver is arbitrary, and gaps would remain without the slivers
     sliver = np.linalg.norm(cross, axis=1) < (100 * ON_PART * part.diagonal) ** 2
     return near & (sliver | (np.einsum("ij,ij->i", cross, part.cross[parent]) > 0)), parent
 
 
 def clip(vertices: Floats, faces: Ints, value: Floats) -> tuple[Floats, Ints, Ints, NDArray[np.bool_]]:
-    """Cuts triangles where a field (V,), linear on each, changes its sign. Neighbours stay joined.
+    """Cuts triangles where a field ``value`` (V,), linear on each, changes its sign. Neighbours stay connected.
 
     Returns:
-        Vertices, faces, the face that each came from, and whether the field is positive on it.
+        Vertices, faces, the original face of each, and whether the field is positive on it.
     """
     sign = np.sign(value)[faces]
     crossed = (sign.max(axis=1) > 0) & (sign.min(axis=1) < 0)
     whole = np.flatnonzero(~crossed)
     cut = np.flatnonzero(crossed)
     touching = (sign[cut] == 0).any(axis=1)
-    # turned so that the corner on the plane, or the one alone on its side, comes first
+    # corners are rotated so that the one on the plane, or the only one on its side, comes first
     lone = np.where(touching[:, None], sign[cut] == 0, sign[cut] == -np.sign(sign[cut].sum(axis=1))[:, None])
     turn = (lone.argmax(axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(faces[cut], turn, axis=1).T
@@ -139,5 +143,5 @@ def clip(vertices: Floats, faces: Ints, value: Floats) -> tuple[Floats, Ints, In
 
 
 def normalise(vectors: Floats) -> Floats:
-    """(N,3) of length 1; 0 where there is none."""
+    """(N,3) the vectors scaled to length 1; 0 stays 0."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])

@@ -1,9 +1,9 @@
-"""Stock of given height on skin, as a solid: a shell over each smooth patch, or a convex piece over each triangle where
-that would fold; and convex pieces over convex edges and corners.
+"""Builds stock of given height on skin, as a solid.
 
-Where the skin is smooth, the pieces over neighbouring triangles share their upper corners, so nothing gapes. Over a
-sharp convex edge the pieces are joined by a mitre, cut off where the edge is sharper than a right angle. Skin without
-stock beside it is not reached over: at the border the stock has straight walls along the normal.
+It is a shell on each smooth patch, or a convex piece on each triangle where a shell would fold; and convex pieces on
+convex edges and corners. Where the skin is smooth, the pieces on neighbouring triangles share their upper corners, so
+there are no gaps. On a sharp convex edge a mitre connects the pieces; it is cut off where the edge is sharper than a
+right angle. At a border with skin without stock the stock has straight walls along the normal.
 """
 
 from __future__ import annotations
@@ -18,21 +18,24 @@ from damageest.stages.allowance._shells import build_shells
 from damageest.stages.allowance._skin import SkinFaces, normalise
 
 SMOOTH = 30.0
-"""Degrees between neighbouring triangles up to which they may share upper corners."""
+"""Largest angle in degrees between neighbouring triangles that may share upper corners."""
 MAX_LEAN = 8.0
-"""Degrees that a common way up may lean from a triangle's normal."""
+"""Largest angle in degrees between a common direction of the stock and the normal of a triangle."""
 MAX_MITRE = 100.0
-"""Degrees between normals up to which an edge is mitred to a point; a sharper one gets `ROUNDS` mitres."""
+"""Largest angle in degrees between normals at an edge with a pointed mitre; a sharper edge gets `ROUNDS` mitres."""
 ROUNDS = 3
 INSET = 4e-3
-"""Of the slack: how far inside its border the stock begins. What ends exactly where other metal begins would touch it
-along lines without thickness."""
+"""How far inside its border the stock begins, in slacks. Stock that ended exactly where other metal begins would touch
+it along lines without thickness."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Edges:
-    """Edges between two faces of the skin: ``first`` and ``second`` (E,) the faces, ``a`` and ``b`` (E,) the ends in
-    the first one's sense, ``at`` (E,2,2) the corners (as 3 x face + k) of the first and of the second at a and b."""
+    """Edges between two faces of the skin.
+
+    ``first``, ``second``: (E,) the faces. ``a``, ``b``: (E,) the ends, in the direction of the first face. ``at``:
+    (E,2,2) the corners (as 3 x face + k) of the first and of the second face at a and b.
+    """
 
     first: Ints
     second: Ints
@@ -41,13 +44,15 @@ class _Edges:
     at: Ints
 
 
-def build_stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: float = INSET) -> Any:
-    """A Manifold, relative to the skin's origin: stock of each face's height, and up to ``slack`` more. It reaches a
-    little below the skin, for the caller to cut off. ``roomy``: no stock meets that of opposite skin; ``drawn_in``: how
-    far inside the skin's border it begins, in slacks."""
+def build_stock(skin: SkinFaces, slack: float, has_room: bool = True, inset: float = INSET) -> Any:
+    """A Manifold relative to the skin's origin: stock of the height of each face, or up to ``slack`` more.
+
+    It reaches a little below the skin; the caller cuts that off. ``has_room``: whether no stock meets that of opposite
+    skin. ``inset``: how far inside the skin's border the stock begins, in slacks.
+    """
     from manifold3d import Manifold, OpType
 
-    skin = _inset_border(skin.select(skin.height > 0), drawn_in * slack)
+    skin = _inset_border(skin.select(skin.height > 0), inset * slack)
     if not len(skin.faces):
         return Manifold()
     edges = _find_edges(skin)
@@ -59,7 +64,7 @@ def build_stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: flo
     lows = corner - sink * normalise(up)[group].reshape(-1, 3, 3)
     bodies: list[Any] = []
     rest = np.arange(len(corner))
-    if roomy:
+    if has_room:
         shared = (group[edges.at[:, 0]] == group[edges.at[:, 1]]).all(axis=1)
         bodies, rest = build_shells(lows, tops, group, np.stack([edges.first, edges.second], 1), shared)
     clouds = list(np.concatenate([lows, tops], axis=1)[rest])
@@ -72,7 +77,7 @@ def build_stock(skin: SkinFaces, slack: float, roomy: bool = True, drawn_in: flo
 
 
 def _inset_border(skin: SkinFaces, by: float) -> SkinFaces:
-    """The skin with its border moved inward."""
+    """The skin with its border moved inward by ``by``."""
     start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
     size = len(skin.vertices)
     lone = np.flatnonzero(~np.isin(start * size + stop, stop * size + start))
@@ -82,14 +87,14 @@ def _inset_border(skin: SkinFaces, by: float) -> SkinFaces:
     for end in (a, b):
         np.add.at(total, end, inward)
         np.add.at(count, end, 1)
-    # as far from both edges at a corner, but not far from a sharp one
+    # at a corner equally far from both edges, but limited where the corner is sharp
     mean = total / np.maximum(count, 1)[:, None]
     step = by * mean / np.maximum(np.einsum("ij,ij->i", mean, mean), 0.25)[:, None]
     return replace(skin, vertices=skin.vertices + step)
 
 
 def _find_edges(skin: SkinFaces) -> _Edges:
-    """Edges with exactly two faces, which run along them in opposite senses."""
+    """Edges of exactly two faces that use them in opposite directions."""
     start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
     size = len(skin.vertices)
     key = np.minimum(start, stop) * size + np.maximum(start, stop)
@@ -107,19 +112,22 @@ def _next_corner(corner: Ints) -> Ints:
 
 
 def _find_directions(skin: SkinFaces, height: Floats, edges: _Edges, slack: float) -> tuple[Ints, Floats]:
-    """The group (3F,) of each corner of each face, and the way up (G,3) from the skin to the stock's top that all
-    corners of a group share: the faces' mean normal, long enough that each face has its height, none ``slack`` more."""
+    """The group (3F,) of each corner of each face, and the vector (G,3) from the skin to the top of the stock that all
+    corners of a group share.
+
+    The vector is along the mean normal of the faces. Each face then has its height, none more than ``slack`` above it.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     count = 3 * len(skin.faces)
     dot = np.einsum("ij,ij->i", skin.normal[edges.first], skin.normal[edges.second])
-    alike = (dot > np.cos(np.radians(SMOOTH))) & (height[edges.first] == height[edges.second])
-    pairs = edges.at[alike].transpose(0, 2, 1).reshape(-1, 2)
+    smooth = (dot > np.cos(np.radians(SMOOTH))) & (height[edges.first] == height[edges.second])
+    pairs = edges.at[smooth].transpose(0, 2, 1).reshape(-1, 2)
     owner = np.arange(count) // 3
     angle = _measure_angles(skin.triangles).ravel()
 
-    def grouped(pairs: Ints) -> tuple[Ints, Floats, Floats]:
+    def group_corners(pairs: Ints) -> tuple[Ints, Floats, Floats]:
         links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
         size, group = connected_components(links, directed=False)
         mean = np.zeros((size, 3))
@@ -129,17 +137,17 @@ def _find_directions(skin: SkinFaces, height: Floats, edges: _Edges, slack: floa
         np.minimum.at(least, group, np.einsum("ij,ij->i", mean[group], skin.normal[owner]))
         return group.astype(np.int64), mean, least
 
-    group, _, least = grouped(pairs)
-    # groups that bend too much for one common way up are taken apart
-    bearable = least[group] >= np.maximum(height / (height + slack), np.cos(np.radians(MAX_LEAN)))[owner]
-    group, mean, least = grouped(pairs[bearable[pairs].all(axis=1)])
+    group, _, least = group_corners(pairs)
+    # groups that bend too much for one common direction are split
+    flat_enough = least[group] >= np.maximum(height / (height + slack), np.cos(np.radians(MAX_LEAN)))[owner]
+    group, mean, least = group_corners(pairs[flat_enough[pairs].all(axis=1)])
     tall = np.zeros(len(mean))
     tall[group] = height[owner]
     return group, mean * (tall / least)[:, None]
 
 
 def _measure_angles(triangles: Floats) -> Floats:
-    """(F,3) angles at the corners."""
+    """(F,3) angles at the corners, in radians."""
     along, back = (
         _normalise_rows(triangles[:, [1, 2, 0]] - triangles),
         _normalise_rows(triangles[:, [2, 0, 1]] - triangles),
@@ -148,20 +156,24 @@ def _measure_angles(triangles: Floats) -> Floats:
 
 
 def _normalise_rows(vectors: Floats) -> Floats:
-    """(...,3) of length 1."""
+    """(...,3) the vectors scaled to length 1."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
 
 
 def _build_over_edges(
     skin: SkinFaces, height: Floats, edges: _Edges, group: Ints, tops: Floats
 ) -> tuple[list[Floats], Ints, Floats]:
-    """Point clouds of the pieces over sharp convex edges; the vertex (2E,) at either end of each, and the cloud's upper
-    points (2E,K,3) there, NaN where there are fewer."""
+    """The pieces on sharp convex edges.
+
+    Returns:
+        For each piece the points whose hull it is; the vertex (2E,) at each end of each edge; the upper points (2E,K,3)
+        there, NaN where there are fewer.
+    """
     n, m = skin.normal[edges.first], skin.normal[edges.second]
     outward = np.cross(skin.vertices[edges.b] - skin.vertices[edges.a], n)
     turn = np.arctan2(np.einsum("ij,ij->i", m, normalise(outward)), np.einsum("ij,ij->i", m, n))
-    parted = (group[edges.at[:, 0]] != group[edges.at[:, 1]]).any(axis=1)
-    some = np.flatnonzero(parted & (turn > 1e-6))
+    split = (group[edges.at[:, 0]] != group[edges.at[:, 1]]).any(axis=1)
+    some = np.flatnonzero(split & (turn > 1e-6))
     mitres = _build_mitres(
         n[some], normalise(outward)[some], turn[some], height[edges.first[some]], height[edges.second[some]]
     )
@@ -179,18 +191,16 @@ def _build_over_edges(
 
 
 def _build_mitres(n: Floats, outward: Floats, turn: Floats, tall: Floats, other: Floats) -> Floats:
-    """(E,ROUNDS,3) from an edge to the points of its mitres, NaN where there are fewer.
+    """(E,ROUNDS,3) vectors from each edge to the points of its mitres, NaN where there are fewer.
 
-    ``n`` (E,3): normal of the first face; ``outward`` (E,3): from it across the edge; ``turn`` (E,): angle to the
-    second one's normal; ``tall``, ``other`` (E,): heights on both.
+    ``n`` (E,3): normal of the first face; ``outward`` (E,3): in its plane, across the edge; ``turn`` (E,): angle to
+    the normal of the second face; ``tall``, ``other`` (E,): heights on the first and second face.
     """
     found = np.full((len(n), ROUNDS, 3), np.nan)
     blunt = turn <= np.radians(MAX_MITRE)
     # in the plane across the edge: the point `tall` above the first face and `other` above the second
     aside = (other - tall * np.cos(turn)) / np.sin(turn)
-    short = np.hypot(tall, aside) <= 1.6 * np.maximum(
-        tall, other
-    )  # heights that differ, over a blunt edge, meet far off
+    short = np.hypot(tall, aside) <= 1.6 * np.maximum(tall, other)  # different heights at a blunt edge meet far away
     one = blunt & short
     found[one, 0] = tall[one, None] * n[one] + aside[one, None] * outward[one]
     step = turn / ROUNDS

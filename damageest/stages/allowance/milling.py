@@ -1,4 +1,4 @@
-"""Stock to mill off again: the deposit stands proud of the nominal surface where it will be milled, and only there."""
+"""Stock to mill off: the deposit is higher than the nominal surface where it will be milled, and only there."""
 
 from __future__ import annotations
 
@@ -13,50 +13,54 @@ from damageest.stages.allowance import Allowance
 from damageest.stages.allowance._selectors import KeepOut, StockPlan, StockTarget
 
 MAX_DUST = 1e-6
-"""Share of the stock's volume."""
+"""Share of the stock's volume up to which an overlap is left: it is a rounding error."""
 SHEET_GAP = 1e-3
-"""Of the tolerance: by how much sheets that touch are moved apart."""
+"""Distance, in tolerances, by which sheets that touch are separated."""
 
 
 class Milling(Allowance):
-    """Stock beyond the nominal surface, to be milled off after deposition; skin by skin, with regions kept free, and a
-    cut-back into sound metal. All lengths in the job's unit, all places in part coordinates."""
+    """Adds stock on the nominal surface, to mill off after deposition, and cuts back into intact metal.
+
+    The height of the stock may differ from skin to skin, and regions may be kept free. All lengths are in the job's
+    unit, all places in part coordinates.
+    """
 
     use: Literal["milling"] = "milling"
     outer: float = Field(
         0.0, ge=0, allow_inf_nan=False,
-        description="stock beyond the nominal surface, along its normal, in the job's unit, where no target matches",
+        description="height of the stock above the nominal surface, along its normal, in the job's unit; where no "
+        "target matches",
     )  # fmt: skip
     targets: tuple[StockTarget, ...] = Field(
         (),
-        description="skin with an `outer` of its own, the first match wins: {outer: 1.0, ...} with one or more of "
-        "box: [[x, y, z], [x, y, z]]; half_space: {point, normal}; facing: {direction, angle} (degrees); "
+        description="skin with its own `outer`; the first target that matches is used: {outer: 1.0, ...} with one or "
+        "more of box: [[x, y, z], [x, y, z]]; half_space: {point, normal}; facing: {direction, angle} (degrees); "
         "faces: [numbers or names of CAD faces]; kind: plane, cylinder or other (of the CAD face). Lengths in the "
         "job's unit, places in part coordinates",
     )
     keep_out: tuple[KeepOut, ...] = Field(
         (),
-        description="what the deposit must not enter: solids {box: ...}, {cylinder: {from, to, radius}}, {mesh: path}; "
-        "or skin as in `targets`, over which there is no stock then. Lengths in the job's unit",
+        description="regions that the deposit must not enter: solids {box: ...}, {cylinder: {from, to, radius}}, "
+        "{mesh: path}; or skin, as in `targets`, which then gets no stock. Lengths in the job's unit",
     )
     overlap: float = Field(
         0.0, ge=0, allow_inf_nan=False,
-        description="how far the stock runs over the intact surface round the rim, in the job's unit; 0: not at all",
+        description="width of the intact skin around the rim that the stock covers, in the job's unit; 0: none",
     )  # fmt: skip
     inner: float = Field(
         0.0, ge=0, allow_inf_nan=False,
-        description="cut-back: sound metal within this of the inner damage surface goes to the cavity, in the job's "
-        "unit; 0: none",
+        description="cut-back: intact metal within this distance of the inner damage surface is added to the cavity, "
+        "in the job's unit; 0: none",
     )  # fmt: skip
     crowded: Literal["refuse", "clip"] = Field(
         "refuse",
         description="where stock would run into an opposite wall, close a bore or fill a gap: refuse the site, or "
-        "clip (the stock ends at the wall, a gap fills up; a warning says where)",
+        "clip (the stock ends at the wall or fills the gap; a warning says where)",
     )
 
     def run(self, damage: Solid, part: Part, tolerance: float, others: Solid | None) -> Solid | None:
-        """Raises StageError where there is no room for the stock, a region to keep free is already damaged, or a
-        guarantee is not kept."""
+        """The deposit. Raises StageError where there is no room for the stock, where the damage volume lies in a region
+        to keep free, or where the finished deposit does not keep a guarantee."""
         from manifold3d import Manifold
 
         from damageest.geometry.solids import subtract_lost, to_manifold
@@ -72,33 +76,37 @@ class Milling(Allowance):
         origin: Floats = part.bounds.mean(axis=0)
         plan = StockPlan(self.outer, self.targets, self.keep_out)
         cavity = cut_back(damage, part, others, self.inner, tolerance) if self.inner else damage
-        filled, whole = to_manifold(cavity, origin), to_manifold(part, origin)
-        left = subtract_lost(whole, filled)
+        hole, whole = to_manifold(cavity, origin), to_manifold(part, origin)
+        left = subtract_lost(whole, hole)
         skin = take_skin(cavity, part, plan, origin)
         reach = plan.max_height + tolerance
-        barred = build_keep_out(self.keep_out, skin, filled, part, plan, reach, origin, tolerance)
+        barred = build_keep_out(self.keep_out, skin, hole, part, plan, reach, origin, tolerance)
         band = grow_over_rim(skin, part, plan, self.overlap, tolerance, origin)
         skins = [skin] if band is None else [skin, band]
-        crowds = [crowd for each in skins if (crowd := find_stock_conflict(each, part, tolerance, origin)) is not None]
-        if crowds and self.crowded == "refuse":
-            raise StageError(str(crowds[0]), "a smaller outer there by targets, keep_out, or crowded: clip")
-        proud = sum((build_stock(each, tolerance / 2, roomy=not crowds) for each in skins), Manifold())
-        proud = simplify_exactly(proud, part.diagonal)
+        conflicts = [
+            conflict for each in skins if (conflict := find_stock_conflict(each, part, tolerance, origin)) is not None
+        ]
+        if conflicts and self.crowded == "refuse":
+            raise StageError(str(conflicts[0]), "use targets with a smaller outer there, keep_out, or crowded: clip")
+        stock = sum((build_stock(each, tolerance / 2, has_room=not conflicts) for each in skins), Manifold())
+        stock = simplify_exactly(stock, part.diagonal)
         for body in (left, barred):
-            within = proud ^ body
-            # crumbs of rounding, cut off, would leave lines where the stock touches what it stands on and no more
-            if within.volume() > MAX_DUST * proud.volume():
-                proud = subtract_lost(proud, within)
-        deposit = simplify_exactly(join(filled, keep_touching(proud, filled, tolerance)), part.diagonal)
+            within = stock ^ body
+            # cutting off rounding errors would leave lines where the stock only touches the skin below it
+            if within.volume() > MAX_DUST * stock.volume():
+                stock = subtract_lost(stock, within)
+        deposit = simplify_exactly(join(hole, keep_touching(stock, hole, tolerance)), part.diagonal)
         thickness = check_deposit(
-            DepositGeometry(deposit, filled, left, barred, skin, band, origin), part, tolerance, crowds
+            DepositGeometry(deposit, hole, left, barred, skin, band, origin), part, tolerance, conflicts
         )
         body = separate_sheets(deposit, origin, SHEET_GAP * tolerance)
         if body is None:
-            raise StageError("the deposit came out empty", "a slightly different outer")
-        notes = [f"{crowd}; clipped there" for crowd in crowds[:1]]
+            raise StageError("the deposit is empty", "use a slightly different outer")
+        notes = [f"{conflict}; clipped there" for conflict in conflicts[:1]]
         if thickness is None:
-            notes.append("no stock is asked for on the skin of this damage: the deposit ends at the nominal surface")
+            notes.append(
+                "the options ask for no stock on the skin of this damage: the deposit ends at the nominal surface"
+            )
         return Deposit(
             body.vertices,
             body.faces,
@@ -112,7 +120,7 @@ class Milling(Allowance):
 
 
 def _find_touched(part: Part, skins: list[Any]) -> tuple[int, ...]:
-    """The CAD faces that stock stands on."""
+    """Numbers of the CAD faces with stock."""
     assert part.faces_brep is not None
     parents = np.concatenate([skin.parent[skin.height > 0] for skin in skins])
     return tuple(np.unique(part.faces_brep[parents]).tolist())

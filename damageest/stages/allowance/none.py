@@ -1,4 +1,4 @@
-"""No allowance: what is deposited is the damage volume itself."""
+"""No allowance: the damage volume itself is deposited."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from damageest.stages.allowance import Allowance
 
 
 class NoAllowance(Allowance):
-    """Deposits the damage volume as it is, with no stock to mill back."""
+    """Deposits the damage volume itself, without stock to mill off."""
 
     use: Literal["none"] = "none"
 
     def run(self, damage: Solid) -> Solid | None:
-        """Always None: no deposit other than the damage volume."""
+        """None: nothing but the damage volume is deposited."""
         return None

@@ -40,7 +40,7 @@ def blade() -> Any:
 
 
 def dovetail() -> Any:
-    """A block with a groove whose walls lean over it: acute concave corners."""
+    """A block with a dovetail groove: acute concave corners."""
     groove = CrossSection([np.array([[-4.0, 0.01], [-7.0, -5.0], [7.0, -5.0], [4.0, 0.01]])])
     return Manifold.cube((30, 30, 12)) - Manifold.extrude(groove, 40).rotate((90, 0, 0)).translate((15, 35, 12))
 
@@ -66,8 +66,8 @@ def solid_of(body: Any) -> Solid:
     return Solid(*to_arrays(body))
 
 
-def struck(body: Any, rng: np.random.Generator) -> Any:
-    """What a random ball, turned cube or rough lump takes off a body at a random place of its surface."""
+def make_damage(body: Any, rng: np.random.Generator) -> Any:
+    """The damage that a random ball, cube or rough body makes at a random place of a surface."""
     mesh = Part(*to_arrays(body))
     area = np.linalg.norm(mesh.cross, axis=1)
     for _ in range(100):
@@ -82,7 +82,7 @@ def struck(body: Any, rng: np.random.Generator) -> Any:
         lost = body ^ turned
         if 5 < lost.volume() < 0.4 * body.volume():
             return lost
-    raise AssertionError("no damage came about")
+    raise AssertionError("no damage could be made")
 
 
 def skin_points(lost: Solid, part: Part, count: int, seed: int) -> tuple[Floats, Floats]:

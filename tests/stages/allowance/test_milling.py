@@ -1,4 +1,4 @@
-"""The guarantees of a milled deposit, on random damages with random options, by other means than the stage's own."""
+"""The guarantees of a milled deposit, on random damages with random options, measured independently of the stage."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from tests.stages.allowance.shapes import (
     TOLERANCE,
     block,
     inside,
+    make_damage,
     nearest,
     part_of,
     skin_points,
     solid_of,
-    struck,
 )
 
 CASES = 56
@@ -45,7 +45,7 @@ def options(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def wanted(chosen: dict[str, Any], normals: Floats) -> Floats:
-    """(N,) the stock that the options ask for over skin of these normals."""
+    """(N,) height of the stock that the options ask for on skin with these normals."""
     height = np.full(len(normals), chosen["outer"])
     for target in chosen.get("targets", []):
         direction = np.array(target["facing"]["direction"])
@@ -54,11 +54,11 @@ def wanted(chosen: dict[str, Any], normals: Floats) -> Floats:
     return height
 
 
-def made(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit]:
-    """Part, damage, options, and the deposit; all of these have room for their stock."""
+def make_case(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit]:
+    """Part, damage, options and deposit; in all cases there is room for the stock."""
     rng = np.random.default_rng([51, seed])
     body = list(SHAPES.values())[seed % len(SHAPES)]()
-    lost, chosen = solid_of(struck(body, rng)), options(rng)
+    lost, chosen = solid_of(make_damage(body, rng)), options(rng)
     part = part_of(body)
     deposit = Milling.model_validate(chosen).run(lost, part, TOLERANCE, None)
     assert isinstance(deposit, Deposit)
@@ -67,7 +67,7 @@ def made(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit]:
 
 @pytest.mark.parametrize("seed", range(CASES))
 def test_guarantees(seed: int) -> None:
-    part, lost, chosen, deposit = made(seed)
+    part, lost, chosen, deposit = make_case(seed)
     assert open_edges(deposit.faces) == 0
     cavity = deposit.cavity or lost
     body, hole, whole = to_manifold(deposit), to_manifold(cavity), to_manifold(part)
@@ -81,19 +81,19 @@ def test_guarantees(seed: int) -> None:
     metal = solid_of(left)
     around, upward = skin_points(metal, part, 3000, seed)
     over = nearest(around, cavity)[0] < chosen.get("overlap", 0.0)
-    stands = np.concatenate([points, around[over]]), np.concatenate([height, wanted(chosen, upward[over])])
+    stock = np.concatenate([points, around[over]]), np.concatenate([height, wanted(chosen, upward[over])])
     tall = height > 0
     if tall.any():
-        assert missed(points[tall], normals[tall], height[tall], stands, deposit, metal, part) <= 0.01
-    assert bare(points, normals, height, deposit) <= 0.01
+        assert share_missed(points[tall], normals[tall], height[tall], stock, deposit, metal, part) <= 0.01
+    assert share_covered(points, normals, height, deposit) <= 0.01
     far = chosen.get("overlap", 0.0) + wanted(chosen, upward).max(initial=0) + max(height.max(), TOLERANCE)
     close = (nearest(around, cavity)[0] > far) & (nearest(around, cavity)[0] < far + 3)
     assert not inside(around[close] + 0.3 * TOLERANCE * upward[close], deposit).any()
 
 
 @pytest.mark.parametrize("seed", range(0, 16))
-def test_who_knows_vertices_by_their_place_finds_it_closed(seed: int, tmp_path: Path) -> None:
-    deposit = made(seed)[3]
+def test_a_reader_that_merges_vertices_finds_it_closed(seed: int, tmp_path: Path) -> None:
+    deposit = make_case(seed)[3]
     single = round_to_single(deposit)
     assert single is not None
     write_stl(tmp_path / "deposit.stl", single)
@@ -102,41 +102,43 @@ def test_who_knows_vertices_by_their_place_finds_it_closed(seed: int, tmp_path: 
     assert again.volume == pytest.approx(deposit.volume, rel=1e-5)
 
 
-def missed(
+def share_missed(
     points: Floats,
     normals: Floats,
     height: Floats,
-    stands: tuple[Floats, Floats],
+    stock: tuple[Floats, Floats],
     deposit: Solid,
     metal: Solid,
     part: Part,
 ) -> float:
-    """The share of skin points over which the stock is thinner than wanted, or more than a tolerance thicker. Metal may
-    stand over it, and in a concave corner the stock of other skin; ``stands``: points of all skin, and the stock there.
+    """The share of skin points where the stock is too thin, or more than a tolerance too thick.
+
+    Metal may cover the point and, in a concave corner, the stock of other skin. ``stock``: points of all skin, and the
+    height of the stock there.
     """
     low = points + (0.999 * height)[:, None] * normals
     half = points + (0.5 * height)[:, None] * normals
     thin = ~(inside(low, deposit) | inside(low, metal)) | ~(inside(half, deposit) | inside(half, metal))
     high = points + (height + 1.001 * TOLERANCE)[:, None] * normals
     own = nearest(high, part)[0] > 0.97 * (height + TOLERANCE)
-    for tall in np.unique(stands[1][stands[1] > 0]):
-        own &= away(high, stands[0][stands[1] == tall]) > 0.97 * (tall + TOLERANCE)
+    for tall in np.unique(stock[1][stock[1] > 0]):
+        own &= distance_to(high, stock[0][stock[1] == tall]) > 0.97 * (tall + TOLERANCE)
     thick = inside(high, deposit) & own
     return float((thin | thick).mean())
 
 
-def bare(points: Floats, normals: Floats, height: Floats, deposit: Solid) -> float:
-    """The share of skin without stock, farther from any with it than that is high, over which there is stock."""
+def share_covered(points: Floats, normals: Floats, height: Floats, deposit: Solid) -> float:
+    """The share of skin that must have no stock and has some; only skin far from skin with stock counts."""
     none, tall = height == 0, height > 0
     if not none.any():
         return 0.0
-    free = away(points[none], points[tall]) if tall.any() else np.full(int(none.sum()), np.inf)
+    free = distance_to(points[none], points[tall]) if tall.any() else np.full(int(none.sum()), np.inf)
     some = free > height.max() + 2 * TOLERANCE
     over = inside(points[none][some] + 0.3 * TOLERANCE * normals[none][some], deposit)
     return float(over.mean()) if len(over) else 0.0
 
 
-def away(points: Floats, cloud: Floats) -> Floats:
+def distance_to(points: Floats, cloud: Floats) -> Floats:
     """(N,) distance to the nearest of a cloud (M,3)."""
     return np.asarray(cKDTree(cloud).query(points)[0])
 
@@ -152,10 +154,10 @@ def test_a_flat_face_gets_its_stock_exactly() -> None:
     assert low == pytest.approx([10, 8, 9])
     assert high[:2] == pytest.approx([16, 13])
     assert 0.7 < high[2] - 12 < 0.7 + TOLERANCE
-    assert deposit.volume == pytest.approx(6 * 5 * (high[2] - 9), rel=5e-4)  # the stock begins a trifle inside the rim
+    assert deposit.volume == pytest.approx(6 * 5 * (high[2] - 9), rel=5e-4)  # the stock begins a little inside the rim
 
 
 def test_same_bytes_twice() -> None:
-    first, second = made(2)[3], made(2)[3]
+    first, second = make_case(2)[3], make_case(2)[3]
     assert first.vertices.tobytes() == second.vertices.tobytes()
     assert first.faces.tobytes() == second.faces.tobytes()

@@ -1,4 +1,4 @@
-"""The check of a finished deposit: each guarantee that is not kept is refused, with the figure."""
+"""The check of a finished deposit: a guarantee that is not kept is refused, with the measured value."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ BITE = Manifold.cube((8, 6, 4)).translate((10, 7, 8))
 TOP = StockTarget(facing={"direction": (0, 0, 1)}, outer=1.0)
 
 
-def checked(stock: Any, hole: Any = BITE, target: StockTarget = TOP) -> tuple[float, float, float] | None:
-    """The thickness of the stock on the bite, checked against what is wanted on its top."""
+def run_check(stock: Any, hole: Any = BITE, target: StockTarget = TOP) -> tuple[float, float, float] | None:
+    """The thickness of the stock on the bite; raises StageError where it is not that of the target."""
     part = part_of(block())
     plan = StockPlan(0.0, (target,), ())
     skin = take_skin(Solid(*to_arrays(BITE)), part, plan, np.zeros(3))
@@ -36,34 +36,34 @@ def slab(height: float, low: float = 0.0) -> Any:
 
 
 def test_what_is_right_passes() -> None:
-    assert checked(slab(1.05)) == pytest.approx((1.05,) * 3)
+    assert run_check(slab(1.05)) == pytest.approx((1.05,) * 3)
 
 
 @pytest.mark.parametrize(
     ("stock", "hole", "message"),
     [
-        (slab(0.9), BITE, "thickness is missed on 100.0% of the skin, by up to 0.1"),
-        (slab(1.2), BITE, "thickness is missed on 100.0% of the skin, by up to 0.2"),
-        (slab(1.05) - Manifold.cube((2, 2, 1)).translate((11, 8, 12.5)), BITE, "thickness is missed on 8"),
-        (slab(1.05), BITE - Manifold.cube((1, 1, 1)).translate((12, 9, 9)), "would miss 0.52% of the damage volume"),
-        (slab(1.05) + Manifold.cube((1, 1, 2)).translate((9.5, 8, 10)), BITE, "of the deposit would lie in metal"),
+        (slab(0.9), BITE, "thickness of the stock is wrong on 100.0% of the skin, by up to 0.1"),
+        (slab(1.2), BITE, "thickness of the stock is wrong on 100.0% of the skin, by up to 0.2"),
+        (slab(1.05) - Manifold.cube((2, 2, 1)).translate((11, 8, 12.5)), BITE, "thickness of the stock is wrong on 8"),
+        (slab(1.05), BITE - Manifold.cube((1, 1, 1)).translate((12, 9, 9)), "does not fill 0.52% of the damage volume"),
+        (slab(1.05) + Manifold.cube((1, 1, 2)).translate((9.5, 8, 10)), BITE, "of the deposit lies in metal"),
         (
             slab(1.05) + Manifold.cube((6, 6, 1)).translate((18, 7, 12)),
             BITE,
-            r"of the skin round it that is to have none, as at \(2\d\.\d*, \d+\.\d*, \d+\)",
+            r"of the skin around the damage that must have none, for example at \(2\d\.\d*, \d+\.\d*, \d+\)",
         ),
     ],
 )
 def test_what_is_wrong_is_refused(stock: Any, hole: Any, message: str) -> None:
     with pytest.raises(StageError, match=message):
-        checked(stock, hole)
+        run_check(stock, hole)
 
 
-def test_stock_where_none_is_wanted_is_refused() -> None:
+def test_stock_on_skin_without_target_is_refused() -> None:
     none = StockTarget(facing={"direction": (0, 0, 1)}, outer=0.0)
-    assert checked(Manifold(), target=none) is None
-    with pytest.raises(StageError, match="that is to have none"):
-        checked(slab(1.05), target=none)
+    assert run_check(Manifold(), target=none) is None
+    with pytest.raises(StageError, match="that must have none"):
+        run_check(slab(1.05), target=none)
 
 
 def test_pieces_that_do_not_touch_are_dropped() -> None:

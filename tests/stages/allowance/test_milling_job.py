@@ -15,7 +15,7 @@ from damageest.stages.allowance import Allowance
 from damageest.stages.allowance.milling import Milling
 from tests import damaged_box
 
-SOUND = """
+VALID = """
 allowance:
   use: milling
   outer: 0.5
@@ -28,12 +28,12 @@ allowance:
 """
 
 
-def written(folder: Path, text: str) -> Path:
+def write_job(folder: Path, text: str) -> Path:
     return damaged_box.write(folder, damaged_box.JOB + text)
 
 
-def test_a_sound_job(tmp_path: Path) -> None:
-    path = written(tmp_path, SOUND)
+def test_a_valid_job(tmp_path: Path) -> None:
+    path = write_job(tmp_path, VALID)
     job = load(path, Registry.discover())
     stage = job.stages[Allowance]
     assert isinstance(stage, Milling)
@@ -46,7 +46,7 @@ def test_a_sound_job(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         (("20, 5]]", "oops, 5]]"), r"job.yaml:12:29: allowance.targets.1.box.1.1: .*'oops'"),
         (("- box", "- boxx"), r"job.yaml:12:7: allowance.targets.1: unknown key 'boxx' \(did you mean 'box'\?\)"),
@@ -56,7 +56,7 @@ def test_a_sound_job(tmp_path: Path) -> None:
         (("outer: 0.8", "outer: -0.8"), r"allowance.targets.2.outer: .* greater than or equal to 0, not -0.8"),
     ],
 )
-def test_faults_are_told_with_their_place(tmp_path: Path, change: tuple[str, str], said: str) -> None:
-    assert SOUND.count(change[0]) == 1
-    with pytest.raises(JobError, match=said):
-        load(written(tmp_path, SOUND.replace(*change)), Registry.discover())
+def test_faults_are_reported_with_their_place(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    assert VALID.count(change[0]) == 1
+    with pytest.raises(JobError, match=message):
+        load(write_job(tmp_path, VALID.replace(*change)), Registry.discover())

@@ -29,10 +29,10 @@ from tests.stages.allowance.shapes import (
     solid_of,
 )
 
-DRAWN_IN = 5e-4
-"""Share of these volumes that goes with the border of the stock, which begins a trifle inside the skin's."""
+INSET = 5e-4
+"""Share of these volumes that goes with the border of the stock, which begins a little inside that of the skin."""
 MORE = TOLERANCE / 4
-"""What the stock stands above what is asked for, so that it is nowhere less."""
+"""How much higher the stock is than asked for, so that it is nowhere lower."""
 CHIP = Manifold.cube((6, 5, 4)).translate((0, 0, 8))
 """At a corner of the block: 6 along x, 5 along y, 4 down from the top."""
 
@@ -58,18 +58,18 @@ def extent(deposit: Solid) -> list[float]:
         ((-1, 0, 0), [-1 - MORE, 0, 8, 6, 5, 12]),
     ],
 )
-def test_stock_on_skin_that_faces_a_way_alone(direction: tuple[int, int, int], expected: list[float]) -> None:
+def test_stock_only_on_skin_that_faces_a_direction(direction: tuple[int, int, int], expected: list[float]) -> None:
     deposit = run(block(), CHIP, targets=[{"facing": {"direction": direction}, "outer": 1}])
     assert extent(deposit) == pytest.approx(expected)
     area = {12 + 1 + MORE: 30.0, 12: 0.0}.get(expected[5], 0.0) or (20.0 if expected[0] < 0 else 0.0)
-    assert deposit.stock_volume == pytest.approx(area * (1 + MORE), rel=DRAWN_IN, abs=1e-6)
+    assert deposit.stock_volume == pytest.approx(area * (1 + MORE), rel=INSET, abs=1e-6)
 
 
-def test_the_first_target_that_matches_wins() -> None:
+def test_the_first_target_that_matches_is_used() -> None:
     top = {"direction": (0, 0, 1)}
     targets = [{"facing": top, "outer": 0.4}, {"facing": top, "outer": 2}, {"facing": top, "outer": 0}]
     deposit = run(block(), CHIP, targets=targets)
-    assert deposit.stock_volume == pytest.approx(30 * (0.4 + MORE), rel=DRAWN_IN)
+    assert deposit.stock_volume == pytest.approx(30 * (0.4 + MORE), rel=INSET)
     assert deposit.thickness == pytest.approx((0.4 + MORE,) * 3)
 
 
@@ -82,7 +82,7 @@ def test_the_first_target_that_matches_wins() -> None:
 )
 def test_skin_is_cut_where_a_target_ends(where: dict[str, Any]) -> None:
     deposit = run(block(), CHIP, targets=[{"facing": {"direction": [0, 0, 1]}, **where, "outer": 1}])
-    assert deposit.stock_volume == pytest.approx(2 * 5 * (1 + MORE), rel=DRAWN_IN)
+    assert deposit.stock_volume == pytest.approx(2 * 5 * (1 + MORE), rel=INSET)
 
 
 def test_two_heights_beside_one_another() -> None:
@@ -93,10 +93,10 @@ def test_two_heights_beside_one_another() -> None:
             {"facing": {"direction": [0, 0, 1]}, "outer": 0.5},
         ],
     )  # fmt: skip
-    assert deposit.stock_volume == pytest.approx(2 * 5 * (2 + MORE) + 4 * 5 * (0.5 + MORE), rel=DRAWN_IN)
+    assert deposit.stock_volume == pytest.approx(2 * 5 * (2 + MORE) + 4 * 5 * (0.5 + MORE), rel=INSET)
 
 
-def test_stock_over_edges_and_corner_stands_proud() -> None:
+def test_stock_on_edges_and_corner() -> None:
     deposit = run(block(), CHIP, outer=1)
     high = 1 + MORE
     assert extent(deposit) == pytest.approx([-high, -high, 8, 6, 5, 12 + high])
@@ -121,13 +121,13 @@ def test_what_is_kept_free(item: dict[str, Any], reached: float) -> None:
     assert deposit.stock_volume == pytest.approx(reached, rel=2e-3, abs=1e-6)
 
 
-def test_no_stock_leans_over_skin_kept_free() -> None:
+def test_no_stock_covers_skin_kept_free() -> None:
     """The wall's stock in a concave corner ends above the floor that is kept free."""
     tool = Manifold.cube((6, 5, 6), True).translate((6, 10, 6))
     both = run(bracket(), tool, outer=1)
     free = run(bracket(), tool, outer=1, keep_out=[{"facing": {"direction": [0, 0, 1]}}])
     floor = Manifold.cube((3, 5, 1)).translate((6, 7.5, 6))
-    assert (to_manifold(both) ^ floor).volume() == pytest.approx(3 * 5, rel=DRAWN_IN)
+    assert (to_manifold(both) ^ floor).volume() == pytest.approx(3 * 5, rel=INSET)
     assert (to_manifold(free) ^ floor).volume() < 1e-6
 
 
@@ -136,7 +136,7 @@ def test_a_mesh_to_keep_free(tmp_path: Path) -> None:
     write_stl(tmp_path / "pad.stl", body)
     target = {"facing": {"direction": [0, 0, 1]}, "outer": 1}
     deposit = run(block(), CHIP, targets=[target], keep_out=[{"mesh": tmp_path / "pad.stl"}])
-    assert deposit.stock_volume == pytest.approx(15 * (1 + MORE), rel=DRAWN_IN)
+    assert deposit.stock_volume == pytest.approx(15 * (1 + MORE), rel=INSET)
 
 
 def test_a_damage_in_a_solid_to_keep_free_is_refused() -> None:
@@ -145,7 +145,7 @@ def test_a_damage_in_a_solid_to_keep_free_is_refused() -> None:
     assert "smaller solid" in caught.value.remedy
 
 
-def test_overlap_runs_over_the_intact_skin_round_the_rim() -> None:
+def test_overlap_covers_the_intact_skin_around_the_rim() -> None:
     tool = Manifold.cube((8, 8, 4)).translate((10, 6, 10))
     deposit = run(block(), tool, outer=1, overlap=1.5)
     reach = 8 * 8 + 4 * 8 * 1.5 + np.pi * 1.5**2
@@ -163,7 +163,7 @@ def test_overlap_stays_on_its_side_of_a_thin_wall() -> None:
     assert deposit.bounds[0][2] == pytest.approx(0.5)
 
 
-def test_cut_back_takes_sound_metal_and_no_more() -> None:
+def test_cut_back_removes_intact_metal_up_to_inner() -> None:
     tool = Manifold.sphere(4, 64).translate((15, 10, 12))
     body, inner = block(), 0.6
     lost = solid_of(body ^ tool)
@@ -180,7 +180,7 @@ def test_cut_back_takes_sound_metal_and_no_more() -> None:
     assert far.max() < inner + TOLERANCE / 2
 
 
-def test_cut_back_leaves_the_other_damages_alone() -> None:
+def test_cut_back_leaves_out_the_other_damages() -> None:
     other = solid_of(Manifold.cube((3, 3, 3)).translate((16.2, 8, 9)))
     tool = Manifold.cube((4, 4, 3)).translate((12, 8, 9))
     deposit = run(block(), tool, others=other, inner=0.5)
@@ -209,27 +209,26 @@ def test_a_gap_narrower_than_twice_the_stock(outer: float, fits: bool) -> None:
     if fits:
         assert run(comb(3.0), GAP, targets=flanks).notes == ()
         return
-    with pytest.raises(
-        StageError, match=r"no room for the stock at \((4|7), .*\): 3 is free there, and 1.6 is wanted and 1.6 on"
-    ):
+    message = r"no room for the stock at \((4|7), .*\): 3 is free there, but the stock is 1.6 high and 1.6 on"
+    with pytest.raises(StageError, match=message):
         run(comb(3.0), GAP, targets=flanks)
     clipped = run(comb(3.0), GAP, targets=flanks, crowded="clip")
     assert "clipped" in clipped.notes[0]
     between = Manifold.cube((3, 6, 4)).translate((4, 4, 9))
-    assert (to_manifold(clipped) ^ between).volume() == pytest.approx(between.volume(), rel=DRAWN_IN)
+    assert (to_manifold(clipped) ^ between).volume() == pytest.approx(between.volume(), rel=INSET)
 
 
 def test_a_bore_that_would_close_is_refused() -> None:
     tool = Manifold.cylinder(6, 8, 8, 64).translate((15, 10, 8))
     inward = {"half_space": {"point": [0, 0, 11.9], "normal": [0, 0, -1]}, "outer": 5.5}
-    with pytest.raises(StageError, match=r"no room .* 5.5 is wanted and 5.5 on the opposite wall"):
+    with pytest.raises(StageError, match=r"no room .* the stock is 5.5 high and 5.5 on the opposite wall"):
         run(bored(), tool, targets=[inward])
     assert run(bored(), tool, targets=[{**inward, "outer": 2.0}]).thickness is not None
 
 
 def test_an_intact_wall_in_the_way_is_refused() -> None:
     tool = Manifold.cube((4, 6, 5)).translate((0, 4, 9))  # one tooth alone; the next one is 3 away
-    with pytest.raises(StageError, match=r"3 is free there, and 3.5 is wanted"):
+    with pytest.raises(StageError, match=r"3 is free there, but the stock is 3.5 high"):
         run(comb(3.0), tool, outer=3.5)
     deposit = run(comb(3.0), tool, outer=3.5, crowded="clip")
     left = comb(3.0) - tool
@@ -259,7 +258,7 @@ def named(body: Any) -> Part:
 @pytest.mark.parametrize("where", [{"faces": [5]}, {"faces": ["top"]}, {"faces": ["top", 5]}])
 def test_cad_faces_by_number_and_name(where: dict[str, Any]) -> None:
     deposit = run(block(), CHIP, part=named(block()), targets=[{**where, "outer": 1}])
-    assert deposit.stock_volume == pytest.approx(30 * (1 + MORE), rel=DRAWN_IN)
+    assert deposit.stock_volume == pytest.approx(30 * (1 + MORE), rel=INSET)
     assert deposit.touched == (5,)
 
 
@@ -276,11 +275,11 @@ def test_kinds_of_surface() -> None:
     [
         (named, {"faces": ["topp"]}, r"no CAD face 'topp' \(did you mean 'top'\?\)", "left, right, front, back"),
         (named, {"faces": [7]}, "no CAD face 7", "from 0 to 6"),
-        (part_of, {"faces": [1]}, "'faces' picks CAD faces, and the part is a mesh", "STEP, IGES or BREP"),
-        (part_of, {"kind": "plane"}, "'kind' picks CAD faces, and the part is a mesh", "STEP, IGES or BREP"),
+        (part_of, {"faces": [1]}, "'faces' selects CAD faces, but the part is a mesh", "STEP, IGES or BREP"),
+        (part_of, {"kind": "plane"}, "'kind' selects CAD faces, but the part is a mesh", "STEP, IGES or BREP"),
     ],
 )
-def test_faces_that_are_not_there(part: Any, where: dict[str, Any], message: str, remedy: str) -> None:
+def test_faces_that_do_not_exist(part: Any, where: dict[str, Any], message: str, remedy: str) -> None:
     with pytest.raises(StageError, match=message) as caught:
         run(block(), CHIP, part=part(block()), targets=[{**where, "outer": 1}])
     assert remedy in caught.value.remedy
@@ -293,11 +292,11 @@ def test_faces_that_are_not_there(part: Any, where: dict[str, Any], message: str
             {"targets": [{"boxx": 1, "outer": 1}]},
             r"unknown key 'boxx' \(did you mean 'box'\?\); valid are: box, half_space",
         ),
-        ({"targets": [{"outer": 1}]}, "says no skin; give one or more of: box, half_space, facing, faces, kind"),
+        ({"targets": [{"outer": 1}]}, "selects no skin; give one or more of: box, half_space, facing, faces, kind"),
         ({"targets": [{"box": [[1, 0, 0], [0, 1, 1]], "outer": 1}]}, "the lowest corner first"),
         ({"targets": [{"facing": {"direction": [0, 0, 0]}, "outer": 1}]}, "a direction must have a length"),
         ({"keep_out": [{"box": [[0, 0, 0], [1, 1, 1]], "mesh": "a.stl"}]}, "give one of: cylinder; mesh"),
-        ({"keep_out": [{"cylinder": {"from": [0, 0, 0], "to": [0, 0, 0], "radius": 1}}]}, "a bar has a length"),
+        ({"keep_out": [{"cylinder": {"from": [0, 0, 0], "to": [0, 0, 0], "radius": 1}}]}, "give two different points"),
         ({"outer": -1}, "greater than or equal to 0"),
         ({"crowded": "maybe"}, "'refuse' or 'clip'"),
     ],
@@ -307,8 +306,8 @@ def test_options_that_are_wrong(chosen: dict[str, Any], message: str) -> None:
         Milling.model_validate(chosen)
 
 
-def test_no_stock_at_all_is_said() -> None:
+def test_no_stock_at_all_is_noted() -> None:
     deposit = run(block(), CHIP)
     assert deposit.volume == pytest.approx(120)
     assert deposit.thickness is None
-    assert "no stock is asked for" in deposit.notes[0]
+    assert "ask for no stock" in deposit.notes[0]

@@ -1,4 +1,4 @@
-"""No deposit beyond the damage volume."""
+"""No deposit other than the damage volume."""
 
 from __future__ import annotations
 
