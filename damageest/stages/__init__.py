@@ -1,8 +1,8 @@
-"""What every stage implementation has in common.
+"""The base of all stage implementations.
 
-An implementation is a frozen pydantic model: its fields are the options that a job may set, its ``run`` does the work.
-Each stage's contract is in ``damageest/stages/<stage>/__init__.py``. The parameters of the contract's ``run`` are what
-an implementation may ask for: it names those that it needs.
+An implementation is a frozen pydantic model. Its fields are the options that a job may set; its ``run`` does the work.
+The contract of a stage is in ``damageest/stages/<stage>/__init__.py``; implementations derive from it. The ``run``
+of the contract lists all parameters that are available; the ``run`` of an implementation names those that it needs.
 """
 
 from __future__ import annotations
@@ -25,8 +25,11 @@ Given = TypeVar("Given")
 
 
 def asked_by_name(run: Callable[..., Given]) -> Callable[..., Given]:
-    """Marks the ``run`` of a contract. An implementation may ask for some of the parameters: the engine passes them by
-    name, and type checkers compare the return type alone. `Stage.needs` compares the parameters."""
+    """Marks the ``run`` of a contract.
+
+    An implementation may ask for some of its parameters; the engine passes them by name. So type checkers must compare
+    the return type only; `Stage.needs` compares the parameters.
+    """
     return run
 
 
@@ -36,15 +39,15 @@ def _resolve_beside_job(path: Path, info: ValidationInfo) -> Path:
 
 
 JobPath = Annotated[Path, AfterValidator(_resolve_beside_job)]
-"""A path option: relative to the job file's folder, absolute once the job is checked."""
+"""Type of an option that is a path. A job gives it relative to the job file's folder; the check makes it absolute."""
 
 
 class Stage(BaseModel):
     """Base of all contracts.
 
-    A contract says ``stage``: its name in a job; ``gives``: the name under which later stages find the result;
-    ``per_site``: whether it runs once for each site, or once per job. ``reads``: suffixes of the files that a reader
-    of part or scan takes.
+    A contract sets ``stage``, its name in a job; ``gives``, the name under which later stages get the result; and
+    ``per_site``, whether it runs once for each site or once for the job. A reader of part or scan sets ``reads``, the
+    suffixes of its files. An implementation sets ``use``, its own name in a job.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
@@ -57,27 +60,28 @@ class Stage(BaseModel):
 
     @classmethod
     def takes(cls) -> Mapping[str, Any]:
-        """What ``run`` may ask for: name and type of each parameter of the contract's ``run``."""
+        """Name and type of each parameter of the contract's ``run``."""
         return {name: kind for name, kind in _read_hints(_find_contract(cls)).items() if name != "return"}
 
     @classmethod
     def gives_type(cls) -> Any:
-        """The type that the contract's ``run`` gives."""
+        """The type that the contract's ``run`` returns."""
         return _read_hints(_find_contract(cls))["return"]
 
     @classmethod
     def needs(cls) -> tuple[str, ...]:
-        """The parameter names of ``run``, checked against the contract: names and types.
+        """The names of the parameters of ``run``. Checks names and types against the contract.
 
-        Raises PluginError where ``run`` is missing, asks for what the contract does not give, or declares other types.
+        Raises PluginError where ``run`` is missing, asks for a parameter that the contract does not have, or declares
+        other types.
         """
         run: Any = getattr(cls, "run", None)
         if run is None or getattr(run, "__isabstractmethod__", False):
             raise PluginError(f"{_name(cls)} has no run method")
         parameters = list(inspect.signature(run).parameters.values())[1:]
-        valid = f"it may ask for: {', '.join(_show(*item) for item in sorted(cls.takes().items()))}"
+        valid = f"it may ask for {', '.join(_show(*item) for item in sorted(cls.takes().items()))}"
         if any(p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD, p.POSITIONAL_ONLY) for p in parameters):
-            raise PluginError(f"{_name(cls)}.run has to name what it needs, without *args, **kwargs or '/'; {valid}")
+            raise PluginError(f"{_name(cls)}.run must name its parameters, without *args, **kwargs or '/'; {valid}")
         names = tuple(p.name for p in parameters)
         unknown = [name for name in names if name not in cls.takes()]
         if unknown:
@@ -90,14 +94,14 @@ class Stage(BaseModel):
 
 
 def _find_contract(cls: type[Stage]) -> type[Stage]:
-    """The class that declares what is given: the contract of an implementation."""
+    """The contract of an implementation: the class that sets ``gives``."""
     return next(kind for kind in cls.__mro__ if issubclass(kind, Stage) and "gives" in vars(kind))
 
 
 @cache
 def _read_hints(cls: type[Stage]) -> Mapping[str, Any]:
-    """Types of the parameters of ``run`` and of what it returns. Names that an implementation imports for type checkers
-    alone are looked up among the artefacts and in its contract's module."""
+    """Types of the parameters of ``run`` and of its result. Names that an implementation imports under TYPE_CHECKING
+    are looked up among the artefacts and in its contract's module."""
     run: Any = cls.run  # type: ignore[attr-defined]
     try:
         return typing.get_type_hints(run)
@@ -109,7 +113,7 @@ def _read_hints(cls: type[Stage]) -> Mapping[str, Any]:
 
 
 def _check_types(cls: type[Stage], names: tuple[str, ...]) -> None:
-    """Raises PluginError where a parameter does not accept what the contract gives, or the result is another type."""
+    """Raises PluginError where a parameter does not accept the contract's type, or the result has another type."""
     try:
         declared = _read_hints(cls)
     except (NameError, TypeError, AttributeError) as error:
@@ -124,13 +128,13 @@ def _check_types(cls: type[Stage], names: tuple[str, ...]) -> None:
             )
     if "return" in declared and not _accepts(cls.gives_type(), declared["return"]):
         raise PluginError(
-            f"{_name(cls)}.run declares that it returns {_text(declared['return'])}; stage '{cls.stage}' has to give "
+            f"{_name(cls)}.run declares that it returns {_text(declared['return'])}; stage '{cls.stage}' must return "
             f"{_text(cls.gives_type())}"
         )
 
 
 def _accepts(wanted: Any, given: Any) -> bool:
-    """Whether each value of type ``given`` is one of type ``wanted``, as far as the annotations tell."""
+    """Whether each value of type ``given`` is one of type ``wanted``, as far as the annotations show."""
     if wanted in (Any, object) or given is Any or wanted == given:
         return True
     if _is_union(given):
@@ -140,7 +144,7 @@ def _accepts(wanted: Any, given: Any) -> bool:
     outer, inner = typing.get_origin(wanted) or wanted, typing.get_origin(given) or given
     if not (isinstance(outer, type) and isinstance(inner, type)):
         return False
-    # A container without its element type accepts any of its kind.
+    # A container without element types accepts any elements.
     return issubclass(inner, outer) and (not typing.get_args(wanted) or not typing.get_args(given))
 
 
@@ -157,7 +161,7 @@ def _show(name: str, kind: Any) -> str:
 
 
 def _text(kind: Any) -> str:
-    """A type as one writes it."""
+    """A type as it is written in code."""
     from damageest import artefacts
 
     if kind == artefacts.Floats:

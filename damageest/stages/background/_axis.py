@@ -1,4 +1,4 @@
-"""The axis round which a part lies closest."""
+"""The axis of the smallest cylinder round a part."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Vector = tuple[float, float, float]
 
 def _check_not_zero(value: Vector | str) -> Vector | str:
     if not isinstance(value, str) and not any(value):
-        raise ValueError("an axis needs a direction: not all three numbers may be 0")
+        raise ValueError("an axis needs a direction; not all three numbers may be 0")
     return value
 
 
@@ -22,22 +22,25 @@ Axis = Annotated[Literal["auto", "x", "y", "z"] | Vector, AfterValidator(_check_
 
 
 def fit_axis(points: Floats, axis: Axis) -> tuple[Floats, Floats, float]:
-    """(frame, centre, radius): the rows of ``frame`` (3,3) are two cross directions and the axis, ``centre`` (2,) and
-    ``radius`` the smallest circle round the points (N,3) seen along it. ``auto``: of the coordinate and principal axes
-    the one whose cylinder round the points is smallest."""
+    """The smallest cylinder round points (N,3) along an axis, as (frame, centre, radius).
+
+    The rows of ``frame`` (3,3) are two directions across the axis, and the axis. ``centre`` (2,), in these two
+    directions, and ``radius`` are those of the smallest circle round the points seen along the axis. ``auto``: the one
+    of the coordinate axes and principal axes with the smallest cylinder.
+    """
     import trimesh
 
     if isinstance(axis, str):
-        ways = np.eye(3) if axis == "auto" else np.eye(3)["xyz".index(axis)][None]
+        directions = np.eye(3) if axis == "auto" else np.eye(3)["xyz".index(axis)][None]
     else:
-        ways = np.array(axis, dtype=np.float64)[None]
+        directions = np.array(axis, dtype=np.float64)[None]
     if axis == "auto":
         spread = points - points.mean(axis=0)
         principal = np.linalg.eigh(spread.T @ spread)[1].T
-        ways = np.concatenate([ways, principal * np.where(principal.sum(axis=1) < 0, -1, 1)[:, None]])
+        directions = np.concatenate([directions, principal * np.where(principal.sum(axis=1) < 0, -1, 1)[:, None]])
     best: tuple[float, Floats, Floats, float] | None = None
-    for way in ways:
-        toward = way / np.linalg.norm(way)
+    for direction in directions:
+        toward = direction / np.linalg.norm(direction)
         helper = np.eye(3)[int(np.argmin(np.abs(toward)))]
         u = np.cross(toward, helper)
         u /= np.linalg.norm(u)
@@ -45,7 +48,7 @@ def fit_axis(points: Floats, axis: Axis) -> tuple[Floats, Floats, float]:
         flat = points @ frame.T
         centre, radius = trimesh.nsphere.minimum_nsphere(flat[:, :2])
         size = float(radius) ** 2 * float(np.ptp(flat[:, 2]))
-        # Principal axes of a symmetric part are those of rounding errors: a coordinate axis as good goes first.
+        # On a symmetric part rounding decides the principal axes: prefer a coordinate axis that is about as good.
         if best is None or size < 0.999 * best[0]:
             best = size, frame, np.asarray(centre, dtype=np.float64), float(radius)
     assert best is not None
@@ -53,13 +56,13 @@ def fit_axis(points: Floats, axis: Axis) -> tuple[Floats, Floats, float]:
 
 
 def take_hull_points(*sets: Floats) -> Floats:
-    """The corners of the convex hull of several point sets."""
+    """The corners (K,3) of the convex hull of several point sets (N,3)."""
     from scipy.spatial import ConvexHull
 
     points = np.concatenate(sets)
     return points[np.sort(ConvexHull(points).vertices)]
 
 
-def count_segments(radius: float, by: float) -> int:
-    """Divisions of a circle whose chords stay within a tenth of ``by``."""
-    return int(np.clip(8 * np.ceil(np.pi / np.arccos(max(1 - 0.1 * by / radius, 0.5)) / 8), 16, 512))
+def count_segments(radius: float, gap: float) -> int:
+    """How many segments a circle needs so that its chords are off by at most a tenth of ``gap``."""
+    return int(np.clip(8 * np.ceil(np.pi / np.arccos(max(1 - 0.1 * gap / radius, 0.5)) / 8), 16, 512))

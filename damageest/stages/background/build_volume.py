@@ -1,4 +1,4 @@
-"""The printer's own working volume."""
+"""A part of the printer's build volume as background."""
 
 from __future__ import annotations
 
@@ -15,50 +15,59 @@ Vector = tuple[float, float, float]
 
 
 class BuildVolume(Background):
-    """The lattice of the printer's working volume (paper 3.2), the same for every part: of its cells, those round the
-    site alone are ever made, and of these the background is the surface that keeps clear of the part. For shops that
-    repair many kinds of parts in one machine: one background to set up, and a part that does not fit in is refused."""
+    """A grid over the printer's build volume, the same for every part (paper 3.2).
+
+    Only the cells round the site are made; the background is the surface at the clearance from the part, cut to these
+    cells. For shops that repair many kinds of parts in one machine: it is set up once, and a part that does not fit
+    into the machine is refused.
+    """
 
     use: Literal["build_volume"] = "build_volume"
     size: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = Field(
-        description="extent of the working volume along x, y, z, in the job's unit"
+        description="size of the build volume along x, y, z, in the job's unit"
     )
     corner: Vector | None = Field(
         None,
-        description="its lowest corner in the part's frame, in the job's unit; default: it lies round the origin",
+        description="lowest corner of the build volume in the part's frame, in the job's unit; default: the volume is "
+        "centred on the origin",
     )
     cell: float | None = Field(
         None,
         gt=0,
-        description="edge of its cells in the job's unit, the finest that the deposition head resolves; default: the "
-        "clearance",
+        description="edge of the grid's cells, in the job's unit: the finest detail that the machine can deposit; "
+        "default: the clearance",
     )
     clearance: float = Field(
         2.0, gt=0, le=100, description="distance from the part, in tolerances; at least 1.5 point spacings"
     )
     margin: float = Field(
-        12.0, ge=6, le=1000, description="how far round the site cells are made, in tolerances or point spacings"
+        12.0,
+        ge=6,
+        le=1000,
+        description="how far round the site cells are made, in tolerances or point spacings, whichever is larger",
     )
 
     def run(
         self, part: Part, surface: Surface, samples: Samples, intact: Floats, tolerance: float, spacing: float
     ) -> Solid:
-        """Raises StageError where the part does not fit in, or the cells round the site would not fit in memory."""
+        """Raises StageError where the part does not fit in, or the cells round the site do not fit into memory."""
         from damageest.geometry.contour import extract_contour
         from damageest.geometry.distance import signed_distance
-        from damageest.stages.background._generated import check_holds, check_surface
+        from damageest.stages.background._shape import check_holds, check_surface
 
         check_surface(surface)
-        by = max(self.clearance * tolerance, 1.5 * spacing)
-        cell = self.cell or by
+        clearance = max(self.clearance * tolerance, 1.5 * spacing)
+        cell = self.cell or clearance
         size = np.array(self.size)
         corner = -size / 2 if self.corner is None else np.array(self.corner)
-        over = np.maximum(corner + by + cell - part.bounds[0], part.bounds[1] - (corner + size - by - cell))
+        over = np.maximum(
+            corner + clearance + cell - part.bounds[0], part.bounds[1] - (corner + size - clearance - cell)
+        )
         if (over > 0).any():
             text = ", ".join(f"{amount:.3g} in {name}" for name, amount in zip("xyz", over, strict=True) if amount > 0)
             raise StageError(
-                f"the part with its clearance does not fit into the build volume: too far by {text}",
-                "another corner or size, in the part's frame",
+                f"the part with its clearance does not fit into the build volume: it sticks out by {text}",
+                "another background.corner or background.size, in the part's frame",
             )
         reach = self.margin * max(tolerance, spacing)
         low, high = _find_neighbourhood(surface, samples, intact, max(3 * tolerance, 3 * spacing), samples.spacing)
@@ -67,10 +76,10 @@ class BuildVolume(Background):
         last = np.clip(np.ceil((high + reach - corner) / cell).astype(np.int64), 0, limit)
         nx, ny, nz = (int(n) for n in last - first + 1)
 
-        def outside(points: Floats) -> Floats:
-            return signed_distance(points, part)[0] - max(by, 0.6 * cell) - 0.1 * cell
+        def measure_gap(points: Floats) -> Floats:
+            return signed_distance(points, part)[0] - max(clearance, 0.6 * cell) - 0.1 * cell
 
-        solid = extract_contour(outside, corner + cell * first, (nx, ny, nz), cell)
+        solid = extract_contour(measure_gap, corner + cell * first, (nx, ny, nz), cell)
         inside = ((part.vertices > low) & (part.vertices < high)).all(axis=1)
         return check_holds(solid, part.vertices[inside], surface)
 
@@ -78,8 +87,11 @@ class BuildVolume(Background):
 def _find_neighbourhood(
     surface: Surface, samples: Samples, intact: Floats, reach: float, gap: float
 ) -> tuple[Floats, Floats]:
-    """Lowest and highest corner of the damage surface and of the skin that is lost with it: all that hangs together
-    with its rim and has no sound point within ``reach``."""
+    """Lowest and highest corner (3,) of the damage surface and of the skin that is lost with it.
+
+    Skin is lost where it is connected to the rim and has no intact point within ``reach``. ``gap``: spacing of the
+    samples.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree

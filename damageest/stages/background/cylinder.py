@@ -1,4 +1,4 @@
-"""A cylinder round part and damage surface."""
+"""A cylinder as background."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Part, Surface
 from damageest.stages.background._axis import Axis, count_segments, fit_axis, take_hull_points
-from damageest.stages.background._generated import Generated
+from damageest.stages.background._shape import ShapeBackground
 
 
-class CylinderBackground(Generated):
-    """The cylinder round the part, somewhat larger (paper 3.2): for parts turned on a lathe."""
+class CylinderBackground(ShapeBackground):
+    """The cylinder round the part, larger by the clearance (paper 3.2): for parts turned on a lathe."""
 
     use: Literal["cylinder"] = "cylinder"
     axis: Axis = Field(
-        "auto", description="x, y, z, a vector, or auto: round which it is smallest; in the part's frame"
+        "auto", description="x, y, z or a vector, in the part's frame; auto: the axis of the smallest cylinder"
     )
 
-    def build_shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
-        """The cylinder, as a prism whose flats keep the distance."""
+    def build_shape(self, part: Part, surface: Surface, gap: float, origin: Floats) -> Any:
+        """The cylinder, as a prism whose flat sides keep the clearance."""
         from manifold3d import Manifold
 
         points = take_hull_points(part.vertices, surface.vertices) - origin
         frame, centre, radius = fit_axis(points, self.axis)
-        count = count_segments(radius + by, by)
-        low, high = (frame[2] @ points.T).min() - by, (frame[2] @ points.T).max() + by
-        wide = (radius + by) / float(np.cos(np.pi / count))
+        count = count_segments(radius + gap, gap)
+        low, high = (frame[2] @ points.T).min() - gap, (frame[2] @ points.T).max() + gap
+        wide = (radius + gap) / float(np.cos(np.pi / count))
         body = Manifold.cylinder(float(high - low), wide, wide, count).translate((*centre, low))
         return body.transform(np.concatenate([frame.T, np.zeros((3, 1))], axis=1))

@@ -1,4 +1,4 @@
-"""The Minkowski sum of part and ball."""
+"""The Minkowski sum of part and ball as background."""
 
 from __future__ import annotations
 
@@ -8,27 +8,29 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Surface
 from damageest.geometry.solids import to_manifold
-from damageest.stages.background._generated import MOST_FACES, Generated
+from damageest.stages.background._shape import MOST_FACES, ShapeBackground
 
 
-class Minkowski(Generated):
-    """The part swept by a ball of the clearance's radius (paper 3.2), as the surface at that distance from it: follows
-    any part, closes gaps narrower than twice the clearance, and takes no notice of how the part is triangulated."""
+class Minkowski(ShapeBackground):
+    """The surface at the clearance from the part: the Minkowski sum of part and ball (paper 3.2). For any part.
+
+    It follows the part and closes gaps narrower than twice the clearance. The part's triangulation does not matter.
+    """
 
     use: Literal["minkowski"] = "minkowski"
 
-    def build_shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
-        """The level of the distance. Raises StageError where its lattice would not fit in memory."""
+    def build_shape(self, part: Part, surface: Surface, gap: float, origin: Floats) -> Any:
+        """The level set of the distance to the part. Raises StageError where its grid would not fit into memory."""
         from damageest.geometry.contour import extract_contour
         from damageest.geometry.distance import signed_distance
 
-        # Two triangles to a cell: a lattice as fine as the clearance, or as the number of triangles allows.
-        cell = max(by, float(np.sqrt(2.5 * part.area / MOST_FACES)))
-        low = part.bounds[0] - by - 3 * cell
-        nx, ny, nz = (int(n) for n in np.ceil((part.bounds[1] + by + 3 * cell - low) / cell).astype(int) + 1)
+        # A cell has about two triangles: the grid is as fine as the clearance, or as the number of triangles allows.
+        cell = max(gap, float(np.sqrt(2.5 * part.area / MOST_FACES)))
+        low = part.bounds[0] - gap - 3 * cell
+        nx, ny, nz = (int(n) for n in np.ceil((part.bounds[1] + gap + 3 * cell - low) / cell).astype(int) + 1)
 
-        def outside(points: Floats) -> Floats:
-            # Between nodes the level runs straight and cuts corners, which a coarse lattice has to be farther off for.
-            return signed_distance(points, part)[0] - max(by, 0.6 * cell) - 0.1 * cell
+        def measure_gap(points: Floats) -> Floats:
+            # Between grid nodes the level set is flat and cuts corners, so a coarse grid needs more distance.
+            return signed_distance(points, part)[0] - max(gap, 0.6 * cell) - 0.1 * cell
 
-        return to_manifold(extract_contour(outside, low, (nx, ny, nz), cell), origin)
+        return to_manifold(extract_contour(measure_gap, low, (nx, ny, nz), cell), origin)

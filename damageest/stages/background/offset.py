@@ -1,4 +1,4 @@
-"""The part's own skin, moved outward."""
+"""The part's own skin, moved outward, as background."""
 
 from __future__ import annotations
 
@@ -8,19 +8,22 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Part, Surface
 from damageest.geometry.solids import to_manifold
-from damageest.stages.background._generated import Generated
+from damageest.stages.background._shape import ShapeBackground
 
 
-class Offset(Generated):
-    """The part scaled up along its vertex normals (paper 3.2): follows concave parts, edge by edge. It refuses parts
-    whose gaps are narrower than twice the clearance, and vertices where faces meet that face both ways."""
+class Offset(ShapeBackground):
+    """The part's skin moved outward along its vertex normals (paper 3.2). Follows concave parts exactly.
+
+    Refused for parts with gaps narrower than twice the clearance, and for parts with vertices where opposite faces
+    meet.
+    """
 
     use: Literal["offset"] = "offset"
 
-    def build_shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
-        """The part with its vertices moved."""
+    def build_shape(self, part: Part, surface: Surface, gap: float, origin: Floats) -> Any:
+        """The part with its vertices moved outward."""
         normals = part.cross / np.maximum(np.linalg.norm(part.cross, axis=1), 1e-300)[:, None]
-        # Each vertex moves so that all planes through it move by the same: least squares over the distinct planes.
+        # Each vertex moves so that all planes through it move by the same amount: least squares over distinct planes.
         pairs = np.stack([part.faces.ravel(), np.repeat(np.arange(len(part.faces)), 3)], axis=1)
         key = np.concatenate([pairs[:, :1], np.round(normals[pairs[:, 1]], 3)], axis=1)
         chosen = pairs[np.unique(key, axis=0, return_index=True)[1]]
@@ -31,4 +34,4 @@ class Offset(Generated):
         np.add.at(right, chosen[:, 0], n)
         move = np.linalg.solve(left + 1e-3 * np.eye(3), right[:, :, None])[:, :, 0]
         move *= np.minimum(1, 3 / np.maximum(np.linalg.norm(move, axis=1), 1e-12))[:, None]
-        return to_manifold(Mesh(part.vertices + by * move, part.faces), origin)
+        return to_manifold(Mesh(part.vertices + gap * move, part.faces), origin)

@@ -10,12 +10,13 @@ from damageest.stages.boolean import Boolean
 
 
 class Manifold(Boolean):
-    """Guaranteed-manifold Booleans (Manifold, by Emmett Lalish), in double precision. Fast, and never leaves a gap."""
+    """Intersection by manifold3d (Emmett Lalish), in double precision. Fast, and the result is always watertight."""
 
     use: Literal["manifold"] = "manifold"
 
     def run(self, solid: Solid, part: Part) -> Solid | None:
-        """The part of ``solid`` inside ``part`` (paper 3.1 step 12). Raises StageError where a mesh is refused."""
+        """The part of ``solid`` inside ``part`` (paper 3.1 step 12). Raises StageError where manifold3d refuses a
+        mesh."""
         from manifold3d import Error
 
         from damageest.geometry.solids import to_manifold, to_solid
@@ -28,6 +29,7 @@ class Manifold(Boolean):
         common = bodies[0] ^ bodies[1]
         if common.status() != Error.NoError:
             raise StageError(
-                f"manifold3d could not intersect: {common.status().name}", "a slightly different tolerance"
+                f"manifold3d could not intersect: {common.status().name}",
+                "a slightly different tolerance, or boolean: pymeshlab",
             )
         return to_solid(common, origin)

@@ -1,4 +1,4 @@
-"""Every rim."""
+"""All rims near the skin."""
 
 from __future__ import annotations
 
@@ -9,22 +9,26 @@ import numpy as np
 from damageest.artefacts import Part, Rims, Surface
 from damageest.stages.boundary import Boundary
 
-DEEP = 5.0
-"""Tolerances below the skin: the damage surface begins at one, and at two where the scan is thin at its rim."""
+DEEPEST = 5.0
+"""Deepest rim, in tolerances below the skin. Usual are one, and two where the scan has few points at the rim."""
 
 
 class AllLoops(Boundary):
-    """Every loop of more than ten nodes that comes near the part's skin: for walls worn through and grooves round a
-    shaft. Loops deep inside are gaps of the scan, and closed."""
+    """All boundary loops near the part's skin: also for walls worn through and grooves round a shaft.
+
+    Loops of ten nodes or fewer and loops deep below the skin are gaps of the scan: `enclose` closes them.
+    """
 
     use: Literal["all_loops"] = "all_loops"
 
     def run(self, surface: Surface, part: Part, tolerance: float) -> Rims:
-        """Raises StageError where there is no such loop."""
+        """Raises StageError where there is no loop of more than ten nodes."""
         from damageest.geometry.distance import signed_distance
         from damageest.geometry.loops import trace_rims
 
-        found = trace_rims(surface)
-        depth = [-signed_distance(surface.vertices[loop], part)[0] for loop in found]
-        near = [loop for loop, one in zip(found, depth, strict=True) if np.quantile(one, 0.25) < DEEP * tolerance]
-        return Rims(tuple(near or found[:1]))
+        loops = trace_rims(surface)
+        depths = [-signed_distance(surface.vertices[loop], part)[0] for loop in loops]
+        near = [
+            loop for loop, depth in zip(loops, depths, strict=True) if np.quantile(depth, 0.25) < DEEPEST * tolerance
+        ]
+        return Rims(tuple(near or loops[:1]))

@@ -1,4 +1,4 @@
-"""The longest rim alone."""
+"""The longest rim only."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from damageest.stages.boundary import Boundary
 
 
 class LargestLoop(Boundary):
-    """The loop with the most nodes (paper 3.1 step 6 and 3.2). The others are closed flat."""
+    """Only the boundary loop with the most nodes (paper 3.1 step 6 and 3.2). `enclose` closes the others flat."""
 
     use: Literal["largest_loop"] = "largest_loop"
 

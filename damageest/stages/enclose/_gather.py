@@ -1,4 +1,4 @@
-"""What the scan says about the losses: points on them, skin that is gone, skin that is still there."""
+"""The scan sorted for the implicit surface: points on the damage, lost skin, intact skin."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from damageest.geometry.voxels import number_cubes
 from damageest.stages.enclose._skin import Flags, SkinSamples, push_outward, sample_skin_near
 
 APART = 0.75
-"""Edge of the cubes that one averaged point each is made for, in cells of the surface."""
+"""Edge of the cubes with one averaged point each, in cells of the surface."""
 
-Surfels = tuple[Floats, Floats, Floats]
+OrientedPoints = tuple[Floats, Floats, Floats]
+"""Points (M,3), unit normals (M,3) toward the lost side, and the area (M,) that each point stands for."""
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
-    """Losses that are solved together: smoothed ``points`` (M,3) on them with
-    ``normals`` toward the lost side and ``areas``, the ``lost`` skin (L,3), the ``sites`` they belong to."""
+class LossGroup:
+    """Losses that are solved together: smoothed ``points`` (M,3) on them with ``normals`` (M,3) toward the lost side
+    and ``areas`` (M,); samples of the ``lost`` skin (L,3); the numbers of the ``sites``."""
 
     points: Floats
     normals: Floats
@@ -33,23 +34,25 @@ class Group:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """In the part's frame: the ``groups``, the ``skin`` with the number of the group that lost each sample in
-    ``lost_by`` (-1: it is there, or nobody knows), ``kept`` (K,3) sound skin pushed outward with ``kept_normals``."""
+class GatheredLosses:
+    """In the part's frame: the ``groups``; samples of the intact skin, moved outward: ``intact`` (K,3) with
+    ``intact_normals`` (K,3) and ``intact_areas`` (K,)."""
 
-    groups: tuple[Group, ...]
-    skin: SkinSamples
-    lost_by: Ints
-    kept: Floats
-    kept_normals: Floats
-    kept_areas: Floats
+    groups: tuple[LossGroup, ...]
+    intact: Floats
+    intact_normals: Floats
+    intact_areas: Floats
 
 
-def gather_groups(
+def gather_losses(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float,
     band: float, push: float,
-) -> Found:  # fmt: skip
-    """Sorts scan and skin into damaged, lost and sound; ``band`` and ``push`` in tolerances."""
+) -> GatheredLosses:  # fmt: skip
+    """Sorts scan points and skin samples into damaged, lost and intact.
+
+    ``band``: width of skin round the damaged points that counts as neither lost nor intact; ``push``: how far the
+    intact skin is moved outward; both in tolerances.
+    """
     from scipy.spatial import cKDTree
 
     points, label, grown, face = _grow_to_rim(aligned, deviation, sites, tolerance)
@@ -61,55 +64,56 @@ def gather_groups(
     areas = measure_local_areas(skin.points)
     kept = np.flatnonzero((lost_by < 0) & ~free)
     moved = push_outward(part, skin.points[kept], skin.normals[kept], push * tolerance)
-    return Found(groups, skin, lost_by, moved, skin.normals[kept], areas[kept])
+    return GatheredLosses(groups, moved, skin.normals[kept], areas[kept])
 
 
-def select_oriented(found: Found, grid: Grid) -> tuple[Floats, Floats, Floats]:
-    """Points (N,3), normals (N,3) toward the lost side or the void, and areas (N,) for a solve on a grid."""
-    points = np.concatenate([*(group.points for group in found.groups), found.kept])
-    normals = np.concatenate([*(group.normals for group in found.groups), found.kept_normals])
-    areas = np.concatenate([*(group.areas for group in found.groups), found.kept_areas])
+def select_in_grid(gathered: GatheredLosses, grid: Grid) -> tuple[Floats, Floats, Floats]:
+    """Points (N,3), normals (N,3) toward the lost side or the void, and areas (N,), of all that lies in the grid."""
+    points = np.concatenate([*(group.points for group in gathered.groups), gathered.intact])
+    normals = np.concatenate([*(group.normals for group in gathered.groups), gathered.intact_normals])
+    areas = np.concatenate([*(group.areas for group in gathered.groups), gathered.intact_areas])
     inside = grid.contains(points)
     return points[inside], normals[inside], areas[inside]
 
 
-def cut_beyond_reach(grid: Grid, field: GridValues, found: Found, number: int, slack: float) -> GridValues:
-    """The field made negative where a sound or another group's surface is nearer, by more than ``slack``, than this
-    one's.
+def cut_beyond_reach(grid: Grid, field: GridValues, gathered: GatheredLosses, number: int, slack: float) -> GridValues:
+    """The field, made negative where the intact skin or another group is nearer than group ``number`` by more than
+    ``slack``.
 
-    From inside a loss, the way to any surface that does not bound it leads through one that does. So only the void
-    outside the part is cut, and what the field invents far from the group.
+    Inside a loss, the nearest surface always is one that bounds it. So this cuts only the void outside the part, and
+    surfaces that the solution extrapolates far from the group.
     """
     from scipy.ndimage import distance_transform_edt
 
-    group = found.groups[number]
+    group = gathered.groups[number]
     ours = np.concatenate([group.points, group.lost])
-    rest = [np.concatenate([other.points, other.lost]) for k, other in enumerate(found.groups) if k != number]
-    theirs = np.concatenate([found.kept, *rest])
+    rest = [np.concatenate([other.points, other.lost]) for k, other in enumerate(gathered.groups) if k != number]
+    theirs = np.concatenate([gathered.intact, *rest])
     half = grid.coarsen()
-    away = []
+    distances = []
     for points in (ours, theirs):
         points = points[half.contains(points)]
         if not len(points):
             return field
         free = np.ones(half.shape, bool)
         free[tuple(np.rint((points - half.origin) / half.cell).astype(np.int64).T)] = False
-        away.append(distance_transform_edt(free).astype(np.float32))
-    cut = (away[1] - away[0]) * np.float32(half.cell) + np.float32(slack)
-    # in units of the field, whose step across a surface is about a half over two cells
+        distances.append(distance_transform_edt(free).astype(np.float32))
+    cut = (distances[1] - distances[0]) * np.float32(half.cell) + np.float32(slack)
+    # In units of the field, which changes by about a half over two cells across a surface.
     cut *= np.float32(0.25 / grid.cell)
     return np.minimum(field, refine_field(cut))
 
 
 def _build_surface(
     points: Floats, above: Floats, lost: Floats, lost_normals: Floats, noise: float, cell: float
-) -> Surfels:
-    """The points (M,3) of one group smoothed, thinned and turned toward the lost side, with the area of each.
+) -> OrientedPoints:
+    """The points (M,3) of one group, smoothed, thinned and oriented toward the lost side.
 
-    ``above`` (M,3): the normal of the nominal skin nearest to each; ``lost`` (L,3): samples of the skin lost with them.
+    ``above`` (M,3): the normal of the part's skin nearest to each point; ``lost`` (L,3): samples of the skin that is
+    lost with them.
     """
     points, counts, first = thin_points(points, 0.5 * cell)
-    # fits overlap much further than this, so more of them would say the same again
+    # The local fits overlap much farther than this, so that more of them would add nothing.
     chosen = pick_one_per_cube(points, APART * cell)
     above = above[first][chosen]
     points, normals = average_points(points, counts, noise, chosen)
@@ -131,48 +135,51 @@ def _group_losses(
     tolerance: float,
     spacing: float,
     noise: float,
-) -> tuple[tuple[Group, ...], Ints]:
-    """Losses whose points or lost skin come within reach of one another are one group; and for each skin sample the
-    group that lost it. Skin that shows no scan point but belongs to no damaged point is not lost: the scanner did not
-    see it. A few stray points of a site whose others form a group are none of their own."""
+) -> tuple[tuple[LossGroup, ...], Ints]:
+    """The groups; and for each skin sample (S,) the number of the group that lost it, -1 for intact and unseen skin.
+
+    Losses whose points or lost skin are near one another are one group. Skin without scan points that is not near
+    damaged points is not lost: the scanner did not see it. A few stray points of a site do not make a group.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     around = skin.usual[free] if free.any() else skin.usual
     link = max(3 * tolerance, 1.5 * spacing, 1.2 * float(np.quantile(around, 0.9)) if len(around) else 0.0)
-    gone = np.flatnonzero(skin.gone)
-    every = np.concatenate([points, skin.points[gone]])
-    cell, number = number_cubes(every, link / 2)
+    bare = np.flatnonzero(skin.bare)
+    all_points = np.concatenate([points, skin.points[bare]])
+    cell, number = number_cubes(all_points, link / 2)
     _, first, cube = np.unique(number, return_index=True, return_inverse=True)
     pairs = cKDTree(cell[first]).query_pairs(2.5, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     _, component = connected_components(links, directed=False)
     group = component[cube]
-    of_points, of_gone = group[: len(points)], group[len(points) :]
-    found: list[Group] = []
-    whole = np.bincount(label)
+    of_points, of_bare = group[: len(points)], group[len(points) :]
+    groups: list[LossGroup] = []
+    sizes = np.bincount(label)
     lost_by = np.full(len(skin.points), -1, np.int64)
     for number in np.unique(of_points):
         members = of_points == number
-        share = np.bincount(label[members], minlength=len(whole))
-        labels = tuple(int(k) for k in np.flatnonzero(share > 0.05 * whole))
+        share = np.bincount(label[members], minlength=len(sizes))
+        labels = tuple(int(k) for k in np.flatnonzero(share > 0.05 * sizes))
         if not labels:
             continue
-        lost = gone[of_gone == number]
-        lost_by[lost] = len(found)
+        lost = bare[of_bare == number]
+        lost_by[lost] = len(groups)
         surface = _build_surface(
             points[members], above[members], skin.points[lost], skin.normals[lost], noise, 0.8 * tolerance
         )
-        found.append(Group(*surface, skin.points[lost], labels))
-    return tuple(found), lost_by
+        groups.append(LossGroup(*surface, skin.points[lost], labels))
+    return tuple(groups), lost_by
 
 
 def _grow_to_rim(
     aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float
 ) -> tuple[Floats, Ints, Flags, Ints]:
-    """The sites' points and their neighbours that are deeper than the noise makes likely: the rim, where the damage is
-    still shallower than the tolerance."""
+    """The sites' points, and neighbours that lie deeper than noise explains: the rim, where the damage is shallower
+    than the tolerance. Gives points (M,3), their sites (M,), which scan points (N,) were added, and nearest triangles
+    (M,)."""
     deep = (sites.label == 0) & (deviation.distance < -max(2 * aligned.noise, 0.1 * tolerance))
     deep &= deviation.distance >= -tolerance * 1.0001
     candidates = np.flatnonzero(deep)

@@ -1,4 +1,4 @@
-"""The surface of a solved field brought onto the points that it was solved from."""
+"""The surface of a Poisson solution moved onto the points that it was solved from."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ import numpy as np
 from damageest.artefacts import Floats, Solid
 from damageest.geometry.neighbourhoods import find_neighbours
 
-NEAR = 12
-"""Points that a vertex is fitted to."""
+NEIGHBOURS = 12
+"""Points that each vertex is fitted to."""
 
 
 def refit_region(region: Solid, points: Floats, normals: Floats, most: float) -> Solid:
     """The region with its vertices moved along the points' normals onto the surface through the points (N,3).
 
-    A grid of cells resolves the field's zero to a fraction of a cell, and the screened solve trades the points against
-    smoothness; the points know better where there are some all round a vertex. The chord between two points of a
-    circular arc is normal to the mean of their normals, so curvature adds no error of second order. ``normals`` (N,3)
-    point into the region; no vertex moves by more than ``most``, and those with no points about do not move.
+    The grid resolves the zero level to a fraction of a cell only, and the screened solution smooths it. With points all
+    round a vertex, the points give a better position. The chord between two points of a circular arc is normal to the
+    mean of their normals, so curvature adds no error of second order. ``normals`` (N,3) point into the region. No
+    vertex moves by more than ``most``; vertices without points near them do not move.
     """
     vertices = region.vertices
-    distance, index = find_neighbours(vertices, NEAR, points)
+    distance, index = find_neighbours(vertices, NEIGHBOURS, points)
     near = np.flatnonzero(distance[:, 0] < 2 * most + np.median(distance[:, 0]))
     distance, index, at = distance[near], index[near], vertices[near]
     own = region.vertex_normals[near]
@@ -35,7 +35,7 @@ def refit_region(region: Solid, points: Floats, normals: Floats, most: float) ->
     chord = points[index] - at[:, None]
     height = 0.5 * np.einsum("ikj,ikj->ik", chord, normals[index] + way[:, None])
     move = np.einsum("ik,ik->i", share, height)
-    # Beyond the points' border the fit would be carried on where none of them speaks for it.
+    # Beyond the border of the points the fit would extrapolate: a vertex with points on one side only moves less.
     aside = np.einsum("ik,ikj->ij", share, chord)
     aside -= np.einsum("ij,ij->i", aside, way)[:, None] * way
     lopsided = np.linalg.norm(aside, axis=1) / reach[:, 0]

@@ -1,4 +1,4 @@
-"""The pieces of which a closed mesh is sewn: carried-on rim, closed path, strip between the two, cut-off background."""
+"""The pieces of an enclosure: extended surface, path on the background, strip between them, cut-off background."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from damageest.geometry.loops import trace_loops
 
 
 @dataclass(frozen=True, eq=False)
-class Wide:
-    """A surface carried on beyond its rims: ``loops`` are the new rims; unlisted loops are still to be filled."""
+class ExtendedSurface:
+    """A surface extended beyond its rims. ``loops`` are the new rims; other boundary loops are still to be filled."""
 
     vertices: Floats
     faces: Ints
     loops: tuple[Ints, ...]
 
 
-def extend_rims(surface: Surface, rims: Rims, by: float) -> Wide:
-    """Adds a strip of width ``by`` along each rim, in the direction in which the surface leaves it.
+def extend_rims(surface: Surface, rims: Rims, width: float) -> ExtendedSurface:
+    """Adds a strip of ``width`` along each rim, in the direction in which the surface ends there.
 
     Raises StageError where there is no rim.
     """
     if not rims.loops:
-        raise StageError("the damage surface has no rim by which to join it to the background", "method: implicit")
+        raise StageError("the damage surface has no rim to join to the background", "method: implicit")
     vertices, faces, ends = [surface.vertices], [surface.faces], []
     start = len(surface.vertices)
     for loop in rims.loops:
@@ -38,18 +38,18 @@ def extend_rims(surface: Surface, rims: Rims, by: float) -> Wide:
             out = out + np.roll(out, 1, axis=0) + np.roll(out, -1, axis=0)
         out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
         new = np.arange(start, start + len(loop))
-        vertices.append(at + by * out)
+        vertices.append(at + width * out)
         before, after = loop, np.roll(loop, -1)
         far, far_after = new, np.roll(new, -1)
         faces.append(np.stack([after, before, far], axis=1))
         faces.append(np.stack([after, far, far_after], axis=1))
         ends.append(new)
         start += len(loop)
-    return Wide(np.concatenate(vertices), np.concatenate(faces), tuple(ends))
+    return ExtendedSurface(np.concatenate(vertices), np.concatenate(faces), tuple(ends))
 
 
-def fill_loops(wide: Wide) -> Ints:
-    """Faces with every loop closed that is no rim, by a fan from its first node (paper 3.2: small loops are closed)."""
+def fill_loops(wide: ExtendedSurface) -> Ints:
+    """Faces (F,3) with a fan from its first node in every boundary loop that is not a rim (paper 3.2)."""
     rim = {int(loop.min()) for loop in wide.loops}
     fans = [wide.faces]
     for loop in trace_loops(wide.faces):
@@ -59,18 +59,19 @@ def fill_loops(wide: Wide) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
-class Cycle:
-    """A closed path of background vertices ``path`` (M,), each once. ``station`` (M,), rising: how far round the rim
-    each is, counted in rim nodes."""
+class ClosedPath:
+    """A closed path of background ``vertices`` (M,), each once. ``station`` (M,), rising: the place on the rim that
+    belongs to each, counted in rim nodes."""
 
-    path: Ints
+    vertices: Ints
     station: Floats
 
 
-def trace_cycle(vertices: Floats, faces: Ints, image: Ints) -> Cycle:
+def trace_closed_path(vertices: Floats, faces: Ints, image: Ints) -> ClosedPath:
     """The closed path on a mesh that joins the images (N,) of the rim's nodes, in their order, by shortest paths.
 
-    Raises StageError where it collapses or finds no way.
+    ``image`` (N,): for each rim node a vertex of the mesh. Raises StageError where fewer than three different vertices
+    are left, or where no edges of the mesh join two images.
     """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
@@ -78,7 +79,7 @@ def trace_cycle(vertices: Floats, faces: Ints, image: Ints) -> Cycle:
     after = np.roll(image, -1)
     moves = np.flatnonzero(image != after)
     if len(moves) < 3:
-        raise StageError(_FLAT, "a smaller background edge, or method: implicit")
+        raise StageError(_COLLAPSED, "a smaller background edge, or method: implicit")
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     used, edges = np.unique(edges, return_inverse=True)
     edges = edges.reshape(-1, 2)
@@ -90,26 +91,31 @@ def trace_cycle(vertices: Floats, faces: Ints, image: Ints) -> Cycle:
     walk: list[tuple[int, float]] = []
     for node, here, there in zip(moves.tolist(), image[moves].tolist(), after[moves].tolist(), strict=True):
         gap = float(np.linalg.norm(place[here] - place[there]))
-        # Most images are neighbours, and their path is short; where the background folds between them it may be long.
+        # Most images are neighbours and their path is short. Across a fold of the background it may be long.
         for limit in (6 * gap + slack, np.inf):
             far, before = dijkstra(graph, directed=False, indices=here, return_predecessors=True, limit=limit)
             if np.isfinite(far[there]):
                 break
         if not np.isfinite(far[there]):
-            raise StageError("no path on the background joins the rim", "background: bbox, or method: implicit")
+            raise StageError(
+                "no closed path on the background follows the rim", "background: bbox, or method: implicit"
+            )
         path = [there]
         while path[-1] != here:
             path.append(int(before[path[-1]]))
         walk += [(step, node + k / (len(path) - 1)) for k, step in enumerate(path[:0:-1])]
     walk = _simplify_walk(walk)
-    return Cycle(used[[step for step, _ in walk]], np.array([station for _, station in walk]))
+    return ClosedPath(used[[step for step, _ in walk]], np.array([station for _, station in walk]))
 
 
-_FLAT = "the rim falls together on the background"
+_COLLAPSED = "the rim shrinks to a point on the background"
 
 
 def _simplify_walk(walk: list[tuple[int, float]]) -> list[tuple[int, float]]:
-    """The closed walk without its detours: of two loops that meet in a vertex the longer one stays."""
+    """The closed walk without detours: of two loops that meet in a vertex, the longer one stays.
+
+    Raises StageError where fewer than three vertices are left.
+    """
     while True:
         seen: dict[int, int] = {}
         for place, (node, _) in enumerate(walk):
@@ -122,43 +128,43 @@ def _simplify_walk(walk: list[tuple[int, float]]) -> list[tuple[int, float]]:
         else:
             break
     if len(walk) < 3:
-        raise StageError(_FLAT, "a smaller background edge, or method: implicit")
+        raise StageError(_COLLAPSED, "a smaller background edge, or method: implicit")
     return walk
 
 
-def build_strip(loop: Ints, other: Cycle, start: int) -> Ints:
-    """Triangles between a rim and the cycle that follows it, whose vertices count from ``start`` on: each rim node is
-    joined to its image and to what lies nearer to it on the paths than to the next (paper 3.2)."""
-    n, m = len(loop), len(other.path)
-    # Walk both by their stations; each step makes one triangle. A node gives way to the next one halfway to it.
-    steps = np.concatenate([np.arange(n) + 0.5, other.station[1:], [n + other.station[0]]])
+def build_strip(loop: Ints, path: ClosedPath, start: int) -> Ints:
+    """Triangles (N + M,3) between a rim (N,) and its path on the background (M,), whose vertices are numbered from
+    ``start`` on. Each rim node is joined to its image and to the path halfway to the next image (paper 3.2)."""
+    n, m = len(loop), len(path.vertices)
+    # Go along both by their stations; each step makes one triangle. Halfway between two rim nodes the next one begins.
+    steps = np.concatenate([np.arange(n) + 0.5, path.station[1:], [n + path.station[0]]])
     which = np.argsort(steps, kind="stable")
     is_first = which < n
     i = np.concatenate([[0], np.cumsum(is_first)])[:-1]
     j = np.concatenate([[0], np.cumsum(~is_first)])[:-1]
     a, a_next = loop[i % n], loop[(i + 1) % n]
-    b, b_next = other.path[j % m] + start, other.path[(j + 1) % m] + start
+    b, b_next = path.vertices[j % m] + start, path.vertices[(j + 1) % m] + start
     return np.where(is_first[:, None], np.stack([a_next, a, b], axis=1), np.stack([a, b, b_next], axis=1))
 
 
-def cut_off(faces: Ints, cycles: list[Ints], against: bool) -> Ints | None:
-    """Of a closed mesh, the faces on one side of the cycles: whose own edges run along them, or ``against``; None where
-    it is no side."""
+def cut_off(faces: Ints, paths: list[Ints], against: bool) -> Ints | None:
+    """Of a closed mesh, the faces on one side of the closed paths (M,): the side whose edges run along the paths, or
+    ``against`` them; None where the paths do not split the mesh there."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     size = int(faces.max()) + 1
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     code, back = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
-    along = np.concatenate([c * size + np.roll(c, -1) for c in cycles])
-    counter = np.concatenate([np.roll(c, -1) * size + c for c in cycles])
+    along = np.concatenate([c * size + np.roll(c, -1) for c in paths])
+    counter = np.concatenate([np.roll(c, -1) * size + c for c in paths])
     order = np.argsort(code)
     twin = order[np.searchsorted(code[order], back)]
     cut = np.isin(code, along) | np.isin(code, counter)
     owner = np.arange(len(edges)) // 3
     links = coo_array((np.ones((~cut).sum()), (owner[~cut], owner[twin[~cut]])), shape=(len(faces),) * 2)
     _, piece = connected_components(links, directed=False)
-    # With the body turned, its rim runs the other way, and so must the side it is sewn to.
+    # Where the surface is turned over, its rim runs the other way, and so must the side that is joined to it.
     wanted = np.unique(piece[owner[np.isin(code, along if against else counter)]])
     unwanted = np.unique(piece[owner[np.isin(code, counter if against else along)]])
     if np.intersect1d(wanted, unwanted).size:

@@ -1,4 +1,4 @@
-"""What the scan says about the part's skin near the losses: still there, or gone."""
+"""Samples of the part's skin near the damage, and whether the scan shows points on them."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class SkinSamples:
-    """Samples (S,3) of the part's skin round the losses, their outward ``normals``, and whether each is ``gone``: no
-    sound scan point near, though the scan is dense enough there to show one. ``usual`` (S,): the gap that the scan
-    leaves."""
+    """``points`` (S,3) on the part's skin round the damage, and their outward ``normals`` (S,3). ``bare`` (S,): whether
+    no intact scan point is near, though the scan is dense enough there. ``usual`` (S,): the usual gap between the
+    scan's points there."""
 
     points: Floats
     normals: Floats
-    gone: Flags
+    bare: Flags
     usual: Floats
 
 
 def sample_skin_near(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, grown: Flags, samples: Samples, tolerance: float
 ) -> SkinSamples:
-    """The skin in the neighbourhood of the sites, and as far from them as it seems to be gone."""
+    """The skin in the neighbourhood of the sites, and as far from them as it is bare."""
     from scipy.spatial import cKDTree
 
-    sound = (deviation.label == INTACT) & ~grown
+    intact = (deviation.label == INTACT) & ~grown
     flat = samples.kind == 0
     points, normals = samples.points[flat], samples.normals[flat]
-    skin, hits = _select_cubes(aligned.points, sites.label > 0, sound, points, 40 * tolerance)
+    skin, hits = _select_cubes(aligned.points, sites.label > 0, intact, points, 40 * tolerance)
     points, normals = points[skin], normals[skin]
     keep = np.flatnonzero(hits)
     hit = aligned.points[keep]
@@ -47,7 +47,7 @@ def sample_skin_near(
     outward = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
     usual = _measure_usual_gap(points, hit, tolerance)
     clear = np.maximum(1.5 * usual, 2 * tolerance)
-    # Direction counts as a fourth to sixth coordinate: the far side of a thin wall does not vouch for the near one.
+    # The normal counts as fourth to sixth coordinate: points on the far side of a thin wall must not count here.
     weight = 1.5 * tolerance
     tree = cKDTree(np.concatenate([hit, weight * outward], axis=1))
     most = float(clear.max()) * 1.001
@@ -56,7 +56,7 @@ def sample_skin_near(
 
 
 def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:
-    """Radius (S,) that holds six sound points on the sound surface nearest to each skin sample."""
+    """Radius (S,) that holds six intact points, measured at the intact points nearest to each skin sample."""
     count = min(7, len(hit))
     some = hit[pick_one_per_cube(hit, 3 * tolerance)]
     radius = find_neighbours(some, count, hit)[0][:, -1]
@@ -64,10 +64,10 @@ def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:
     return np.asarray(np.median(radius[index], axis=1))
 
 
-def _select_cubes(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size: float) -> tuple[Flags, Flags]:
-    """Which skin samples and which sound points matter, by the cubes of a coarse lattice that they lie in.
+def _select_cubes(scan: Floats, damaged: Flags, intact: Flags, skin: Floats, size: float) -> tuple[Flags, Flags]:
+    """Which skin samples (S,) and which intact points (N,) are near the damage, by the cubes of a coarse grid.
 
-    Cubes with damage count, cubes joined to them whose skin is poor in sound points, and the cubes round both.
+    These are cubes with damage, cubes connected to them whose skin has few intact points, and the cubes round both.
     """
     from scipy.ndimage import binary_dilation, label
 
@@ -77,20 +77,20 @@ def _select_cubes(scan: Floats, damaged: Flags, sound: Flags, skin: Floats, size
         np.ravel_multi_index(tuple(np.floor((p - low) / size).astype(np.int64).T), tuple(shape)) for p in (scan, skin)
     ]
     total = int(np.prod(shape))
-    seen = np.bincount(flat[0][sound], minlength=total)
-    asked = np.bincount(flat[1], minlength=total)
-    usual = np.median(seen[asked > 0] / asked[asked > 0])
-    hurt = np.bincount(flat[0][damaged], minlength=total) > 0
-    poor = (asked > 0) & (seen < 0.15 * usual * asked)
-    joined, _ = label((hurt | poor).reshape(shape), np.ones((3, 3, 3), bool))
-    core = np.isin(joined, np.unique(joined.ravel()[hurt]))
+    seen = np.bincount(flat[0][intact], minlength=total)
+    expected = np.bincount(flat[1], minlength=total)
+    usual = np.median(seen[expected > 0] / expected[expected > 0])
+    has_damage = np.bincount(flat[0][damaged], minlength=total) > 0
+    poor = (expected > 0) & (seen < 0.15 * usual * expected)
+    joined, _ = label((has_damage | poor).reshape(shape), np.ones((3, 3, 3), bool))
+    core = np.isin(joined, np.unique(joined.ravel()[has_damage]))
     wide = binary_dilation(core, np.ones((3, 3, 3), bool))
     wider = binary_dilation(wide, np.ones((3, 3, 3), bool))
-    return wide.ravel()[flat[1]], sound & wider.ravel()[flat[0]]
+    return wide.ravel()[flat[1]], intact & wider.ravel()[flat[0]]
 
 
 def push_outward(part: Part, skin: Floats, outward: Floats, push: float) -> Floats:
-    """The samples moved outward by ``push``, or by less where another wall stands in the way."""
+    """The samples (S,3) moved outward by ``push``, or by less where another wall of the part is near."""
     if not len(skin):
         return skin
     distance, _ = signed_distance(skin + push * outward, part)

@@ -1,4 +1,4 @@
-"""Rim to the nearest points of a background that is refined only there."""
+"""Rims joined to the nearest points of a background that is refined only there."""
 
 from __future__ import annotations
 
@@ -13,36 +13,39 @@ from damageest.errors import StageError
 from damageest.stages.enclose import Enclose
 
 if TYPE_CHECKING:
-    from damageest.stages.enclose._sew import Cycle
+    from damageest.stages.enclose._sew import ClosedPath
 
 ROUNDS = 12
+"""Passes of `trace_trail`; each leaves smaller gaps."""
 MOST_BETWEEN = 1000
-"""Points put between two images at a time."""
+"""Points put between two neighbours in one pass."""
 
 
 class Adaptive(Enclose):
-    """Maps each rim node to the nearest point of the background, which is refined along the rim and nowhere else, and
-    joins them by shortest paths within what was refined (the paper's 5.1, future work): its cost grows with the rim's
-    length, not with the part's surface."""
+    """Joins the rims to the nearest points of the background, which it refines only there (paper 5.1, future work).
+
+    Then as `shortest_path`, with paths on the refined faces. Its cost grows with the length of the rims, not with the
+    surface of the part.
+    """
 
     refines: ClassVar[bool] = True
 
     use: Literal["adaptive"] = "adaptive"
     overhang: float = Field(
-        3.0, ge=0, le=20, description="how far the rim is carried on along the surface, in tolerances"
+        3.0, ge=0, le=20, description="how far the surface is extended beyond its rim, in tolerances"
     )
     edge: float = Field(
         1.5,
         gt=0,
         le=100,
-        description="longest edge of the background along the rim, in tolerances; at least the spacing of its nodes",
+        description="longest edge of the background near the rim, in tolerances; at least the rim's node spacing",
     )
 
     def run(
         self, surface: Surface, rims: Rims, background: Solid, part: Part, intact: Floats, tolerance: float
     ) -> Mesh:
-        """Raises StageError where paths do not close or lead through the part, or either side holds sound points, and
-        NotSeparatedError where they do not split the background."""
+        """Raises StageError where no path closes, where a strip runs through the part, or where the intact points do
+        not show which side is lost; NotSeparatedError where the paths do not split the background."""
         from damageest.geometry.refinement import find_nearest, insert_points, refine_at
         from damageest.stages.enclose._close import close_enclosure, orient_by_intact
         from damageest.stages.enclose._sew import extend_rims
@@ -56,16 +59,18 @@ class Adaptive(Enclose):
         ends = np.cumsum([len(loop) for loop in wide.loops])[:-1]
         trails = [trace_trail(background, one, edge) for one in np.split(foot, ends)]
         more, way = find_nearest(background, np.concatenate(trails))
-        mesh, held = refine_at(background, np.concatenate([face, more]), np.concatenate([foot, way]), edge)
-        mesh, image = insert_points(mesh, held[: len(foot)], foot)
+        mesh, holding = refine_at(background, np.concatenate([face, more]), np.concatenate([foot, way]), edge)
+        mesh, image = insert_points(mesh, holding[: len(foot)], foot)
         near = _find_along(mesh, np.concatenate([foot, way]), 3 * edge) | np.isin(mesh.faces, image).any(axis=1)
-        cycles = [_trace_cycle(mesh, near, one) for one in np.split(image, ends)]
-        return close_enclosure(surface, wide, mesh, cycles, intact, part, tolerance)
+        paths = [_trace_path(mesh, near, one) for one in np.split(image, ends)]
+        return close_enclosure(surface, wide, mesh, paths, intact, part, tolerance)
 
 
 def trace_trail(background: Mesh, foot: Floats, edge: float) -> Floats:
-    """Points (K,3) on a background where the closed path through its points ``foot`` (N,3) will run, none farther than
-    an edge from the next unless the background has no surface between them."""
+    """Points (K,3) on the background along which the closed path through its points ``foot`` (N,3) will run.
+
+    Neighbours are at most ``edge`` apart, except where the background has no surface between them.
+    """
     from damageest.geometry.refinement import find_nearest
 
     at = foot
@@ -76,7 +81,8 @@ def trace_trail(background: Mesh, foot: Floats, edge: float) -> Floats:
             break
         which = np.repeat(np.arange(len(at)), count)
         place = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 1) / (count[which] + 1)
-        # The straight way leaves the surface at an edge; what is nearest to it leaves a smaller gap each time.
+        # A straight line between two points leaves the surface at its edges. The points nearest to the line lie on it,
+        # and the gaps between them are smaller.
         _, between = find_nearest(background, at[which] + place[:, None] * (after - at)[which])
         order = np.argsort(np.concatenate([np.arange(len(at)), which + place]), kind="stable")
         at = np.concatenate([at, between])[order]
@@ -84,18 +90,18 @@ def trace_trail(background: Mesh, foot: Floats, edge: float) -> Floats:
 
 
 def _find_along(mesh: Mesh, places: Floats, reach: float) -> NDArray[np.bool_]:
-    """(F,) which faces have a corner within ``reach`` of places (K,3)."""
+    """(F,) whether a corner of each face is within ``reach`` of places (K,3)."""
     from scipy.spatial import cKDTree
 
     far, _ = cKDTree(places).query(mesh.vertices, distance_upper_bound=reach, workers=2)
     return np.asarray(np.isfinite(far)[mesh.faces].any(axis=1))
 
 
-def _trace_cycle(mesh: Mesh, near: NDArray[np.bool_], image: Ints) -> Cycle:
-    """The cycle within the ``near`` faces, where the mesh is fine; on all of it where they do not hang together."""
-    from damageest.stages.enclose._sew import trace_cycle
+def _trace_path(mesh: Mesh, near: NDArray[np.bool_], image: Ints) -> ClosedPath:
+    """The closed path on the ``near`` faces (F,), where the mesh is fine; on all faces where it finds none there."""
+    from damageest.stages.enclose._sew import trace_closed_path
 
     try:
-        return trace_cycle(mesh.vertices, mesh.faces[near], image)
+        return trace_closed_path(mesh.vertices, mesh.faces[near], image)
     except StageError:
-        return trace_cycle(mesh.vertices, mesh.faces, image)
+        return trace_closed_path(mesh.vertices, mesh.faces, image)

@@ -1,4 +1,4 @@
-"""One closed surface through everything: all inner damage surfaces, and the sound skin pushed outward."""
+"""One closed surface by Poisson reconstruction: through all inner damage surfaces, and outside the intact skin."""
 
 from __future__ import annotations
 
@@ -13,33 +13,44 @@ from damageest.stages.enclose import EncloseAll
 
 
 class Implicit(EncloseAll):
-    """A screened Poisson surface round the losses, solved only in their neighbourhood. Takes several losses,
-    worn-through walls and broken-off ends alike, since it neither traces rims nor guesses a side."""
+    """A closed screened Poisson surface round each loss, solved in its neighbourhood only.
+
+    For damage of any shape: several losses, worn-through walls, broken-off ends. It needs no rims and no background.
+    """
 
     use: Literal["implicit"] = "implicit"
     cell: float = Field(1.0, gt=0.1, le=4, description="edge of a grid cell, in tolerances")
-    band: float = Field(1.0, ge=0, le=10, description="skin left free round the damaged points, in tolerances")
-    push: float = Field(1.0, gt=0, le=4, description="how far the sound skin is pushed outward, in tolerances")
-    margin: float = Field(8.0, ge=4, le=60, description="space round a loss that takes part, in tolerances")
-    screening: float = Field(1.0, gt=0, le=100, description="how strongly points pull the surface onto themselves")
+    band: float = Field(
+        1.0,
+        ge=0,
+        le=10,
+        description="width of skin round the damaged points that does not hold the surface, in tolerances",
+    )
+    push: float = Field(1.0, gt=0, le=4, description="how far the intact skin is moved outward, in tolerances")
+    margin: float = Field(
+        8.0, ge=4, le=60, description="space round a loss in which the surface is solved, in tolerances"
+    )
+    screening: float = Field(
+        1.0, gt=0, le=100, description="weight of the points against the smoothness of the surface"
+    )
     most_cells: int = Field(
-        4_000_000, ge=50_000, le=60_000_000, description="grid cells of one loss; a larger one gets larger cells"
+        4_000_000, ge=50_000, le=60_000_000, description="most grid cells for one loss; a larger loss gets larger cells"
     )
 
     def run(
         self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
     ) -> Enclosures:
-        """Raises StageError where no closed surface comes about."""
+        """Raises StageError where no closed surface can be reconstructed."""
         from damageest.geometry.isosurface import extract_region
         from damageest.geometry.poisson import make_grid, solve_coarse_to_fine
-        from damageest.stages.enclose._gather import cut_beyond_reach, gather_groups, select_oriented
+        from damageest.stages.enclose._gather import cut_beyond_reach, gather_losses, select_in_grid
         from damageest.stages.enclose._refit import refit_region
 
         if not sites.count:
             return Enclosures(())
-        found = gather_groups(part, aligned, deviation, sites, samples, tolerance, self.band, self.push)
+        gathered = gather_losses(part, aligned, deviation, sites, samples, tolerance, self.band, self.push)
         items = []
-        for number, group in enumerate(found.groups):
+        for number, group in enumerate(gathered.groups):
             low = np.minimum(group.points.min(axis=0), group.lost.min(axis=0, initial=np.inf)) - self.margin * tolerance
             high = (
                 np.maximum(group.points.max(axis=0), group.lost.max(axis=0, initial=-np.inf)) + self.margin * tolerance
@@ -47,15 +58,19 @@ class Implicit(EncloseAll):
             cell = max(self.cell * tolerance, float((np.prod(high - low) / self.most_cells) ** (1 / 3)))
             notes: tuple[str, ...] = ()
             if cell > 2 * self.cell * tolerance:
-                notes = (f"a loss this large was solved in cells of {cell:.3g}, {cell / tolerance:.1f} tolerances",)
+                notes = (
+                    f"this loss is large: it was solved in cells of {cell:.3g}, {cell / tolerance:.1f} tolerances",
+                )
             grid = make_grid(low, high, cell)
-            points, normals, areas = select_oriented(found, grid)
+            points, normals, areas = select_in_grid(gathered, grid)
             field = solve_coarse_to_fine(grid, points, normals, areas, self.screening)
-            field = cut_beyond_reach(grid, field, found, number, 4 * tolerance)
+            field = cut_beyond_reach(grid, field, gathered, number, 4 * tolerance)
             region = extract_region(grid, field)
             if region is not None:
                 region = refit_region(region, points, normals, 0.5 * tolerance)
                 items.append(Enclosure(region, group.sites, notes))
         if not items:
-            raise StageError("no closed surface came about", "method: surface, or a larger tolerance")
+            raise StageError(
+                "no closed surface could be reconstructed round the damage", "method: surface, or a larger tolerance"
+            )
         return Enclosures(tuple(items))

@@ -12,51 +12,56 @@ from damageest.geometry.open_surfaces import centre_points, orient_points, trim_
 from damageest.stages.reconstruct import Reconstruct
 
 MOST_CELLS = 3e6
-"""Cells in the box of a damage."""
+"""Cells in the bounding box of a damage, at most."""
 
 
 class SignedDistance(Reconstruct):
-    """The zero level of a signed distance, the weighted mean of the heights over the tangent planes nearby
-    (vtkSignedDistance and vtkExtractSurface, after Curless and Levoy 1996; paper 3.1 step 5)."""
+    """The zero level of the signed distance to oriented points, after Curless and Levoy 1996 (paper 3.1 step 5).
+
+    By VTK (vtkSignedDistance and vtkExtractSurface): the distance is the weighted mean of the heights over the tangent
+    planes of nearby points.
+    """
 
     use: Literal["signed_distance"] = "signed_distance"
     spacing: float | None = Field(
         None,
         gt=0,
-        description="edge of the cells, in the job's unit; default: the larger of tolerance and point spacing, more "
-        "where the damage's box would hold more than three million cells",
+        description="edge of the cells, in the job's unit; default: the larger of tolerance and point spacing, or more "
+        "where the damage would need over three million cells",
     )
     radius: float = Field(
         2.0,
         ge=1.5,
         le=8,
-        description="how far from a point the distance is taken, in cells; larger bridges more, and shifts a surface "
-        "of curvature radius R by up to radius^2 / 4R",
+        description="how far from a point the distance is computed, in cells; a larger radius bridges wider gaps, but "
+        "shifts a surface of curvature radius R by up to radius^2 / 4R",
     )
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
-        """Raises StageError where the points are too few, or no surface comes about."""
+        """Raises StageError where the points are too few, or where no surface can be reconstructed."""
         origin = centre_points(points)
-        # Along its own axes a damage's box is a fraction of that along the part's.
+        # VTK fills the bounding box with cells. Along the damage's own axes that box is much smaller.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         local = (points - origin) @ axes
         least = float(np.prod(np.ptp(local, axis=0)) / MOST_CELLS) ** (1 / 3)
         cell = self.spacing or max(tolerance, spacing, least)
         cloud, normals = orient_points(points, part, cell, noise)
-        vertices, faces = _zero_level((cloud - origin) @ axes, normals @ axes, cell, self.radius * cell)
+        vertices, faces = _extract_zero_level((cloud - origin) @ axes, normals @ axes, cell, self.radius * cell)
         if np.linalg.det(axes) < 0:
             faces = faces[:, ::-1]
         return trim_surface(vertices @ axes.T + origin, faces, cloud, 1.4 * cell, part, tolerance)
 
 
-def _zero_level(points: Floats, normals: Floats, cell: float, radius: float) -> tuple[Floats, Ints]:
-    """Vertices (V,3) and triangles (F,3) of where the signed distance to oriented points (N,3) is 0; none where no
-    point is within ``radius``."""
+def _extract_zero_level(points: Floats, normals: Floats, cell: float, radius: float) -> tuple[Floats, Ints]:
+    """Vertices (V,3) and triangles (F,3) of the surface where the signed distance to oriented points (N,3) is 0.
+
+    The surface ends at ``radius`` from the points.
+    """
     import pyvista
     from vtkmodules.vtkFiltersPoints import vtkExtractSurface, vtkSignedDistance
 
     cloud = pyvista.PolyData(points)
-    # The filter refuses normals of double precision.
+    # The filter accepts only single-precision normals.
     cloud.point_data.SetNormals(pyvista.convert_array(np.ascontiguousarray(normals, np.float32), name="Normals"))
     low, high = points.min(axis=0) - 2 * cell, points.max(axis=0) + 2 * cell
     counts = np.ceil((high - low) / cell).astype(int) + 1

@@ -1,4 +1,4 @@
-"""No repair: only the check that there is nothing to repair."""
+"""No repair: only the check that the enclosure is watertight."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from damageest.stages.repair import Repair
 
 
 class NoRepair(Repair):
-    """Passes a watertight mesh on and refuses any other. Right wherever the enclosure is closed by construction."""
+    """Passes a watertight mesh on and refuses any other. For enclosures that are closed by construction."""
 
     use: Literal["none"] = "none"
 
@@ -19,5 +19,5 @@ class NoRepair(Repair):
         try:
             return Solid(enclosure.vertices, enclosure.faces)
         except ValueError as error:
-            remedy = "method: implicit, which closes by construction, or a repairing plugin"
+            remedy = "method: implicit, whose enclosures are always closed, or repair: pymeshfix"
             raise StageError(f"the enclosure is {error}", remedy) from None

@@ -1,4 +1,4 @@
-"""What every background has to do, for the tests of each."""
+"""What every background must do, for the tests of each."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def dent(top: float = 10.0, away: tuple[float, float, float] = (0, 0, 0)) -> Sur
     return Surface(surface.vertices + np.array(away), surface.faces)
 
 
-def longest_edge(mesh: Mesh) -> float:
+def measure_longest_edge(mesh: Mesh) -> float:
     corners = mesh.triangles
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
 
 
-def gap(background: Solid, part: Part, surface: Surface) -> tuple[float, bool]:
+def measure_gap(background: Solid, part: Part, surface: Surface) -> tuple[float, bool]:
     """(nearest distance of the part's and the damage surface's points to the background, whether all are inside)."""
     points = np.concatenate([part.vertices, part.triangles.mean(axis=1), surface.vertices])
     origin = part.bounds.mean(axis=0)

@@ -7,7 +7,7 @@ import pytest
 
 from damageest.errors import StageError
 from damageest.stages.background.bbox import BoundingBox
-from tests.stages.background.holding import box, dent, longest_edge
+from tests.stages.background.holding import box, dent, measure_longest_edge
 
 
 def test_holds_both_with_the_clearance() -> None:
@@ -17,7 +17,7 @@ def test_holds_both_with_the_clearance() -> None:
     high = np.maximum(part.bounds[1], surface.bounds[1])
     assert np.allclose(found.bounds, [low - 1.5, high + 1.5])
     assert found.volume == pytest.approx(np.prod(np.ptp(found.bounds, axis=0)))
-    assert longest_edge(found) <= 2.0
+    assert measure_longest_edge(found) <= 2.0
 
 
 def test_left_coarse_where_enclose_refines() -> None:
@@ -36,7 +36,7 @@ def test_a_sparse_scan_widens_the_clearance() -> None:
 @pytest.mark.parametrize("how", ["linear", "adaptive"])
 def test_subdivision_keeps_the_box(how: str) -> None:
     found = BoundingBox.model_validate({"use": "bbox", "subdivide": how}).run(box(), dent(), 0.5, 0.1, True)
-    assert longest_edge(found) <= 1.0
+    assert measure_longest_edge(found) <= 1.0
     assert found.volume == pytest.approx(np.prod(np.ptp(found.bounds, axis=0)))
     assert np.allclose(found.bounds, [box().bounds[0] - 1, box().bounds[1] + 1])
 

@@ -1,4 +1,4 @@
-"""The capsule's domes begin where the part lets them."""
+"""The capsule is as short as the part allows."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import trimesh
 from damageest.artefacts import Part
 from damageest.stages.background.capsule import Capsule
 from tests.stages._open import bowl
-from tests.stages.background.holding import box, dent, gap, longest_edge
+from tests.stages.background.holding import box, dent, measure_gap, measure_longest_edge
 
 
-def test_a_ball_needs_no_more_than_a_ball() -> None:
+def test_the_capsule_round_a_ball_is_a_ball() -> None:
     ball = trimesh.creation.icosphere(4, 10)
     part = Part(ball.vertices, ball.faces)
     found = Capsule().run(part, bowl(3, 8, 0.5), 0.5, 0.1, False)
@@ -22,14 +22,14 @@ def test_a_ball_needs_no_more_than_a_ball() -> None:
 def test_holds_a_block_of_any_shape() -> None:
     for size in [(40, 30, 20), (5, 80, 5), (60, 60, 4)]:
         part, surface = box(size), dent(size[2] / 2)  # type: ignore[arg-type]
-        nearest, holds = gap(Capsule().run(part, surface, 0.5, 0.1, False), part, surface)
+        nearest, holds = measure_gap(Capsule().run(part, surface, 0.5, 0.1, False), part, surface)
         assert holds
         assert nearest > 0.9
 
 
 @pytest.mark.parametrize("how", ["linear", "loop", "butterfly", "adaptive"])
 def test_every_subdivision_holds_the_part(how: str) -> None:
-    """A capsule has no sharp corners, so the smoothing kinds do it no harm."""
+    """A capsule has no sharp corners, so the smoothing subdivisions keep its shape."""
     found = Capsule.model_validate({"use": "capsule", "subdivide": how}).run(box(), dent(), 0.5, 0.1, True)
-    assert longest_edge(found) <= 1.5 * 1.001
-    assert gap(found, box(), dent())[1]
+    assert measure_longest_edge(found) <= 1.5 * 1.001
+    assert measure_gap(found, box(), dent())[1]

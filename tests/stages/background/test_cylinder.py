@@ -1,4 +1,4 @@
-"""The cylinder finds its axis, whatever the pose, and keeps the clearance."""
+"""The cylinder finds its axis in any pose and keeps the clearance."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from damageest.artefacts import Part, Surface
 from damageest.stages.background.capsule import Capsule
 from damageest.stages.background.cylinder import CylinderBackground
 from tests.stages._open import bowl
-from tests.stages.background.holding import gap, longest_edge
+from tests.stages.background.holding import measure_gap, measure_longest_edge
 
 RADIUS, LENGTH, CLEARANCE = 10.0, 40.0, 1.0
 
@@ -29,7 +29,7 @@ def test_keeps_close_to_a_rod_in_any_pose(kind: type, seed: int | None) -> None:
     turn = np.eye(3) if seed is None else Rotation.random(random_state=seed).as_matrix()
     part, surface = rod(turn, np.array([0, 0, 0]) if seed is None else np.array([300.0, -200.0, 5000.0]))
     found = kind().run(part, surface, 0.5, 0.1, False)
-    nearest, holds = gap(found, part, surface)
+    nearest, holds = measure_gap(found, part, surface)
     assert holds
     assert nearest > 0.98 * CLEARANCE
     wide = RADIUS + CLEARANCE
@@ -51,4 +51,4 @@ def test_an_axis_may_be_given() -> None:
 
 def test_fine_everywhere_where_enclose_needs_it() -> None:
     part, surface = rod(np.eye(3), np.zeros(3))
-    assert longest_edge(CylinderBackground().run(part, surface, 0.5, 0.1, True)) <= 1.5
+    assert measure_longest_edge(CylinderBackground().run(part, surface, 0.5, 0.1, True)) <= 1.5

@@ -9,7 +9,7 @@ from damageest.artefacts import Mesh
 from damageest.evaluate.parts import PARTS
 from damageest.geometry.distance import signed_distance
 from damageest.stages.background.minkowski import Minkowski
-from tests.stages.background.holding import box, dent, gap
+from tests.stages.background.holding import box, dent, measure_gap
 
 
 @pytest.mark.parametrize("name", ["grille", "gear", "tube"])
@@ -22,7 +22,7 @@ def test_everywhere_at_the_clearance(name: str) -> None:
     assert np.median(distance) == pytest.approx(2 * tolerance, rel=0.12)
     assert distance.min() > 1.3 * tolerance
     assert distance.max() < 3.1 * tolerance
-    assert gap(found, part, inside)[1]
+    assert measure_gap(found, part, inside)[1]
 
 
 def test_volume_is_steiners() -> None:

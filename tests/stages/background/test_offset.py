@@ -1,4 +1,4 @@
-"""The moved skin runs beside the part's, or it is refused."""
+"""The moved skin follows the part at the clearance, or it is refused."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def test_runs_beside_the_part_at_the_clearance(name: str) -> None:
     moved = Offset().run(part, inside, tolerance, 0.1 * tolerance, True)
     middles = moved.triangles.mean(axis=1)
     distance, _ = signed_distance(middles, part)
-    # Flat faces move by the clearance exactly; at corners the skin is farther out, never nearer than chords make it.
+    # Flat faces move by the clearance exactly; at corners the skin is farther out. Only chords of round faces are
+    # nearer.
     assert np.median(distance) == pytest.approx(2 * tolerance, rel=0.02)
     assert distance.min() > 0.5 * tolerance
     assert distance.max() < 3.5 * 2 * tolerance

@@ -52,7 +52,7 @@ def test_parts_of_an_enclosure_give_parts_of_a_damage() -> None:
     assert found.volume == pytest.approx(16)
 
 
-def test_a_mesh_that_manifold_refuses_is_refused_by_name() -> None:
+def test_a_mesh_that_manifold_refuses_is_a_stage_error() -> None:
     solid = box((4, 4, 4), (8, 8, 8))
     broken = object.__new__(Solid)
     object.__setattr__(broken, "vertices", solid.vertices)

@@ -1,4 +1,4 @@
-"""Rims follow the surface's own boundary."""
+"""Rims follow the boundary edges of the surface."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ def test_pipe_has_two_rims_along_its_own_edges() -> None:
             assert (b, a) not in edges
 
 
-def test_longest_first_and_specks_are_no_rims() -> None:
+def test_longest_first_and_short_loops_are_no_rims() -> None:
     surface = bowl(5, 0, 0.2)
-    speck = np.flatnonzero((surface.faces == surface.faces[200, 0]).any(axis=1))
-    gash = slit(8, 30)
-    whole = np.delete(surface.faces, np.concatenate([speck, gash]), axis=0)
+    hole = np.flatnonzero((surface.faces == surface.faces[200, 0]).any(axis=1))
+    gap = slit(8, 30)
+    whole = np.delete(surface.faces, np.concatenate([hole, gap]), axis=0)
     torn = Surface(surface.vertices, whole)
     rims = AllLoops().run(torn, block(0.4), 1.0).loops
     assert len(rims) == 2
     assert len(rims[0]) == 96 > len(rims[1]) > 10
-    # The same gash, when it lies far below the skin, is a gap of the scan and no rim.
+    # The same slit far below the skin is a gap of the scan and no rim.
     assert len(AllLoops().run(torn, block(0.4), 0.1).loops) == 1
 
 

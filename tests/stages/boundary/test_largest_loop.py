@@ -29,6 +29,6 @@ def test_equal_loops_always_give_the_same() -> None:
     assert set(first.tolist()) == set(second.tolist())
 
 
-def test_a_speck_is_refused() -> None:
+def test_a_single_triangle_is_refused() -> None:
     with pytest.raises(StageError, match="no rim"):
         LargestLoop().run(Surface(np.eye(3), np.array([[0, 1, 2]])))

@@ -1,4 +1,4 @@
-"""The implicit enclosure, intersected with the part, is the damage: on losses of every kind that a part can have."""
+"""The implicit enclosure, intersected with the part, is the damage, for damage of all kinds."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from tests.scenes import TOLERANCE, Scene, scene
 
 
 @lru_cache
-def enclosed(name: str) -> Enclosures:
+def enclose(name: str) -> Enclosures:
     return Implicit().run(**scene(name).inputs())
 
 
-def lost(case: Scene, enclosures: Enclosures) -> list[object]:
+def intersect_pieces(case: Scene, enclosures: Enclosures) -> list[object]:
     bodies = (to_solid(to_manifold(case.part) ^ to_manifold(item.solid)) for item in enclosures.items)
     return [body for body in bodies if body is not None]
 
@@ -37,15 +37,15 @@ def lost(case: Scene, enclosures: Enclosures) -> list[object]:
 )
 def test_the_part_inside_it_is_the_damage(name: str, least: float) -> None:
     case = scene(name)
-    pieces = lost(case, enclosed(name))
+    pieces = intersect_pieces(case, enclose(name))
     assert iou(to_solid(unite(pieces)), case.truth) > least
 
 
 def test_every_site_is_in_an_enclosure_and_none_in_two() -> None:
     case = scene("two")
-    enclosures = enclosed("two")
+    enclosures = enclose("two")
     assert sorted(k for item in enclosures.items for k in item.sites) == list(range(1, case.sites.count + 1))
-    first, second = (to_manifold(body) for body in lost(case, enclosures))
+    first, second = (to_manifold(body) for body in intersect_pieces(case, enclosures))
     assert (first ^ second).volume() == pytest.approx(0, abs=1e-6)
 
 
@@ -54,17 +54,17 @@ def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
     away = np.linalg.norm(case.aligned.points - [26, 3, 12], axis=1) < 3
     assert away.sum() > 100
     partial = case.without(away)
-    pieces = lost(partial, Implicit().run(**partial.inputs()))
+    pieces = intersect_pieces(partial, Implicit().run(**partial.inputs()))
     assert iou(to_solid(unite(pieces)), case.truth) > 0.97
 
 
 def test_the_same_input_gives_the_same_bytes() -> None:
-    first, again = enclosed("pit").items[0], Implicit().run(**scene("pit").inputs()).items[0]
+    first, again = enclose("pit").items[0], Implicit().run(**scene("pit").inputs()).items[0]
     assert first.solid.vertices.tobytes() == again.solid.vertices.tobytes()
     assert first.solid.faces.tobytes() == again.solid.faces.tobytes()
 
 
-def test_a_loss_too_large_for_its_grid_is_solved_coarsely_and_says_so() -> None:
+def test_a_loss_too_large_for_its_grid_is_solved_coarsely_and_a_note_says_so() -> None:
     case = scene("end")
     (item,) = Implicit(most_cells=60_000).run(**case.inputs()).items
     assert "cells of" in item.notes[0]
@@ -80,7 +80,7 @@ def test_no_site_no_enclosure() -> None:
 
 def test_the_void_outside_the_part_is_only_taken_near_the_loss() -> None:
     case = scene("pit")
-    (item,) = enclosed("pit").items
+    (item,) = enclose("pit").items
     reach = 25 * TOLERANCE
     assert (item.solid.bounds[0] > case.truth.bounds[0] - reach).all()
     assert (item.solid.bounds[1] < case.truth.bounds[1] + reach).all()

@@ -30,13 +30,13 @@ def surface() -> Surface:
     return PyVista().run(points, part, TOLERANCE, 0.15, NOISE)
 
 
-def off(surface: Surface) -> np.ndarray:
+def measure_errors(surface: Surface) -> np.ndarray:
     return np.linalg.norm(surface.vertices - [0, 0, TOP], axis=1) - RADIUS
 
 
 def test_averages_the_noise(surface: Surface) -> None:
-    assert np.sqrt((off(surface) ** 2).mean()) < 0.6 * NOISE
-    assert np.abs(off(surface)).max() < TOLERANCE
+    assert np.sqrt((measure_errors(surface) ** 2).mean()) < 0.6 * NOISE
+    assert np.abs(measure_errors(surface)).max() < TOLERANCE
 
 
 def test_one_piece_with_one_rim_that_ends_where_the_points_do(surface: Surface) -> None:

@@ -10,7 +10,7 @@ from damageest.artefacts import Part, Surface
 from damageest.errors import StageError
 from damageest.stages.reconstruct.signed_distance import SignedDistance
 from tests.damaged_box import box
-from tests.stages.reconstruct.test_pyvista import NOISE, RADIUS, TOLERANCE, TOP, off, scene
+from tests.stages.reconstruct.test_pyvista import NOISE, RADIUS, TOLERANCE, TOP, measure_errors, scene
 
 
 @pytest.fixture(scope="module")
@@ -20,8 +20,8 @@ def surface() -> Surface:
 
 
 def test_averages_the_noise(surface: Surface) -> None:
-    assert np.sqrt((off(surface) ** 2).mean()) < 0.6 * NOISE
-    assert np.abs(off(surface)).max() < TOLERANCE
+    assert np.sqrt((measure_errors(surface) ** 2).mean()) < 0.6 * NOISE
+    assert np.abs(measure_errors(surface)).max() < TOLERANCE
 
 
 def test_one_piece_with_one_rim_and_normals_toward_the_lost_material(surface: Surface) -> None:

@@ -1,4 +1,4 @@
-"""Passes what is watertight, refuses what is not."""
+"""Watertight meshes pass, others are refused."""
 
 from __future__ import annotations
 

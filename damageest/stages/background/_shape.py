@@ -1,4 +1,4 @@
-"""What all backgrounds made from a shape have in common: clearance, subdivision, the check that they hold the part."""
+"""What the backgrounds made from a shape share: clearance, subdivision, the check that they hold the part."""
 
 from __future__ import annotations
 
@@ -16,45 +16,47 @@ from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.stages.background import Background
 
 MOST_FACES = 400_000
+"""About how many triangles a background may have."""
 PASSES = 6
+"""Most passes of a subdivision."""
 Subdivision = Literal["linear", "loop", "butterfly", "adaptive"]
 
 
-class Generated(Background, ABC):
-    """A shape round part and damage surface, subdivided where `enclose` wants it fine everywhere (paper 3.2)."""
+class ShapeBackground(Background, ABC):
+    """A shape round part and damage surface, subdivided where `enclose` needs it fine everywhere (paper 3.2)."""
 
     clearance: float = Field(
         2.0, gt=0, le=100, description="distance from the part, in tolerances; at least 1.5 point spacings"
     )
     edge: float = Field(
-        3.0, gt=0, le=100, description="spacing of its vertices, in tolerances; more where that would make too many"
+        3.0, gt=0, le=100, description="longest edge, in tolerances; longer where that would make too many triangles"
     )
     subdivide: Subdivision = Field(
         "linear",
-        description="how it is refined to that spacing: linear (edges into equal parts), adaptive (long edges halved), "
+        description="how it is refined to that edge: linear (edges into equal parts), adaptive (long edges halved), "
         "loop or butterfly (smoothing; not for shapes with sharp corners)",
     )
 
     def run(self, part: Part, surface: Surface, tolerance: float, spacing: float, fine: bool) -> Solid:
-        """Raises StageError where the mesh does not hold part and damage surface."""
+        """Raises StageError where the background does not hold part and damage surface."""
         check_surface(surface)
-        by = max(self.clearance * tolerance, 1.5 * spacing)
+        gap = max(self.clearance * tolerance, 1.5 * spacing)
         origin = (part.bounds[0] + part.bounds[1]) / 2
-        body = self.build_shape(part, surface, by, origin)
+        body = self.build_shape(part, surface, gap, origin)
         if fine:
             body = refine_body(body, self.edge * max(tolerance, 0.5 * spacing), self.subdivide)
         solid = to_solid(body, origin)
         if solid is None:
-            raise StageError("the background came out empty", "background: minkowski, or method: implicit")
+            raise StageError("the background is empty", "background: minkowski, or method: implicit")
         return check_holds(solid, np.concatenate([part.vertices, part.triangles.mean(axis=1)]), surface)
 
     @abstractmethod
-    def build_shape(self, part: Part, surface: Surface, by: float, origin: Floats) -> Any:
-        """A closed shape as a ``manifold3d.Manifold`` relative to ``origin`` (3,), at least ``by`` from the part."""
+    def build_shape(self, part: Part, surface: Surface, gap: float, origin: Floats) -> Any:
+        """A closed shape as a ``manifold3d.Manifold`` relative to ``origin`` (3,), at least ``gap`` from the part."""
 
 
 def refine_body(body: Any, edge: float, how: Subdivision = "linear") -> Any:
-    """A Manifold with no edge longer than ``edge``, or than what some 400,000 triangles allow."""
+    """A Manifold with no edge longer than ``edge``, or longer ones where that takes more than MOST_FACES faces."""
     least = float(np.sqrt(8 * body.surface_area() / np.sqrt(3) / MOST_FACES))
     edge = max(edge, least)
     if how == "linear":
@@ -73,14 +75,14 @@ def refine_body(body: Any, edge: float, how: Subdivision = "linear") -> Any:
         fine = to_manifold(Mesh(np.asarray(mesh.points), mesh.regular_faces))
     except ValueError as error:
         raise StageError(
-            f"subdivide: {how} does not leave this background closed ({error})", "subdivide: linear"
+            f"the background is no longer closed after subdivide: {how} ({error})", "subdivide: linear"
         ) from error
-    # The smoothing kinds quarter all triangles alike: what is still too long on uneven ones is divided evenly.
+    # Loop and butterfly divide all triangles in four. Edges that are still too long are divided evenly.
     return _divide(fine, edge)
 
 
 def _divide(body: Any, edge: float) -> Any:
-    """A Manifold with its edges in equal parts. What lies across a slender triangle is divided by another pass."""
+    """A Manifold with its edges divided into equal parts. Several passes, for edges across slender triangles."""
     for _ in range(PASSES):
         vertices, faces = to_arrays(body)
         if _measure_longest(vertices[faces]) <= edge:
@@ -90,21 +92,22 @@ def _divide(body: Any, edge: float) -> Any:
 
 
 def _measure_longest(corners: Floats) -> float:
+    """The longest edge of triangles (F,3,3)."""
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
 
 
 def check_surface(surface: Surface) -> None:
-    """Raises StageError for a damage surface without vertices, round which there is nothing to make."""
+    """Raises StageError for a damage surface without vertices."""
     if not len(surface.vertices):
-        raise StageError("the damage surface is empty", "another `reconstruct`, or method: implicit")
+        raise StageError("the damage surface is empty", "another reconstruct, or method: implicit")
 
 
 def check_holds(background: Solid, skin: Floats, surface: Surface) -> Solid:
-    """The background, if IDS and ``skin``, points (N,3) of the part, lie inside it. Raises StageError otherwise."""
+    """Gives the background. Raises StageError unless the ``skin`` points (N,3) and the damage surface lie inside it."""
     inner = np.concatenate([skin, surface.vertices])
     if outside := int((~is_inside(inner, background)).sum()):
         raise StageError(
-            f"the background does not hold part and damage surface: {outside} of {len(inner)} points lie outside",
+            f"the background does not hold part and damage surface: {outside} of {len(inner)} points lie outside it",
             "subdivide: linear, background: minkowski, or method: implicit",
         )
     return background
