@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from manifold3d import Manifold
 
 from damageest.artefacts import Part
 from damageest.geometry.skin import extract_ids, find_inner_faces
+from damageest.geometry.solids import to_manifold, to_solid
 from tests.geometry.shapes import FAR, box
-from tests.scenes import scene
 
 
 def test_the_damage_surface_is_what_lies_inside_the_part_and_faces_the_loss() -> None:
-    case = scene("pit")
-    surface = extract_ids(case.truth, case.part)
-    # a cap of a sphere of radius 4 about (9, 9, 14), 2 deep: 2 pi r h
+    part = box((30, 20, 12))
+    damage = to_solid(to_manifold(part) ^ Manifold.sphere(4, 96).translate((3, 2, 8)))
+    assert damage is not None
+    surface = extract_ids(damage, Part(part.vertices, part.faces))
+    # a cap of a sphere of radius 4, 2 deep: 2 pi r h
     assert surface.area == pytest.approx(2 * np.pi * 4 * 2, rel=0.01)
-    toward = np.array([9, 9, 14]) - surface.triangles.mean(axis=1)
+    toward = np.array([3, 2, 8]) - surface.triangles.mean(axis=1)
     assert (np.einsum("ij,ij->i", surface.cross, toward) > 0).all()
 
 

@@ -1,4 +1,4 @@
-"""Parts from mesh files: safe repairs are made and told, everything else is refused with the place and the remedy."""
+"""Parts from mesh files of every format, and files that are refused with name and remedy."""
 
 from __future__ import annotations
 
