@@ -1,10 +1,10 @@
-"""Checks for authors of stages: subclass the class of your contract in a test file and set ``stage``.
+"""Checks for authors of stage implementations: subclass the class of your contract in a test file and set ``stage``.
 
     class TestMine(BooleanContract):
         stage = Mine()
 
-There is a class for every contract. Where an implementation does not promise what a check asks for, name the check in
-``exceptions``, with the reason; the other attributes that a class knows are said in its docstring and in `Contract`.
+Every contract has a class. If an implementation cannot pass a check, name the check in ``exceptions`` with the reason.
+The docstring of a class describes its other attributes; `StageContract` describes those of all classes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The checks for the stages that touch files: `part`, `scan` and `export`."""
+"""The checks for the stages that read or write files: `part`, `scan` and `export`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from damageest.artefacts import Evidence, Floats, Mesh, Part, Scan, Truth
 from damageest.conformance import _scene
-from damageest.conformance._base import REFUSED, PlacedContract, StageContract, back, right_or_refused
+from damageest.conformance._base import REFUSED, PlacementContract, StageContract, check_or_refused, undo_placement
 from damageest.geometry.distance import distance_to_mesh
 
 BROKEN: dict[str, bytes | None] = {
@@ -25,104 +25,105 @@ BROKEN: dict[str, bytes | None] = {
 }
 
 
-class _Reader(StageContract):
-    """What readers of part and scan have in common."""
+class ReaderContract(StageContract):
+    """The checks for readers of a part or a scan."""
 
-    def paths(self) -> list[Path]:
-        """The files that the implementation was told to read; empty where it reads none."""
+    def get_paths(self) -> list[Path]:
+        """The files in the implementation's option ``path``; empty if it reads no file."""
         given = getattr(self.stage, "path", ())
         return [given] if isinstance(given, Path) else list(given)
 
-    def told(self, path: Path) -> Any:
-        """The implementation, told to read another file."""
+    def with_path(self, path: Path) -> Any:
+        """The implementation, with another file in ``path``."""
         return type(self.stage).model_validate({**self.stage.model_dump(), "path": path})
 
-    def refuses(self, path: Path) -> None:
+    def check_refuses(self, path: Path) -> None:
+        """Asserts that reading ``path`` raises an error that names the file."""
         with pytest.raises(REFUSED) as caught:
-            self.call(self.told(path), self.inputs())
-        assert path.name in str(caught.value), "the message names the file"
+            self.call(self.with_path(path), self.make_inputs())
+        assert path.name in str(caught.value), "the message must name the file"
 
-    def state(self, given: dict[str, Any]) -> dict[str, bytes]:
-        return super().state(given) | {str(path): path.read_bytes() for path in self.paths()}
+    def capture_state(self, given: dict[str, Any]) -> dict[str, bytes]:
+        return super().capture_state(given) | {str(path): path.read_bytes() for path in self.get_paths()}
 
     @pytest.mark.parametrize("kind", BROKEN)
     def test_refuses_a_broken_file(self, kind: str, tmp_path: Path) -> None:
-        for path in self.paths()[:1]:
+        for path in self.get_paths()[:1]:
             other = tmp_path / f"{kind}{path.suffix}"
             if (data := BROKEN[kind]) is not None:
                 other.write_bytes(data)
-            self.refuses(other)
+            self.check_refuses(other)
 
     def test_refuses_a_folder(self, tmp_path: Path) -> None:
-        for path in self.paths()[:1]:
+        for path in self.get_paths()[:1]:
             (tmp_path / f"folder{path.suffix}").mkdir()
-            self.refuses(tmp_path / f"folder{path.suffix}")
+            self.check_refuses(tmp_path / f"folder{path.suffix}")
 
     def test_a_file_cut_short(self, tmp_path: Path) -> None:
-        for path in self.paths()[:1]:
+        for path in self.get_paths()[:1]:
             data = path.read_bytes()
             (tmp_path / f"cut{path.suffix}").write_bytes(data[: len(data) // 2])
-            stage = self.told(tmp_path / f"cut{path.suffix}")
-            right_or_refused(lambda stage=stage: self.call(stage, self.inputs()), self.sound)
+            stage = self.with_path(tmp_path / f"cut{path.suffix}")
+            check_or_refused(lambda stage=stage: self.call(stage, self.make_inputs()), self.check_usable)
 
-    def sound(self, got: Any) -> None:
-        """Whether a result could be used."""
+    def check_usable(self, got: Any) -> None:
+        """Asserts that a result is complete enough to be used."""
 
     def test_gives_the_unit_asked_for(self) -> None:
-        """A file that says its unit is converted; the numbers of one that does not are in the job's."""
+        """The lengths of a file with a unit are converted. Those of a file without one are in the job's unit."""
         fine = self.run(unit="um", tolerance=1000 * _scene.TOLERANCE)
-        assert (fine.unit, self.plain().unit) == ("um", "mm")
-        ratio = _size(fine) / _size(self.plain())
+        assert (fine.unit, self.get_result().unit) == ("um", "mm")
+        ratio = _measure_extent(fine) / _measure_extent(self.get_result())
         assert ratio == pytest.approx(1000, rel=1e-2) or ratio == pytest.approx(1, rel=1e-2)
 
 
-class PartContract(_Reader):
+class PartContract(ReaderContract):
     """Checks for `part`.
 
-    ``volume``: of what the file holds, in cubic millimetres where the file says its unit; and ``error``, the share of
-    it by which the part may be off.
+    ``volume``: the volume of the part in the file; in cubic millimetres if the file has a unit. ``error``: allowed
+    error of the volume, as a share of it.
     """
 
     volume: ClassVar[float]
     error: ClassVar[float] = 1e-6
 
     def test_has_the_volume_of_its_file(self) -> None:
-        assert self.plain().volume == pytest.approx(self.volume, rel=self.error)
+        assert self.get_result().volume == pytest.approx(self.volume, rel=self.error)
 
     def test_says_how_far_it_is_off_the_cad(self) -> None:
-        assert 0 <= self.plain().tessellation_error <= _scene.TOLERANCE
+        assert 0 <= self.get_result().tessellation_error <= _scene.TOLERANCE
 
     def test_without_a_tolerance_yet(self) -> None:
         assert self.run(tolerance=None).volume == pytest.approx(self.volume, rel=self.error)
 
-    def sound(self, got: Any) -> None:
+    def check_usable(self, got: Any) -> None:
         assert isinstance(got, Part)
 
 
-class ScanContract(_Reader, PlacedContract):
-    """Checks for `scan`. ``mesh``: what the points of the file lie on; a virtual scanner's lie on the part."""
+class ScanContract(ReaderContract, PlacementContract):
+    """Checks for `scan`. ``mesh``: the surface that the file's points lie on; None: the part, for a virtual scanner."""
 
     mesh: ClassVar[Mesh | None] = None
 
-    def scene(self) -> dict[str, Any]:
-        return {**super().scene(), "part": _scene.prism()}
+    def make_scene(self) -> dict[str, Any]:
+        return {**super().make_scene(), "part": _scene.make_prism()}
 
-    def of(self, scale: float = 1.0, turn: Floats | None = None, shift: Floats | None = None) -> Any:
+    def run_placed(self, scale: float = 1.0, turn: Floats | None = None, shift: Floats | None = None) -> Any:
         if "part" not in self.stage.needs():
-            pytest.skip("points in a file follow no part")
-        return super().of(scale, turn, shift)
+            pytest.skip("the points of a file do not move with the part")
+        return super().run_placed(scale, turn, shift)
 
-    def sound(self, got: Scan) -> None:
+    def check_usable(self, got: Scan) -> None:
         assert len(got.points)
         assert np.isfinite(got.points).all()
         if got.normals is not None:
             assert np.linalg.norm(got.normals, axis=1) == pytest.approx(1, abs=1e-6)
 
     def test_finite_points_and_unit_normals(self) -> None:
-        self.sound(self.plain())
+        self.check_usable(self.get_result())
 
     def test_lies_on_what_was_scanned(self) -> None:
-        mesh, scan = self.mesh or _scene.prism(), self.plain()
+        mesh, scan = self.mesh or _scene.make_prism(), self.get_result()
         at = scan if scan.truth is None else scan.move(scan.truth.T_part_scan)
         far = distance_to_mesh(at.points, mesh)
         damage = scan.truth and scan.truth.damage
@@ -132,77 +133,77 @@ class ScanContract(_Reader, PlacedContract):
         else:
             assert (far < _scene.TOLERANCE).mean() > 0.95
 
-    def agree(self, got: Any, plain: Any, scale: float, turn: Floats, shift: Floats) -> None:
-        """By the points' extent."""
-        there = back(got.points, scale, turn, shift)
-        got_extent, extent = (np.quantile(p, (0.01, 0.5, 0.99), axis=0) for p in (there, plain.points))
+    def check_agrees(self, got: Any, expected: Any, scale: float, turn: Floats, shift: Floats) -> None:
+        """Compares the extents of the points."""
+        found = undo_placement(got.points, scale, turn, shift)
+        got_extent, extent = (np.quantile(p, (0.01, 0.5, 0.99), axis=0) for p in (found, expected.points))
         assert np.allclose(got_extent, extent, atol=2 * _scene.TOLERANCE)
 
 
 class ExportContract(StageContract):
-    """Checks for `export`, on a result with two sites, one of them with a deposit of its own."""
+    """Checks for `export`, on a result with two sites, one of them with a deposit."""
 
     @pytest.fixture(autouse=True)
-    def _folders(self, tmp_path: Path) -> None:
+    def _set_folders(self, tmp_path: Path) -> None:
         self.home, self.count = tmp_path, 0
 
-    def scene(self) -> dict[str, Any]:
-        return {"result": result()}
+    def make_scene(self) -> dict[str, Any]:
+        return {"result": make_result()}
 
     def call(self, stage: Any, given: dict[str, Any]) -> Any:
         self.count += 1
         self.folder = self.home / f"run {self.count}"
         self.folder.mkdir()
-        return super().call(stage, {**given, "folder": self.folder, "writers": _writers()})
+        return super().call(stage, {**given, "folder": self.folder, "writers": _load_writers()})
 
-    def written(self, **changes: Any) -> dict[str, bytes]:
-        """The files that a run says it has written, with their bytes."""
+    def write_files(self, **changes: Any) -> dict[str, bytes]:
+        """Runs the export and gives the bytes of the files that it reports, by path."""
         files = self.run(**changes).files
-        assert len(set(files)) == len(files), "a file twice"
+        assert len(set(files)) == len(files), "a file is reported twice"
         assert not [name for name in files if Path(name).is_absolute() or ".." in Path(name).parts]
         held = {str(p.relative_to(self.folder)) for p in self.folder.rglob("*") if p.is_file()}
-        assert held == set(files), "it names the files that it has written, and no others"
-        assert not [p for p in self.home.iterdir() if not p.name.startswith("run ")], "it writes outside the folder"
+        assert held == set(files), "the reported files differ from the files in the folder"
+        assert not [p for p in self.home.iterdir() if not p.name.startswith("run ")], "it wrote outside its folder"
         return {name: (self.folder / name).read_bytes() for name in files}
 
     def test_writes_the_files_it_names(self) -> None:
-        assert any(self.written().values())
+        assert any(self.write_files().values())
 
     def test_same_files_twice(self) -> None:
-        assert self.written() == self.written()
+        assert self.write_files() == self.write_files()
 
     def test_another_result_another_file(self) -> None:
-        plain = result()
-        assert self.written(result=replace(plain, sites=plain.sites[:1])) != self.written()
+        result = make_result()
+        assert self.write_files(result=replace(result, sites=result.sites[:1])) != self.write_files()
 
     def test_nothing_lost(self) -> None:
-        plain = result()
-        none = np.zeros_like(plain.site_label)
-        self.written(result=replace(plain, sites=(), damage=None, site_label=none, undamaged=plain.part))
+        result = make_result()
+        none = np.zeros_like(result.site_label)
+        self.write_files(result=replace(result, sites=(), damage=None, site_label=none, undamaged=result.part))
 
     def test_nothing_left(self) -> None:
-        self.written(result=replace(result(), undamaged=None))
+        self.write_files(result=replace(make_result(), undamaged=None))
 
     def test_after_a_virtual_scan(self) -> None:
-        plain = result()
-        truth = Truth(plain.damage, np.eye(4))
-        self.written(result=replace(plain, scan=replace(plain.scan, truth=truth), truth=np.array([1.0, 1.0])))
+        result = make_result()
+        truth = Truth(result.damage, np.eye(4))
+        self.write_files(result=replace(result, scan=replace(result.scan, truth=truth), truth=np.array([1.0, 1.0])))
 
 
 @lru_cache
-def _writers() -> Any:
+def _load_writers() -> Any:
     from damageest.registry import Registry
 
     return Registry.discover().writers
 
 
-def result() -> Any:
-    """What a run finds on the scene."""
+def make_result() -> Any:
+    """The result of a run on the scene."""
     from damageest.geometry.solids import to_manifold, to_solid, unite
     from damageest.result import Result, Site
 
-    scene = _scene.scene()
-    losses = [_scene.dent(k) for k in (0, 1)]
+    scene = _scene.make_scene()
+    losses = [_scene.make_dent(k) for k in (0, 1)]
     lost = unite(losses)
     sites = [
         Site(k, (k,), scene.sites.members(k), loss, scene.surface, deposit, "surface", Evidence(), 1.8)
@@ -214,5 +215,5 @@ def result() -> Any:
     )  # fmt: skip
 
 
-def _size(got: Any) -> float:
+def _measure_extent(got: Any) -> float:
     return float(np.linalg.norm(np.ptp(got.points if isinstance(got, Scan) else got.vertices, axis=0)))

@@ -1,7 +1,7 @@
-"""A damaged part with known truth: a prism with two round dents, its scan, and what the stages make of it on the way.
+"""A damaged part with known truth: a prism with two round dents, its scan, and the artefacts of all stages.
 
-The prism, 16 x 12 x 8 with one edge cut off, has no symmetry, so that its pose is known. What is lost is where a ball
-dips into its top, and a smaller one into its bottom.
+The prism, 16 x 12 x 8 with one edge cut off, has no symmetry, so that its pose is unique. The damage is the
+intersection with a ball at its top, and with a smaller ball at its bottom.
 """
 
 from __future__ import annotations
@@ -32,18 +32,21 @@ from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 
 TOLERANCE = 0.2
 NOISE = 0.02
+"""Standard deviation of the scan points along the normal."""
 DENSITY = 25.0
 """Scan points per unit of area."""
 SPACING = 0.22
+"""Mean distance between neighbouring scan points."""
 OUTLINE = np.array([[-8, -6], [8, -6], [8, 1], [3, 6], [-8, 6]], dtype=float)
 HALF_HEIGHT = 4.0
 DENTS = ((np.array([-3.0, -1.0, 5.2]), 3.0), (np.array([3.0, -2.0, -4.8]), 2.0))
-"""Centre (3,) and radius of each ball: above, below. Their slopes stay under 70 degrees."""
+"""Centre (3,) and radius of each ball: top, bottom. The slopes of the dents are below 70 degrees."""
 SECTIONS = 96
+"""Vertices of the rim of a dent or a bore."""
 
 
-def place(value: Any, scale: float, turn: Floats, shift: Floats) -> Any:
-    """An artefact, points (N,3) or a length, scaled, turned and shifted in that order."""
+def transform(value: Any, scale: float, turn: Floats, shift: Floats) -> Any:
+    """An artefact, points (N,3) or a length; scaled, then turned, then shifted."""
     match value:
         case Mesh():
             return replace(value, vertices=scale * value.vertices @ turn.T + shift)
@@ -66,7 +69,7 @@ def place(value: Any, scale: float, turn: Floats, shift: Floats) -> Any:
             return value
 
 
-def prism() -> Part:
+def make_prism() -> Part:
     """The part as designed, 10 vertices."""
     count = len(OUTLINE)
     flat = np.concatenate([np.column_stack([OUTLINE, np.full(count, z)]) for z in (-HALF_HEIGHT, HALF_HEIGHT)])
@@ -79,9 +82,12 @@ def prism() -> Part:
     return Part(flat, np.array(faces))
 
 
-def revolved(radius: Floats, height: Floats, centre: Floats, tip: bool) -> Surface:
-    """A profile turned about the z axis through ``centre``, wound so that normals of a rising one point to the axis.
-    ``tip``: whether it begins with a point on the axis, which is then the last vertex; its last ring comes first."""
+def revolve(radius: Floats, height: Floats, centre: Floats, tip: bool) -> Surface:
+    """A profile of ``radius`` (N,) and ``height`` (N,), revolved about the z axis through ``centre`` (3,).
+
+    The normals of a rising profile point to the axis. The vertices of the last ring come first. ``tip``: the profile
+    starts with a point on the axis, which becomes the last vertex.
+    """
     angle = 2 * np.pi * np.arange(SECTIONS) / SECTIONS
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
     start = 1 if tip else 0
@@ -103,25 +109,30 @@ def revolved(radius: Floats, height: Floats, centre: Floats, tip: bool) -> Surfa
     return Surface(vertices + centre, np.concatenate(faces))
 
 
-def bowl(short: float = TOLERANCE) -> Surface:
-    """What the dent on top leaves, its rim ``short`` below the skin, as segmentation leaves it; normals upward. The
-    rim's vertices come first."""
+def make_bowl(short: float = TOLERANCE) -> Surface:
+    """The surface of the dent on top, with normals upward. The vertices of the rim come first.
+
+    The rim is ``short`` below the skin, because segmentation labels shallower points as intact.
+    """
     centre, radius = DENTS[0]
     polar = np.linspace(0, np.arccos((centre[2] - HALF_HEIGHT + short) / radius), 24)
-    return revolved(radius * np.sin(polar), -radius * np.cos(polar), centre, True)
+    return revolve(radius * np.sin(polar), -radius * np.cos(polar), centre, True)
 
 
 BORE = 2.0
+"""Radius of the worn-through bore."""
 
 
-def bore(short: float = TOLERANCE) -> Surface:
-    """The wall of a hole of radius BORE that goes through the prism below the dent's centre; normals to its axis. The
-    rims' vertices come first and last."""
+def make_bore(short: float = TOLERANCE) -> Surface:
+    """The wall of a hole of radius BORE through the prism, with normals to its axis.
+
+    The vertices of the two rims come first and last. The rims are ``short`` below the skin.
+    """
     height = np.linspace(-HALF_HEIGHT + short, HALF_HEIGHT - short, 24)
-    return revolved(np.full(24, BORE), height, np.array([-3.0, -1.0, 0.0]), False)
+    return revolve(np.full(24, BORE), height, np.array([-3.0, -1.0, 0.0]), False)
 
 
-def box_round(low: Floats, high: Floats, edge: float) -> Solid:
+def make_box(low: Floats, high: Floats, edge: float) -> Solid:
     """A box whose edges are no longer than ``edge``."""
     from manifold3d import Manifold
 
@@ -129,18 +140,18 @@ def box_round(low: Floats, high: Floats, edge: float) -> Solid:
     return Solid(*to_arrays(body.refine_to_length(edge)))
 
 
-def dent(number: int) -> Solid:
-    """What is lost in one place."""
+def make_dent(number: int) -> Solid:
+    """The damage volume of one dent."""
     from manifold3d import Manifold
 
     centre, radius = DENTS[number]
-    lost = to_solid(Manifold.sphere(radius, 128).translate(tuple(centre)) ^ to_manifold(prism()))
+    lost = to_solid(Manifold.sphere(radius, 128).translate(tuple(centre)) ^ to_manifold(make_prism()))
     assert lost is not None
     return lost
 
 
-def spread(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Random points (N,3) on a mesh, even by area, and their normals (N,3)."""
+def sample_points(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Random points (N,3) on a mesh, uniform by area, and their normals (N,3)."""
     area = np.linalg.norm(mesh.cross, axis=1)
     face = rng.choice(len(area), count, p=area / area.sum())
     u, v = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
@@ -149,31 +160,31 @@ def spread(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Floats, Fl
 
 
 @lru_cache
-def scene() -> SimpleNamespace:
-    """Part, scan and all that lies between, in the part's frame; arrays are read-only."""
+def make_scene() -> SimpleNamespace:
+    """The part, its scan and the artefacts of all stages, in the part's frame."""
     from damageest.geometry.distance import signed_distance
     from damageest.stages.sample.edge_aware import EdgeAware
 
     rng = np.random.default_rng(7)
-    part = prism()
-    points, normals = spread(part, int(DENSITY * part.area), rng)
-    kept = np.all([np.linalg.norm(points - centre, axis=1) > radius for centre, radius in DENTS], axis=0)
-    points, normals, site = points[kept], normals[kept], np.zeros(kept.sum(), np.int32)
+    part = make_prism()
+    points, normals = sample_points(part, int(DENSITY * part.area), rng)
+    is_intact = np.all([np.linalg.norm(points - centre, axis=1) > radius for centre, radius in DENTS], axis=0)
+    points, normals, site = points[is_intact], normals[is_intact], np.zeros(is_intact.sum(), np.int32)
     for number, (centre, radius) in enumerate(DENTS, 1):
         up = np.abs(centre[2]) - HALF_HEIGHT
         count = int(DENSITY * 2 * np.pi * radius * (radius - up))
         steep, turn = rng.uniform(up / radius, 1, count), rng.uniform(0, 2 * np.pi, count)
         wide = np.sqrt(1 - steep**2)
-        way = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), -np.sign(centre[2]) * steep])
-        points, normals = np.concatenate([points, centre + radius * way]), np.concatenate([normals, -way])
-        site = np.append(site, np.full(len(way), number, np.int32))
+        direction = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), -np.sign(centre[2]) * steep])
+        points, normals = np.concatenate([points, centre + radius * direction]), np.concatenate([normals, -direction])
+        site = np.append(site, np.full(len(direction), number, np.int32))
     points = points + NOISE * rng.normal(size=len(points))[:, None] * normals
     order = rng.permutation(len(points))
     points, normals, site = points[order], normals[order], site[order]
     distance, face = signed_distance(points, part)
     damage = distance < -TOLERANCE
     site = np.where(damage, site, 0).astype(np.int32)
-    surface = bowl()
+    surface = make_bowl()
     low, high = part.bounds
     clear = 2 * TOLERANCE
     return SimpleNamespace(
@@ -187,7 +198,7 @@ def scene() -> SimpleNamespace:
         points=points[site == 1],
         surface=surface,
         rims=Rims((np.arange(SECTIONS),)),
-        background=box_round(low - clear, high + clear, 3 * TOLERANCE),
+        background=make_box(low - clear, high + clear, 3 * TOLERANCE),
         pose=Pose(np.eye(4)),
         tolerance=TOLERANCE,
         spacing=SPACING,
@@ -197,7 +208,7 @@ def scene() -> SimpleNamespace:
     )
 
 
-def open_loops(faces: Any) -> set[tuple[int, int]]:
+def find_boundary_edges(faces: Any) -> set[tuple[int, int]]:
     """The directed boundary edges of faces (F,3)."""
     edges = {tuple(edge) for edge in np.asarray(faces)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()}
     return {(a, b) for a, b in edges if (b, a) not in edges}

@@ -1,1 +1,1 @@
-"""Files in and out: mesh formats, point formats, and conversions to the objects of other libraries."""
+"""Readers and writers of mesh and point formats, and conversions to objects of other libraries."""

@@ -1,4 +1,4 @@
-"""Meshes for others: in the scan's frame, with fewer facets, and as trimesh and manifold3d objects."""
+"""Conversions of meshes to objects of trimesh and manifold3d."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from damageest.geometry.transforms import move_mesh
 
 
 def as_trimesh(mesh: Mesh, T: Floats | None = None) -> Any:
-    """A ``trimesh.Trimesh`` of its own, moved by T, nothing merged or reordered."""
+    """A ``trimesh.Trimesh`` with a copy of the mesh, moved by T (4,4). Vertices are not merged or reordered."""
     from trimesh import Trimesh
 
     return Trimesh(np.array(move_mesh(mesh, T).vertices), np.array(mesh.faces), process=False)
 
 
 def as_manifold(solid: Solid, T: Floats | None = None) -> Any:
-    """A ``manifold3d.Manifold``, moved by T."""
+    """A ``manifold3d.Manifold`` of the solid, moved by T (4,4)."""
     return to_manifold(move_mesh(solid, T))

@@ -1,4 +1,4 @@
-"""Checks that every reader of files makes first, and the hash of a file."""
+"""Checks that every reader makes before it reads a file, and the hash of a file."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from damageest.errors import DamageestError, InputError, describe_missing_librar
 
 
 def check_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
-    """The file's suffix in lower case. Raises InputError where it is missing, empty or not of ``suffixes``."""
-    valid = f"{what} may be: {', '.join(suffixes)}"
+    """The file's suffix in lower case. Raises InputError if the file is missing, empty or not of ``suffixes``."""
+    valid = f"{what} may have the format: {', '.join(suffixes)}"
     if path.is_dir():
         raise InputError(f"{path}: is a folder, not a file; {valid}")
     if not path.is_file():
         raise InputError(f"{path}: no such file; {valid}")
     suffix = path.suffix.lower()
     if suffix not in suffixes:
-        raise InputError(f"{path}: '{suffix}' is not a suffix that can be read here; {valid}")
+        raise InputError(f"{path}: the format '{suffix}' cannot be read; {valid}")
     try:
         with path.open("rb") as stream:
             start = stream.read(64)
     except OSError as error:
-        raise InputError(f"{path}: cannot be opened: {error.strerror or error}") from None
+        raise InputError(f"{path}: the file cannot be opened: {error.strerror or error}") from None
     if not start:
         raise InputError(f"{path}: the file is empty; {valid}")
     if start.lstrip().lower().startswith((b"<!doctype html", b"<html")):
-        raise InputError(f"{path}: holds a web page, not {what}; {valid}")
+        raise InputError(f"{path}: the file is a web page, not {what}; {valid}\n  try: download the file again")
     return suffix
 
 
@@ -37,7 +37,7 @@ def file_sha256(path: Path) -> str:
 
 
 def shorten_error(error: BaseException) -> str:
-    """An error of a library in one line."""
+    """The message of a library's error in one line of at most 160 characters."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= 160 else text[:157] + "..."
 

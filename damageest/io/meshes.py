@@ -1,4 +1,4 @@
-"""Reading and writing triangle meshes and point clouds, the formats and nothing else."""
+"""Reads triangle meshes; writes triangle meshes and point clouds."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ MESH_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf")
 
 
 def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
-    """Vertices (V,3) and faces (F,3) of all bodies in a mesh file, and the file's own unit where it has one.
+    """Vertices (V,3) and faces (F,3) of all bodies in a mesh file, and the file's unit, or None if it states none.
 
-    Instances of a scene are placed; nothing is merged or repaired. Raises InputError, naming the file, where it is
-    not a mesh of its kind or is cut short.
+    Bodies are moved to their positions in the scene. Nothing is merged or repaired. Raises InputError, which names the
+    file, if it is not a mesh in the format of its suffix, or if it is truncated.
     """
     suffix = check_file(path, MESH_SUFFIXES, "a mesh")
     if suffix == ".stl":
@@ -39,12 +39,12 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
         unit = str(scene.units) if suffix == ".3mf" and scene.units else None
     except Exception as error:
         raise_environment_fault(error)
-        raise InputError(f"{path}: not a readable {suffix} mesh ({shorten_error(error)})") from None
+        raise InputError(f"{path}: cannot be read as a {suffix} mesh ({shorten_error(error)})") from None
     if not meshes:
-        raise InputError(f"{path}: holds no triangles; a part must be a closed mesh")
+        raise InputError(f"{path}: the file has no triangles; a part must be a closed mesh")
     vertices, faces = trimesh.util.append_faces(*zip(*meshes, strict=True))
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(f"{path}: a triangle refers to a vertex that the file lacks; it may be cut short")
+        raise InputError(f"{path}: a triangle refers to a vertex that is not in the file; the file may be truncated")
     return vertices, faces, unit
 
 
@@ -52,28 +52,28 @@ STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("att
 
 
 def read_stl_corners(path: Path) -> Floats:
-    """(F,3,3) the triangles' corners of an STL file, binary or text. Raises InputError."""
+    """Corners (F,3,3) of the triangles in a binary or text STL file. Raises InputError if the file is not complete."""
     data = path.read_bytes()
     if len(data) >= 84:
         count = int.from_bytes(data[80:84], "little")
         if len(data) >= 84 + count * 50 and (count or not data.lstrip().startswith(b"solid")):
             found = np.frombuffer(data, STL_TRIANGLE, count, 84)
             if not count:
-                raise InputError(f"{path}: the STL file holds no triangles")
+                raise InputError(f"{path}: the STL file has no triangles")
             return found["corners"].astype(np.float64)
     if not data.lstrip()[:5].lower() == b"solid":
         raise InputError(
-            f"{path}: not an STL file, or one cut short: {len(data)} bytes do not hold what its header says"
+            f"{path}: not an STL file, or truncated: {len(data)} bytes are too few for the triangles in its header"
         )
     words = data.lower()
     corners = words.count(b"vertex")
     if not corners or corners % 3 or words.count(b"facet") % 2 or b"endsolid" not in words[-4096:]:
-        raise InputError(f"{path}: a text STL file without whole triangles, or one cut short")
+        raise InputError(f"{path}: a text STL file with incomplete triangles; the file may be truncated")
     pieces = words.split(b"vertex")[1:]
     try:
         numbers = np.array([piece.split(None, 3)[:3] for piece in pieces], dtype="S32").astype(np.float64)
     except (ValueError, IndexError):
-        raise InputError(f"{path}: a text STL file whose vertices are not numbers") from None
+        raise InputError(f"{path}: a text STL file with vertices that are not numbers") from None
     return numbers.reshape(-1, 3, 3)
 
 
@@ -83,7 +83,7 @@ def _read_stl(path: Path) -> tuple[Floats, Ints]:
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:
-    """A mesh as binary little-endian PLY with coordinates in double precision."""
+    """Writes a mesh as binary little-endian PLY with coordinates in double precision."""
     table = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3)])
     table["count"], table["corners"] = 3, mesh.faces
     head = (
@@ -95,7 +95,7 @@ def write_ply(path: Path, mesh: Mesh) -> None:
 
 
 def write_points(path: Path, columns: dict[str, NDArray[Any]]) -> None:
-    """Points as binary little-endian PLY, one property per column (N,), in the columns' own types."""
+    """Writes points as binary little-endian PLY, with one property per column (N,), in the type of the column."""
     names = {"f8": "double", "f4": "float", "u1": "uchar", "i4": "int"}
     kind = np.dtype([(name, values.dtype.newbyteorder("<")) for name, values in columns.items()])
     table = np.empty(len(next(iter(columns.values()))), kind)
@@ -107,7 +107,7 @@ def write_points(path: Path, columns: dict[str, NDArray[Any]]) -> None:
 
 
 def write_stl(path: Path, mesh: Mesh) -> None:
-    """A mesh as binary STL, whose coordinates are single precision; see `single_precision`. No date in its header."""
+    """Writes a mesh as binary STL, with coordinates in single precision and no date in its header."""
     corners = mesh.triangles.astype(np.float32)
     a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
     normal = np.cross(b - a, c - a)

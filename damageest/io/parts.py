@@ -1,4 +1,4 @@
-"""A part from a mesh file."""
+"""Reads a part from a mesh file."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from damageest.io.meshes import MESH_SUFFIXES, read_mesh
 
 
 def read_part(path: Path, unit: str, source: str | None = None, repair: bool = True) -> Part:
-    """The part in a mesh file, in ``unit``. ``source``: the unit of the file's lengths; None: the file's own, else
-    ``unit``. Raises InputError for a file that is not a solid and cannot be made one."""
+    """The part in a mesh file, in ``unit``.
+
+    ``source``: unit of the lengths in the file; None: the unit that the file states, else ``unit``. Raises InputError
+    if the file is not a solid and cannot be repaired to one.
+    """
     check_file(path, MESH_SUFFIXES, "a part")
     vertices, faces, own = read_mesh(path)
     notes: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""Scans from files, and from points wherever they came from."""
+"""Makes scans from files and from arrays of points."""
 
 from __future__ import annotations
 
@@ -22,46 +22,48 @@ def make_scan(
     paths: tuple[str, ...] = (),
     notes: tuple[str, ...] = (),
 ) -> Scan:
-    """A scan from points (N,3), already in ``unit``; says how many were left out, not finite or there already.
+    """A scan from points (N,3) in ``unit`` and optional normals (N,3).
 
-    Normals are brought to length 1, and dropped where any is zero or not finite. Raises InputError where no point is
-    left.
+    Points that are not finite and duplicates are removed; the scan's notes give their numbers. Normals are scaled to
+    length 1. If one of them is zero or not finite, no normals are used. Raises InputError if no point remains.
     """
     name = ", ".join(paths) or "the scan"
     points = np.asarray(points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"{name}: expected points (N,3), got an array of shape {points.shape}")
+        raise InputError(f"{name}: points need the shape (N,3), but the array has the shape {points.shape}")
     if normals is not None:
         normals = np.asarray(normals, dtype=np.float64)
         if normals.shape != points.shape:
-            raise InputError(f"{name}: {len(points)} points, but normals of shape {normals.shape}")
+            raise InputError(
+                f"{name}: normals need the shape of the points, {points.shape}, but have the shape {normals.shape}"
+            )
     finite = np.isfinite(points.sum(1))
     if not finite.all():
-        notes = (*notes, f"left out {int((~finite).sum())} points whose coordinates are not finite")
+        notes = (*notes, f"removed {int((~finite).sum())} points with coordinates that are not finite")
         points, normals = points[finite], None if normals is None else normals[finite]
     if not len(points):
-        raise InputError(f"{name}: holds no points")
+        raise InputError(f"{name}: has no points")
     keep, _ = find_duplicates(points)
     if len(keep) < len(points):
-        notes = (*notes, f"left out {len(points) - len(keep)} copies of points that are there already")
+        notes = (*notes, f"removed {len(points) - len(keep)} duplicate points")
         points, normals = points[keep], None if normals is None else normals[keep]
     if normals is not None:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         if np.isfinite(length).all() and length.min() > 1e-6:
             normals = normals / length
         else:
-            notes, normals = (*notes, "some normals are zero or not finite: none is used"), None
+            notes, normals = (*notes, "some normals are zero or not finite; no normals are used"), None
     return Scan(points, normals, canonical_unit(unit), paths, notes=notes)
 
 
 def read_scan(paths: Sequence[Path], unit: str, source: str | None = None, columns: str | None = None) -> Scan:
-    """The points of one file, or of several views that share a frame, in ``unit``.
+    """The points of one file, or of several files in the same frame, in ``unit``.
 
-    ``source``: the unit of the files' lengths; None: each file's own (E57: m), else ``unit``. ``columns``: what the
-    columns of a text file are. Raises InputError for a file that cannot be read or holds no points.
+    ``source``: unit of the lengths in the files; None: the unit that each file states (E57: m), else ``unit``.
+    ``columns``: names of the columns of a text file. Raises InputError if a file cannot be read or has no points.
     """
     if not paths:
-        raise InputError("scan: no file named")
+        raise InputError("scan: no file is given")
     clouds = [read_points(path, columns) for path in paths]
     notes: list[str] = []
     scaled = []
@@ -76,6 +78,6 @@ def read_scan(paths: Sequence[Path], unit: str, source: str | None = None, colum
     given = [cloud.normals for cloud in clouds if cloud.normals is not None]
     normals = np.concatenate(given) if len(given) == len(clouds) else None
     if given and normals is None:
-        notes.append("only some of the files have normals: they are not used")
+        notes.append("only some of the files have normals; no normals are used")
     whole = scaled[0] if len(scaled) == 1 else np.concatenate(scaled)
     return make_scan(whole, normals, unit, paths=tuple(map(str, paths)), notes=tuple(notes))

@@ -14,7 +14,7 @@ import pytest
 from damageest import conformance
 from damageest.artefacts import Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
 from damageest.conformance import _scene
-from damageest.conformance._base import PlacedContract, StageContract
+from damageest.conformance._base import PlacementContract, StageContract
 from damageest.io.meshes import write_stl
 from damageest.stages.align.none import KnownPose
 from damageest.stages.allowance.none import NoAllowance as NoAllowance
@@ -34,7 +34,7 @@ from damageest.stages.scan.simulate import Simulate
 from damageest.stages.segment.mesh_distance import MeshDistance
 
 GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
-    "Part": (PartFile(path=Path("prism.stl")), {"volume": _scene.prism().volume}),
+    "Part": (PartFile(path=Path("prism.stl")), {"volume": _scene.make_prism().volume}),
     "Scan": (Simulate(points=5000), {}),
     "Sample": (Uniform(), {}),
     "Align": (KnownPose(), {"pose": np.eye(4)}),
@@ -60,8 +60,8 @@ MEANING = {
     "Reconstruct": "test_follows_the_dent",
     "Boundary": "test_the_open_edges_of_a_dent",
     "Background": "test_holds_the_damage",
-    "Enclose": "test_holds_the_damage_and_no_sound_points",
-    "EncloseAll": "test_holds_the_damage_and_no_sound_points",
+    "Enclose": "test_holds_the_damage_and_no_intact_points",
+    "EncloseAll": "test_holds_the_damage_and_no_intact_points",
     "Repair": "test_what_is_closed_keeps_its_volume",
     "Boolean": "test_gives_what_lies_in_the_part",
     "Allowance": "test_deposit_holds_the_damage",
@@ -80,12 +80,12 @@ BAD_INPUT: dict[str, tuple[str, tuple[Any, ...]]] = {
     "Repair": ("test_an_empty_mesh_is_refused", ()),
     "Boolean": ("test_apart_gives_none", ()),
 }
-PLACED = [n for n in GOOD if issubclass(getattr(conformance, f"{n}Contract"), PlacedContract) and n != "Boundary"]
+PLACED = [n for n in GOOD if issubclass(getattr(conformance, f"{n}Contract"), PlacementContract) and n != "Boundary"]
 """Rims are numbers of vertices and have no length."""
 Fault = Callable[[Any, dict[str, Any]], Any]
 
 
-def spoilt(value: Any, by: float) -> Any:
+def spoil(value: Any, by: float) -> Any:
     """A result that is off by ``by``, in the job's unit or as near to that as its kind comes."""
     match value:
         case Mesh() | Samples() | Scan():
@@ -102,16 +102,16 @@ def spoilt(value: Any, by: float) -> Any:
                 tuple(np.roll(loop, int(np.ceil(by * 1e6)))[: -1 if by > 0.1 else None] for loop in value.loops)
             )
         case Enclosures():
-            return Enclosures(tuple(replace(item, solid=spoilt(item.solid, by)) for item in value.items))
+            return Enclosures(tuple(replace(item, solid=spoil(item.solid, by)) for item in value.items))
         case ExportedFiles():
             return replace(value, files=(*value.files, f"{by}.txt"))
         case None:
-            return Solid(*(getattr(_scene.box_round(np.zeros(3), np.full(3, by), 9), n) for n in ("vertices", "faces")))
+            return Solid(*(getattr(_scene.make_box(np.zeros(3), np.full(3, by), 9), n) for n in ("vertices", "faces")))
         case _:
             return replace(value, distance=value.distance + by, label=value.label + np.uint8(by > 0.1))
 
 
-def edited(result: Any, given: dict[str, Any]) -> Any:
+def edit_input(result: Any, given: dict[str, Any]) -> Any:
     """Writes into an input, past the lock of its arrays."""
     value = next(v for v in given.values() if not isinstance(v, float | str | bool | Path))
     held = value if isinstance(value, np.ndarray) else next(iter(vars(value).values()))
@@ -124,12 +124,12 @@ def edited(result: Any, given: dict[str, Any]) -> Any:
     return result
 
 
-def case(name: str, tmp_path: Path, fault: Fault) -> Any:
+def make_checks(name: str, tmp_path: Path, fault: Fault) -> Any:
     """The checks of a contract on an implementation that has a fault."""
     stage, told = GOOD[name]
     base = getattr(conformance, f"{name}Contract")
     if name == "Part":
-        write_stl(tmp_path / "prism.stl", _scene.prism())
+        write_stl(tmp_path / "prism.stl", _scene.make_prism())
         stage = PartFile(path=tmp_path / "prism.stl")
 
     def call(self: Any, stage: Any, given: dict[str, Any]) -> Any:
@@ -150,13 +150,13 @@ def test_there_is_one_good_for_every_class() -> None:
 @pytest.mark.parametrize("name", GOOD)
 def test_a_wrong_type(name: str, tmp_path: Path) -> None:
     with pytest.raises(AssertionError):
-        case(name, tmp_path, lambda result, given: SimpleNamespace()).test_gives_its_type()
+        make_checks(name, tmp_path, lambda result, given: SimpleNamespace()).test_gives_its_type()
 
 
 @pytest.mark.parametrize("name", sorted(GOOD.keys() - {"Part"}))
 def test_an_edited_input(name: str, tmp_path: Path) -> None:
     with pytest.raises(AssertionError):
-        case(name, tmp_path, edited).test_leaves_its_inputs()
+        make_checks(name, tmp_path, edit_input).test_leaves_its_inputs()
 
 
 def test_an_edited_file(tmp_path: Path) -> None:
@@ -165,20 +165,20 @@ def test_an_edited_file(tmp_path: Path) -> None:
         return result
 
     with pytest.raises(AssertionError):
-        case("Part", tmp_path, appended).test_leaves_its_inputs()
+        make_checks("Part", tmp_path, appended).test_leaves_its_inputs()
 
 
 @pytest.mark.parametrize("name", GOOD)
 def test_chance(name: str, tmp_path: Path) -> None:
     np.random.seed(1)  # noqa: NPY002
-    made = case(name, tmp_path, lambda result, given: spoilt(result, 1e-5 * np.random.random()))  # noqa: NPY002
+    made = make_checks(name, tmp_path, lambda result, given: spoil(result, 1e-5 * np.random.random()))  # noqa: NPY002
     with pytest.raises(AssertionError):
         made.test_same_bytes_twice()
 
 
 @pytest.mark.parametrize("name", PLACED)
 def test_a_length_of_its_own(name: str, tmp_path: Path) -> None:
-    made: Any = case(name, tmp_path, lambda result, given: spoilt(result, 1.0))
+    made: Any = make_checks(name, tmp_path, lambda result, given: spoil(result, 1.0))
     if name == "Cluster":
         made = type("Case", (conformance.ClusterContract,), {"stage": Dbscan(eps=0.5)})()
     for check in (lambda: made.test_no_length_of_its_own(1e-3), lambda: made.test_no_length_of_its_own(1e3)):
@@ -192,9 +192,9 @@ def test_a_length_of_its_own(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", GOOD)
 def test_a_wrong_result(name: str, tmp_path: Path) -> None:
     by = -3.0 if name in ("Background", "Sample") else 3.0
-    made = case(name, tmp_path, lambda result, given: spoilt(result, by))
+    made = make_checks(name, tmp_path, lambda result, given: spoil(result, by))
     if name == "Allowance":
-        made = case(name, tmp_path, lambda result, given: spoilt(given["damage"], -0.5))
+        made = make_checks(name, tmp_path, lambda result, given: spoil(given["damage"], -0.5))
     with pytest.raises(AssertionError):
         getattr(made, MEANING[name])()
 
@@ -205,7 +205,7 @@ def test_a_crash_on_bad_input(name: str, kind: type[Exception], tmp_path: Path) 
     def call(stage: Any, given: dict[str, Any]) -> Any:
         raise kind("zero-size array")
 
-    made = case(name, tmp_path, lambda result, given: result)
+    made = make_checks(name, tmp_path, lambda result, given: result)
     made.call = call
     check, arguments = BAD_INPUT[name]
     with pytest.raises(kind, match="zero-size"):
@@ -213,14 +213,14 @@ def test_a_crash_on_bad_input(name: str, kind: type[Exception], tmp_path: Path) 
 
 
 def test_a_crash_on_a_broken_file(tmp_path: Path) -> None:
-    made = case("Part", tmp_path, lambda result, given: result)
+    made = make_checks("Part", tmp_path, lambda result, given: result)
     made.call = lambda stage, given: stage.path.read_bytes()[99]
     with pytest.raises(IndexError):
         made.test_refuses_a_broken_file("empty", tmp_path)
 
 
 def test_a_check_that_is_no_check_cannot_be_excepted(tmp_path: Path) -> None:
-    made = case("Boolean", tmp_path, lambda result, given: result)
+    made = make_checks("Boolean", tmp_path, lambda result, given: result)
     made.exceptions = {"test_of_nothing": "because"}
-    with pytest.raises(AssertionError, match="exceptions name checks"):
+    with pytest.raises(AssertionError, match="exceptions must name checks"):
         StageContract.test_declares_itself(made)

@@ -19,10 +19,10 @@ from damageest.registry.contracts import DEFAULTS
 
 HERE = tempfile.TemporaryDirectory(prefix="damageest-conformance-")
 FOLDER = Path(HERE.name)
-SPECIMEN = _scene.spread(_scene.prism(), 20_000, np.random.default_rng(1))[0]
-write_stl(FOLDER / "prism.stl", _scene.prism())
+SPECIMEN = _scene.sample_points(_scene.make_prism(), 20_000, np.random.default_rng(1))[0]
+write_stl(FOLDER / "prism.stl", _scene.make_prism())
 write_points(FOLDER / "prism.ply", dict(zip("xyz", SPECIMEN.T, strict=True)))
-VOLUME = _scene.prism().volume
+VOLUME = _scene.make_prism().volume
 
 WITH: dict[str, dict[str, Any]] = {
     "part file": {"options": {"path": FOLDER / "prism.stl"}, "volume": VOLUME},

@@ -1,4 +1,10 @@
-"""Readers of point clouds, one module per family of formats, each imported only when a file asks for it."""
+"""Readers of point clouds, with one module per family of formats.
+
+To add a format, add a module here with ``read(path, columns) -> PointFile``. ``columns`` names the columns of text.
+It raises `FormatError` with what is wrong in the file, and imports its library inside ``read``.
+Add a line to READERS: the suffix, and the module's name. `read_points` imports the module when it is needed.
+Add a file of tests in tests/io: a good file, a truncated one, one without points, and one of another format.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +19,10 @@ from damageest.io.files import check_file, raise_environment_fault, shorten_erro
 
 @dataclass(frozen=True)
 class PointFile:
-    """Points (N,3) as the file has them, finite or not; normals (N,3) or None; the unit where the format states one."""
+    """The content of one file.
+
+    ``points`` (N,3), which may be not finite; ``normals`` (N,3) or None; ``unit`` if the file states one, else None.
+    """
 
     points: Floats
     normals: Floats | None = None
@@ -22,7 +31,7 @@ class PointFile:
 
 
 class FormatError(ValueError):
-    """The file is not what its suffix says; the text tells what is wrong with it."""
+    """The file is not a valid file of its format. The message says what is wrong."""
 
 
 READERS = {
@@ -41,11 +50,11 @@ READERS = {
     ".laz": "las",
     ".e57": "e57",
 }
-"""Suffix to the module here whose ``read(path, columns)`` gives a `Cloud`."""
+"""Suffix of a file: the module of this folder that reads it."""
 
 
 def read_points(path: Path, columns: str | None = None) -> PointFile:
-    """The points of one file. Raises InputError, naming the file, where it cannot be read or holds no points."""
+    """The points of one file. Raises InputError, which names the file, if it cannot be read or has no points."""
     suffix = check_file(path, tuple(READERS), "a scan")
     module = importlib.import_module(f"{__name__}.{READERS[suffix]}")
     try:
@@ -54,9 +63,9 @@ def read_points(path: Path, columns: str | None = None) -> PointFile:
         raise InputError(f"{path}: {error}") from None
     except (KeyboardInterrupt, SystemExit, GeneratorExit):
         raise
-    except BaseException as error:  # the readers' libraries raise anything on a broken file, some outside Exception
+    except BaseException as error:  # libraries raise any error on a broken file, some not an Exception
         raise_environment_fault(error)
-        raise InputError(f"{path}: not a readable {suffix} file ({shorten_error(error)})") from None
+        raise InputError(f"{path}: cannot be read as a {suffix} file ({shorten_error(error)})") from None
     if not len(cloud.points):
-        raise InputError(f"{path}: holds no points")
+        raise InputError(f"{path}: has no points")
     return cloud

@@ -1,4 +1,4 @@
-"""E57 (ASTM E2807), by pye57: metres by the standard, any number of scans, each with its pose."""
+"""E57 (ASTM E2807), read by pye57: lengths in metres, any number of scans, each with its pose."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from damageest.io.points import FormatError, PointFile
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """The points of all scans in the file's common frame; those the scanner marked invalid left out."""
+    """The points of all scans in the common frame of the file, without those that are marked as invalid."""
     import pye57
 
     with path.open("rb") as stream:
@@ -22,11 +22,11 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     normals: list[Floats | None] = []
     with pye57.E57(str(path)) as file:
         for index in range(file.scan_count):
-            points, normal = _scan(file, index)
+            points, normal = _read_scan(file, index)
             pieces.append(points)
             normals.append(normal)
     if not pieces:
-        raise FormatError("the E57 file holds no scans")
+        raise FormatError("the E57 file has no scans")
     whole = [n for n in normals if n is not None]
     notes = (f"{len(pieces)} scans in one E57 file",) if len(pieces) > 1 else ()
     return PointFile(
@@ -34,7 +34,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     )
 
 
-def _scan(file: Any, index: int) -> tuple[Floats, Floats | None]:
+def _read_scan(file: Any, index: int) -> tuple[Floats, Floats | None]:
     header = file.get_header(index)
     raw = file.read_scan_raw(index)
     if "cartesianX" in raw:

@@ -1,4 +1,4 @@
-"""LAS and LAZ, by laspy. Coordinates are stored as scaled integers with an offset and come out as float64."""
+"""LAS and LAZ, read by laspy, which converts the stored integers with scale and offset to float64."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from damageest.io.points import FormatError, PointFile
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """All points of the file. LAS states no unit that laspy could give."""
+    """All points of the file. laspy gives no unit."""
     import laspy
 
     size = path.stat().st_size
@@ -21,11 +21,11 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         with laspy.open(stream, closefd=False) as reader:
             count, width = reader.header.point_count, reader.header.point_format.size
             packed = reader.header.are_points_compressed
-            # a header that promises more than the file can hold would only exhaust the memory
+            # a wrong count in the header would fill the memory
             if count * width > size * (1000 if packed else 1):
-                raise FormatError(f"the file is cut short: its {count} points are not all there")
+                raise FormatError(f"the file is truncated: it is too small for the {count} points in its header")
             las = reader.read()
     points = np.column_stack([np.asarray(las.x), np.asarray(las.y), np.asarray(las.z)])
     if len(points) < count:
-        raise FormatError(f"the file is cut short: {len(points)} of {count} points are there")
+        raise FormatError(f"the file is truncated: it has {len(points)} of {count} points")
     return PointFile(points)

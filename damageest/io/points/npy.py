@@ -10,11 +10,11 @@ from damageest.io.points import FormatError, PointFile
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """An array of numbers; never a pickle, which could run code."""
+    """An array of numbers. Pickles are not read, because they can run code."""
     try:
         array = np.load(path, allow_pickle=False)
     except (ValueError, EOFError, OSError) as error:
-        raise FormatError(f"not a readable NumPy array ({error})") from None
+        raise FormatError(f"cannot be read as a NumPy array ({error})") from None
     if (
         not isinstance(array, np.ndarray)
         or array.ndim != 2
@@ -22,5 +22,5 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         or array.dtype.kind not in "fiu"
     ):
         what = f"{array.shape} of {array.dtype}" if isinstance(array, np.ndarray) else "an archive of several arrays"
-        raise FormatError(f"expected an array (N,3), or (N,6) with normals, of numbers; it holds {what}")
+        raise FormatError(f"needs an array of numbers with the shape (N,3), or (N,6) with normals, but holds {what}")
     return PointFile(array[:, :3], array[:, 3:] if array.shape[1] == 6 else None)

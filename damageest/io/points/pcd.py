@@ -8,18 +8,18 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.io.points import FormatError, PointFile
-from damageest.io.points.text import numbers
+from damageest.io.points.text import parse_numbers
 
 _KEYS = ("VERSION", "FIELDS", "COLUMNS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
 
 
-def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
+def _read_header(data: bytes) -> tuple[dict[str, list[str]], int]:
     head: dict[str, list[str]] = {}
     at = 0
     while "DATA" not in head:
         end = data.find(b"\n", at)
         if end < 0 or at > 65536:
-            raise FormatError("the PCD header has no DATA line; not a PCD file, or one cut short")
+            raise FormatError("the PCD header has no DATA line; not a PCD file, or truncated")
         words = data[at:end].decode("latin-1").split()
         at = end + 1
         if not words or words[0].startswith("#"):
@@ -31,9 +31,9 @@ def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """The fields x, y, z and, where there are any, normal_x, normal_y, normal_z."""
+    """The fields x, y, z and, if present, normal_x, normal_y, normal_z."""
     data = path.read_bytes()
-    head, start = _header(data)
+    head, start = _read_header(data)
     try:
         names = head.get("FIELDS") or head["COLUMNS"]
         sizes = [int(s) for s in head["SIZE"]]
@@ -47,13 +47,13 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         ]
         kind = np.dtype(fields)
     except (KeyError, IndexError, ValueError, TypeError):
-        raise FormatError("the PCD header is incomplete or contradicts itself") from None
+        raise FormatError("the PCD header is incomplete or inconsistent") from None
     if not {"x", "y", "z"} <= set(names):
         raise FormatError(f"the PCD file has no fields x, y, z; it has: {', '.join(names)}")
     if points < 0 or any(c < 1 for c in counts):
         raise FormatError("the PCD header gives a negative number")
     if form == "ascii":
-        table = _ascii(data[start:], points, sum(counts))
+        table = _read_ascii(data[start:], points, sum(counts))
         offsets = dict(zip(names, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
 
         def column(name: str) -> Floats:
@@ -61,18 +61,18 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     elif form == "binary":
         have = (len(data) - start) // kind.itemsize
         if have < points:
-            raise FormatError(f"the PCD file is cut short: {have} of {points} points are there")
+            raise FormatError(f"the PCD file is truncated: it has {have} of {points} points")
         rows = np.frombuffer(data, kind, points, start)
 
         def column(name: str) -> Floats:
             return rows[name][:, 0]
     elif form == "binary_compressed":
-        blocks = _compressed(data, start, points, kind)
+        blocks = _read_compressed(data, start, points, kind)
 
         def column(name: str) -> Floats:
             return blocks[name]
     else:
-        raise FormatError(f"PCD data '{form}' is unknown; it may be ascii, binary or binary_compressed")
+        raise FormatError(f"the PCD data format '{form}' is unknown; valid are ascii, binary and binary_compressed")
 
     def stack(*which: str) -> Floats:
         return np.column_stack([column(name).astype(np.float64) for name in which])
@@ -80,8 +80,8 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     wanted = ("normal_x", "normal_y", "normal_z")
     view = head.get("VIEWPOINT", [])
     notes = (
-        ("the PCD file's VIEWPOINT is not applied",)
-        if view and view != _NO_VIEW and any(map(_nonzero, view[:3]))
+        ("the VIEWPOINT of the PCD file is not applied to its points",)
+        if view and view != _NO_VIEW and any(map(_is_nonzero, view[:3]))
         else ()
     )
     return PointFile(stack("x", "y", "z"), stack(*wanted) if set(wanted) <= set(names) else None, notes=notes)
@@ -90,22 +90,22 @@ def read(path: Path, columns: str | None = None) -> PointFile:
 _NO_VIEW = ["0", "0", "0", "1", "0", "0", "0"]
 
 
-def _nonzero(word: str) -> bool:
+def _is_nonzero(word: str) -> bool:
     return word.strip("-+0.eE") != ""
 
 
-def _ascii(data: bytes, points: int, width: int) -> Floats:
-    values = numbers(data)
+def _read_ascii(data: bytes, points: int, width: int) -> Floats:
+    values = parse_numbers(data)
     if len(values) < points * width:
-        raise FormatError(f"the PCD file is cut short: {len(values) // width} of {points} points are there")
+        raise FormatError(f"the PCD file is truncated: it has {len(values) // width} of {points} points")
     return values[: points * width].reshape(points, width)
 
 
-def _compressed(data: bytes, start: int, points: int, kind: np.dtype[np.void]) -> dict[str, Floats]:
-    """The columns of a block that stores one field after the other, packed by LZF."""
+def _read_compressed(data: bytes, start: int, points: int, kind: np.dtype[np.void]) -> dict[str, Floats]:
+    """The columns of a block that is compressed by LZF and holds one field after the other."""
     packed, size = (int.from_bytes(data[start + k : start + k + 4], "little") for k in (0, 4))
     if size != points * kind.itemsize or len(data) < start + 8 + packed:
-        raise FormatError("the PCD file's compressed block is cut short or not of the size its header says")
+        raise FormatError("the compressed block of the PCD file is truncated, or differs in size from its header")
     block = _unpack_lzf(data[start + 8 : start + 8 + packed], size)
     columns, at = {}, 0
     for name in kind.names or ():
@@ -118,7 +118,7 @@ def _compressed(data: bytes, start: int, points: int, kind: np.dtype[np.void]) -
 
 
 def _unpack_lzf(packed: bytes, size: int) -> bytes:
-    """LZF, as liblzf's description of the format has it: runs of literals, and references back of 3 bytes or more."""
+    """Decompresses LZF as defined by liblzf: runs of literals, and references to 3 bytes or more of earlier output."""
     out = bytearray()
     at, end = 0, len(packed)
     try:
@@ -140,11 +140,11 @@ def _unpack_lzf(packed: bytes, size: int) -> bytes:
                 raise IndexError
             if back + length <= len(out):
                 out += out[back : back + length]
-            else:  # the reference runs into what it is writing: its period repeats
+            else:  # the reference overlaps its own output, which repeats periodically
                 period = bytes(out[back:])
                 out += (period * (length // len(period) + 1))[:length]
     except IndexError:
-        raise FormatError("the PCD file's compressed block is damaged") from None
+        raise FormatError("the compressed block of the PCD file is corrupt") from None
     if len(out) != size:
-        raise FormatError("the PCD file's compressed block is damaged")
+        raise FormatError("the compressed block of the PCD file is corrupt")
     return bytes(out)

@@ -1,4 +1,4 @@
-"""Columns of numbers: XYZ, TXT, ASC, PTS, CSV, with any of the usual separators, comments and headers."""
+"""Columns of numbers: XYZ, TXT, ASC, PTS, CSV, with the usual separators, comments and headers."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _NAMES = {
 _NUMBER = re.compile(rb"^[+-]?(\d+\.?\d*([eEdD][+-]?\d+)?|\.\d+([eEdD][+-]?\d+)?|nan|inf(inity)?)$", re.IGNORECASE)
 
 
-def numbers(data: bytes) -> Floats:
-    """All numbers of a text without separators but white space. Raises FormatError at the first that is none."""
+def parse_numbers(data: bytes) -> Floats:
+    """All numbers of a text with white space as separator. Raises FormatError if a word is not a number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         try:
-            return np.fromstring(data.decode("latin-1"), dtype=np.float64, sep=" ")  # the fastest parser numpy has
+            return np.fromstring(data.decode("latin-1"), dtype=np.float64, sep=" ")  # the fastest parser of numpy
         except (DeprecationWarning, ValueError):
             pass
     words = data.split()
@@ -35,43 +35,43 @@ def numbers(data: bytes) -> Floats:
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """Points from the columns x, y, z (and nx, ny, nz), found by header, by ``columns``, or by their number."""
+    """Points from the columns x, y, z (and nx, ny, nz), identified by ``columns``, the header, or their number."""
     data = path.read_bytes()
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         data = data.decode("utf-16", errors="replace").encode("latin-1", errors="replace")
     data = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"\0" in data[:4096]:
-        raise FormatError("not text: it holds binary data")
+        raise FormatError("not a text file: it has binary data")
     if b"#" in data or b"//" in data:
         head = re.search(rb"^\s*(?:#|//)+(.*)$", data[:4096], re.MULTILINE)
-        names = _header(head.group(1)) if head and columns is None else None
+        names = _find_names(head.group(1)) if head and columns is None else None
         data = re.sub(rb"(#|//)[^\n]*", b"", data)
     else:
         names = None
     data, header = _strip_header(data.strip())
     names = header or names
-    data = _plain_separators(data)
+    data = _unify_separators(data)
     first = data.split(b"\n", 1)[0].split()
     if not first:
-        raise FormatError("holds no points")
+        raise FormatError("has no points")
     width = len(first)
-    values = numbers(data)
-    lines = _line_count(data)
+    values = parse_numbers(data)
+    lines = _count_lines(data)
     if len(values) != width * lines:
-        raise FormatError(_ragged(data, width))
+        raise FormatError(_describe_ragged(data, width))
     table = values.reshape(-1, width)
-    return _pick(table, columns.replace(",", " ").split() if columns else names)
+    return _select_columns(table, columns.replace(",", " ").split() if columns else names)
 
 
-def _header(line: bytes) -> list[str] | None:
-    """The columns' names, if the line gives x, y and z among them."""
+def _find_names(line: bytes) -> list[str] | None:
+    """The names of the columns, or None if x, y and z are not among them."""
     bare = re.sub(r"\s*[\[(][^\])]*[\])]|\"", "", line.decode("latin-1").lower())  # without units, as in 'x [mm]'
     found = [_NAMES.get(word, "_") for word in re.split(r"[\s,;]+", bare.strip())]
     return found if {"x", "y", "z"} <= set(found) else None
 
 
 def _strip_header(data: bytes) -> tuple[bytes, list[str] | None]:
-    """The text without its leading lines that are no rows: names of columns, the count of points (PTS)."""
+    """The text without the lines before the first row, and the names of the columns if one of these lines has them."""
     names = None
     for _ in range(3):
         line, _, rest = data.partition(b"\n")
@@ -79,7 +79,7 @@ def _strip_header(data: bytes) -> tuple[bytes, list[str] | None]:
         if len(words) == 1 and words[0].isdigit() and rest.strip():
             data = rest.strip()
         elif words and not all(_NUMBER.match(w) for w in words):
-            names = names or _header(line)
+            names = names or _find_names(line)
             if names is None and any(_NUMBER.match(w) for w in words):
                 word = next(w for w in words if not _NUMBER.match(w))
                 raise FormatError(f"line '{line[:60].decode('latin-1')}': '{word.decode('latin-1')}' is not a number")
@@ -89,39 +89,39 @@ def _strip_header(data: bytes) -> tuple[bytes, list[str] | None]:
     return data, names
 
 
-def _plain_separators(data: bytes) -> bytes:
-    """White space for every separator; with ';' between the numbers a ',' within them is a decimal point."""
+def _unify_separators(data: bytes) -> bytes:
+    """The text with white space for every separator. If ';' is the separator, ',' is the decimal point."""
     if b";" in data:
         return data.replace(b",", b".").replace(b";", b" ")
     return data.replace(b",", b" ")
 
 
-def _line_count(data: bytes) -> int:
+def _count_lines(data: bytes) -> int:
     lines = data.count(b"\n") + 1
     if b"\n\n" in data or re.search(rb"\n[ \t]+\n", data):
         lines = sum(1 for line in data.split(b"\n") if line.strip())
     return lines
 
 
-def _ragged(data: bytes, width: int) -> str:
+def _describe_ragged(data: bytes, width: int) -> str:
     for number, line in enumerate((row for row in data.split(b"\n") if row.strip()), 1):
         if (here := len(line.split())) != width:
-            return f"row {number} has {here} columns where the first has {width}; the file may be cut short"
-    return "rows of unequal length"
+            return f"row {number} has {here} columns, but the first row has {width}; the file may be truncated"
+    return "rows have different numbers of columns"
 
 
-def _pick(table: Floats, names: list[str] | None) -> PointFile:
+def _select_columns(table: Floats, names: list[str] | None) -> PointFile:
     width = table.shape[1]
     if names is not None:
         if not {"x", "y", "z"} <= set(names):
-            raise FormatError(f"columns must name x, y and z; they are: {' '.join(names)}")
+            raise FormatError(f"the columns must include x, y and z; they are: {' '.join(names)}")
         if len(names) > width:
-            raise FormatError(f"{len(names)} columns are named, but the rows have {width}")
+            raise FormatError(f"{len(names)} columns are named, but the rows have {width} columns")
         normals = [names.index(n) for n in ("nx", "ny", "nz")] if {"nx", "ny", "nz"} <= set(names) else None
         return PointFile(table[:, [names.index(n) for n in "xyz"]], None if normals is None else table[:, normals])
     if width < 3:
-        raise FormatError(f"rows have {width} columns; a point needs three: x y z")
-    for start in (3, width - 3):  # normals, not colours: of length 1, and not all in the first octant as colours are
+        raise FormatError(f"the rows have {width} columns; a point needs three: x y z")
+    for start in (3, width - 3):  # normals, not colours: the length is 1
         if start >= 3 and width >= 6:
             tail = table[:, start : start + 3]
             if np.abs(np.linalg.norm(tail[:: max(1, len(tail) // 1000)], axis=1) - 1).max() < 0.02:

@@ -88,7 +88,7 @@ class TestSweep(EncloseContract):
 
 
 def test_several_rims_are_refused() -> None:
-    scene = TestSweep().inputs()
+    scene = TestSweep().make_inputs()
     loop = scene["rims"].loops[0]
     wanted = {name: scene[name] for name in Sweep.needs()}
     with pytest.raises(StageError, match="2 rims"):
@@ -96,7 +96,7 @@ def test_several_rims_are_refused() -> None:
 
 
 def test_intact_points_inside_are_refused() -> None:
-    scene = TestSweep().inputs()
+    scene = TestSweep().make_inputs()
     wanted = {name: scene[name] for name in Sweep.needs()}
     enclosure = Sweep(steepest=89).run(**wanted)
     assert isinstance(enclosure, Mesh)

@@ -74,13 +74,13 @@ def test_a_file_without_unit_is_in_the_jobs_unless_told(tmp_path):
     [
         ("empty.stl", b"", "empty"),
         ("page.stl", b"<html><body>404</body></html>", "web page"),
-        ("short.stl", bytes(80) + (12).to_bytes(4, "little") + bytes(300), "cut short"),
-        ("noise.stl", bytes(range(256)) * 4, "cut short"),
-        ("text.stl", b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0\n", "cut short"),
+        ("short.stl", bytes(80) + (12).to_bytes(4, "little") + bytes(300), "truncated"),
+        ("noise.stl", bytes(range(256)) * 4, "truncated"),
+        ("text.stl", b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0\n", "truncated"),
         ("none.ply", b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", "none.ply"),
-        ("bad.3mf", b"PK\x03\x04 not a zip", "not a readable .3mf"),
+        ("bad.3mf", b"PK\x03\x04 not a zip", "cannot be read as a .3mf"),
         ("bad.obj", b"v 0 0 zero\nf 1 2 3\n", "bad.obj"),
-        ("part.step", b"ISO-10303-21;", "'.step' is not a suffix"),
+        ("part.step", b"ISO-10303-21;", "the format '.step' cannot be read"),
     ],
 )
 def test_what_is_no_mesh_is_refused_with_name_and_valid_suffixes(name, content, says, tmp_path):

@@ -208,8 +208,8 @@ def test_views_are_joined_copies_and_gaps_left_out(tmp_path):
     expected = np.concatenate([np.delete(points, 3, 0), points[3:4], points[:5] + 9])
     np.testing.assert_array_equal(scan.points, expected)
     assert scan.paths == (str(tmp_path / "a.xyz"), str(tmp_path / "b.ply"))
-    assert "left out 1 points whose coordinates are not finite" in scan.notes
-    assert "left out 4 copies of points that are there already" in scan.notes
+    assert "removed 1 points with coordinates that are not finite" in scan.notes
+    assert "removed 4 duplicate points" in scan.notes
 
 
 def test_unit_of_the_files_is_converted_into_the_jobs(tmp_path):
@@ -242,7 +242,7 @@ def test_normals_are_found_in_six_columns_and_by_header_but_colours_are_not(tmp_
     [
         ("empty.ply", b"", "empty"),
         ("page.xyz", b"<!DOCTYPE html><html></html>", "web page"),
-        ("scan.docx", b"PK", "'.docx' is not a suffix"),
+        ("scan.docx", b"PK", "the format '.docx' cannot be read"),
         ("short.ply", ply(np.ones((9, 3)))[:-1], "8 of 9 vertices"),
         ("short.pcd", pcd(np.ones((9, 3)), "binary")[:-1], "8 of 9 points"),
         ("none.ply", ply(np.empty((0, 3))), "no points"),
@@ -269,7 +269,7 @@ def test_missing_file_and_folder_are_named(tmp_path):
 def test_lzf_references_may_overlap_what_they_write():
     # 'a', then 9 more by a reference one byte back: control 7<<5, length byte 0, distance 0
     assert _unpack_lzf(bytes([0, ord("a"), 7 << 5, 0, 0]), 10) == b"a" * 10
-    with pytest.raises(ValueError, match="damaged"):
+    with pytest.raises(ValueError, match="corrupt"):
         _unpack_lzf(bytes([7 << 5, 0, 9]), 10)
 
 
