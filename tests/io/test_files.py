@@ -64,7 +64,7 @@ def test_an_interrupt_stays_one(read_with, error) -> None:
 
 @pytest.mark.parametrize("error", [ValueError("odd"), OSError(5, "Input/output error"), IndexError("7")])
 def test_other_errors_are_the_files(read_with, error) -> None:
-    with pytest.raises(InputError, match=r"a\.ply: not a readable \.ply"):
+    with pytest.raises(InputError, match=r"a\.ply: cannot be read as a \.ply"):
         read_with(error)
 
 
