@@ -1,4 +1,4 @@
-"""Points spread over triangles without a loop over them."""
+"""Spreads points over triangles, and thins them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from damageest.geometry.voxels import number_cubes
 
 
 def spread_points(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats, Ints]:
-    """Points (N,3) on the ``chosen`` of ``triangles`` (F,3,3) and the triangle (N,) of each; gaps up to ``step``.
+    """Points (N,3) on the ``chosen`` (K,) of ``triangles`` (F,3,3), and the triangle (N,) of each; gaps up to ``step``.
 
-    The triangle is cut into bands along its longest edge and the bands into columns; each column has its point in the
-    middle of what of it lies in the triangle, so that thin corners are covered as well as wide ones.
+    Each triangle is divided into bands parallel to its longest edge, and the bands into columns. Each column has one
+    point, in the middle of the part of it that lies in the triangle, so that narrow corners are covered too.
     """
     if not len(chosen):
         return np.empty((0, 3)), np.empty(0, np.int64)
@@ -40,7 +40,7 @@ def spread_points(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats,
     column = np.arange(len(row)) - np.repeat(np.cumsum(columns) - columns, columns)
     of, low, high = of[row], low[row], high[row]
     x = start[row] + (column + 0.5) / columns[row] * width[row]
-    # A lone column of a band leans with the triangle: under the apex it reaches highest.
+    # In a band of one column the point is below the apex, where the triangle is highest.
     x = np.where(columns[row] == 1, np.clip(apex[of], start[row], start[row] + width[row]), x)
     left, right = apex[of], base[of] - apex[of]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -52,13 +52,15 @@ def spread_points(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats,
 
 
 def thin(points: Floats, apart: float, reach: float) -> Ints:
-    """Indices (sorted) of a subset of ``points`` (N,3), about ``apart`` from one another; every point is within
-    ``reach`` >= ``apart`` of a kept one. Deterministic: ties are broken by a seeded shuffle."""
+    """Sorted indices of a subset of ``points`` (N,3), about ``apart`` from each other.
+
+    Each point is within ``reach`` >= ``apart`` of a point of the subset. The same points give the same subset.
+    """
     from scipy.spatial import cKDTree
 
     if not len(points):
         return np.empty(0, np.int64)
-    # Very fine meshes are first brought down to a few points per disc, else the pairs of points fill the memory.
+    # First keep few points per disc: on very fine meshes the pairs of points would not fit in memory.
     todo = _pick_one_per_cell(points, 0.4 * apart)
     kept = np.empty(0, np.int64)
     while len(todo):
@@ -69,6 +71,7 @@ def thin(points: Floats, apart: float, reach: float) -> Ints:
 
 
 def _pick_one_per_cell(points: Floats, cell: float, among: Ints | None = None) -> Ints:
+    """Sorted indices of one point for each occupied cell of a grid, of the points ``among`` (all by default)."""
     among = np.arange(len(points)) if among is None else among
     if not len(among):
         return among
@@ -77,22 +80,22 @@ def _pick_one_per_cell(points: Floats, cell: float, among: Ints | None = None) -
 
 
 def _pick_apart(points: Floats, distance: float) -> Ints:
-    """A maximal set of points no two of which are closer than ``distance``: rounds in which local minima of a random
-    rank win and their neighbours leave (Luby 1986)."""
+    """Indices of a maximal set of points, no two closer than ``distance``, by rounds: points whose random rank is lower
+    than that of all neighbours are chosen, and their neighbours removed (Luby 1986)."""
     from scipy.spatial import cKDTree
 
     pairs = cKDTree(points).query_pairs(distance, output_type="ndarray")
     rank = np.random.default_rng(0).permutation(len(points))
     chosen = np.zeros(len(points), bool)
-    open_ = np.ones(len(points), bool)
-    while open_.any():
+    undecided = np.ones(len(points), bool)
+    while undecided.any():
         lowest = rank.copy()
         np.minimum.at(lowest, pairs[:, 0], rank[pairs[:, 1]])
         np.minimum.at(lowest, pairs[:, 1], rank[pairs[:, 0]])
-        winners = open_ & (lowest == rank)
-        chosen |= winners
-        open_ &= ~winners
-        open_[pairs[winners[pairs[:, 0]], 1]] = False
-        open_[pairs[winners[pairs[:, 1]], 0]] = False
-        pairs = pairs[open_[pairs].all(axis=1)]
+        lowest_here = undecided & (lowest == rank)
+        chosen |= lowest_here
+        undecided &= ~lowest_here
+        undecided[pairs[lowest_here[pairs[:, 0]], 1]] = False
+        undecided[pairs[lowest_here[pairs[:, 1]], 0]] = False
+        pairs = pairs[undecided[pairs].all(axis=1)]
     return np.flatnonzero(chosen)

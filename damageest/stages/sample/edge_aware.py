@@ -1,4 +1,4 @@
-"""Uniform CAD points on faces, and exactly on sharp edges and corners (paper 3.1 step 1)."""
+"""Samples on faces, and exactly on sharp edges and corners (paper 3.1 step 1)."""
 
 from __future__ import annotations
 
@@ -14,21 +14,26 @@ from damageest.stages.sample._edges import place_sharp_points
 from damageest.stages.sample._spread import spread_points, thin
 
 FINE = 0.4
-"""Step of the candidates on faces too small for a lattice of their own, in units of the spacing."""
+"""Step of the first points on faces that are too small for a grid of their own, in spacings."""
 
 
 class EdgeAware(Sample):
-    """Points on the faces, plus points exactly on sharp edges and corners. Deterministic."""
+    """Points on the faces, and points exactly on sharp edges and corners; no random draws."""
 
     use: Literal["edge_aware"] = "edge_aware"
     spacing: float = Field(
-        1.0, gt=0, description="largest distance from the surface to its nearest point, in tolerances"
+        1.0, gt=0, description="largest distance from any place of the surface to the nearest point, in tolerances"
     )
     angle: float = Field(
-        30.0, gt=0, lt=180, description="an edge whose faces turn by more than this is sharp, in degrees"
+        30.0,
+        gt=0,
+        lt=180,
+        description="an edge is sharp where the normals of its faces differ by more than this, in degrees",
     )
     max_points: int = Field(
-        400_000, ge=1000, description="where the spacing would need more points than this, it is enlarged and says so"
+        400_000,
+        ge=1000,
+        description="largest number of points; where the spacing would need more, the spacing is enlarged",
     )
 
     def run(self, part: Part, tolerance: float) -> Samples:
@@ -39,7 +44,7 @@ class EdgeAware(Sample):
         area = part.area
         if not area > 0:
             raise InputError("the part's surface has no area; check the file it was read from")
-        # a lattice on each triangle takes a quarter more points than one on all would, at least
+        # one grid per triangle needs at least a quarter more points than one grid over all
         spacing = max(self.spacing * tolerance, float(np.sqrt(1.25 * area / self.max_points)))
         while True:
             samples = _sample(part, spacing, self.angle)
@@ -54,12 +59,12 @@ def _sample(part: Mesh, spacing: float, angle: float) -> Samples:
     cross = part.cross
     double_area = np.linalg.norm(cross, axis=1)
     longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
-    # A flat triangle holds next to nothing that its neighbours' points do not cover, and it has no normal.
-    sound = double_area > 1e-12 * part.diagonal * longest
-    # One lattice per triangle wastes points where triangles are small or thin: those share a thinned set of candidates.
-    roomy = sound & (double_area > 0.5 * spacing * longest) & (longest > spacing)
-    points, face = spread_points(triangles, np.flatnonzero(roomy), spacing)
-    fine, fine_face = spread_points(triangles, np.flatnonzero(sound & ~roomy), FINE * spacing)
+    # A triangle without area has no normal, and the points of its neighbours cover it.
+    usable = double_area > 1e-12 * part.diagonal * longest
+    # One grid per triangle wastes points on small or thin triangles: these share one thinned set of points.
+    large = usable & (double_area > 0.5 * spacing * longest) & (longest > spacing)
+    points, face = spread_points(triangles, np.flatnonzero(large), spacing)
+    fine, fine_face = spread_points(triangles, np.flatnonzero(usable & ~large), FINE * spacing)
     kept = thin(fine, 0.5 * spacing, (1 - FINE) * spacing)
     edge_points, edge_normals, edge_face, edge_kind = place_sharp_points(part, spacing, angle)
     faces = np.concatenate([face, fine_face[kept]])

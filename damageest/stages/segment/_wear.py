@@ -1,9 +1,9 @@
-"""Wear shallower than the tolerance: seen in the distance averaged over neighbours, not in single points.
+"""Finds wear shallower than the tolerance: the mean distance over neighbours shows it, single points do not.
 
-The tolerance has to be as wide as the noise of a single point, some four standard deviations. The mean over k
-neighbours on the same face has a k-th of the noise's variance, so it shows wear of three standard deviations, or two,
-as plainly as single points show a pit. What limits it is no longer the noise but what is common to whole faces: the
-error of the pose, the part's own deviations from the CAD, the chords of its triangles.
+The tolerance must cover the noise of a single point, about four standard deviations. The mean over k neighbours on the
+same face has 1/k of the variance, so it shows wear of two or three standard deviations as clearly as single points show
+a pit. The limit is then set by errors that are common to whole faces: the error of the pose, deviations of the part
+from its CAD model, the chords of the triangles.
 """
 
 from __future__ import annotations
@@ -19,33 +19,33 @@ from damageest.geometry.voxels import CHUNK, number_cubes, number_faced_cubes
 Flags = NDArray[np.bool_]
 
 NEIGHBOURS = 48
-"""Points averaged for the verdict on one."""
+"""Largest number of points that a mean is taken over."""
 MIN_NEIGHBOURS = 12
-"""With fewer of them, there is no verdict."""
+"""Smallest number of points that a mean is taken over."""
 REACH = 6.0
-"""How far the neighbours may lie, in spacings of the scan: an even scan has twice as many as asked for there."""
+"""Largest distance of the neighbours, in spacings of the scan: an even scan has twice `NEIGHBOURS` points there."""
 SAME_FACE = 0.6
-"""Neighbours' normals differ by less than this, as a vector; 35 degrees."""
+"""Largest length of the difference between the normals of neighbours; 35 degrees."""
 CUBE = 4.0
-"""Edge of the cubes that are averaged first, in spacings: some thirteen points on a face."""
-NOISE_SHARE = 2.5
-"""Standard deviations of the noise that a tolerance is meant to cover and a mean need not keep clear of. A tolerance of
-four leaves one and a half: half the depth of wear of three, so that its rim comes out where it is."""
+"""Edge of the cubes that are averaged first, in spacings: about thirteen points on a face."""
+COVERED_NOISE = 2.5
+"""Standard deviations of the noise that the threshold of a mean may be below the tolerance. A tolerance of four gives a
+threshold of 1.5: half the depth of wear of three, so that its rim is found in the right place."""
 MIN_THRESHOLD = 0.35
-"""Least threshold in tolerances, whatever the noise: it keeps clear of the pose's error."""
+"""Smallest threshold, in tolerances, at any noise; it must be above the error of the pose."""
 SAFETY = 2.0
-"""How many times what deviates outward, where nothing is worn, wear has to deviate inward."""
+"""How many times deeper wear must be than the outward deviation of intact surface."""
 NOISE = 2.0
-"""Standard deviations that are taken for noise where neighbours are looked for."""
+"""Standard deviations of a distance that are removed as noise before neighbours are searched."""
 MIN_SIGMAS = 4.0
-"""Standard deviations below which a cube's mean is not by chance: of a million cubes, at thirty."""
+"""Standard deviations below which the mean of a cube is significant; by chance, thirty in a million cubes are."""
 MIN_REGION = 100
-"""Points of a worn region at least."""
+"""Smallest number of points of a worn region."""
 
 
 @dataclass(frozen=True, eq=False)
 class Wear:
-    """``worn`` (N,) points, the ``threshold`` that their averaged distance was held against, and ``notes``."""
+    """``worn`` (N,): whether each point is worn; ``threshold``: depth of the mean from which it is; ``notes``."""
 
     worn: Flags
     threshold: float
@@ -53,33 +53,37 @@ class Wear:
 
 
 def find_wear(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance: float) -> Wear:
-    """Which points lie in a region whose averaged distance shows it worn.
+    """Finds the points in regions whose mean distance shows wear.
 
     Args:
-        distance, face: (N,) of the scan's points, as in a Deviation. tolerance: lambda, in the job's unit.
+        aligned: the scan, N points, with noise and spacing measured.
+        part: the part as designed.
+        distance: (N,) signed distances, positive outside, in the job's unit.
+        face: (N,) nearest triangle of the part.
+        tolerance: distance from which a single point is damage.
     """
     none = np.zeros(len(distance), bool)
-    # Without those that the noise takes beyond the tolerance, the mean would be too shallow.
+    # Also points that noise moves beyond the tolerance: without them the mean would be too shallow.
     some = np.flatnonzero(np.abs(distance) < tolerance + 3 * aligned.noise)
     if not (aligned.noise and aligned.spacing) or len(some) < MIN_REGION:
         return Wear(none, tolerance)
     points, depth = aligned.points[some], distance[some]
     cross = part.cross[face[some]]
     normals = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
-    # Neighbours along the surface: where points lie closer than the noise, the nearest in space are as deep as oneself.
-    # Only by what is noise: beside a rim, points on the damage stay as far off as they lie deeper than that.
+    # Neighbours are searched along the surface: in a dense scan the nearest points in space have the same noise.
+    # Only noise is removed from the positions: points deeper than that stay apart from those beside the rim.
     noise = NOISE * aligned.noise
     points = points - np.clip(depth, -noise, noise)[:, None] * normals
 
     cube, group, mean, count = _average_cubes(points, normals, depth, CUBE * aligned.spacing)
     left = _measure_remaining(mean[count >= MIN_NEIGHBOURS], count[count >= MIN_NEIGHBOURS], aligned.noise)
-    usual = max(tolerance - NOISE_SHARE * aligned.noise, MIN_THRESHOLD * tolerance, 1.5 * part.tessellation_error)
-    threshold = max(usual, SAFETY * left)
+    base = max(tolerance - COVERED_NOISE * aligned.noise, MIN_THRESHOLD * tolerance, 1.5 * part.tessellation_error)
+    threshold = max(base, SAFETY * left)
     notes: tuple[str, ...] = ()
-    if threshold > usual:
+    if threshold > base:
         notes = (
-            f"sound surface lies up to {left:.3g} off the part over whole areas (pose, or the part's own form): wear "
-            f"shallower than {min(threshold, tolerance):.3g} is not told from it",
+            f"intact surface deviates by up to {left:.3g} from the part over whole areas (error of the pose, or of the "
+            f"form of the part): wear shallower than {min(threshold, tolerance):.3g} cannot be distinguished from it",
         )
     if threshold >= tolerance:
         return Wear(none, threshold, notes)
@@ -100,15 +104,19 @@ def find_wear(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance
 
 
 def _average_cubes(points: Floats, normals: Floats, depth: Floats, edge: float) -> tuple[Ints, Ints, Floats, Ints]:
-    """Cubes (C,3) that hold points of one of six directions, the cube of each point (N,), and of each cube the mean
-    ``depth`` and the number of its points (C,)."""
+    """Averages over cubes, with the points of each of six directions of the normal apart.
+
+    Returns:
+        The cells (C,3) of the cubes, the cube (N,) of each point, the mean ``depth`` (C,) of each cube and the number
+        (C,) of its points.
+    """
     cell, key = number_faced_cubes(points, normals, edge)
     _, first, group, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
     return cell[first], group, np.bincount(group, weights=depth) / count, count
 
 
 def _measure_remaining(mean: Floats, count: Ints, noise: float) -> float:
-    """How far sound surface deviates outward over whole cubes, where nothing is worn: what the fit leaves."""
+    """How far intact surface deviates outward over whole cubes: the error that the alignment leaves."""
     outward = mean > 0
     if outward.sum() < 10:
         return 0.0
@@ -118,7 +126,7 @@ def _measure_remaining(mean: Floats, count: Ints, noise: float) -> float:
 
 
 def _count_cubes_away(cube: Ints, low: Flags) -> Floats:
-    """(C,) how many cubes the nearest ``low`` one is away, centre to centre."""
+    """(C,) distance from each cube to the nearest ``low`` one, between centres, in cubes."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(cube[low]).query(cube, distance_upper_bound=4.0, workers=2)[0])
@@ -127,10 +135,13 @@ def _count_cubes_away(cube: Ints, low: Flags) -> Floats:
 def _average_neighbours(
     points: Floats, normals: Floats, depth: Floats, asked: Ints, around: Ints, reach: float
 ) -> tuple[Floats, Ints]:
-    """Mean depth (A,) of the nearest points ``around`` the ``asked`` ones on the same face, and how many they are."""
+    """Mean depth (A,) of the nearest points on the same face, and their number (A,).
+
+    ``asked`` (A,): points to find it for; ``around`` (B,): points to average; ``reach``: largest distance.
+    """
     from scipy.spatial import cKDTree
 
-    # Direction as a fourth to sixth coordinate: across an edge or a thin wall nothing is near.
+    # The normal is the fourth to sixth coordinate: points across an edge or a thin wall are then not near.
     place = np.concatenate([points, reach / SAME_FACE * normals], axis=1)
     count = min(NEIGHBOURS, len(around))
     tree = cKDTree(place[around])
@@ -145,7 +156,7 @@ def _average_neighbours(
 
 
 def _is_in_region(points: Floats, link: float) -> Flags:
-    """(M,) which of the points lie in a region, with the gaps that a ``link`` bridges, that has enough of them."""
+    """(M,) whether each point lies in a region of enough points; gaps up to ``link`` connect."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree

@@ -1,4 +1,4 @@
-"""Distance of each scan point to the CAD points, as in the paper (3.1 step 4, 3.2)."""
+"""Distance of each scan point to the samples of the part, as in the paper (3.1 step 4, 3.2)."""
 
 from __future__ import annotations
 
@@ -12,15 +12,19 @@ from damageest.errors import StageError
 from damageest.stages.segment import Segment
 
 NEAREST = 12
-"""CAD points looked at for each scan point: those round it on a face, and some of the next face at an edge."""
+"""Number of nearest samples used for each scan point: those around it on a face, and some of the next face at an
+edge."""
 PLAIN_SPACING, TANGENT_SPACING = 0.5, 2.0
-"""Most of the CAD points' spacing, in thresholds. At the paper's bound of 1 the gap alone may use up all of a plain
-distance's threshold; discs cover the gaps on faces, and miss what is as shallow as the threshold only beside edges."""
+"""Largest spacing of the samples, in thresholds. At the paper's bound of 1, the gap between samples alone may be as
+large as the threshold of a plain distance. Discs cover the gaps on faces; damage as shallow as the threshold is then
+missed beside edges only."""
 
 
 class CloudDistance(Segment):
-    """Distance to the CAD points instead of the triangles (the paper's one-sided Hausdorff distance), signed by their
-    normals."""
+    """Distance to samples of the part instead of triangles, signed by their normals.
+
+    This is the one-sided Hausdorff distance of the paper.
+    """
 
     use: Literal["cloud_distance"] = "cloud_distance"
     threshold: float = Field(
@@ -28,26 +32,26 @@ class CloudDistance(Segment):
     )
     measure: Literal["tangent", "plain"] = Field(
         "tangent",
-        description="tangent: to flat discs round the CAD points, as wide as their spacing; plain: to the points "
-        "themselves, which needs them at half the threshold (sample: {use: edge_aware, spacing: 0.5})",
+        description="tangent: distance to flat discs around the samples, with their spacing as radius; plain: distance "
+        "to the samples, which must be at most half a threshold apart (sample: {use: edge_aware, spacing: 0.5})",
     )
 
     def run(self, aligned: Scan, samples: Samples, tolerance: float) -> Deviation:
-        """Distance (N,), positive outside, in the job's unit; triangle (N,) of the CAD point it is to; label (N,).
+        """Distance (N,), positive outside, in the job's unit; triangle (N,) of the nearest sample; label (N,).
 
-        With s the spacing of the CAD points and d the true distance: 'plain' gives up to sqrt(d^2 + s^2), too much;
-        'tangent' is right on flat faces, off by up to s^2 / 2R where the radius of curvature is R, and too small
-        beside an edge, on its outer side if convex and its inner side if concave, but never below
-        sqrt(p^2 - s^2) for a plain distance of p.
-        Raises StageError where the CAD points lie too far apart for the threshold.
+        With s the spacing of the samples and d the true distance: 'plain' gives up to sqrt(d^2 + s^2), which is too
+        large. 'tangent' is exact on flat faces and has an error of up to s^2 / 2R where the radius of curvature is R.
+        Beside an edge it is too small, outside a convex one and inside a concave one, but never below
+        sqrt(p^2 - s^2) where the plain distance is p.
+        Raises StageError where the samples are too far apart for the threshold.
         """
         limit = self.threshold * tolerance
         widest = (TANGENT_SPACING if self.measure == "tangent" else PLAIN_SPACING) * limit
         if samples.spacing > widest * (1 + 1e-9):
             raise StageError(
-                f"the CAD points are {samples.spacing:.4g} apart, too coarse for a threshold of {limit:.4g} by the "
-                f"{self.measure} distance, which takes {widest:.4g} at most",
-                "sample.spacing smaller (or sample.max_points larger), segment.measure: tangent, or segment: "
+                f"the samples of the part are {samples.spacing:.4g} apart, too coarse for a threshold of {limit:.4g}: "
+                f"the {self.measure} distance needs {widest:.4g} at most",
+                "use a smaller sample.spacing (or a larger sample.max_points), segment.measure: tangent, or segment: "
                 "mesh_distance",
             )
         distance, face = cloud_distance(aligned.points, samples, self.measure == "plain")
@@ -58,12 +62,15 @@ class CloudDistance(Segment):
 
 
 def cloud_distance(points: Floats, samples: Samples, plain: bool = False) -> tuple[Floats, Ints]:
-    """Signed distance (N,) of ``points`` (N,3) to CAD points, and the triangle (N,) of the one that it is to."""
+    """Signed distance (N,) of ``points`` (N,3) to samples of the part, and the triangle (N,) of the nearest one.
+
+    ``plain``: to the samples themselves; else to flat discs around them.
+    """
     from scipy.spatial import cKDTree
 
     if not len(points):
         return np.empty(0), np.empty(0, np.int64)
-    # Those on edges have normals of neither face; the faces' own points tell sides apart.
+    # Samples on edges have normals of neither face; only samples on faces give the sign.
     flat = np.flatnonzero(samples.kind == 0)
     flat = flat if len(flat) else np.arange(len(samples.points))
     tree = cKDTree(samples.points[flat])
@@ -74,28 +81,30 @@ def cloud_distance(points: Floats, samples: Samples, plain: bool = False) -> tup
         far, index = (np.reshape(a, (-1, count)) for a in tree.query(points[part], k=count, workers=2))
         distance[part], face[part] = _sign_distance(points[part], samples, far, flat[index], plain)
     if len(flat) < len(samples.points):
-        # An edge's own points bound the distance from above.
+        # The distance to a sample on an edge is an upper bound.
         edge, _ = cKDTree(samples.points[samples.kind > 0]).query(points, workers=2)
         distance = np.sign(distance) * np.minimum(np.abs(distance), edge)
     return distance, face
 
 
 def _sign_distance(points: Floats, samples: Samples, far: Floats, index: Ints, plain: bool) -> tuple[Floats, Ints]:
-    """As `cloud_distance`, from the distances ``far`` and indices (N,K) of the nearest CAD points, nearest first."""
+    """As `cloud_distance`, from the distances ``far`` and indices (N,K) of the nearest samples, nearest first."""
     height = np.einsum("ikj,ikj->ik", points[:, None] - samples.points[index], samples.normals[index])
-    # The foot on the true surface has a CAD point within the spacing: one of these, for a face that is flat.
-    may = far**2 <= far[:, :1] ** 2 + samples.spacing**2
+    # The closest point of a flat face has a sample within the spacing: one of these.
+    candidate = far**2 <= far[:, :1] ** 2 + samples.spacing**2
     rows = np.arange(len(points))
-    # Beside an edge several faces are about as near; the one seen most squarely has the side right.
-    square = np.where(may, np.abs(height) / np.maximum(far, 1e-300), -1).argmax(axis=1)
+    # Beside an edge several faces are about equally near; the one with the most perpendicular view gives the right
+    # sign.
+    square = np.where(candidate, np.abs(height) / np.maximum(far, 1e-300), -1).argmax(axis=1)
     sign = np.where(height[rows, square] < 0, -1.0, 1.0)
     if plain:
         return sign * far[:, 0], samples.face[index[:, 0]]
     lateral = np.sqrt(np.maximum(far**2 - height**2, 0))
-    # Seen from afar, the disc of a face nearly edge on reaches out beyond its edge; close by, no face is seen squarely.
+    # From far away, the disc of a face seen at a flat angle extends beyond its edge; close by, no view is
+    # perpendicular.
     cosine = np.abs(height) / np.maximum(far, 1e-300)
-    may &= (cosine >= 0.7 * cosine[rows, square][:, None]) | (far[:, :1] < 1.2 * samples.spacing)
-    disc = np.where(may, np.hypot(height, np.maximum(lateral - samples.spacing, 0)), np.inf)
+    candidate &= (cosine >= 0.7 * cosine[rows, square][:, None]) | (far[:, :1] < 1.2 * samples.spacing)
+    disc = np.where(candidate, np.hypot(height, np.maximum(lateral - samples.spacing, 0)), np.inf)
     best = disc.argmin(axis=1)
     least = np.sqrt(np.maximum(far[:, 0] ** 2 - samples.spacing**2, 0))
     return sign * np.clip(disc[rows, best], least, far[:, 0]), samples.face[index[rows, best]]

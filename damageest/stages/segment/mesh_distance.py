@@ -1,4 +1,4 @@
-"""Exact signed distance of each scan point to the part's triangles (paper 3.1 step 4, its exact variant)."""
+"""Exact signed distance of each scan point to the triangles of the part (paper 3.1 step 4)."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from damageest.geometry.distance_by_cells import signed_distance_by_cells
 from damageest.stages.segment import Segment
 from damageest.stages.segment._wear import find_wear
 
-MAX_SINGLE = 100_000
-"""Scan points beyond which not each of them is searched for."""
+MIN_FOR_CELLS = 100_000
+"""Number of scan points above which distances are computed by cells of a grid, not for each point."""
 
 
 class MeshDistance(Segment):
-    """Signed distance to the triangles themselves, so no CAD sampling limits it."""
+    """Signed distance to the triangles of the part, exact, and a search for shallow wear."""
 
     use: Literal["mesh_distance"] = "mesh_distance"
     threshold: float = Field(
         1.0, gt=0, description="distance from the part beyond which a point is damage or added metal, in tolerances"
     )
     wear: bool = Field(
-        True, description="also label as damage what is worn by less than that, where the mean over neighbours shows it"
+        True, description="also label shallower wear as damage, where the mean distance over neighbours shows it"
     )
 
     def run(self, aligned: Scan, part: Part, tolerance: float) -> Deviation:
         """Distance (N,), positive outside, in the job's unit; nearest triangle (N,); label (N,)."""
         limit = self.threshold * tolerance
-        if len(aligned.points) > max(MAX_SINGLE, 4 * len(part.faces)):
+        if len(aligned.points) > max(MIN_FOR_CELLS, 4 * len(part.faces)):
             points, near = aligned.points, 0.5 * min(limit, tolerance)
             distance, face = signed_distance_by_cells(points, part, near, lambda some: signed_distance(some, part))
         else:

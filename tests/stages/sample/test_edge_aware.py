@@ -78,7 +78,7 @@ def test_finely_tessellated_rim_is_not_sampled_at_every_vertex() -> None:
     assert cKDTree(rim).query(on_rim)[0].max() <= 1.0
 
 
-def test_the_count_is_bounded_and_the_spacing_says_so() -> None:
+def test_the_count_is_bounded_and_the_spacing_is_enlarged() -> None:
     mesh = PARTS["strips"]()
     samples = EdgeAware(max_points=5000).run(as_part(mesh), 0.01)
     assert len(samples.points) <= 5000

@@ -55,7 +55,7 @@ def test_points_lie_inside_their_faces_and_normals_agree() -> None:
     assert (np.isclose(np.abs(samples.points), [20, 15, 5]).sum(axis=1) == 1).all()  # none on an edge
 
 
-def test_the_count_is_bounded_and_the_spacing_says_so() -> None:
+def test_the_count_is_bounded_and_the_spacing_is_enlarged() -> None:
     mesh = PARTS["strips"]()
     samples = Uniform(max_points=5000).run(as_part(mesh), 0.01)
     assert len(samples.points) <= 5000

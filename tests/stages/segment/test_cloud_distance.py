@@ -1,4 +1,4 @@
-"""Distances to CAD points against exact ones, on faces, at edges and on curved parts."""
+"""Distances to samples compared with exact ones, on faces, at edges and on curved parts."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_flat_faces_are_exact_and_the_sign_holds_at_edges(sampler: type) -> None
     assert np.percentile(np.abs(np.abs(got.distance) - np.abs(exact)), 99.9) < tolerance
 
 
-def test_plain_is_the_distance_to_the_points_and_wants_them_dense() -> None:
+def test_plain_is_the_distance_to_the_points_and_needs_them_dense() -> None:
     part, tolerance = box(), 0.5
     points = around(part, 2.0)
     with pytest.raises(StageError, match="too coarse") as caught:

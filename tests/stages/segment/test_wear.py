@@ -1,4 +1,4 @@
-"""Wear within the tolerance, on a plate and a box whose worn points are known."""
+"""Wear within the tolerance, on parts whose worn points are known."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def plate() -> Part:
     return Part(mesh.vertices, mesh.faces)
 
 
-def scanned(shift: float = 0.0, bend: float = 0.0) -> Floats:
+def scan_plate(shift: float = 0.0, bend: float = 0.0) -> Floats:
     """Points (N,3) on both faces of the thin plate, upper ones first, with noise; moved up, or bent in waves."""
     rng = np.random.default_rng(3)
     count = int(PER_AREA * SIZE[0] * SIZE[1])
@@ -39,73 +39,73 @@ def scanned(shift: float = 0.0, bend: float = 0.0) -> Floats:
     return np.column_stack([xy, z]) + rng.normal(0, SIGMA, (2 * count, 3))
 
 
-def found(points: Floats, tolerance: float = TOLERANCE) -> Wear:
+def find(points: Floats, tolerance: float = TOLERANCE) -> Wear:
     scan = Scan(points, noise=SIGMA, spacing=1.1 / np.sqrt(PER_AREA))
     distance, face = signed_distance(points, plate())
     return find_wear(scan, plate(), distance, face, tolerance)
 
 
-def worn_patch(depth: float) -> tuple[Floats, np.ndarray]:
+def make_worn_patch(depth: float) -> tuple[Floats, np.ndarray]:
     """The plate with a patch of its upper face lowered, and which points those are."""
-    points = scanned()
+    points = scan_plate()
     patch = (np.abs(points[:, 0] + 8) < 6) & (np.abs(points[:, 1]) < 8) & (points[:, 2] > 0)
     points[patch, 2] -= depth
     return points, patch
 
 
 @pytest.mark.parametrize(("depth", "share"), [(2.0, 0.85), (3.0, 0.94), (4.0, 0.97)])
-def test_wear_within_the_tolerance_is_seen(depth: float, share: float) -> None:
-    points, patch = worn_patch(depth * SIGMA)
+def test_wear_within_the_tolerance_is_find(depth: float, share: float) -> None:
+    points, patch = make_worn_patch(depth * SIGMA)
     alone = signed_distance(points, plate())[0] < -TOLERANCE
-    assert alone[patch].mean() < 0.55  # what single points show of it
-    result = found(points)
+    assert alone[patch].mean() < 0.55  # by single points
+    result = find(points)
     seen = result.worn | alone
     assert seen[patch].mean() > share
-    # What is deeper than twice the threshold shows a little beyond its rim.
+    # Wear deeper than twice the threshold is found slightly beyond its rim.
     assert result.worn[~patch].sum() < 0.05 * patch.sum()
 
 
-def test_its_rim_comes_out_where_it_is() -> None:
-    points, patch = worn_patch(3 * SIGMA)
-    seen = found(points).worn | (signed_distance(points, plate())[0] < -TOLERANCE)
+def test_its_rim_is_in_the_right_place() -> None:
+    points, patch = make_worn_patch(3 * SIGMA)
+    seen = find(points).worn | (signed_distance(points, plate())[0] < -TOLERANCE)
     assert seen.sum() == pytest.approx(patch.sum(), rel=0.03)
 
 
 def test_the_other_face_of_a_thin_wall_is_not_worn() -> None:
-    points, _ = worn_patch(3 * SIGMA)
-    assert not found(points).worn[len(points) // 2 :].any()
+    points, _ = make_worn_patch(3 * SIGMA)
+    assert not find(points).worn[len(points) // 2 :].any()
 
 
-def test_nothing_is_worn_on_a_sound_plate() -> None:
-    result = found(scanned())
+def test_nothing_is_worn_on_an_intact_plate() -> None:
+    result = find(scan_plate())
     assert not result.worn.any()
     assert result.threshold == pytest.approx(1.5 * SIGMA)
     assert not result.notes
 
 
 @pytest.mark.parametrize(("shift", "bend"), [(1.8, 0.0), (0.0, 2.0), (2.5, 1.0)])
-def test_what_pose_or_form_leave_is_not_wear(shift: float, bend: float) -> None:
-    result = found(scanned(shift * SIGMA, bend * SIGMA))
+def test_errors_of_pose_or_form_are_not_wear(shift: float, bend: float) -> None:
+    result = find(scan_plate(shift * SIGMA, bend * SIGMA))
     assert not result.worn.any()
     assert "over whole areas" in result.notes[0]
 
 
-def test_a_tolerance_wider_than_the_noise_asks_for_is_kept_to() -> None:
-    points, patch = worn_patch(5 * SIGMA)
-    assert not found(points, 10 * SIGMA).worn.any()
-    assert found(points, 5 * SIGMA).worn[patch].mean() > 0.9
+def test_a_tolerance_wider_than_the_noise_needs_is_respected() -> None:
+    points, patch = make_worn_patch(5 * SIGMA)
+    assert not find(points, 10 * SIGMA).worn.any()
+    assert find(points, 5 * SIGMA).worn[patch].mean() > 0.9
 
 
-def test_too_few_points_are_no_wear() -> None:
-    points, patch = worn_patch(3 * SIGMA)
+def test_too_few_points_are_not_wear() -> None:
+    points, patch = make_worn_patch(3 * SIGMA)
     few = patch & (np.abs(points[:, 0] + 8) < 1) & (np.abs(points[:, 1]) < 1)
     points[patch & ~few, 2] += 3 * SIGMA
     assert few.sum() > 30
-    assert not found(points).worn.any()
+    assert not find(points).worn.any()
 
 
 def test_the_option_turns_it_off() -> None:
-    points, patch = worn_patch(3 * SIGMA)
+    points, patch = make_worn_patch(3 * SIGMA)
     scan = Scan(points, noise=SIGMA, spacing=1.1 / np.sqrt(PER_AREA))
     with_wear, without = (
         MeshDistance(wear=on).run(scan, plate(), TOLERANCE).label[patch] == DAMAGE for on in (True, False)
@@ -114,8 +114,8 @@ def test_the_option_turns_it_off() -> None:
     assert 0.05 < without.mean() < 0.3
 
 
-def test_an_unmeasured_scan_is_left_alone() -> None:
-    points, _ = worn_patch(3 * SIGMA)
+def test_without_measured_noise_nothing_is_worn() -> None:
+    points, _ = make_worn_patch(3 * SIGMA)
     plain = MeshDistance(wear=False).run(Scan(points), plate(), TOLERANCE).label
     assert np.array_equal(MeshDistance().run(Scan(points), plate(), TOLERANCE).label, plain)
 
@@ -150,7 +150,7 @@ def test_volume_of_wear_of_three_sigma(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["cuboid", "coupling", "blade"])
-def test_sound_parts_have_no_site(name: str) -> None:
+def test_intact_parts_have_no_site(name: str) -> None:
     scan = Simulate.model_validate({"points": 150_000, "density": 0.4}).run("mm", PARTS[name]())
     result = damageest.run({"version": 1, "align": "icp"}, part=PARTS[name](), scan=scan)
     assert not result.sites
