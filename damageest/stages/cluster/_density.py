@@ -1,4 +1,4 @@
-"""Density clustering with bounded memory."""
+"""Density clustering (DBSCAN) with bounded memory."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from damageest.artefacts import Floats, Ints
 from damageest.geometry.voxels import number_cubes
 
 MAX_PAIRS = 20_000_000
-"""Pairs of neighbours that may be held at once, 16 bytes each; more, and points are first gathered into a grid."""
+"""Largest number of pairs of neighbours in memory, 16 bytes each; with more, points are first averaged in a grid."""
 
 
 def run_dbscan(points: Floats, eps: float, neighbours: int) -> Ints:
-    """Cluster number (M,) per point, -1 for noise (Ester et al. 1996); border points join their nearest dense point.
+    """The cluster number (M,) of each of ``points`` (M,3), from 0, -1 for noise (Ester et al. 1996).
 
-    Where points lie so close that their pairs would not fit in memory, those within one cell of a grid of eps/4 count
-    as one point of their number; distances are then right within that cell's size.
+    A point is dense where at least ``neighbours`` points, itself included, are within ``eps``. A border point belongs
+    to the cluster of its nearest dense point. Where the pairs of points would not fit in memory, the points in one cell
+    of a grid of eps/4 count as one point with their number as weight; distances are then exact within the size of a
+    cell.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -47,7 +49,7 @@ def run_dbscan(points: Floats, eps: float, neighbours: int) -> Ints:
 
 
 def measure_neighbour_distances(points: Floats, neighbours: int) -> Floats:
-    """Average distance (M,) of each of ``points`` (M,3) to its ``neighbours`` nearest; inf where there are fewer."""
+    """Mean distance (M,) of each of ``points`` (M,3) to its ``neighbours`` nearest ones; inf where there are fewer."""
     from scipy.spatial import cKDTree
 
     distance, _ = cKDTree(points).query(points, k=neighbours + 1, workers=-1)
@@ -56,7 +58,8 @@ def measure_neighbour_distances(points: Floats, neighbours: int) -> Floats:
 
 
 def _gather_in_cells(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
-    """Mean points of the occupied cells of a grid, the cell of each point, and the number of points in each cell."""
+    """Averages points in cells of a grid: the mean points, the cell of each point, the number of points of each
+    cell."""
     _, of, count = np.unique(number_cubes(points, cell)[1], return_inverse=True, return_counts=True)
     of = of.ravel()
     means = np.stack([np.bincount(of, points[:, axis]) for axis in range(3)], axis=1) / count[:, None]

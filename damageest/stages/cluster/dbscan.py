@@ -14,38 +14,42 @@ from damageest.stages.cluster import Cluster
 from damageest.stages.cluster._density import measure_neighbour_distances, run_dbscan
 
 NEIGHBOURHOOD = 12
-"""Nearest scan points, itself included, among which a damage point looks for others like it."""
+"""Number of nearest scan points, itself included, among which other damage points are counted."""
 MIN_DAMAGE = 4
-"""How many of those, itself included, must be damage too. Where noise takes one point in 700 beyond the tolerance (a
-pose off by one standard deviation at a tolerance of four), one stray in two million has three more beside it."""
+"""How many of these, itself included, must be damage. Where noise moves one point in 700 beyond the tolerance (a
+tolerance of four standard deviations and a pose error of one), one such point in two million has three others beside
+it."""
 
-MAX_WHOLE = 200_000
-"""Scan points beyond which the gaps between them are looked at here and there only."""
+MAX_FOR_ALL = 200_000
+"""Number of scan points above which the gaps between them are measured at few places only."""
 
 
 class Dbscan(Cluster):
-    """DBSCAN of the points labelled damage; a cluster that chance would produce is noise."""
+    """DBSCAN of the points labelled damage; clusters that noise can produce are left out."""
 
     use: Literal["dbscan"] = "dbscan"
     eps: PositiveFloat | Literal["tolerance", "auto"] | None = Field(
         None,
-        description="radius that holds a point's neighbours, in the job's unit; 'tolerance': the tolerance itself; "
-        "'auto': where the sorted k-distance curve bends most; empty: the tolerance or, where that is shorter, what "
-        "bridges the scan's spacing",
+        description="radius within which points are neighbours, in the job's unit; 'tolerance': the tolerance; "
+        "'auto': where the sorted k-distance curve bends most; default: the tolerance or, where it is larger, the "
+        "distance that bridges the gaps of the scan",
     )
     neighbours: int = Field(
-        10, ge=5, le=20, description="k: points within eps, itself included, that make a point dense"
+        10, ge=5, le=20, description="k: number of points within eps, itself included, that make a point dense"
     )
-    min_points: int = Field(4, ge=3, description="a site of fewer points is noise")
+    min_points: int = Field(4, ge=3, description="a cluster of fewer points is noise")
     min_extent: float = Field(
-        1.0, ge=0, description="a site whose bounding box has a shorter diagonal is noise, in tolerances"
+        1.0, ge=0, description="a cluster whose bounding box has a shorter diagonal is noise, in tolerances"
     )
     support: float = Field(
-        0.15, ge=0, le=1, description="a site is noise unless this share of its points has mostly damage around it"
+        0.15,
+        ge=0,
+        le=1,
+        description="a cluster is noise where less than this share of its points has other damage points around it",
     )
 
     def run(self, aligned: Scan, deviation: Deviation, tolerance: float) -> Sites:
-        """Sites numbered by their number of points, largest first (ties: the earlier in the scan)."""
+        """Sites, the one with most points first; of equal ones, the one that comes first in the scan."""
         label = np.zeros(len(aligned.points), np.int32)
         damage = np.flatnonzero(deviation.label == DAMAGE)
         if not len(damage):
@@ -54,7 +58,7 @@ class Dbscan(Cluster):
         gap, typical = _measure_gaps(aligned.points, self.neighbours)
         bridging = max(tolerance, 1.25 * gap)
         eps, why = self._choose_eps(points, tolerance, bridging)
-        # A sparse scan puts fewer than k points on a damage of four tolerances across, which must not go unseen.
+        # A sparse scan has fewer than k points on damage of four tolerances across; it must be found all the same.
         expected = self.neighbours * (1.5 * tolerance / typical) ** 2 if typical else np.inf
         dense = int(np.clip(expected / 2, 4, self.neighbours))
 
@@ -70,7 +74,8 @@ class Dbscan(Cluster):
         notes = [f"eps {eps:.4g} ({why}), {dense} neighbours: {noise} of {len(damage)} damage points are noise"]
         if eps < bridging / 2:
             notes.append(
-                f"eps is shorter than what bridges the scan's spacing ({bridging:.4g}): sites may fall apart or vanish"
+                f"eps is shorter than the distance that bridges the gaps of the scan ({bridging:.4g}): damage sites "
+                "may be split or missed; use a larger eps"
             )
         if dense < self.neighbours:
             notes.append(f"the scan is sparse for its tolerance: {dense} neighbours instead of {self.neighbours}")
@@ -81,15 +86,15 @@ class Dbscan(Cluster):
             return tolerance, "the tolerance"
         if self.eps == "auto":
             bend = find_sharpest_bend(measure_neighbour_distances(points, self.neighbours))
-            # On a scan without damage the curve is that of strays, metres apart; it says nothing then.
+            # On a scan without damage the curve is that of far-apart noise points and gives no useful eps.
             eps = float(np.clip(bend, bridging / 2, 4 * bridging)) if np.isfinite(bend) else bridging
             return eps, f"sharpest bend of the k-distance curve at {bend:.4g}"
         if self.eps is None:
-            return bridging, "the tolerance" if bridging == tolerance else "the scan's spacing"
-        return self.eps, "set"
+            return bridging, "the tolerance" if bridging == tolerance else "from the gaps of the scan"
+        return self.eps, "as set"
 
     def _drop_noise(self, points: Floats, cluster: Ints, supported: NDArray[np.bool_], tolerance: float) -> Ints:
-        """``cluster`` (M,) with -1 for the members of clusters too small, too short or too scattered to be damage."""
+        """``cluster`` (M,) with -1 for the points of clusters with too few points, extent or support to be damage."""
         inside = cluster >= 0
         if not inside.any():
             return cluster
@@ -100,18 +105,19 @@ class Dbscan(Cluster):
         np.minimum.at(low, which, points[inside])
         np.maximum.at(high, which, points[inside])
         extent = np.linalg.norm(np.where(count[:, None] > 0, high - low, 0), axis=1)
-        sound = (count >= self.min_points) & (extent >= self.min_extent * tolerance) & (share >= self.support)
+        valid = (count >= self.min_points) & (extent >= self.min_extent * tolerance) & (share >= self.support)
         result = cluster.copy()
-        result[inside] = np.where(sound[which], which, -1)
+        result[inside] = np.where(valid[which], which, -1)
         return result
 
 
 def find_sharpest_bend(average: Floats) -> float:
-    """Where the sorted curve of ``average`` (M,) neighbour distances has its largest second difference (paper 3.3).
+    """The distance at which the sorted curve of ``average`` (M,) neighbour distances bends most (paper 3.3).
 
-    Of 200 quantiles, not of single points: between neighbours in a sorted sample the differences are chance. And of the
-    logarithm: the gaps among far strays are the longest of all, but not in proportion, and would be taken for the bend.
-    Where densities differ several times over and much is noise, the bend may be that of the denser damage alone.
+    The bend is the largest second difference of 200 quantiles, not of single points, because differences between
+    neighbours in a sorted sample are random. It is taken of the logarithm, because the distances between far outliers
+    are the largest differences, but not the largest ratios. Where densities differ several times and much is noise, the
+    bend may be that of the densest damage only.
     """
     average = np.sort(average[np.isfinite(average)])
     if len(average) < 3:
@@ -123,18 +129,18 @@ def find_sharpest_bend(average: Floats) -> float:
 
 
 def _measure_gaps(points: Floats, neighbours: int) -> tuple[float, float]:
-    """95th percentile and median of the distance to the k-th nearest scan point, of points evenly picked: 5,000 or, of
-    a dense scan, 600."""
+    """95th percentile and median of the distance to the k-th nearest scan point, of evenly picked points: 5,000, or 600
+    of a dense scan."""
     from scipy.spatial import cKDTree
 
     if len(points) <= neighbours:
         return 0.0, 0.0
-    dense = len(points) > MAX_WHOLE
+    dense = len(points) > MAX_FOR_ALL
     picked = points[_draw_evenly(len(points), 600 if dense else 5000)]
     reach = np.inf
     if dense:
-        # Among some of the points the k-th is farther than among all, so it tells how far to look.
-        some = cKDTree(points[_draw_evenly(len(points), MAX_WHOLE)])
+        # The k-th nearest of a subset is farther than the k-th nearest of all: an upper bound of the reach.
+        some = cKDTree(points[_draw_evenly(len(points), MAX_FOR_ALL)])
         reach = float(np.percentile(np.asarray(some.query(picked, k=[neighbours + 1], workers=2)[0]), 97))
         points = points[find_nearby(points, picked, reach)]
     tree = cKDTree(points)
@@ -143,12 +149,12 @@ def _measure_gaps(points: Floats, neighbours: int) -> tuple[float, float]:
 
 
 def _draw_evenly(count: int, wanted: int) -> Ints:
-    """At most ``wanted`` of ``count`` indices, evenly over all."""
+    """At most ``wanted`` of ``count`` indices, evenly spaced."""
     return np.linspace(0, count - 1, min(count, wanted)).round().astype(np.int64)
 
 
 def _is_supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:
-    """(M,) whether enough of a damage point's nearest scan points are damage as well."""
+    """(M,) whether enough of the nearest scan points of each damage point are damage too."""
     from scipy.spatial import cKDTree
 
     here = find_nearby(points, points[damage], reach)

@@ -1,4 +1,4 @@
-"""Smooth random fields, repeatable from a seed: for rough fracture surfaces and for uneven scans."""
+"""Smooth random fields from a seed: for rough fracture surfaces and for uneven scans."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from damageest.artefacts import Floats
 
 @dataclass(frozen=True, eq=False)
 class RandomField:
-    """Cosines of random direction and phase; standard deviation about 1 over space, kept within -2.5 to 2.5."""
+    """A sum of cosines of random direction and phase; standard deviation about 1, clipped to -2.5 to 2.5."""
 
     waves: Floats
     phases: Floats
@@ -19,7 +19,8 @@ class RandomField:
 
     @classmethod
     def build(cls, wavelength: float, octaves: int, seed: int, waves: int = 10) -> RandomField:
-        """``octaves`` bands of ``waves`` cosines each, every band half the wavelength and half the height."""
+        """``octaves`` bands of ``waves`` cosines each; each band has half the wavelength and half the height of the one
+        before."""
         rng = np.random.default_rng([20771, seed])
         band = np.repeat(np.arange(octaves), waves)
         direction = rng.normal(size=(len(band), 3))
@@ -30,7 +31,7 @@ class RandomField:
         return cls(direction * number[:, None], rng.uniform(0, 2 * np.pi, len(band)), heights)
 
     def evaluate(self, points: Floats) -> Floats:
-        """(N,) the field at points (N,3)."""
+        """The field (N,) at points (N,3)."""
         total = np.zeros(len(points))
         for wave, phase, height in zip(self.waves, self.phases, self.heights, strict=True):
             total += height * np.cos(points @ wave + phase)

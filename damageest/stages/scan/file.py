@@ -1,4 +1,4 @@
-"""The scan from files."""
+"""Reads the scan from files."""
 
 from __future__ import annotations
 
@@ -16,19 +16,23 @@ from damageest.stages.scan import ReadScan
 
 
 class ScanFile(ReadScan):
-    """A scan from one file, or from several views that already share a frame: point clouds or meshed scans."""
+    """Reads a scan from one file, or from several views in one frame: point clouds or meshed scans."""
 
     use: Literal["file"] = "file"
     reads: ClassVar[tuple[str, ...]] = tuple(READERS)
-    path: JobPath | tuple[JobPath, ...] = Field(description="the file or files, relative to the job's folder")
+    path: JobPath | tuple[JobPath, ...] = Field(
+        description="the file, or a list of files in one frame, relative to the job's folder"
+    )
     unit: Unit | None = Field(
         None, description="unit of the files' lengths; default: the file's own (E57: m), else the job's `units`"
     )
     columns: str | None = Field(
-        None, description="what the columns of a text file are, e.g. 'x y z _ nx ny nz'; default: by header or number"
+        None,
+        description="meaning of the columns of a text file, e.g. 'x y z _ nx ny nz'; default: from the header or their "
+        "number",
     )
 
     def run(self, unit: str) -> Scan:
-        """The points in ``unit``, the job's. Raises InputError for a file that cannot be read or holds no points."""
+        """The points in ``unit``, the job's. Raises InputError for a file that cannot be read or has no points."""
         paths = (self.path,) if isinstance(self.path, Path) else self.path
         return read_scan(paths, unit, self.unit, self.columns)

@@ -1,4 +1,4 @@
-"""What a virtual scanner does: wear a part down to a damaged one, and take points on it."""
+"""The virtual scanner: damages a part with tools, and draws points on what is left."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.scan.tools import Tool
 
 DUST = 1e-9
-"""Share of the part's volume below which a piece is a rounding error of the Booleans."""
+"""Share of the part's volume below which a piece is a rounding error of the Boolean operations."""
 
 
 def apply_tools(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None, tuple[str, ...]]:
     """The damaged part, the damage and notes; both solids in the part's frame.
 
-    Pieces that the tools cut loose from a body of the part fall off and count as damage, since a scan shows only what
-    still holds together: of every body the largest piece stays. Raises StageError for a tool that misses the part, or
-    is no solid, and for damage that leaves nothing or opens a closed cavity.
+    Pieces that the tools cut loose count as damage too: of each body of the part only the largest piece is kept. Raises
+    StageError for a tool that misses the part or is not a solid, and for damage that leaves nothing of the part or lies
+    in a closed cavity.
     """
     if not tools:
         return part, None, ()
@@ -37,11 +37,11 @@ def apply_tools(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None,
             raise StageError(
                 f"damage tool {number} ({tool.tool}) misses the part, which reaches from "
                 f"{_format_point(part.bounds[0])} to {_format_point(part.bounds[1])} {part.unit}",
-                remedy="move the tool; its coordinates are in the part's frame and the job's unit",
+                remedy="move the tool; its coordinates are in the part's frame, in the job's unit",
             )
         cuts.append(cut)
     cutter = Manifold.batch_boolean(cuts, OpType.Add)
-    kept, lost, fallen, cavities = [], [], [], 0
+    kept, lost, loose, cavities = [], [], [], 0
     for body in _split_bodies(whole):
         inside, outside = body.split(cutter)
         lost.append(inside)
@@ -51,23 +51,28 @@ def apply_tools(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None,
         if pieces:
             pieces.sort(key=lambda p: p.volume(), reverse=True)
             kept.append(pieces[0])
-            fallen.extend(pieces[1:])
+            loose.extend(pieces[1:])
     if not kept:
-        raise StageError("the damage tools take the whole part: nothing is left to scan", remedy="make them smaller")
+        raise StageError(
+            "the damage tools remove the whole part: nothing is left to scan", remedy="make the tools smaller"
+        )
     if cavities > 0:
         raise StageError(
-            "the damage tools hollow out a closed cavity, which no scanner sees from outside",
-            remedy="move or enlarge the tool until it breaks through the part's surface",
+            "the damage tools make a closed cavity inside the part, which a scanner cannot see",
+            remedy="move or enlarge the tool so that it reaches the part's surface",
         )
     notes = []
-    if fallen:
-        share = 100 * sum(p.volume() for p in fallen) / part.volume
-        notes.append(f"cut loose and counted as damage: {share:.2g} % of the part, in {len(fallen)} piece(s)")
-    damage = _drop_dust(Manifold.batch_boolean([*lost, *fallen], OpType.Add), origin, part.volume)
+    if loose:
+        share = 100 * sum(p.volume() for p in loose) / part.volume
+        notes.append(
+            f"cut loose by the tools and counted as damage: {share:.2g} % of the part, in {len(loose)} piece(s)"
+        )
+    damage = _drop_dust(Manifold.batch_boolean([*lost, *loose], OpType.Add), origin, part.volume)
     return _drop_dust(Manifold.compose(kept), origin, part.volume), damage, tuple(notes)
 
 
 def _build_cut(tool: Tool, number: int, origin: Floats, diagonal: float) -> Any:
+    """The tool as a Manifold relative to ``origin`` (3,). Raises StageError where it is not a solid."""
     from manifold3d import Error
 
     try:
@@ -77,7 +82,7 @@ def _build_cut(tool: Tool, number: int, origin: Floats, diagonal: float) -> Any:
     except ValueError as error:
         fault = str(error)
     if fault:
-        raise StageError(f"damage tool {number} ({tool.tool}) is no solid: {fault}", remedy="change its options")
+        raise StageError(f"damage tool {number} ({tool.tool}) is not a solid: {fault}", remedy="change its options")
     return body
 
 
@@ -105,7 +110,7 @@ def _split_bodies(solid: Any) -> list[Any]:
 
 
 def _drop_dust(body: Any, origin: Floats, volume: float) -> Solid:
-    """A Solid without the specks that rounding leaves."""
+    """A Manifold as Solid, without the small pieces that rounding errors leave."""
     from manifold3d import Manifold
 
     shells = body.decompose()
@@ -116,27 +121,28 @@ def _drop_dust(body: Any, origin: Floats, volume: float) -> Solid:
 
 
 Weigh = Callable[[Floats], Floats]
-"""Points (N,3) to weights (N,): how likely each is kept, 0 for never."""
+"""A function of points (N,3) that gives their weights (N,): how likely each is kept; 0: never."""
 
 
 def sample_seen(
-    mesh: Mesh, faces: NDArray[np.bool_], count: int, rng: np.random.Generator, thin: Weigh | None, spare: float
+    mesh: Mesh, faces: NDArray[np.bool_], count: int, rng: np.random.Generator, weigh: Weigh | None, spare: float
 ) -> Floats:
-    """(count,3) random points on the triangles that ``faces`` (F,) admits, uniform by area or as ``thin`` weighs them.
+    """(count,3) random points on the triangles that are seen, ``faces`` (F,), uniform by area or weighted by ``weigh``.
 
-    ``spare``: how many candidates to draw per point where points are thinned. Raises StageError where nothing is seen.
+    ``spare``: how many points to draw for each that is kept, where they are weighted. Raises StageError where the
+    scanner sees nothing.
     """
     area = np.linalg.norm(mesh.cross, axis=1) * faces
     if not area.any():
         raise _make_unseen_error()
-    if thin is None:
+    if weigh is None:
         return _sample_faces(mesh, area, count, rng)
     drawn: list[Floats] = []
     keys: list[Floats] = []
     have, tried = 0, 0
     while have < spare * count:
         points = _sample_faces(mesh, area, int(spare * count), rng)
-        weights = thin(points)
+        weights = weigh(points)
         seen = weights > 0
         drawn.append(points[seen])
         # the smallest of exponential variables over weight: a weighted draw without replacement
@@ -151,12 +157,12 @@ def sample_seen(
 
 def _make_unseen_error() -> StageError:
     return StageError(
-        "the virtual scanner sees nothing of the part: 'unseen' covers all of it", remedy="narrow 'unseen'"
+        "the virtual scanner sees nothing of the part: 'unseen' covers all of it", remedy="make 'unseen' smaller"
     )
 
 
 def _sample_faces(mesh: Mesh, area: Floats, count: int, rng: np.random.Generator) -> Floats:
-    """(count,3) points, uniform over triangles of the given areas (F,)."""
+    """(count,3) random points, uniform over the triangles, with probabilities proportional to ``area`` (F,)."""
     total = np.cumsum(area)
     face = np.searchsorted(total, rng.random(count) * total[-1], side="right")
     face = np.minimum(face, int(np.flatnonzero(area)[-1]))

@@ -1,4 +1,4 @@
-"""Tools that take virtual damage off a part: each is a solid, given in the part's frame and the job's unit."""
+"""Tools that remove virtual damage from a part: each is a solid, in the part's frame and the job's unit."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ def _check_rigid(value: Matrix) -> Matrix:
 
 
 RigidMatrix = Annotated[Matrix, AfterValidator(_check_rigid)]
-Seed = Annotated[int, Field(ge=0, description="of the random shape; the same seed gives the same shape")]
+Seed = Annotated[int, Field(ge=0, description="seed of the random shape; the same seed gives the same shape")]
 
 
 class Tool(BaseModel, ABC):
-    """Base of the tools."""
+    """Base of the tools that remove material."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     tool: str
@@ -54,11 +54,11 @@ class Tool(BaseModel, ABC):
 
 
 class SphereTool(Tool):
-    """A ball."""
+    """A sphere."""
 
     tool: Literal["sphere"] = "sphere"
-    centre: Vector = Field(description="in the part's frame")
-    radius: PositiveFloat = Field(description="in the job's unit")
+    centre: Vector = Field(description="centre, in the part's frame")
+    radius: PositiveFloat = Field(description="radius, in the job's unit")
 
     def build(self, origin: Floats, diagonal: float) -> Any:
         from manifold3d import Manifold
@@ -68,13 +68,15 @@ class SphereTool(Tool):
 
 
 class BoxTool(Tool):
-    """A box, turned about its centre; with ``roughness`` its faces are those of a fracture."""
+    """A box, rotated about its centre; with ``roughness`` its faces are like fracture surfaces."""
 
     tool: Literal["box"] = "box"
-    centre: Vector = Field(description="in the part's frame")
-    size: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = Field(description="edges in the job's unit")
-    rotation: Vector = Field((0.0, 0.0, 0.0), description="degrees about the fixed x, then y, then z axis")
-    roughness: float = Field(0.0, ge=0, description="rms height of the faces' unevenness, in the job's unit")
+    centre: Vector = Field(description="centre, in the part's frame")
+    size: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = Field(
+        description="lengths of the edges, in the job's unit"
+    )
+    rotation: Vector = Field((0.0, 0.0, 0.0), description="rotation in degrees about the fixed x, then y, then z axis")
+    roughness: float = Field(0.0, ge=0, description="rms height of the roughness of the faces, in the job's unit")
     seed: Seed = 0
 
     def build(self, origin: Floats, diagonal: float) -> Any:
@@ -86,22 +88,22 @@ class BoxTool(Tool):
             block = block.refine_to_length(wave / 10)
             fields = [_random_field.RandomField.build(wave, 2, 3 * self.seed + axis) for axis in range(3)]
 
-            # each coordinate is moved by a field whose slope stays below 1, so that faces cannot cross
-            def uneven(points: Floats) -> Floats:
+            # each coordinate is displaced by a field with a slope below 1, so that faces cannot cross
+            def displace(points: Floats) -> Floats:
                 return points + self.roughness * np.column_stack([field.evaluate(points) for field in fields])
 
-            block = block.warp_batch(uneven)
+            block = block.warp_batch(displace)
         return block.rotate(self.rotation).translate(tuple(self.centre - origin))
 
 
 class CylinderTool(Tool):
-    """A round bar that starts at a point and follows an axis; for bores and through holes."""
+    """A round bar from a point along an axis; for bores and through holes."""
 
     tool: Literal["cylinder"] = "cylinder"
     point: Vector = Field(description="centre of one end, in the part's frame")
-    axis: Direction = Field(description="from that end to the other; its length does not matter")
-    radius: PositiveFloat = Field(description="in the job's unit")
-    length: PositiveFloat = Field(description="in the job's unit")
+    axis: Direction = Field(description="direction from that end to the other; its length does not matter")
+    radius: PositiveFloat = Field(description="radius, in the job's unit")
+    length: PositiveFloat = Field(description="length, in the job's unit")
 
     def build(self, origin: Floats, diagonal: float) -> Any:
         from manifold3d import Manifold
@@ -111,17 +113,20 @@ class CylinderTool(Tool):
 
 
 class PlaneTool(Tool):
-    """Everything on the side of a plane that its normal points to; with ``roughness`` a break instead of a cut."""
+    """The space on the side of a plane to which its normal points; with ``roughness`` a fracture instead of a cut."""
 
     tool: Literal["plane"] = "plane"
-    point: Vector = Field(description="on the plane, in the part's frame")
-    normal: Direction = Field(description="toward what is taken away; its length does not matter")
+    point: Vector = Field(description="a point on the plane, in the part's frame")
+    normal: Direction = Field(description="direction to the material that is removed; its length does not matter")
     within: PositiveFloat | None = Field(
-        None, description="only within this distance of the line through `point` along `normal`; default: everything"
+        None,
+        description="remove only what is within this distance of the line through `point` along `normal`; default: all",
     )
-    roughness: float = Field(0.0, ge=0, description="rms height of the break's unevenness, in the job's unit")
+    roughness: float = Field(0.0, ge=0, description="rms height of the roughness of the fracture, in the job's unit")
     grain: PositiveFloat | None = Field(
-        None, description="length of the unevenness; default: an eighth of the part's diagonal, or half of `within`"
+        None,
+        description="wavelength of the roughness, in the job's unit; default: an eighth of the part's diagonal, or "
+        "half of `within`",
     )
     seed: Seed = 0
 
@@ -132,9 +137,9 @@ class PlaneTool(Tool):
         far = diagonal + float(np.linalg.norm(foot))
         reach = self.within or far
         grain = self.grain or (self.within / 2 if self.within else diagonal / 8)
-        # the grid must not bend the field's finest octave; beyond 400 cells a part shows no difference
+        # the grid must resolve the field's finest octave; more than 400 cells make no visible difference
         cells = min(400, math.ceil(2.4 * reach / (grain / 12))) if self.roughness else 1
-        # a cone from the grid's border to a far tip: all of the half space as far as the part reaches
+        # a cone from the border of the grid to a far tip: it contains all of the half space near the part
         line = np.linspace(-1.2 * reach, 1.2 * reach, cells + 1)
         x, y = (a.ravel() for a in np.meshgrid(line, line, indexing="ij"))
         flat = np.column_stack([x, y, np.zeros_like(x)])
@@ -158,11 +163,11 @@ class PlaneTool(Tool):
 
 
 class BlobTool(Tool):
-    """An irregular lump with the surface of a fracture: a ball whose radius varies at random, smoothly."""
+    """An irregular body with a surface like a fracture: a sphere whose radius varies smoothly and at random."""
 
     tool: Literal["blob"] = "blob"
-    centre: Vector = Field(description="in the part's frame")
-    radius: PositiveFloat = Field(description="mean radius in the job's unit")
+    centre: Vector = Field(description="centre, in the part's frame")
+    radius: PositiveFloat = Field(description="mean radius, in the job's unit")
     roughness: float | None = Field(
         None, ge=0, description="rms variation of the radius, in the job's unit; default: 0.12 of the radius"
     )
@@ -174,21 +179,23 @@ class BlobTool(Tool):
         share = 0.12 if self.roughness is None else self.roughness / self.radius
         field = _random_field.RandomField.build(1.6, 3, self.seed)
 
-        # the radius is a function of the direction alone and stays positive, so the lump cannot cut itself
-        def uneven(points: Floats) -> Floats:
+        # the radius is a positive function of the direction, so the surface cannot intersect itself
+        def displace(points: Floats) -> Floats:
             out = points / np.linalg.norm(points, axis=1, keepdims=True)
             return np.asarray(out * (self.radius * np.maximum(1 + share * field.evaluate(out), 0.2))[:, None])
 
         segments = max(96, _count_segments(self.radius, diagonal))
-        return Manifold.sphere(1.0, segments).warp_batch(uneven).translate(tuple(self.centre - origin))
+        return Manifold.sphere(1.0, segments).warp_batch(displace).translate(tuple(self.centre - origin))
 
 
 class MeshTool(Tool):
-    """A closed mesh from a file, taken to be in the job's unit."""
+    """A closed mesh from a file whose lengths are in the job's unit."""
 
     tool: Literal["mesh"] = "mesh"
-    path: JobPath = Field(description="STL, PLY, OBJ, OFF or 3MF, relative to the job's folder")
-    transform: RigidMatrix | None = Field(None, description="4x4, rigid, to the part's frame; default: as it is")
+    path: JobPath = Field(description="an STL, PLY, OBJ, OFF or 3MF file, relative to the job's folder")
+    transform: RigidMatrix | None = Field(
+        None, description="4x4, rigid, from the file's frame to the part's; default: identity"
+    )
 
     def build(self, origin: Floats, diagonal: float) -> Any:
         from damageest.geometry.make_part import make_part
@@ -206,13 +213,13 @@ AnyTool = Annotated[SphereTool | BoxTool | CylinderTool | PlaneTool | BlobTool |
 
 
 def _count_segments(radius: float, diagonal: float) -> int:
-    """Divisions of a circle so that chords stay within 0.00005 of the part's diagonal."""
+    """Number of segments of a circle, so that chords deviate by at most 0.00005 of the part's diagonal."""
     step = math.acos(max(0.0, 1 - 5e-5 * diagonal / radius))
     return 4 * min(150, max(8, math.ceil(math.pi / step / 4)))
 
 
 def _place(body: Any, axis: Vector, foot: Floats) -> Any:
-    """The body, made along z, turned to ``axis`` and moved to ``foot``."""
+    """A body that was made along z, rotated to ``axis`` and moved to ``foot`` (3,)."""
     z = np.array(axis) / np.linalg.norm(axis)
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
     x /= np.linalg.norm(x)

@@ -79,7 +79,7 @@ def test_uneven_density_leaves_one_damage_whole() -> None:
     assert (sites.label[pit == 1] == 1).mean() > 0.99
 
 
-def test_auto_finds_both_damages_among_strays() -> None:
+def test_auto_finds_both_damages_among_outliers() -> None:
     scan, deviation, pit = plate(150_000, [(15, 15, 5), (45, 45, 5)], outliers=0.01)
     sites = Dbscan(eps="auto").run(scan, deviation, TOLERANCE)
     assert sites.count == 2
@@ -116,7 +116,7 @@ def test_gathering_dense_points_keeps_the_clusters(monkeypatch: pytest.MonkeyPat
     assert len(np.unique(np.stack([whole[same], gathered[same]]), axis=1).T) == 2
 
 
-def test_eps_below_the_spacing_is_said() -> None:
+def test_eps_below_the_spacing_is_noted() -> None:
     scan, deviation, _ = plate(20_000, [(30, 30, 10)])
     sites = Dbscan(eps="tolerance").run(scan, deviation, TOLERANCE)
     assert any("shorter" in note for note in sites.notes)
@@ -125,8 +125,8 @@ def test_eps_below_the_spacing_is_said() -> None:
 @pytest.mark.parametrize(
     ("share", "uneven"), [(0.003, 1), (0.003, 4), (0.02, 1), (0.02, 4), (0.1, 1), (0.1, 4), (0.3, 1)]
 )
-def test_the_bend_parts_clusters_from_noise(share: float, uneven: int) -> None:
-    """Two squares, the second with its points ``uneven`` times farther apart, in noise all round."""
+def test_the_bend_separates_clusters_from_noise(share: float, uneven: int) -> None:
+    """Two squares, the second with its points ``uneven`` times farther apart, with noise around them."""
     rng = np.random.default_rng(0)
     squares = [rng.uniform(0, 10, (5000, 2)), rng.uniform(0, 10, (5000 // uneven**2, 2)) + np.array([25, 0])]
     flat = np.concatenate(squares)
