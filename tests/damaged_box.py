@@ -1,4 +1,4 @@
-"""A small damaged box, scanned, as files: quick enough to run the whole route on in every test."""
+"""A small damaged box and its scan as files, small enough to run the whole route in every test."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from damageest.stages.scan.simulate import Simulate
 
 SIZE = (40.0, 30.0, 20.0)
 TRUE_VOLUME = np.pi * 6**3 * 2 / 3
-"""mm3 of the half ball of radius 6 taken off the top."""
+"""mm3 of the half ball of radius 6 removed from the top."""
 JOB = "version: 1\ntolerance: 0.2\nalign: none\npart: box.stl\nscan: scan.ply\n"
 
 

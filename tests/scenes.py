@@ -1,4 +1,4 @@
-"""Damaged parts of known truth, scanned with noise at known pose, for the tests of what follows alignment."""
+"""Damaged parts with known truth, scanned with noise at known pose, for the tests of the stages after alignment."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TOLERANCE = 0.08
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything that an enclosure takes, and ``truth``, the damage."""
+    """All inputs of an enclosure, and ``truth``, the damage."""
 
     part: Part
     truth: Solid
@@ -39,7 +39,7 @@ class Scene:
         return self.aligned.points[self.sites.label > 0]
 
     def without(self, hidden: np.ndarray[Any, Any]) -> Scene:
-        """The same scene where the scanner missed some points (N,) of it."""
+        """The same scene without the points that are ``hidden`` (N,)."""
         return _seen(self.part, self.truth, self.aligned.points[~hidden])
 
 

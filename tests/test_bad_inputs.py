@@ -1,4 +1,4 @@
-"""Bad jobs and bad files: a defined exit status, a few lines that say what to do, and nothing lost."""
+"""Invalid jobs and files: a defined exit status, a few lines that say what to do, and no file changed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The guide's plugin, taken from the README as it stands, works outside the repository."""
+"""The plugin of the guide in the README works outside the repository."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every example job, as shipped: sound, watertight, and right where the truth is known."""
+"""Every example job: the result is consistent, and right if the truth is known."""
 
 from __future__ import annotations
 

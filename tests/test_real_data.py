@@ -1,4 +1,4 @@
-"""Files that no one here wrote, from the folder that DAMAGEEST_REAL_DATA names; skipped where it names none."""
+"""Real files, from the folder in the variable DAMAGEEST_REAL_DATA; skipped if it is not set."""
 
 from __future__ import annotations
 

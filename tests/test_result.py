@@ -1,4 +1,4 @@
-"""A result's meshes as objects of trimesh and manifold3d, in either frame."""
+"""A result's meshes as objects of trimesh and manifold3d, in both frames."""
 
 from __future__ import annotations
 

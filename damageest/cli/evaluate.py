@@ -33,7 +33,10 @@ Noise = Annotated[
     str, typer.Option(metavar="A,B", help="Noise of the scan: multiples of its default, or lengths, as 0.02mm.")
 ]
 Points = Annotated[str, typer.Option(metavar="A,B", help="Number of points of the scan.")]
-Settings = Annotated[list[str] | None, typer.Option("--set", help="stage.option=value or field=value, in all cases.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Replace a value of the job in all cases: stage.option=value or field=value."),
+]
 Jobs = Annotated[int, typer.Option(min=1, help="Cases that run at the same time. More than 1 makes each run slower.")]
 Timeout = Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")]
 Out = Annotated[
@@ -188,9 +191,9 @@ def _write_report(rows: list[dict[str, Any]], first: list[str], unit: str, out: 
     typer.echo("\n" + format_tables(rows, [*first, *collect_axes(rows)], unit))
     if out:
         write_files(rows, unit, out, _format_command())
-        made = draw_plots(rows, unit, out) if plots else []
-        names = ", ".join(sorted({path.stem for path in made}))
-        typer.echo(f"written to {out}" + (f", with plots: {names}" if made else ""))
+        paths = draw_plots(rows, unit, out) if plots else []
+        names = ", ".join(sorted({path.stem for path in paths}))
+        typer.echo(f"written to {out}" + (f", with plots: {names}" if paths else ""))
 
 
 def _format_command() -> str:

@@ -19,13 +19,16 @@ def command(
     output: Annotated[
         Path | None, typer.Option(help="Output folder; only with a single job. Default: out/<name>.")
     ] = None,
-    settings: Annotated[list[str] | None, typer.Option("--set", help="stage.option=value or field=value.")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Replace a value of the job: stage.option=value or field=value. May be repeated."),
+    ] = None,
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Compute all stages again.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print result.json on stdout, one line per job.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, no progress and no table.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """Run jobs: from part and scan to damage volumes."""
+    """Run jobs: compute the damage volumes from part and scan."""
     from damageest.cli._progress import Progress
     from damageest.errors import DamageestError, Fault, JobError
     from damageest.job import load

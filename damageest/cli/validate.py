@@ -10,7 +10,10 @@ import typer
 
 def command(
     jobs: Annotated[list[Path], typer.Argument(metavar="JOB...", help="Job files.")],
-    settings: Annotated[list[str] | None, typer.Option("--set", help="stage.option=value or field=value.")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Replace a value of the job: stage.option=value or field=value. May be repeated."),
+    ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Check jobs without computing, and list all errors with line and column."""

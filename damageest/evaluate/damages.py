@@ -182,10 +182,10 @@ def make_hole(picker: PlacePicker) -> list[Tool]:
 def wear_through(picker: PlacePicker) -> list[Tool]:
     """A hole worn through a thin wall by a round body, with a rim on either side."""
     wall = picker.thickness
-    place = np.flatnonzero(wall < 0.12 * picker.size)
-    if not len(place):
+    thin = np.flatnonzero(wall < 0.12 * picker.size)
+    if not len(thin):
         raise LookupError("the part has no thin wall")
-    k = picker.rng.choice(place)
+    k = picker.rng.choice(thin)
     radius = max(wall[k], 0.02 * picker.size) * picker.draw(1.1, 2.0)
     middle = picker.points[k] + (radius - 1.25 * wall[k]) * picker.normals[k] * picker.draw(0.0, 0.8)
     return [_make_lump(picker, middle, float(radius))]
@@ -257,7 +257,7 @@ def make_random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), count
     picker = PlacePicker(part, rng)
     wanted = count or max(len(kinds), int(rng.choice([1, 2, 3], p=[0.6, 0.25, 0.15])))
     tools: list[Tool] = []
-    made: list[str] = []
+    names: list[str] = []
     damage: Solid | None = None
     for number in range(wanted):
         name = kinds[number] if number < len(kinds) else str(rng.choice(list(KINDS)))
@@ -267,11 +267,11 @@ def make_random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), count
             found = _try_damage(picker, name, tools)
             if found is not None:
                 tools, damage = found
-                made.append(name)
+                names.append(name)
                 break
     if damage is None:
         raise LookupError(f"no damage fits the part with seed {seed}")
-    return RandomDamage(tuple(tools), tuple(made), damage)
+    return RandomDamage(tuple(tools), tuple(names), damage)
 
 
 def _try_damage(picker: PlacePicker, name: str, before: list[Tool]) -> tuple[list[Tool], Solid] | None:

@@ -175,8 +175,8 @@ def _find_least_depth(rows: Sequence[Row]) -> tuple[float | None, int, int, floa
         hits.setdefault(row["size"], []).append(_is_found(row))
     sizes = list(hits)
     below = next((k for k, size in enumerate(sizes) if np.mean(hits[size]) < ENOUGH), len(sizes))
-    place = sizes[max(below - 1, 0)]
-    return place if below else None, sum(hits[place]), len(hits[place]), place
+    depth = sizes[max(below - 1, 0)]
+    return depth if below else None, sum(hits[depth]), len(hits[depth]), depth
 
 
 def lower_confidence_bound(hits: int, cases: int) -> float:

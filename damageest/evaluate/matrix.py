@@ -1,4 +1,4 @@
-"""Accuracy, time and memory of every implementation of every stage, with the job's implementations in all other stages.
+"""Accuracy, time and memory of every implementation of every stage, with all other stages at their defaults.
 
 The scans of the jobs are simulated, so that the truth is known. Each run has a process of its own, so that its peak
 memory can be measured.

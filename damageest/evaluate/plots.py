@@ -37,14 +37,14 @@ def draw_plots(rows: Sequence[Row], unit: str, folder: Path) -> list[Path]:
     rows = [row for row in rows if not row["skipped"]]
     damaged = [row for row in rows if row["size"] != 0]
     complete = [row for row in damaged if row.get("surface_error") is not None]
-    made: list[Path] = []
+    paths: list[Path] = []
 
     def plot(name: str, x: str, y: str, chosen: Sequence[Row], point: Callable[[Row], Point], **style: Any) -> None:
         lines: dict[str, list[Point]] = {}
         for row in chosen:
             lines.setdefault(str(row["varied"].get("way", "")), []).append(point(row))
         if lines:
-            made.extend(_save_plot(folder / name, x, y, lambda axes: _plot_lines(axes, lines, **style)))
+            paths.extend(_save_plot(folder / name, x, y, lambda axes: _plot_lines(axes, lines, **style)))
 
     varied = collect_axes(rows)
     if "noise" in varied:
@@ -75,7 +75,7 @@ def draw_plots(rows: Sequence[Row], unit: str, folder: Path) -> list[Path]:
         def plot_cost(axes: Any) -> None:
             _plot_ways(axes, {way: [row for row in complete if row["varied"]["way"] == way] for way in varied["way"]})
 
-        made.extend(_save_plot(folder / "error_by_time", "seconds", "surface error, tolerances", plot_cost))
+        paths.extend(_save_plot(folder / "error_by_time", "seconds", "surface error, tolerances", plot_cost))
     errors = np.array([row["surface_error"] for row in complete])
     if len(errors):
 
@@ -85,8 +85,8 @@ def draw_plots(rows: Sequence[Row], unit: str, folder: Path) -> list[Path]:
             axes.axvline(np.median(errors), color="C3", label=f"median {np.median(errors):.3g}")
             axes.legend()
 
-        made.extend(_save_plot(folder / "errors", "surface error, tolerances", "cases", plot_histogram))
-    return made
+        paths.extend(_save_plot(folder / "errors", "surface error, tolerances", "cases", plot_histogram))
+    return paths
 
 
 def _to_time_by_points(row: Row) -> Point:
@@ -106,10 +106,10 @@ def _plot_lines(
     """
     for number, (way, points) in enumerate(lines.items()):
         x, y = np.array(points).T
-        places = np.unique(x)
+        values = np.unique(x)
         if dots:
             axes.plot(x, y, "o", color="0.7", markersize=4, label="" if number else "cases")
-        axes.plot(places, [of(y[x == place]) for place in places], "o-", color=f"C{number}", label=way or of.__name__)
+        axes.plot(values, [of(y[x == value]) for value in values], "o-", color=f"C{number}", label=way or of.__name__)
     axes.set_xscale(scale)
     axes.set_yscale(scale)
     if scale == "linear":

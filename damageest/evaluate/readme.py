@@ -35,13 +35,13 @@ def make_matrix_table(cells: Sequence[MatrixCell]) -> str:
     """A Markdown table: a row for each implementation, a column for each job. The reasons of refusals follow it."""
     jobs = list(dict.fromkeys(cell.job for cell in cells))
     rows = list(dict.fromkeys((cell.stage, cell.use) for cell in cells))
-    found = {(cell.stage, cell.use, cell.job): cell for cell in cells}
+    cell_of = {(cell.stage, cell.use, cell.job): cell for cell in cells}
     reasons: list[str] = []
     head = ["stage", "implementation", *jobs, "stage, s", "run, s", "peak, MB"]
     lines = [head]
     before = ""
     for stage, use in rows:
-        row = [found[stage, use, job] for job in jobs]
+        row = [cell_of[stage, use, job] for job in jobs]
         shown = [_format_cell(cell, reasons) for cell in row]
         figures = [
             _format_number([cell.stage_seconds for cell in row], "{:.2f}"),
@@ -76,9 +76,9 @@ def _format_number(values: Sequence[float], form: str, of: object = np.median) -
 
 def describe_measurement(what: str) -> str:
     """``what``, followed by the date, the versions and the machine of the measurement."""
-    found = collect_versions()
-    libraries = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
-    return f"{what}. Measured {found['date']}: {libraries}; {found['machine']}."
+    measured = collect_versions()
+    libraries = ", ".join(f"{name} {number}" for name, number in measured["versions"].items())
+    return f"{what}. Measured {measured['date']}: {libraries}; {measured['machine']}."
 
 
 def collect_versions() -> dict[str, Any]:

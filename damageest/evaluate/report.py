@@ -72,8 +72,8 @@ def make_combination_cells(rows: Sequence[Row], unit: str) -> list[list[str]]:
     return [[*(make_title(axis, rows, unit) for axis in axes), *(head for head, _ in COLUMNS.values())], *body]
 
 
-def _format_figures(found: dict[str, Number]) -> list[str]:
-    return [_format_number(found[name], form) for name, (_, form) in COLUMNS.items()]
+def _format_figures(values: dict[str, Number]) -> list[str]:
+    return [_format_number(values[name], form) for name, (_, form) in COLUMNS.items()]
 
 
 def _format_number(value: Number, form: str) -> str:
@@ -91,10 +91,10 @@ def format_columns(lines: Sequence[Sequence[str]]) -> str:
 
 def format_tables(rows: Sequence[Row], axes: Sequence[str], unit: str) -> str:
     """The tables of all axes, the legend, the costs of the stages, and the remarks, as text."""
-    made = [format_columns(make_cells(rows, axis, unit)) for axis in axes or ("",)]
+    tables = [format_columns(make_cells(rows, axis, unit)) for axis in axes or ("",)]
     if "way" in axes:  # figures over several ways together have no meaning
-        made = [format_columns(make_combination_cells(rows, unit))]
-    return "\n\n".join([*made, make_legend(unit), format_columns(make_stage_cells(rows)), make_remarks(rows)])
+        tables = [format_columns(make_combination_cells(rows, unit))]
+    return "\n\n".join([*tables, make_legend(unit), format_columns(make_stage_cells(rows)), make_remarks(rows)])
 
 
 def make_stage_cells(rows: Sequence[Row]) -> list[list[str]]:
@@ -105,15 +105,15 @@ def make_stage_cells(rows: Sequence[Row]) -> list[list[str]]:
 
 def make_remarks(rows: Sequence[Row]) -> str:
     """Wrong results, and how many of them were flagged; failed and skipped cases; the time to start."""
-    found = compute_figures(rows)
+    figures = compute_figures(rows)
     skipped = [row for row in rows if row["skipped"]]
     lines = [
-        f"cases with IoU < {WRONG}: {found['wrong']}, of these flagged: {found['wrong_flagged']}; cases with IoU >= "
-        f"{RIGHT} but flagged: {found['right_flagged']}; without a result: {found['errors']}; with a pose error above "
-        f"the tolerance: {found['pose_lost']}"
+        f"cases with IoU < {WRONG}: {figures['wrong']}, of these flagged: {figures['wrong_flagged']}; "
+        f"cases with IoU >= {RIGHT} but flagged: {figures['right_flagged']}; without a result: {figures['errors']}; "
+        f"with a pose error above the tolerance: {figures['pose_lost']}"
     ]
-    if found["start_seconds"] is not None:
-        lines.append(f"not included in s: {found['start_seconds']:.1f} s to start Python and import the libraries")
+    if figures["start_seconds"] is not None:
+        lines.append(f"not included in s: {figures['start_seconds']:.1f} s to start Python and import the libraries")
     if skipped:
         lines.append(f"skipped cases: {len(skipped)}; the first: {skipped[0]['error']}")
     return "\n".join(lines)
@@ -121,16 +121,16 @@ def make_remarks(rows: Sequence[Row]) -> str:
 
 def make_readme_tables(rows: Sequence[Row], axes: Sequence[str], unit: str, command: str) -> str:
     """The tables in Markdown, with the command, the date, the versions and the machine of the measurement."""
-    made = [
+    tables = [
         format_markdown(
             [*make_cells(rows, axis, unit), *([["all", *_format_figures(compute_figures(rows))]] if not k else [])]
         )
         for k, axis in enumerate(axes)
     ]
     if "way" in axes:
-        made = [format_markdown(make_combination_cells(rows, unit), len(collect_axes(rows)))]
+        tables = [format_markdown(make_combination_cells(rows, unit), len(collect_axes(rows)))]
     text = f"{make_legend(unit)} {'; '.join(make_remarks(rows).splitlines())}."
-    return "\n\n".join([*made, text, describe_measurement(f"`{command}`")])
+    return "\n\n".join([*tables, text, describe_measurement(f"`{command}`")])
 
 
 def format_row(row: Row) -> str:

@@ -1,4 +1,4 @@
-"""The checks catch implementations that do not keep their contract."""
+"""The checks detect implementations that do not keep their contract."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ MEANING = {
     "Allowance": "test_deposit_holds_the_damage",
     "Export": "test_writes_the_files_it_names",
 }
-"""By contract: the check of what a result means."""
+"""By contract: the check of the meaning of a result."""
 BAD_INPUT: dict[str, tuple[str, tuple[Any, ...]]] = {
     "Align": ("test_few_points", (3,)),
     "Segment": ("test_few_points", (0,)),
@@ -86,7 +86,7 @@ Fault = Callable[[Any, dict[str, Any]], Any]
 
 
 def spoil(value: Any, by: float) -> Any:
-    """A result that is off by ``by``, in the job's unit or as near to that as its kind comes."""
+    """A result with an error of ``by``, in the job's unit if it has lengths."""
     match value:
         case Mesh() | Samples() | Scan():
             points = value.vertices if isinstance(value, Mesh) else value.points

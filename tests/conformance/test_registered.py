@@ -1,4 +1,4 @@
-"""Every implementation found here keeps its contract."""
+"""All installed implementations keep their contracts."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ WITH: dict[str, dict[str, Any]] = {
     "enclose octree": {"error": 0.06},
     "enclose poisson_subtract": {"error": 0.13},
 }
-"""By implementation: the ``options`` to check it with, and what else its class is told."""
+"""By implementation: the ``options`` to check it with, and other attributes of its class."""
 
 
 def base(contract: type) -> Any:
-    """The class of a contract: that of its name, which for the readers is shorter by 'Read'."""
+    """The class of a contract, which has its name without 'Read'."""
     return getattr(conformance, f"{contract.__name__.removeprefix('Read')}Contract")
 
 

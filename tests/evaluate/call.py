@@ -1,4 +1,4 @@
-"""The command line, in a process of its own."""
+"""Calls of the command line in a process of its own."""
 
 from __future__ import annotations
 

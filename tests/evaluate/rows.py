@@ -1,4 +1,4 @@
-"""Rows as cases give them, made up."""
+"""Rows of cases, without running them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from damageest.evaluate.case import DamageCase, make_blank_row
 
 
 def row(**figures: Any) -> dict[str, Any]:
-    """The row of a case that went well, with other ``figures``."""
+    """The row of a case with a good result, with some ``figures`` replaced."""
     case = DamageCase("cuboid", 5, "pit", 0.2, scanner={"noise": 0.05, "points": 1000})
     well = {"iou": 0.99, "volume_error": -0.01, "surface_error": 0.2, "pose_error": 0.01, "found": 1, "missed": 0}
     cost = {"seconds": 2.0, "cpu_seconds": 3.0, "libigl_seconds": 0.5, "start_seconds": 1.0, "megabytes": 100.0}

@@ -1,4 +1,4 @@
-"""What the figures count, and what the sentence says of them."""
+"""Figures, tables and the summary."""
 
 from __future__ import annotations
 

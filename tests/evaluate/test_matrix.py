@@ -1,4 +1,4 @@
-"""The matrix: every implementation on a job, with the truth, or why not; in a README where it asks for it."""
+"""The matrix of all implementations on a job, and its table in a text file."""
 
 from __future__ import annotations
 

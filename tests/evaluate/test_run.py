@@ -1,4 +1,4 @@
-"""Rows kept in a file and gone on from, without running anything."""
+"""Rows are kept in a file, and runs resume from it; no case is run."""
 
 from __future__ import annotations
 

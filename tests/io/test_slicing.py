@@ -1,4 +1,4 @@
-"""The README's example of a whole round, taken as it stands: run, deposit, layers."""
+"""The complete example in the README: run, deposit, layers."""
 
 from __future__ import annotations
 
