@@ -33,12 +33,12 @@ def test_shuffled_faces_come_apart_into_the_bodies_they_were(sizes: list[float],
 
 
 @pytest.mark.parametrize("away", [np.zeros(3), FAR])
-def test_nested_spheres_are_a_shell_with_its_cavity_and_a_ball_in_it(away: np.ndarray) -> None:
-    outer, hollow, inner = ball(5, away), ball(4, away), ball(3, away)
-    pairs = split_shells(Solid(*join(outer, invert(hollow), inner)))
+def test_each_cavity_of_nested_spheres_belongs_to_the_shell_around_it(away: np.ndarray) -> None:
+    first, second, third, fourth = (ball(radius, away) for radius in (5, 4, 3, 2))
+    pairs = split_shells(Solid(*join(first, invert(second), third, invert(fourth))))
     assert [[shell.volume, *(cavity.volume for cavity in cavities)] for shell, cavities in pairs] == [
-        pytest.approx([outer.volume, hollow.volume]),
-        pytest.approx([inner.volume]),
+        pytest.approx([first.volume, second.volume]),
+        pytest.approx([third.volume, fourth.volume]),
     ]
 
 

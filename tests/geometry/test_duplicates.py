@@ -26,3 +26,28 @@ def test_neighbouring_numbers_differ_and_the_zeros_are_equal() -> None:
     keep, inverse = find_duplicates(points)
     assert keep.tolist() == [0, 2, 3]
     assert inverse.tolist() == [0, 0, 1, 2]
+
+
+def find_collision(first: np.ndarray, x: float) -> np.ndarray:
+    """A point with the given x whose hash is that of another: each step of the hash can be undone."""
+    odd, mask = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F), 2**64 - 1
+
+    def mix(a: int, b: int) -> int:
+        state = 0
+        for column, factor in zip((a, b), odd, strict=True):
+            state = ((state ^ (column >> 29) ^ column) * factor) & mask
+            state ^= state >> 32
+        return state
+
+    a, b, c = (int(bits) for bits in first.view(np.uint64))
+    other = int(np.float64(x).view(np.uint64))
+    wanted = c ^ (c >> 29) ^ mix(a, b) ^ mix(other, b)
+    return np.array([other, b, wanted ^ (wanted >> 29) ^ (wanted >> 58)], np.uint64).view(np.float64)
+
+
+def test_points_with_equal_hashes_are_compared_in_full() -> None:
+    first = np.array([1.0, 2.0, 3.0])
+    other = next(point for x in range(2, 50) if np.isfinite(point := find_collision(first, float(x))).all())
+    keep, inverse = find_duplicates(np.stack([first, other, first, other, other]))
+    assert keep.tolist() == [0, 1]
+    assert inverse.tolist() == [0, 1, 0, 1, 1]

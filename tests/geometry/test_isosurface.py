@@ -24,6 +24,7 @@ def test_a_ball_also_where_nodes_lie_exactly_on_it(radius: float, away: Floats) 
     solid = extract_region(grid, field)
     assert solid is not None
     assert solid.volume == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.02)
+    assert np.linalg.norm(solid.cross, axis=1).min() > 1e-12
     assert np.abs(np.linalg.norm(solid.vertices - away - 5, axis=1) - radius).max() < 0.05
 
 
