@@ -56,12 +56,22 @@ def split_shells(solid: Solid) -> list[tuple[Solid, list[Solid]]]:
     return out
 
 
+def label_pieces(faces: Ints) -> Ints:
+    """(F,) the number, from 0, of the piece that each face belongs to, in the order of their first vertices.
+
+    Faces that share a vertex are in one piece.
+    """
+    size = int(faces.max(initial=-1)) + 1
+    links = coo_array((np.ones(2 * len(faces)), np.concatenate([faces[:, :2], faces[:, 1:]]).T), shape=(size, size))
+    label = connected_components(links, directed=False)[1][faces[:, 0]]
+    return np.unique(label, return_inverse=True)[1].astype(np.int64)  # vertices without a face have numbers too
+
+
 def _split_pieces(solid: Solid) -> list[tuple[Floats, Ints]]:
     """Vertices (V,3) and faces (F,3) of each piece that shares no vertex with another, in the order of their first
     vertices."""
-    size, faces = len(solid.vertices), solid.faces
-    links = coo_array((np.ones(2 * len(faces)), np.concatenate([faces[:, :2], faces[:, 1:]]).T), shape=(size, size))
-    of_face = connected_components(links, directed=False)[1][faces[:, 0]]
+    faces = solid.faces
+    of_face = label_pieces(faces)
     order = np.argsort(of_face, kind="stable")
     pieces = []
     for own in np.split(order, np.flatnonzero(np.diff(of_face[order])) + 1):

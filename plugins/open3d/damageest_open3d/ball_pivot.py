@@ -12,35 +12,38 @@ from damageest.stages.reconstruct import Reconstruct
 
 
 class BallPivot(Reconstruct):
-    """Ball pivoting (Bernardini et al. 1999), by Open3D: triangles wherever a ball comes to rest on three points, which
-    are moved onto local fits first. Ends exactly where the points do. Wants even density, or radii that bridge gaps."""
+    """Ball pivoting (Bernardini et al. 1999), by Open3D. Needs even density, or radii that bridge the gaps.
+
+    Three points form a triangle where a ball rests on them. The points are first moved onto local fits. The surface
+    ends exactly where the points end.
+    """
 
     use: Literal["ball_pivot"] = "ball_pivot"
     radii: tuple[PositiveFloat, ...] = Field(
         (1.5, 3.0),
         min_length=1,
-        description="radii of the balls, in units of `spacing`; each larger one fills gaps that the smaller left",
+        description="radii of the balls, in units of `spacing`; each larger ball fills gaps that the smaller ones left",
     )
     spacing: float | None = Field(
         None,
         gt=0,
-        description="distance between the points that the ball rolls on, in the job's unit; default: the larger of "
-        "tolerance and point spacing",
+        description="spacing of the points that the ball rolls on, in the job's unit; default: the larger of tolerance "
+        "and point spacing",
     )
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
-        """Raises StageError where the points are too few, or no surface comes about."""
+        """Raises StageError where the points are too few, or where no surface can be reconstructed."""
         from damageest.geometry.open_surfaces import centre_points, orient_points, trim_surface
 
         cell = self.spacing or max(tolerance, spacing)
         origin = centre_points(points)
         cloud, normals = orient_points(points, part, cell, noise)
-        faces = _pivoted(cloud - origin, normals, [radius * cell for radius in sorted(self.radii)])
+        faces = _pivot_ball(cloud - origin, normals, [radius * cell for radius in sorted(self.radii)])
         return trim_surface(cloud, faces, cloud, np.inf, part, tolerance)
 
 
-def _pivoted(points: Floats, normals: Floats, radii: list[float]) -> Ints:
-    """Triangles (F,3) between points (N,3), by Open3D."""
+def _pivot_ball(points: Floats, normals: Floats, radii: list[float]) -> Ints:
+    """Triangles (F,3) between points (N,3) with ``normals`` (N,3), by Open3D."""
     from damageest_open3d._system import check
 
     check()

@@ -1,4 +1,4 @@
-"""Poisson reconstruction of the whole scan, and the part minus it."""
+"""Poisson reconstruction of the whole scan, and the part minus that body."""
 
 from __future__ import annotations
 
@@ -20,92 +20,98 @@ from damageest.artefacts import (
     Samples,
     Scan,
     Sites,
-    Solid,
 )
 from damageest.errors import StageError
 from damageest.stages.enclose import EncloseAll
 
 FEWEST = 100
-"""Points below which there is no body to speak of; Open3D crashes on very few."""
-FLAT = 1e-6
-"""Least spread across the points, in diagonals of the part; Open3D crashes on points in one place."""
+"""Fewest points for a body; Open3D crashes on very few points."""
+THINNEST = 1e-6
+"""Least spread of the points across their flattest direction, in diagonals of the part; Open3D crashes on less."""
 NEIGHBOURS = 30
 """Points of each normal's fit."""
-FIRM = 100.0
-"""How much more the nearest face says about the side of a sound point than about that of a damaged one, whose nearest
-face may be the one behind it."""
-CLEAR = 0.1
-"""From the part to the box round it, in diagonals of the part."""
+INTACT_WEIGHT = 100.0
+"""Weight of the nearest face's normal at an intact point; at a damaged one it is 1, because the nearest face may be on
+the other side of the part."""
+MARGIN = 0.1
+"""Distance from the part to the box round it, in diagonals of the part."""
 
 
 class PoissonSubtract(EncloseAll):
-    """Screened Poisson (Kazhdan and Hoppe 2013) of the whole scan, by Open3D, and the part minus that body, slivers
-    included: wherever noise or a rounded edge leaves the body below sound skin. For comparison."""
+    """The part minus a screened Poisson body of the whole scan (Kazhdan and Hoppe 2013), by Open3D. For comparison.
+
+    The difference has slivers: wherever noise or a rounded edge puts the body below intact skin.
+    """
 
     use: Literal["poisson_subtract"] = "poisson_subtract"
     depth: int = Field(
-        9, ge=5, le=13, description="levels of the octree over the scan, at most: it goes no finer than the points"
+        9, ge=5, le=13, description="most levels of the octree over the scan; it gets no finer than the points"
     )
     scale: float = Field(1.1, gt=1, le=4, description="edge of the octree's cube, in edges of the scan's bounding cube")
 
     def run(
         self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
     ) -> Enclosures:
-        """Raises StageError where the scan says too little, no closed body comes about, or nothing of the part is
-        outside it."""
+        """Raises StageError where the scan has too few points, where no closed body can be reconstructed, or where no
+        part of the metal is outside it."""
         from manifold3d import Manifold
 
+        from damageest.geometry.bodies import split_bodies
         from damageest.geometry.pieces import find_pieces
         from damageest.geometry.solids import to_manifold, to_solid
 
         if not sites.count:
             return Enclosures(())
-        sound = np.isin(deviation.label, (INTACT, ADDED))
+        intact = np.isin(deviation.label, (INTACT, ADDED))
         members = sites.label > 0
-        used = sound | members
-        # On coordinates of size one about the middle, Open3D's single precision loses nothing.
+        used = intact | members
+        # Open3D computes in single precision: coordinates near the origin, of size one, lose least.
         origin, size = part.bounds.mean(axis=0), part.diagonal
         points = (aligned.points[used] - origin) / size
-        if len(points) < FEWEST or np.linalg.eigvalsh(np.cov(points.T))[0] < FLAT**2:
+        if len(points) < FEWEST or np.linalg.eigvalsh(np.cov(points.T))[0] < THINNEST**2:
             raise StageError(
-                f"{len(points)} points, or points in one plane, bound no body", "method: implicit, or a denser scan"
+                f"no closed body can be reconstructed from {len(points)} points that are too few or lie in one plane",
+                "method: implicit, or a denser scan",
             )
         cell = max(tolerance, aligned.spacing) / size
-        above = _face_normals(part)[deviation.face[used]] * np.where(sound, FIRM, 1.0)[used, None]
-        vertices, faces = _poisson(points, above, cell, self.depth, self.scale)
-        mesh, notes = _closed(vertices * size, faces)
+        above = _compute_face_normals(part)[deviation.face[used]] * np.where(intact, INTACT_WEIGHT, 1.0)[used, None]
+        vertices, faces = _reconstruct_body(points, above, cell, self.depth, self.scale)
+        mesh, notes = _keep_closed(vertices * size, faces)
         try:
-            # edges where the body touches itself come apart here, and nothing moves
+            # Edges where the body touches itself are separated here; no vertex moves.
             body = to_manifold(mesh)
         except ValueError as error:
-            raise StageError(f"the Poisson body: {error}", "another enclose.depth, or method: implicit") from None
+            raise StageError(
+                f"the Poisson body is not usable: {error}", "another enclose.depth, or method: implicit"
+            ) from None
         if body.volume() <= 0:
             raise StageError("the Poisson body is inside out", "method: implicit, or a scan of all sides")
         nominal = to_manifold(part, origin)
-        gone = to_solid(nominal - body, origin)
-        low, high = part.bounds - origin + CLEAR * size * np.array([[-1.0], [1.0]])
+        lost = to_solid(nominal - body, origin)
+        low, high = part.bounds - origin + MARGIN * size * np.array([[-1.0], [1.0]])
         around = to_solid(Manifold.cube(tuple(high - low)).translate(tuple(low)) - body, origin)
-        if gone is None or around is None:
-            raise StageError("nothing of the part is outside the Poisson body", "method: implicit")
-        # the rule by which the route drops pieces, so that the note counts what it will drop
+        if lost is None or around is None:
+            raise StageError("no metal of the part is outside the Poisson body", "method: implicit")
+        # By the rule by which the route drops pieces, so that the note counts what the route drops.
         reach = max(2 * tolerance, aligned.spacing)
-        kept, dropped = find_pieces(gone, aligned.points[members], sites.label[members].astype(np.int64), reach)
-        count = _pieces(gone)
+        kept, dropped = find_pieces(lost, aligned.points[members], sites.label[members].astype(np.int64), reach)
+        count = len(split_bodies(lost))
         if slivers := count - len(kept):
             notes += (
                 f"{slivers} of the {count} pieces of part minus body touch no damaged point: slivers, "
-                f"{dropped / gone.volume:.1%} of the volume, not counting those that a thin neck joins to the damage",
+                f"{dropped / lost.volume:.1%} of the volume; slivers that are connected to the damage are not counted",
             )
         return Enclosures((Enclosure(around, tuple(range(1, sites.count + 1)), notes),))
 
 
-def _face_normals(part: Part) -> Floats:
-    """(F,3) unit normals."""
+def _compute_face_normals(part: Part) -> Floats:
+    """(F,3) unit normals of the faces."""
     return np.asarray(part.cross / np.maximum(np.linalg.norm(part.cross, axis=1), 1e-300)[:, None])
 
 
-def _poisson(points: Floats, above: Floats, cell: float, depth: int, scale: float) -> tuple[Floats, Ints]:
-    """The mesh (V,3), (F,3) of points (N,3), whose normals turn outward by ``above`` (N,3) and by one another."""
+def _reconstruct_body(points: Floats, above: Floats, cell: float, depth: int, scale: float) -> tuple[Floats, Ints]:
+    """Vertices (V,3) and faces (F,3) of the Poisson surface of points (N,3). Normals are oriented outward by ``above``
+    (N,3), the weighted normals of the nearest faces, and so that they agree with their neighbours."""
     from damageest.geometry.orientation import turn_toward_void
     from damageest_open3d._system import check
 
@@ -119,39 +125,42 @@ def _poisson(points: Floats, above: Floats, cell: float, depth: int, scale: floa
     cloud.normals = o3d.utility.Vector3dVector(normals)
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         try:
-            # with several threads the sums differ from run to run
+            # With several threads the sums differ from run to run.
             mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
                 cloud, depth=depth, scale=scale, n_threads=1
             )
         except RuntimeError as error:
             raise StageError(
-                f"Open3D could not reconstruct: {str(error).strip()}", "another enclose.depth, or method: implicit"
+                f"Open3D could not reconstruct a surface: {str(error).strip()}",
+                "another enclose.depth, or method: implicit",
             ) from None
     return np.asarray(mesh.vertices).copy(), np.asarray(mesh.triangles).astype(np.int64)
 
 
-def _closed(vertices: Floats, faces: Ints) -> tuple[Mesh, tuple[str, ...]]:
-    """The closed ones of a mesh's components (V,3), (F,3), and what to say of them.
+def _keep_closed(vertices: Floats, faces: Ints) -> tuple[Mesh, tuple[str, ...]]:
+    """The closed components of a mesh (V,3), (F,3), and notes on the others.
 
-    Raises StageError where the largest of them is open.
+    Raises StageError where the largest component is open.
     """
+    from damageest.geometry.bodies import label_pieces
+
     if not len(faces):
-        raise StageError("no Poisson body came about", "method: implicit, or a denser scan")
-    owner = _owners(faces)
-    lone, crowded = _edges(faces)
-    loose = np.bincount(owner, lone)
+        raise StageError("no Poisson body could be reconstructed", "method: implicit, or a denser scan")
+    owner = label_pieces(faces)
+    unpaired, crowded = _count_flawed_edges(faces)
+    loose = np.bincount(owner, unpaired)
     largest = int(np.argmax(np.bincount(owner)))
     if loose[largest]:
         raise StageError(
             f"the Poisson body is not watertight: {int(loose[largest])} of its edges have a triangle on one side "
-            "alone, as where the scan has a side without points",
-            "method: implicit, a scan of all sides, or more enclose.scale",
+            "only, as where one side of the part has no scan points",
+            "method: implicit, a scan of all sides, or a larger enclose.scale",
         )
     notes = []
     if sheets := int((loose > 0).sum()):
         notes.append(f"{sheets} open sheets beside the Poisson body were left out")
     if sheets + 1 < len(loose):
-        notes.append(f"the Poisson body came out in {len(loose) - sheets} closed surfaces")
+        notes.append(f"the Poisson body consists of {len(loose) - sheets} closed surfaces")
     kept = loose[owner] == 0
     if touching := int(crowded[kept].sum()) // 4:
         notes.append(f"the Poisson body is not manifold: it touches itself along {touching} edges")
@@ -159,8 +168,8 @@ def _closed(vertices: Floats, faces: Ints) -> tuple[Mesh, tuple[str, ...]]:
     return Mesh(vertices[used], inverse.reshape(-1, 3)), tuple(notes)
 
 
-def _edges(faces: Ints) -> tuple[Ints, Ints]:
-    """For each face (F,3) how many of its edges are not passed as often the other way, and how many several times."""
+def _count_flawed_edges(faces: Ints) -> tuple[Ints, Ints]:
+    """For each face (F,) how many of its edges lack an opposite edge, and how many are shared by four or more faces."""
     first, second = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T
     size = int(faces.max()) + 1
     codes, inverse, counts = np.unique(first * size + second, return_inverse=True, return_counts=True)
@@ -168,22 +177,5 @@ def _edges(faces: Ints) -> tuple[Ints, Ints]:
     at = np.searchsorted(codes, back).clip(max=len(codes) - 1)
     opposite = np.where(codes[at] == back, counts[at], 0)
     of_edge = np.stack([counts != opposite, (counts == opposite) & (counts > 1)])[:, inverse]
-    lone, crowded = of_edge.reshape(2, -1, 3).sum(axis=2)
-    return lone, crowded
-
-
-def _owners(faces: Ints) -> Ints:
-    """The connected component (F,) of each face (F,3)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    first, second = faces[:, [0, 1, 1, 2]].reshape(-1, 2).T
-    links = coo_array((np.ones(len(first)), (first, second)), shape=(int(faces.max()) + 1,) * 2)
-    return np.asarray(connected_components(links, directed=False)[1][faces[:, 0]])
-
-
-def _pieces(solid: Solid) -> int:
-    """How many separate pieces a solid has; a cavity in one is none."""
-    a, b, c = np.moveaxis(solid.triangles - solid.bounds.mean(axis=0), 1, 0)
-    volume = np.bincount(_owners(solid.faces), np.einsum("ij,ij->i", a, np.cross(b, c)))
-    return int((volume > 0).sum())
+    unpaired, crowded = of_edge.reshape(2, -1, 3).sum(axis=2)
+    return unpaired, crowded

@@ -71,14 +71,14 @@ def test_far_from_the_origin() -> None:
     assert np.sqrt((off**2).mean()) < 0.6 * NOISE
 
 
-def test_a_ball_that_falls_through_everywhere_gives_no_surface() -> None:
-    with pytest.raises(StageError, match="no surface") as caught:
+def test_a_ball_too_small_for_the_points_gives_no_surface() -> None:
+    with pytest.raises(StageError, match="gives no inner damage surface") as caught:
         BallPivot(radii=(0.01,)).run(bowl(), box(), TOLERANCE, 0.15, NOISE)
     assert "spacing" in caught.value.remedy
 
 
 def test_too_few_points_are_refused() -> None:
-    with pytest.raises(StageError, match="too few") as caught:
+    with pytest.raises(StageError, match="at least 16 are needed") as caught:
         BallPivot().run(bowl()[:12], box(), TOLERANCE, 0.15, NOISE)
     assert caught.value.remedy
 

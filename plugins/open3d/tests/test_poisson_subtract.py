@@ -1,4 +1,4 @@
-"""The part minus a Poisson body of the whole scan: known losses, its slivers, what it refuses, and the job's route."""
+"""The part minus a Poisson body of the whole scan: known damage, slivers, refusals, and the route of a job."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def box() -> Part:
 
 
 @lru_cache
-def scanned(name: str, noise: float = NOISE) -> Floats:
+def scan_box(name: str, noise: float = NOISE) -> Floats:
     """Points (N,3), ten for each unit of area, on the box without what one of TOOLS takes."""
     left = Mesh(*to_arrays(Manifold.cube(tuple(SIZE), True) - TOOLS[name]()))
     rng = np.random.default_rng(5)
@@ -60,15 +60,15 @@ def inputs(points: Floats) -> dict[str, Any]:
 
 
 @lru_cache
-def enclosed(name: str, noise: float = NOISE, depth: int = 7) -> Enclosures:
-    return PoissonSubtract(depth=depth).run(**inputs(scanned(name, noise)))
+def enclose(name: str, noise: float = NOISE, depth: int = 7) -> Enclosures:
+    return PoissonSubtract(depth=depth).run(**inputs(scan_box(name, noise)))
 
 
-def lost(enclosures: Enclosures) -> Any:
+def intersect(enclosures: Enclosures) -> Any:
     return to_manifold(box()) ^ unite(item.solid for item in enclosures.items)
 
 
-def slivers(enclosures: Enclosures) -> tuple[int, int, float]:
+def read_sliver_note(enclosures: Enclosures) -> tuple[int, int, float]:
     """Slivers, pieces and the slivers' percentage of the volume, as the note has them."""
     notes = " ".join(note for item in enclosures.items for note in item.notes)
     found = re.search(r"(\d+) of the (\d+) pieces .* touch no damaged point: slivers, ([\d.]+)% of the volume", notes)
@@ -78,53 +78,53 @@ def slivers(enclosures: Enclosures) -> tuple[int, int, float]:
 
 @pytest.mark.parametrize("name", TOOLS)
 def test_the_part_inside_it_is_the_damage_and_slivers(name: str) -> None:
-    enclosures = enclosed(name)
+    enclosures = enclose(name)
     truth = to_solid(Manifold.cube(tuple(SIZE), True) ^ TOOLS[name]())
-    assert iou(to_solid(lost(enclosures)), truth) > 0.9
+    assert iou(to_solid(intersect(enclosures)), truth) > 0.9
     (item,) = enclosures.items
-    assert item.sites == tuple(range(1, inputs(scanned(name))["sites"].count + 1))
+    assert item.sites == tuple(range(1, inputs(scan_box(name))["sites"].count + 1))
     assert (item.solid.bounds[1] > SIZE / 2 + 1).all()
     assert (item.solid.bounds[0] < -SIZE / 2 - 1).all()
 
 
-def test_the_note_counts_the_slivers_and_none_is_cleaned_away() -> None:
-    enclosures = enclosed("half ball")
-    volumes = sorted(body.volume() for body in lost(enclosures).decompose() if body.volume() > 0)
-    count, pieces, percent = slivers(enclosures)
+def test_the_note_counts_the_slivers_and_all_are_kept() -> None:
+    enclosures = enclose("half ball")
+    volumes = sorted(body.volume() for body in intersect(enclosures).decompose() if body.volume() > 0)
+    count, pieces, percent = read_sliver_note(enclosures)
     assert count > 20
     assert (count, pieces) == (len(volumes) - 1, len(volumes))
     assert percent == pytest.approx(100 * sum(volumes[:-1]) / sum(volumes), abs=0.06)
 
 
-def test_noise_makes_more_of_them_and_rounded_edges_are_lost_even_without() -> None:
-    clean, noisy = (enclosed("half ball", noise) for noise in (0.0, NOISE))
+def test_noise_adds_slivers_and_rounded_edges_are_lost_even_without_noise() -> None:
+    clean, noisy = (enclose("half ball", noise) for noise in (0.0, NOISE))
     ball = 2 / 3 * np.pi * 6**3
-    assert 1.01 * ball < lost(clean).volume() < lost(noisy).volume()
-    assert slivers(noisy)[0] > slivers(clean)[0]
-    assert slivers(noisy)[2] > 2 * slivers(clean)[2]
+    assert 1.01 * ball < intersect(clean).volume() < intersect(noisy).volume()
+    assert read_sliver_note(noisy)[0] > read_sliver_note(clean)[0]
+    assert read_sliver_note(noisy)[2] > 2 * read_sliver_note(clean)[2]
 
 
-def test_a_body_in_two_pieces_is_kept_and_said() -> None:
-    (item,) = enclosed("middle").items
+def test_a_body_in_two_pieces_is_kept_and_noted() -> None:
+    (item,) = enclose("middle").items
     assert any("2 closed surfaces" in note for note in item.notes)
 
 
 def test_fewer_levels_give_a_rounder_body() -> None:
     truth = to_solid(Manifold.cube(tuple(SIZE), True) ^ TOOLS["half ball"]())
-    coarse, fine = (iou(to_solid(lost(enclosed("half ball", depth=depth))), truth) for depth in (5, 7))
+    coarse, fine = (iou(to_solid(intersect(enclose("half ball", depth=depth))), truth) for depth in (5, 7))
     assert coarse < fine - 0.02
 
 
 def test_a_side_without_points_is_refused() -> None:
-    points = scanned("half ball")
+    points = scan_box("half ball")
     with pytest.raises(StageError, match="not watertight") as caught:
         PoissonSubtract(depth=7).run(**inputs(points[points[:, 2] > -3]))
     assert "implicit" in caught.value.remedy
 
 
 @pytest.mark.parametrize("change", ["few", "flat", "one place"])
-def test_points_that_bound_no_body_are_refused(change: str) -> None:
-    points = scanned("half ball")
+def test_points_that_enclose_no_body_are_refused(change: str) -> None:
+    points = scan_box("half ball")
     given = inputs(points)
     damaged = np.flatnonzero(given["sites"].label)
     chosen = damaged[:60] if change == "few" else damaged[:1000]
@@ -133,7 +133,7 @@ def test_points_that_bound_no_body_are_refused(change: str) -> None:
     given["deviation"] = type(of)(of.distance[chosen], of.face[chosen], of.label[chosen])
     given["sites"] = type(given["sites"])(given["sites"].label[chosen], given["sites"].count)
     given["aligned"] = Scan(moved, noise=NOISE, spacing=SPACING)
-    with pytest.raises(StageError, match="bound no body") as caught:
+    with pytest.raises(StageError, match="no closed body") as caught:
         PoissonSubtract().run(**given)
     assert caught.value.remedy
 
@@ -151,7 +151,7 @@ def test_naming_it_fixes_the_route() -> None:
             load({**header, "enclose": "poisson_subtract", **wrong}, registry)
 
 
-def test_a_whole_job_says_what_was_dropped(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_whole_job_warns_of_what_was_dropped(capfd: pytest.CaptureFixture[str]) -> None:
     tool = {"tool": "sphere", "centre": [0, 0, 6], "radius": 6}
     scan = Simulate.model_validate({"damage": [tool], "points": 20_000, "noise": NOISE}).run("mm", box())
     job = {"version": 1, "tolerance": TOLERANCE, "align": "none", "enclose": {"use": "poisson_subtract", "depth": 7}}

@@ -1,4 +1,4 @@
-"""MeshFix on one shell at a time: left to itself it keeps the largest and drops the others."""
+"""MeshFix on one shell at a time: on several it keeps only the largest."""
 
 from __future__ import annotations
 
@@ -8,35 +8,33 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh, Solid
+from damageest.geometry.body_repair import label_bodies
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.solids import concatenate_meshes, to_manifold, unite
 
 
-def shells(mesh: Mesh) -> list[Mesh]:
-    """The pieces whose triangles hang together by edges that two of them share, largest area first.
+def split_open_shells(mesh: Mesh) -> list[Mesh]:
+    """The pieces of a mesh, closed or not, largest area first.
 
-    Corners in the same place count as one. Where three or more triangles meet at an edge, pieces part there.
+    Triangles are in one piece where they share an edge that no third triangle has. Vertices in the same place count as
+    one.
     """
-    import trimesh
-
     _, first, same = np.unique(mesh.vertices, axis=0, return_index=True, return_inverse=True)
     faces = first[same.reshape(-1)][mesh.faces]
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     if not len(faces):
         return []
-    pairs = trimesh.graph.face_adjacency(faces)
-    label = trimesh.graph.connected_component_labels(pairs, node_count=len(faces))
-    pieces = [trimmed(mesh.vertices, faces[label == k]) for k in range(int(label.max()) + 1)]
+    label, count = label_bodies(faces)
+    pieces = [drop_unused_vertices(mesh.vertices, faces[label == k]) for k in range(count)]
     return sorted(pieces, key=lambda piece: -piece.area)
 
 
-def closed(pieces: Sequence[Mesh]) -> Solid | None:
-    """MeshFix's closed mesh of pieces that belong together, normals outward; None where none comes about."""
+def close_shells(pieces: Sequence[Mesh]) -> Solid | None:
+    """One closed mesh of several pieces by MeshFix, normals outward; None where MeshFix cannot close them."""
     from pymeshfix import PyTMesh
 
-    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
-    vertices = np.concatenate([piece.vertices for piece in pieces])
-    faces = np.concatenate([piece.faces + start for piece, start in zip(pieces, starts, strict=False)])
+    vertices, faces, _ = concatenate_meshes(pieces)
     fixer = PyTMesh()
     fixer.set_quiet(1)
     try:
@@ -49,19 +47,17 @@ def closed(pieces: Sequence[Mesh]) -> Solid | None:
     except RuntimeError:
         return None
     faces = np.asarray(faces, np.int64)
-    for wound in (faces, faces[:, ::-1]):
+    for oriented in (faces, faces[:, ::-1]):
         try:
-            return Solid(np.asarray(vertices, np.float64), wound)
+            return Solid(np.asarray(vertices, np.float64), oriented)
         except ValueError:
             continue
     return None
 
 
-def assembled(solids: Sequence[Solid]) -> Any:
-    """The solids as one manifold3d.Manifold. One inside an odd number of others bounds a cavity."""
-    from damageest.geometry.solids import to_manifold, unite
-
-    depth = [sum(_inside(solid.vertices, other) for other in solids if other is not solid) for solid in solids]
+def combine_solids(solids: Sequence[Solid]) -> Any:
+    """The solids as one manifold3d.Manifold. A solid inside an odd number of others bounds a cavity."""
+    depth = [sum(_is_inside(solid.vertices, other) for other in solids if other is not solid) for solid in solids]
     body = unite([solid for solid, level in zip(solids, depth, strict=True) if not level])
     for level in range(1, max(depth) + 1):
         for solid in (s for s, d in zip(solids, depth, strict=True) if d == level):
@@ -69,11 +65,12 @@ def assembled(solids: Sequence[Solid]) -> Any:
     return body
 
 
-def _inside(points: Floats, solid: Solid) -> bool:
+def _is_inside(points: Floats, solid: Solid) -> bool:
+    """Whether all points (N,3) lie inside a solid."""
     return bool((signed_distance(points, solid)[0] < 0).all())
 
 
-def trimmed(vertices: Floats, faces: Ints) -> Mesh:
-    """A mesh of these faces, with the vertices that they use."""
+def drop_unused_vertices(vertices: Floats, faces: Ints) -> Mesh:
+    """A mesh of these faces (F,3), with only the vertices (V,3) that they use."""
     used, faces = np.unique(faces, return_inverse=True)
     return Mesh(vertices[used], faces.reshape(-1, 3))

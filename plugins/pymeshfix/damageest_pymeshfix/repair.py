@@ -12,63 +12,69 @@ from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.stages.repair import Repair
 
-LOST = 0.01
-"""Share of a shell's area that its repair may take away."""
-REMEDY = "method: implicit, which closes by construction"
+MOST_LOST = 0.01
+"""Share of a shell's area that its repair may remove."""
+REMEDY = "method: implicit, whose enclosures are always closed"
 
 
 class PyMeshFix(Repair):
-    """MeshFix (Attene 2010), shell by shell: fills holes, turns flipped triangles, takes pinches and intersections
-    apart. Passes a watertight mesh on as it is, and refuses where the repaired one is another shape than the given."""
+    """Repairs the enclosure by MeshFix (Attene 2010), shell by shell; a watertight one passes unchanged.
+
+    Fills holes, turns flipped triangles, and separates pinched and intersecting triangles. Refused where the repaired
+    mesh has another shape than the given one.
+    """
 
     use: Literal["pymeshfix"] = "pymeshfix"
     invented: float = Field(
-        0.03, ge=0, le=1, description="largest share of the repaired area farther than the tolerance from the given one"
+        0.03,
+        ge=0,
+        le=1,
+        description="largest share of the repaired area that may be farther than the tolerance from the given mesh",
     )
 
     def run(self, enclosure: Mesh, tolerance: float) -> Solid:
-        """Raises StageError where nothing closed comes about, or the repaired mesh strays from the given one."""
-        from damageest_pymeshfix._meshfix import closed, shells, trimmed
+        """Raises StageError where MeshFix closes nothing, or where the repaired mesh differs from the given one."""
+        from damageest_pymeshfix._meshfix import close_shells, drop_unused_vertices, split_open_shells
 
         try:
             return Solid(enclosure.vertices, enclosure.faces)
         except ValueError as error:
             if not len(enclosure.faces):
-                raise StageError(f"the enclosure is not to be repaired: {error}", REMEDY) from None
-        mesh = trimmed(enclosure.vertices, enclosure.faces)
+                raise StageError(f"the enclosure cannot be repaired: {error}", REMEDY) from None
+        mesh = drop_unused_vertices(enclosure.vertices, enclosure.faces)
         origin = mesh.bounds.mean(axis=0)
         mesh = Mesh(mesh.vertices - origin, mesh.faces)
-        sound: list[Solid] = []
-        doubtful: list[Mesh] = []
-        for shell in shells(mesh):
-            repaired = closed([shell])
+        done: list[Solid] = []
+        unclear: list[Mesh] = []
+        for shell in split_open_shells(mesh):
+            repaired = close_shells([shell])
             if (
                 repaired
-                and _share_off(shell, repaired, tolerance) <= LOST
-                and _share_off(repaired, shell, tolerance) <= self.invented
+                and _measure_share_off(shell, repaired, tolerance) <= MOST_LOST
+                and _measure_share_off(repaired, shell, tolerance) <= self.invented
             ):
-                sound.append(repaired)
-            else:  # where much is missing, another piece may belong to it
-                doubtful.append(shell)
-        if doubtful and (joined := closed(doubtful)):
-            sound.append(joined)
-        solid = _one(sound, doubtful)
-        self._check(solid, sound, doubtful, mesh, tolerance)
+                done.append(repaired)
+            else:  # much of it may be missing: another piece may belong to it
+                unclear.append(shell)
+        if unclear and (joined := close_shells(unclear)):
+            done.append(joined)
+        solid = _combine_shells(done, unclear)
+        self._check_shape(solid, done, unclear, mesh, tolerance)
         return Solid(solid.vertices + origin, solid.faces)
 
-    def _check(self, solid: Solid, sound: list[Solid], doubtful: list[Mesh], given: Mesh, tolerance: float) -> None:
-        """Raises StageError where the solid made of ``sound`` shells strays from the ``given`` mesh."""
-        added = _share_off(solid, given, tolerance)
+    def _check_shape(self, solid: Solid, done: list[Solid], unclear: list[Mesh], given: Mesh, tolerance: float) -> None:
+        """Raises StageError where the solid made of the repaired shells ``done`` differs from the ``given`` mesh."""
+        added = _measure_share_off(solid, given, tolerance)
         if added > self.invented:
             raise StageError(
                 f"{added:.1%} of the repaired mesh's area is farther than the tolerance from the enclosure: a hole is "
-                "too large to be filled by guess",
-                f"{REMEDY}, or, where the patch is right, invented: {1.1 * added:.2g}",
+                "too large to be filled",
+                f"{REMEDY}; where the filled hole is right, repair.invented: {1.1 * added:.2g}",
             )
-        for piece in doubtful:
-            if (lost := min(_share_off(piece, shell, tolerance) for shell in [*sound, solid])) > LOST:
+        for piece in unclear:
+            if (lost := min(_measure_share_off(piece, shell, tolerance) for shell in [*done, solid])) > MOST_LOST:
                 raise StageError(
-                    f"a piece of the enclosure of {len(piece.faces)} triangles does not close and belongs to no other; "
+                    f"a piece of the enclosure, {len(piece.faces)} triangles, cannot be closed or joined to another: "
                     f"{lost:.0%} of it would be lost",
                     REMEDY,
                 )
@@ -79,26 +85,26 @@ class PyMeshFix(Repair):
             )
 
 
-def _one(sound: list[Solid], doubtful: list[Mesh]) -> Solid:
-    """All shells as one solid: united where they overlap, those that bound a cavity taken out."""
+def _combine_shells(done: list[Solid], unclear: list[Mesh]) -> Solid:
+    """All shells as one solid: overlapping ones united, cavities subtracted."""
     from damageest.geometry.solids import to_solid
-    from damageest_pymeshfix._meshfix import assembled
+    from damageest_pymeshfix._meshfix import combine_solids
 
-    if not sound:
-        pieces = f"; it is in {len(doubtful)} pieces" if len(doubtful) > 1 else ""
-        raise StageError(f"MeshFix finds nothing in the enclosure that closes{pieces}", REMEDY)
-    if len(sound) == 1:
-        return sound[0]
+    if not done:
+        pieces = f", which is in {len(unclear)} pieces" if len(unclear) > 1 else ""
+        raise StageError(f"MeshFix could not close the enclosure{pieces}", REMEDY)
+    if len(done) == 1:
+        return done[0]
     try:
-        solid = to_solid(assembled(sound))
+        solid = to_solid(combine_solids(done))
     except ValueError as error:
-        raise StageError(f"the repaired shells do not go together: {error}", REMEDY) from None
+        raise StageError(f"the repaired shells cannot be combined: {error}", REMEDY) from None
     if solid is None:
-        raise StageError("the repaired shells enclose nothing together", REMEDY)
+        raise StageError("the repaired shells together enclose no volume", REMEDY)
     return solid
 
 
-def _share_off(mesh: Mesh, other: Mesh, tolerance: float) -> float:
+def _measure_share_off(mesh: Mesh, other: Mesh, tolerance: float) -> float:
     """Share of the area of ``mesh`` farther than ``tolerance`` from ``other``."""
     area = np.linalg.norm(mesh.cross, axis=1)
     distance = distance_to_mesh(mesh.triangles.mean(axis=1), other)

@@ -12,14 +12,16 @@ from damageest.stages.boolean import Boolean
 
 
 class PyMeshLabBoolean(Boolean):
-    """Intersection with exact predicates (libigl's, after Zhou et al. 2016), by PyMeshLab, in double precision. Slower
-    than manifold, and an independent check of it."""
+    """Intersection with exact predicates, by PyMeshLab (libigl's, after Zhou et al. 2016), in double precision.
+
+    Slower than `manifold`, and an independent check of it.
+    """
 
     use: Literal["pymeshlab"] = "pymeshlab"
 
     def run(self, solid: Solid, part: Part) -> Solid | None:
-        """The part of ``solid`` inside ``part``. Raises StageError where PyMeshLab refuses the meshes, or what it gives
-        is not watertight."""
+        """The part of ``solid`` inside ``part``. Raises StageError where PyMeshLab refuses the meshes, or where its
+        result is not watertight."""
         from damageest_pymeshlab._system import check
 
         check()
@@ -32,23 +34,26 @@ class PyMeshLabBoolean(Boolean):
         try:
             meshes.generate_boolean_intersection(first_mesh=0, second_mesh=1)
         except pymeshlab.PyMeshLabException as error:
-            if "Vertex matrix is empty" in str(error):  # its way of saying that nothing is in common
+            if "Vertex matrix is empty" in str(error):  # this means: nothing in common
                 return None
             raise StageError(
-                f"PyMeshLab could not intersect: {str(error).strip()}", "boolean: manifold, or repair: pymeshfix"
+                f"PyMeshLab could not intersect the meshes: {str(error).strip()}",
+                "boolean: manifold, or repair: pymeshfix",
             ) from None
-        made = meshes.current_mesh()
-        if not made.face_number():
+        result = meshes.current_mesh()
+        if not result.face_number():
             return None
-        vertices, faces = _ordered(np.asarray(made.vertex_matrix(), np.float64), made.face_matrix().astype(np.int64))
+        vertices, faces = _sort_mesh(
+            np.asarray(result.vertex_matrix(), np.float64), result.face_matrix().astype(np.int64)
+        )
         try:
             return Solid(vertices + origin, faces)
         except ValueError as error:
-            raise StageError(f"PyMeshLab's intersection is {error}", "boolean: manifold") from None
+            raise StageError(f"the result of PyMeshLab is not usable: {error}", "boolean: manifold") from None
 
 
-def _ordered(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """The same mesh, vertices and faces in an order that does not depend on the filter's threads."""
+def _sort_mesh(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    """The same mesh with vertices (V,3) and faces (F,3) sorted: PyMeshLab's order depends on its threads."""
     order = np.lexsort(vertices.T[::-1])
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))

@@ -83,7 +83,7 @@ def test_solids_that_meet_in_an_edge_give_no_solid_and_are_refused() -> None:
     assert "manifold" in caught.value.remedy
 
 
-def test_an_open_mesh_is_refused_by_name() -> None:
+def test_an_open_mesh_is_a_stage_error() -> None:
     whole = solid(Body.cube((4, 4, 4)).translate((8, 8, 8)))
     broken = object.__new__(Solid)
     object.__setattr__(broken, "vertices", whole.vertices)

@@ -62,6 +62,6 @@ def test_a_part_that_does_not_fit_in_is_refused() -> None:
 
 
 def test_too_many_cells_are_refused_before_they_are_made() -> None:
-    with pytest.raises(StageError, match="too large") as caught:
+    with pytest.raises(StageError, match="does not fit in memory") as caught:
         make_background(BuildVolume(size=SIZE, cell=0.02), box((80, 60, 20)))
     assert "a cell of" in caught.value.remedy

@@ -50,7 +50,7 @@ def test_far_from_the_origin() -> None:
 
 def test_too_few_points_are_refused() -> None:
     points, part = scene()
-    with pytest.raises(StageError, match="too few") as caught:
+    with pytest.raises(StageError, match="at least 16 are needed") as caught:
         SignedDistance().run(points[:12], part, TOLERANCE, 0.15, NOISE)
     assert caught.value.remedy
 

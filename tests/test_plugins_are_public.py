@@ -1,0 +1,101 @@
+"""The bundled plugins use nothing of damageest that any other plugin could not use."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PLUGINS = Path(__file__).parent.parent / "plugins"
+FILES = sorted(PLUGINS.glob("*/damageest_*/**/*.py"))
+
+PUBLIC_NAMES = {"damageest": {"hookimpl"}}
+"""Modules of which only some names are public."""
+PUBLIC_MODULES = {
+    "damageest.artefacts",
+    "damageest.errors",
+    "damageest.geometry",
+    "damageest.io",
+    "damageest.registry.system_libraries",
+}
+"""Public modules, with the modules in them."""
+
+
+def is_public(module: str, name: str) -> bool:
+    """Whether a plugin may import this name of this module; ``name`` is empty for `import module`."""
+    parts = module.split(".")
+    if any(part.startswith("_") for part in [*parts, name]):
+        return False
+    if module in PUBLIC_NAMES:
+        return name in PUBLIC_NAMES[module]
+    if parts[:2] == ["damageest", "stages"]:  # the base class and the contracts, without their implementations
+        return len(parts) <= 3 and bool(name) and not is_implementation(parts, name)
+    return any(module == public or module.startswith(f"{public}.") for public in PUBLIC_MODULES)
+
+
+def is_implementation(parts: list[str], name: str) -> bool:
+    """Whether the name is a module of one stage, as in `from damageest.stages.enclose import adaptive`."""
+    folder = Path(*parts)
+    return len(parts) == 3 and (PLUGINS.parent / folder / f"{name}.py").exists()
+
+
+def list_imports(source: str) -> list[tuple[str, str]]:
+    """The modules and names of damageest that a source file imports, with those inside functions."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and not node.level:
+            found += [(node.module or "", alias.name) for alias in node.names]
+        elif isinstance(node, ast.Import):
+            found += [(alias.name, "") for alias in node.names]
+    return [item for item in found if item[0].split(".")[0] == "damageest"]
+
+
+def list_private_attributes(source: str) -> list[str]:
+    """Attributes `module._name` of names that were imported from damageest."""
+    tree = ast.parse(source)
+    names = {
+        alias.asname or alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "damageest"
+        for alias in node.names
+    }
+    return [
+        f"{node.value.id}.{node.attr}"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in names
+        if node.attr.startswith("_") and not node.attr.startswith("__")
+    ]
+
+
+def test_there_are_plugins() -> None:
+    assert {file.relative_to(PLUGINS).parts[0] for file in FILES} >= {"cadquery", "octree", "open3d", "sweep"}
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PLUGINS)))
+def test_a_plugin_uses_public_names_only(file: Path) -> None:
+    source = file.read_text(encoding="utf-8")
+    private = [f"{module}: {name}" for module, name in list_imports(source) if not is_public(module, name)]
+    assert not private + list_private_attributes(source)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from damageest.geometry.body_repair import _label",
+        "from damageest.stages.enclose._sew import build_strip",
+        "from damageest.stages.enclose.adaptive import Adaptive",
+        "from damageest.stages.enclose import adaptive",
+        "import damageest.stages.enclose.adaptive",
+        "from damageest.pipeline.engine import Engine",
+        "from damageest.job import Job",
+        "from damageest import run",
+        "def f():\n    import damageest",
+    ],
+)
+def test_private_imports_are_found(line: str) -> None:
+    assert not all(is_public(module, name) for module, name in list_imports(line))
+
+
+def test_private_attributes_are_found() -> None:
+    assert list_private_attributes("from damageest.io import meshes\nmeshes._read('a.stl')") == ["meshes._read"]
