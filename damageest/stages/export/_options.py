@@ -1,4 +1,4 @@
-"""The formats that a job names, checked with the job against what the plugins here can write."""
+"""Options for file formats, checked with the job: is there a writer for each?"""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from damageest.errors import suggest
 
 PLUGINS = {"step": "damageest-cadquery"}
-"""The plugin that has a format, for whoever lacks it."""
+"""Format to the plugin that writes it; named where it is not installed."""
 
 
 def _check_known(name: str, info: ValidationInfo) -> str:
@@ -27,12 +27,12 @@ def _make_error(text: str) -> PydanticCustomError:
     return PydanticCustomError("format", "{text}", {"text": text})
 
 
-def check_spline_writer(wanted: bool, info: ValidationInfo) -> bool:
-    """Refuses a spline where nothing here can write one."""
+def check_spline_writer(spline: bool, info: ValidationInfo) -> bool:
+    """Refuses a spline where no writer can write one."""
     registry = (info.context or {}).get("registry")
-    if wanted and registry is not None and not any(writer.patch for writer in registry.writers.values()):
+    if spline and registry is not None and not any(writer.patch for writer in registry.writers.values()):
         raise _make_error(f"a spline needs {registry.describe_plugin(PLUGINS['step'])}")
-    return wanted
+    return spline
 
 
 Format = Annotated[str, AfterValidator(_check_known), Field(examples=["stl", "ply", "3mf", "step"])]
@@ -45,4 +45,4 @@ Formats = Annotated[
     AfterValidator(lambda names: tuple(dict.fromkeys(names))),
     Field(min_length=1),
 ]
-"""One format or a list; each once."""
+"""One format or a list of formats, without duplicates."""

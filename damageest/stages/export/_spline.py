@@ -1,4 +1,4 @@
-"""A B-spline through an inner damage surface, where that is a height field over a plane: one smooth face for CAM."""
+"""Fits a B-spline to an inner damage surface that is a height field over a plane: one smooth face for CAM."""
 
 from __future__ import annotations
 
@@ -13,23 +13,26 @@ from damageest.stages.export import Patch, Spline
 
 DEGREE = 3
 _OVERHANG = 0.01
-"""Share of the area that may lean over, as slivers do; how far the spline is off there is measured all the same."""
+"""Largest share of the area that may overhang, as slivers do; the deviation there is measured all the same."""
 _SPANS = (4, 8, 16, 32, 64)
 _STIFF = 1e-4
-"""Weight of the poles' second differences, which bridge where the surface has no points."""
+"""Weight of the second differences of the poles, which fix the spline where the surface has no points."""
 _SPECK = 0.01
 _MARGIN = 0.03
 _SAMPLES = 400
 
 
 def fit_spline(surface: Surface, tolerance: float) -> tuple[Patch | None, Spline]:
-    """The coarsest spline within half of ``tolerance`` of the surface, else the nearest within it; or why none is.
+    """The coarsest spline within half of ``tolerance`` of the surface, else the one with the smallest deviation.
 
-    Its parameters are lengths in the plane that the surface is a height field over.
+    Its parameters are lengths in the plane over which the surface is a height field.
+
+    Returns:
+        The spline, None where none is within the tolerance; and its deviation, or the reason why there is none.
     """
     axes, overhang = _fit_plane(surface)
     if overhang > _OVERHANG:
-        return None, Spline(reason=f"no height field over any plane: {overhang:.1%} of its area overhangs")
+        return None, Spline(reason=f"the surface is no height field over any plane: {overhang:.1%} of it overhangs")
     origin = surface.bounds.mean(axis=0)
     points = (surface.vertices - origin) @ axes.T
     corners = points[surface.faces]
@@ -41,7 +44,7 @@ def fit_spline(surface: Surface, tolerance: float) -> tuple[Patch | None, Spline
         knots, poles = _solve_least_squares(data, spans)
         along = np.abs(NdBSpline(knots, poles[..., 2], DEGREE)(points[:, :2]) - points[:, 2]) * upright
         if along.max() > 2 * tolerance and spans != _SPANS[-1]:
-            continue  # far off, and quick to tell
+            continue  # too far off; this test is fast
         off = _measure_deviation(points, surface, knots, poles)
         if best is None or off < best[0]:
             best = off, Patch(DEGREE, knots, origin + poles @ axes, tuple(rims))
@@ -49,16 +52,22 @@ def fit_spline(surface: Surface, tolerance: float) -> tuple[Patch | None, Spline
             break
     assert best is not None
     if best[0] > tolerance:
-        return None, Spline(best[0], reason=f"the nearest is {best[0]:.3g} off, the tolerance {tolerance:.3g}")
+        return None, Spline(
+            best[0], reason=f"the best spline deviates by {best[0]:.3g}, more than the tolerance {tolerance:.3g}"
+        )
     return best[1], Spline(best[0], bool(rims))
 
 
 def _fit_plane(surface: Surface) -> tuple[Floats, float]:
-    """(3,3) two directions of a plane and its normal, so that little of the surface faces away; and that share."""
+    """Fits a plane so that little of the surface faces away from its normal.
+
+    Returns:
+        (3,3) two directions in the plane and its normal; the share of the area that faces away.
+    """
     area = np.linalg.norm(surface.cross, axis=1)
     unit = surface.cross / np.maximum(area, 1e-300)[:, None]
     weight, best, least = area / area.sum(), np.zeros(3), np.inf
-    for _ in range(20):  # the steepest gain weight, so that the normal leans toward them
+    for _ in range(20):  # faces at a steep angle get more weight, so that the normal turns toward them
         normal = weight @ unit
         normal /= max(float(np.linalg.norm(normal)), 1e-300)
         away = area[unit @ normal < 0.02].sum() / area.sum()
@@ -75,7 +84,7 @@ def _fit_plane(surface: Surface) -> tuple[Floats, float]:
 
 
 def _solve_least_squares(data: Floats, spans: int) -> tuple[tuple[Floats, Floats], Floats]:
-    """Knots of both directions and poles (U,V,3) of the surface nearest to points (N,3), over all of their extent."""
+    """Knots in both directions and poles (U,V,3) of the spline nearest to points (N,3), by least squares."""
     low, high = data[:, :2].min(axis=0), data[:, :2].max(axis=0)
     edge = _MARGIN * (high - low).max()
     long = (high - low).max()
@@ -89,22 +98,23 @@ def _solve_least_squares(data: Floats, spans: int) -> tuple[tuple[Floats, Floats
         bend.append(csr_array(np.diff(np.eye(size), 2, axis=0)))
     sizes = [len(k) - DEGREE - 1 for k in knots]
     u, v = basis
-    # each point meets DEGREE + 1 poles a side: their products, row by row
+    # at each point, DEGREE + 1 basis functions per direction are not 0: their products, row by row
     rows = np.repeat(np.arange(len(data)), (DEGREE + 1) ** 2)
     columns = (u.indices.reshape(-1, DEGREE + 1, 1) * sizes[1] + v.indices.reshape(-1, 1, DEGREE + 1)).reshape(-1)
     values = (u.data.reshape(-1, DEGREE + 1, 1) * v.data.reshape(-1, 1, DEGREE + 1)).reshape(-1)
     A = csr_array((values, (rows, columns)), shape=(len(data), sizes[0] * sizes[1]))
     stiff = kron(bend[0].T @ bend[0], eye_array(sizes[1])) + kron(eye_array(sizes[0]), bend[1].T @ bend[1])
     heights = spsolve((A.T @ A + _STIFF * len(data) / A.shape[1] * stiff).tocsc(), A.T @ data[:, 2])
-    # the mean of the knots that a pole belongs to: poles there give back the parameters as coordinates
+    # poles at the means of their knots (Greville points) reproduce the parameters as coordinates
     at = [np.convolve(k[1:-1], np.full(DEGREE, 1 / DEGREE), "valid") for k in knots]
     poles = np.dstack([*np.meshgrid(*at, indexing="ij"), np.asarray(heights).reshape(sizes)])
     return (knots[0], knots[1]), poles
 
 
 def _trace_outlines(triangles: Floats, tolerance: float) -> list[Floats]:
-    """The outlines (K,2) of the region that triangles (F,3,2) cover, the outer one first, straightened by a tenth of
-    ``tolerance``; none where it falls into several. Holes and islands of less than a hundredth of it are left out."""
+    """The outlines (K,2) of the region that triangles (F,3,2) cover, the outer one first, simplified within a tenth of
+    ``tolerance``; none where there are several regions. Holes and islands smaller than a hundredth of it are left
+    out."""
     from manifold3d import CrossSection, FillRule
 
     region = CrossSection(list(np.ascontiguousarray(triangles)), FillRule.NonZero)
@@ -115,15 +125,16 @@ def _trace_outlines(triangles: Floats, tolerance: float) -> list[Floats]:
 
 
 def _measure_area(loop: Floats) -> float:
+    """Signed area of a closed loop (K,2), positive where it runs counter-clockwise."""
     x, y = loop.T
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
 
 
 def _measure_deviation(points: Floats, surface: Surface, knots: tuple[Floats, Floats], poles: Floats) -> float:
-    """The largest distance from the surface's vertices (V,3) to the spline, and back from the spline where it lies over
-    the surface; in the plane's coordinates."""
+    """The largest distance from the surface's vertices ``points`` (V,3) to the spline, or back from the spline where it
+    is above or below the surface; in the coordinates of the plane."""
 
-    def off(queries: Floats, vertices: Floats, faces: Ints) -> Floats:
+    def measure(queries: Floats, vertices: Floats, faces: Ints) -> Floats:
         return distance_to_mesh(queries, Mesh(vertices, faces))
 
     sides = [np.linspace(knot[0], knot[-1], _SAMPLES) for knot in knots]
@@ -131,7 +142,7 @@ def _measure_deviation(points: Floats, surface: Surface, knots: tuple[Floats, Fl
     sampled = np.column_stack([grid, NdBSpline(knots, poles[..., 2], DEGREE)(grid)])
     number = np.arange(len(sampled)).reshape(_SAMPLES, _SAMPLES)
     a, b, c, d = (x.reshape(-1) for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
-    there = off(points, sampled, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])).max()
+    there = measure(points, sampled, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])).max()
     flat, faces = points * [1, 1, 0], np.array(surface.faces)
-    over = off(sampled * [1, 1, 0], flat, faces) <= 1e-9 * surface.diagonal
-    return float(max(there, off(sampled[over], points, faces).max(initial=0.0)))
+    over = measure(sampled * [1, 1, 0], flat, faces) <= 1e-9 * surface.diagonal
+    return float(max(there, measure(sampled[over], points, faces).max(initial=0.0)))

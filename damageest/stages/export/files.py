@@ -1,4 +1,4 @@
-"""The result as files that CAM and inspection programs read."""
+"""Writes the result as files for CAM and inspection programs."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ UNDAMAGED, DAMAGE, DEPOSIT = (150, 155, 165), (215, 50, 40), (40, 130, 205)
 
 
 class Files(Export):
-    """Solids as STL, PLY, 3MF or STEP, inner damage surfaces as PLY, the scan with distance, label and site."""
+    """Writes solids as STL, PLY, 3MF or STEP; inner damage surfaces and the labelled scan as PLY."""
 
     use: Literal["files"] = "files"
     format: Formats = Field(
         ("stl",),
-        description="of the solids, one or a list: stl (single precision; a solid that this would open is written as "
-        "ply too), ply (double precision), 3mf (one file of all, with unit, names and colours), step (faceted; plugin "
-        "cadquery)",
+        description="format of the solids, one or a list: stl (single precision; a solid that rounding opens is "
+        "written as ply too), ply (double precision), 3mf (one file for all, with unit, names and colours), step "
+        "(faceted; plugin cadquery)",
     )
     frame: Literal["part", "scan", "both"] = Field(
-        "part", description="the part's, the scan's as it was measured (files below scan_frame/), or both"
+        "part", description="frame of the files: the part's, the scan's as measured (files in scan_frame/), or both"
     )
     detail: float | None = Field(
         None,
         ge=0,
-        description="how far facets of STEP solids may lie off the surface, so that there are fewer of them, in the "
-        "job's unit; default: a tenth of the tolerance",
+        description="largest distance by which facets of STEP solids may deviate, to make fewer of them, in the job's "
+        "unit; default: a tenth of the tolerance",
     )
     spline: Annotated[bool, AfterValidator(check_spline_writer)] = Field(
         False,
-        description="each inner damage surface as B-spline in STEP too, where one fits within the tolerance (plugin "
-        "cadquery)",
+        description="write each inner damage surface as B-spline in STEP too, where one fits within the tolerance "
+        "(plugin cadquery)",
     )
 
     def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles:
-        """Writes into ``folder`` and gives the paths relative to it. The same result gives the same bytes."""
+        """Writes into ``folder``; gives the paths relative to it. The same result gives the same bytes."""
         splines = {s.id: fit_spline(s.surface, result.tolerance) for s in result.sites} if self.spline else {}
         detail = result.tolerance / 10 if self.detail is None else self.detail
         bodies, coarse = _collect_bodies(result), {}
@@ -69,12 +69,12 @@ class Files(Export):
                 patches = {number: patch for number, (patch, _) in splines.items() if patch}
                 done += _write_patches(writers, folder, place, patches, T, result.units)
         done.append(self._write_truth(result, folder, writers))
-        files = dict.fromkeys(f for one in done for f in one.files)  # STL may have written a PLY already
+        files = dict.fromkeys(f for one in done for f in one.files)  # the writer of STL may have written a PLY already
         notes = tuple(n for one in done for n in one.notes)
         return ExportedFiles(tuple(files), notes, {number: spline for number, (_, spline) in splines.items()})
 
     def _write_surfaces(self, result: Result, folder: Path, place: str, T: Floats | None) -> list[ExportedFiles]:
-        """Surfaces and scan, below ``place``; ``T`` takes a point of the part to their frame."""
+        """Writes surfaces and scan below ``place``; ``T`` (4,4) takes a point from the part's frame to theirs."""
         done = []
         for site in result.sites:
             path = _make_folder(folder, f"{place}surface/site-{site.id}.ply")
@@ -84,7 +84,7 @@ class Files(Export):
         return done
 
     def _write_truth(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles:
-        """What a virtual scanner knows, in the part's frame."""
+        """Writes the true damage and pose of a virtual scan, in the part's frame."""
         truth = result.scan.truth
         if truth is None:
             return ExportedFiles()
@@ -99,21 +99,21 @@ class Files(Export):
 
 
 def _collect_bodies(result: Result) -> dict[str, Body]:
-    """Stem of the file to body, in the part's frame."""
-    wanted: list[tuple[str, str, Solid | None, tuple[int, int, int]]] = [
+    """All bodies in the part's frame, by the stems of their files."""
+    found: list[tuple[str, str, Solid | None, tuple[int, int, int]]] = [
         ("damage", "damage", result.damage, DAMAGE),
         ("undamaged", "undamaged part", result.undamaged, UNDAMAGED),
     ]
     for site in result.sites:
-        wanted.append((f"damage/site-{site.id}", f"damage site-{site.id}", site.damage, DAMAGE))
-        wanted.append((f"deposit/site-{site.id}", f"deposit site-{site.id}", site.deposit, DEPOSIT))
-    return {stem: Body(name, solid, colour) for stem, name, solid, colour in wanted if solid is not None}
+        found.append((f"damage/site-{site.id}", f"damage site-{site.id}", site.damage, DAMAGE))
+        found.append((f"deposit/site-{site.id}", f"deposit site-{site.id}", site.deposit, DEPOSIT))
+    return {stem: Body(name, solid, colour) for stem, name, solid, colour in found if solid is not None}
 
 
 def _write_solids(
     writer: Writer, folder: Path, place: str, bodies: Mapping[str, Body], T: Floats | None, unit: str
 ) -> list[ExportedFiles]:
-    """One file for each body; or one of all, where the union of the damages would only double its pieces."""
+    """Writes one file for each body, or one of all bodies; that leaves out the union of the damage volumes."""
     here = {stem: replace(body, solid=move_mesh(body.solid, T)) for stem, body in bodies.items()}
     if writer.one_file:
         pieces = [body for stem, body in here.items() if stem != "damage"]
@@ -124,7 +124,7 @@ def _write_solids(
 def _write_patches(
     writers: Mapping[str, Writer], folder: Path, place: str, patches: Mapping[int, Patch], T: Floats | None, unit: str
 ) -> list[ExportedFiles]:
-    """The splines of the sites, by the first format that has such a thing."""
+    """Writes the splines of the sites in the first format that can hold them."""
     suffix, write = next((name, writer.patch) for name, writer in sorted(writers.items()) if writer.patch)
     done = []
     for number, patch in patches.items():
@@ -141,6 +141,7 @@ def _write(writer: Writer, folder: Path, stem: str, bodies: Sequence[Body], unit
 
 
 def _make_folder(folder: Path, name: str) -> Path:
+    """The path of a file ``name`` in ``folder``, with its parent folders made."""
     (folder / name).parent.mkdir(parents=True, exist_ok=True)
     return folder / name
 

@@ -32,7 +32,7 @@ _NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 
 
 def write_threemf(folder: Path, stem: str, bodies: Sequence[Body], unit: str) -> ExportedFiles:
-    """All bodies as objects of one 3MF file, each with a material of its name and colour, and an item of the build."""
+    """Writes all bodies as objects of one 3MF file, each with a material of its name and colour, and a build item."""
     if not bodies:
         return ExportedFiles()
     materials = "".join(
@@ -48,14 +48,14 @@ def write_threemf(folder: Path, stem: str, bodies: Sequence[Body], unit: str) ->
     content = {"[Content_Types].xml": _TYPES, "_rels/.rels": _RELATIONS, "3D/3dmodel.model": model}
     with zipfile.ZipFile(folder / f"{stem}.3mf", "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
         for name, text in content.items():
-            entry = zipfile.ZipInfo(name)  # its date is fixed: the same bodies give the same bytes
+            entry = zipfile.ZipInfo(name)  # with a fixed date: the same bodies give the same bytes
             entry.compress_type, entry.create_system = zipfile.ZIP_DEFLATED, 3
             archive.writestr(entry, text)
     return ExportedFiles((f"{stem}.3mf",))
 
 
 def _build_object(number: int, body: Body) -> str:
-    # most readers round to single precision: where the solid bears that it is done here, and nine digits say all
+    # most readers round to single precision: where the solid stays closed it is rounded here, and nine digits are exact
     single = round_to_single(body.solid)
     mesh, digits = (body.solid, 17) if single is None else (single, 9)
     point = f'<vertex x="{{:.{digits}g}}" y="{{:.{digits}g}}" z="{{:.{digits}g}}"/>\n'.format

@@ -1,4 +1,4 @@
-"""The part from a mesh file."""
+"""Reads the part from a mesh file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from damageest.stages.part import ReadPart
 
 
 class PartFile(ReadPart):
-    """A part from a mesh file: STL, PLY, OBJ, OFF or 3MF. For STEP, IGES and BREP: the plugin damageest-cadquery."""
+    """Reads the part from a mesh: STL, PLY, OBJ, OFF or 3MF. For STEP, IGES, BREP: plugin damageest-cadquery."""
 
     use: Literal["file"] = "file"
     reads: ClassVar[tuple[str, ...]] = MESH_SUFFIXES
@@ -24,9 +24,11 @@ class PartFile(ReadPart):
         None, description="unit of the file's lengths; default: the file's own (3MF), else the job's `units`"
     )
     repair: bool = Field(
-        True, description="mend small faults (duplicate vertices, windings, holes of a few edges, overlapping bodies)"
+        True,
+        description="repair small defects (duplicate vertices, wrong windings, holes of a few edges, overlapping "
+        "bodies)",
     )
 
     def run(self, unit: str) -> Part:
-        """The part in ``unit``, the job's. Raises InputError for a file that is not a solid and cannot be made one."""
+        """The part in ``unit``, the job's. Raises InputError for a file that is not a solid and cannot be repaired."""
         return read_part(self.path, unit, self.unit, self.repair)

@@ -1,4 +1,4 @@
-"""The part from the scan of an undamaged specimen, where there is no CAD (paper 3.2)."""
+"""Makes the part from the scan of an undamaged specimen, where there is no CAD model (paper 3.2)."""
 
 from __future__ import annotations
 
@@ -21,39 +21,46 @@ from damageest.stages.part import ReadPart
 MIN_POINTS = 1000
 HOLD_OUT = 20
 VOXEL_FACTORS = (1.0, 1.6, 2.5)
-"""Factors by which the voxels that tell inside from outside grow where the points leave gaps between finer ones."""
+"""Sizes of the voxels that separate inside from outside, tried in this order until the shell has no openings."""
 NOTED_GAP, MAX_GAP = 2.0, 3.5
-"""Gaps, in circles of seven neighbours, that are mentioned, and that are too wide."""
+"""Gaps, in radii of circles with seven neighbours, from which on a note mentions them, and that are refused."""
 
 
 class PartFromScan(ReadPart):
-    """A closed part through the points of a scan of an undamaged specimen, in that scan's frame: a screened Poisson
-    surface. For want of CAD only: it has the scan's noise, and rounds sharp edges."""
+    """Makes a closed part from the scan of an undamaged specimen, in that scan's frame, by screened Poisson.
+
+    Only for parts without a CAD model: the surface has the noise of the scan, and sharp edges are rounded.
+    """
 
     use: Literal["reconstruct"] = "reconstruct"
     path: JobPath | tuple[JobPath, ...] = Field(
-        description="the specimen's scan, a file or several in one frame, relative to the job's folder"
+        description="the specimen's scan, a file or a list of files in one frame, relative to the job's folder"
     )
     unit: Unit | None = Field(
         None, description="unit of the files' lengths; default: the file's own (E57: m), else the job's `units`"
     )
     cell: float | None = Field(
-        None, gt=0, description="resolution, in the job's unit; default: from the scan's spacing and noise"
+        None, gt=0, description="resolution, in the job's unit; default: from the spacing and noise of the scan"
     )
-    screening: float = Field(4.0, gt=0, le=100, description="how strongly points pull the surface onto themselves")
+    screening: float = Field(4.0, gt=0, le=100, description="weight of the points against smoothness of the surface")
     most_cells: int = Field(
-        16_000_000, ge=100_000, le=100_000_000, description="grid cells at most; a default resolution gets coarser"
+        16_000_000,
+        ge=100_000,
+        le=100_000_000,
+        description="largest number of grid cells; a default resolution is made coarser to meet it",
     )
 
     def run(self, unit: str) -> Part:
-        """The part in ``unit``. ``tessellation_error`` is the 95th percentile of the distance of every 20th point,
-        not used for the surface, from it: noise included. Raises InputError for a scan that does not close."""
+        """The part in ``unit``. ``tessellation_error`` is the 95th percentile of the distances of held-out points,
+        every 20th, to the surface, noise included. Raises InputError for a scan whose points do not close a surface."""
         from damageest.geometry.noise import measure_noise_and_spacing
 
         paths = (self.path,) if isinstance(self.path, Path) else self.path
         scan = read_scan(paths, unit, self.unit)
         if len(scan.points) < MIN_POINTS:
-            raise InputError(f"part: {len(scan.points)} points are too few for a part; {MIN_POINTS} at least")
+            raise InputError(
+                f"part: {len(scan.points)} points are too few for a part; at least {MIN_POINTS} are needed"
+            )
         noise, spacing = measure_noise_and_spacing(scan.points)
         try:
             vertices, faces, cell, error = self._build_surface(scan.points, noise, spacing)
@@ -62,9 +69,9 @@ class PartFromScan(ReadPart):
             raise InputError(f"{', '.join(map(str, paths))}: {fault}") from None
         digest = hashlib.sha256("".join(map(file_sha256, paths)).encode()).hexdigest()
         note = (
-            f"reconstructed from {len(scan.points)} points of a scan, not from CAD: its surface is off by up to "
-            f"{error:.3g} (95 % of points held back, their noise of {noise:.3g} included), sharp edges are rounded by "
-            f"about {cell:.3g}, and the scan's frame is the part's"
+            f"reconstructed from {len(scan.points)} points of a scan, not from CAD: its surface has an error of up to "
+            f"{error:.3g} (of 95 % of held-out points, their noise of {noise:.3g} included), sharp edges are rounded "
+            f"by about {cell:.3g}, and the scan's frame is the part's"
         )
         return Part(
             vertices, faces, unit, ", ".join(map(str, paths)), digest, tessellation_error=error,
@@ -78,7 +85,7 @@ class PartFromScan(ReadPart):
         from damageest.geometry.neighbourhoods import measure_local_areas, thin_points
         from damageest.geometry.poisson import make_grid, solve_coarse_to_fine
 
-        held = np.arange(len(points)) % HOLD_OUT == 0
+        held_out = np.arange(len(points)) % HOLD_OUT == 0
         span = np.ptp(points, axis=0)
         least = float(np.prod(span * 1.1) / self.most_cells) ** (1 / 3)
         cell = self.cell or max(spacing, 2 * noise, least)
@@ -86,7 +93,7 @@ class PartFromScan(ReadPart):
             raise InputError(
                 f"a resolution of {cell:.3g} needs more than most_cells ({self.most_cells}); set part.cell larger"
             )
-        cloud, *_ = thin_points(points[~held], 0.8 * cell)
+        cloud, *_ = thin_points(points[~held_out], 0.8 * cell)
         cloud, normals, _ = smooth_points(cloud, noise, 24)
         normals = _turn_outward(cloud, normals, 1.25 * max(cell, spacing))
         grid = make_grid(points.min(axis=0) - 8 * cell, points.max(axis=0) + 8 * cell, cell)
@@ -94,13 +101,13 @@ class PartFromScan(ReadPart):
         field = solve_coarse_to_fine(grid, cloud, -normals, measure_local_areas(cloud), self.screening)
         region = extract_region(grid, field)
         if region is None:
-            raise InputError("no closed surface came about; scan the specimen all round")
-        error = _measure_error(region.vertices, region.faces, points[held], cell, noise)
+            raise InputError("no closed surface could be reconstructed; scan the specimen from all sides")
+        error = _measure_error(region.vertices, region.faces, points[held_out], cell, noise)
         return region.vertices, region.faces, cell, error
 
 
 def _turn_outward(cloud: Floats, normals: Floats, voxel: float) -> Floats:
-    """Normals turned out, by the finest voxels that close the points' shell."""
+    """The normals, turned outward with the finest voxels whose shell has no openings."""
     from damageest.stages.part._turn_outward import turn_outward
 
     first: InputError | None = None
@@ -113,19 +120,20 @@ def _turn_outward(cloud: Floats, normals: Floats, voxel: float) -> Floats:
     raise first
 
 
-def _measure_error(vertices: Floats, faces: Ints, held: Floats, cell: float, noise: float) -> float:
-    """The 95th percentile of the held points' (H,3) distance to the surface; refuses one that misses its points."""
-    error = float(np.percentile(distance_to_mesh(held, Mesh(vertices, faces)), 95))
+def _measure_error(vertices: Floats, faces: Ints, held_out: Floats, cell: float, noise: float) -> float:
+    """The 95th percentile of the distances of points (H,3) to the surface. Raises InputError where it is too large."""
+    error = float(np.percentile(distance_to_mesh(held_out, Mesh(vertices, faces)), 95))
     if error > 3 * noise + cell:
-        raise InputError(f"the surface misses its points by {error:.3g}; set part.cell smaller than {cell:.3g}")
+        raise InputError(f"the surface deviates from its points by {error:.3g}; set part.cell smaller than {cell:.3g}")
     return error
 
 
 def _note_openings(vertices: Floats, faces: Ints, points: Floats) -> tuple[str, ...]:
-    """What is to be said of gaps between the points (N,3) that the surface closes over; refuses wide ones.
+    """A note on gaps between the points (N,3) that the surface closes; empty where there are none.
 
-    A gap is measured by the circle that holds the nearest point's seven neighbours, so that uneven density is none:
-    between random points one place in a million is as far as twice that from all of them.
+    A gap is compared with the circle that holds the seven neighbours of the nearest point, so that uneven density is no
+    gap: among random points, one place in a million is farther than two radii from all of them. Raises InputError for
+    gaps that are too wide.
     """
     from scipy.spatial import cKDTree
 
@@ -139,7 +147,7 @@ def _note_openings(vertices: Floats, faces: Ints, points: Floats) -> tuple[str, 
     if gap.max() > MAX_GAP:
         share = 100 * float((gap > NOTED_GAP).mean())
         raise InputError(
-            f"the specimen's scan has an opening {text}, {share:.1f} % of the surface would be invented; "
-            "scan it there too"
+            f"the specimen's scan has an opening {text}, {share:.1f} % of the surface would have no points; "
+            "scan the specimen there too"
         )
-    return (f"closed over openings of the specimen's scan, the widest {text}",) if gap.max() > NOTED_GAP else ()
+    return (f"the surface closes openings of the specimen's scan, the widest {text}",) if gap.max() > NOTED_GAP else ()

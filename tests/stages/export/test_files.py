@@ -1,4 +1,4 @@
-"""The files of a result: read back, they say what the result says."""
+"""The files of a result: read back, they hold what the result holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What CAM and robot cell get: 3MF that others read, any formats together, the scan's frame, the pose."""
+"""Files for CAM and robot cell: 3MF that other programs read, several formats at once, the scan's frame, the pose."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def test_lib3mf_and_trimesh_read_solids_names_colours_and_unit(
         assert scene.geometry[body].volume == pytest.approx(volume * MILLIMETRES[units] ** 3, rel=1e-4)
 
 
-def test_names_that_xml_would_trip_over(tmp_path: Path) -> None:
+def test_names_with_xml_characters(tmp_path: Path) -> None:
     from damageest.stages.export import Body
     from damageest.stages.export.threemf import write_threemf
 

@@ -98,7 +98,7 @@ def test_missing_files_and_folders_are_named(tmp_path):
 
 
 @functools.cache
-def sound_file(suffix):
+def valid_file(suffix):
     if suffix == ".obj":
         return b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
     what = trimesh.Scene({"part": box(1)}) if suffix == ".3mf" else box(1)
@@ -110,7 +110,7 @@ def sound_file(suffix):
 @given(data=st.data())
 @quick
 def test_damaged_bytes_raise_nothing_but_input_errors(suffix, data, tmp_path):
-    whole = bytearray(sound_file(suffix))
+    whole = bytearray(valid_file(suffix))
     if data.draw(st.booleans()):
         whole = bytearray(data.draw(st.binary(min_size=1, max_size=200)))
     at, cut = (int(data.draw(st.floats(0, 1, exclude_max=True)) * len(whole)) for _ in range(2))

@@ -23,7 +23,7 @@ def specimen(folder: Path, points: int = 25_000, **options: object) -> Path:
     return path
 
 
-def test_the_box_comes_back_closed_and_says_what_it_is(tmp_path: Path) -> None:
+def test_the_box_comes_back_closed_with_a_note_of_its_errors(tmp_path: Path) -> None:
     part = PartFromScan(path=specimen(tmp_path)).run("mm")
     assert isinstance(part, Part)
     assert iou([part], [box()]) > 0.98
@@ -40,13 +40,13 @@ def test_an_opening_is_refused_with_its_place(tmp_path: Path) -> None:
         PartFromScan(path=path).run("mm")
 
 
-def test_a_small_opening_is_closed_over_and_said(tmp_path: Path) -> None:
+def test_a_small_opening_is_closed_and_noted(tmp_path: Path) -> None:
     path = specimen(tmp_path)
     points = np.load(path)
     np.save(path, points[np.linalg.norm(points - [5, 3, 10], axis=1) > 1.8])
     part = PartFromScan(path=path).run("mm")
     assert iou([part], [box()]) > 0.98
-    assert "closed over openings" in part.notes[-1]
+    assert "closes openings" in part.notes[-1]
     np.save(path, points[np.linalg.norm(points - [5, 3, 10], axis=1) > 4])
     with pytest.raises(InputError, match="opening"):
         PartFromScan(path=path).run("mm")
