@@ -120,7 +120,8 @@ class Registry:
             if broken.provider.name == name:
                 reason = broken.reason.splitlines()[0]
                 return f"the plugin {name}, which cannot be used here ({reason}); try: {broken.remedy}"
-        return f"the plugin {name}, which is not installed: pip install {name}"
+        remedy = f"uv sync --all-packages in a checkout, or pip install {name}"
+        return f"the plugin {name}, which is not installed; try: {remedy}"
 
     def missing(self) -> str:
         """A clause on plugins that are installed but broken, empty where there are none."""
