@@ -1,4 +1,4 @@
-"""Draws the README's pictures from finished outputs: `uv run python jobs/picture.py`."""
+"""Draws the pictures of the documentation from finished outputs: `uv run python jobs/picture.py`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pyvista as pv
 
 COLOURS = ("#d1495b", "#edae49", "#00798c", "#66a182", "#8d5b9f")
 HERE = Path(__file__).parent
+IMAGES = HERE.parent / "docs" / "images"
 CLOSE = {
     "stock_flanks": ((25.0, 0.0, 7.0), (1.0, 0.7, 0.9), 4.0),
     "worn_bore": ((0.0, 2.0, 8.0), (0.5, -0.9, 1.6), 2.4),
@@ -39,7 +40,7 @@ def damages(folders: list[Path]) -> None:
         for number, path in enumerate(sorted((folder / "damage").glob("*.stl"))):
             picture.add_mesh(pv.read(path), color=COLOURS[number % len(COLOURS)])
         _look(picture)
-    picture.screenshot(HERE / "picture.png")
+    picture.screenshot(IMAGES / "damages.png")
 
 
 def stock(folders: list[Path]) -> None:
@@ -64,7 +65,7 @@ def stock(folders: list[Path]) -> None:
             picture.view_vector(way, (0, 0, 1))
             picture.camera.focal_point = focus
             picture.camera.zoom(zoom)
-    picture.screenshot(HERE / "stock.png")
+    picture.screenshot(IMAGES / "stock.png")
 
 
 def _scan(path: Path) -> tuple[np.ndarray, np.ndarray]:

@@ -227,10 +227,9 @@ def matrix_command(
     if write:
         replace_between_marks(write, None, "matrix")  # fails before the runs start if the marks are missing
     cells = run_matrix(jobs, Registry.discover(), stage or (), workers, timeout, _print_cell)
-    table = make_matrix_table(cells)
-    typer.echo(table)
+    typer.echo(make_matrix_table(cells))
     if write:
-        write.write_text(replace_between_marks(write, table, "matrix"))
+        write.write_text(replace_between_marks(write, make_matrix_table(cells, legend=False), "matrix"))
 
 
 def _print_cell(cell: MatrixCell) -> None:

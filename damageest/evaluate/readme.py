@@ -31,8 +31,11 @@ MATRIX = (
 )
 
 
-def make_matrix_table(cells: Sequence[MatrixCell]) -> str:
-    """A Markdown table: a row for each implementation, a column for each job. The reasons of refusals follow it."""
+def make_matrix_table(cells: Sequence[MatrixCell], legend: bool = True) -> str:
+    """A Markdown table: a row for each implementation, a column for each job. The reasons of refusals follow it.
+
+    ``legend``: whether the text says what the columns are; not for a page that has the legend already.
+    """
     jobs = list(dict.fromkeys(cell.job for cell in cells))
     rows = list(dict.fromkeys((cell.stage, cell.use) for cell in cells))
     cell_of = {(cell.stage, cell.use, cell.job): cell for cell in cells}
@@ -51,7 +54,7 @@ def make_matrix_table(cells: Sequence[MatrixCell]) -> str:
         lines.append([stage if stage != before else "", use, *shown, *figures])
         before = stage
     notes = [f"{number}. {reason}" for number, reason in enumerate(reasons, 1)]
-    return "\n".join([format_markdown(lines, 2), "", describe_measurement(MATRIX), *(["", *notes] if notes else [])])
+    return "\n".join([format_markdown(lines, 2), "", describe_measurement(MATRIX if legend else ""), *(["", *notes] if notes else [])])
 
 
 def format_markdown(lines: Sequence[Sequence[str]], names: int = 1) -> str:
@@ -75,10 +78,10 @@ def _format_number(values: Sequence[float], form: str, of: object = np.median) -
 
 
 def describe_measurement(what: str) -> str:
-    """``what``, followed by the date, the versions and the machine of the measurement."""
+    """``what``, if any, followed by the date, the versions and the machine of the measurement."""
     measured = collect_versions()
     libraries = ", ".join(f"{name} {number}" for name, number in measured["versions"].items())
-    return f"{what}. Measured {measured['date']}: {libraries}; {measured['machine']}."
+    return f"{what}{'. ' if what else ''}Measured {measured['date']}: {libraries}; {measured['machine']}."
 
 
 def collect_versions() -> dict[str, Any]:

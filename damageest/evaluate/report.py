@@ -120,7 +120,10 @@ def make_remarks(rows: Sequence[Row]) -> str:
 
 
 def make_readme_tables(rows: Sequence[Row], axes: Sequence[str], unit: str, command: str) -> str:
-    """The tables in Markdown, with the command, the date, the versions and the machine of the measurement."""
+    """The tables in Markdown, with the command, the date, the versions and the machine of the measurement.
+
+    They come without the legend, which the page has once for all its tables.
+    """
     tables = [
         format_markdown(
             [*make_cells(rows, axis, unit), *([["all", *_format_figures(compute_figures(rows))]] if not k else [])]
@@ -129,8 +132,8 @@ def make_readme_tables(rows: Sequence[Row], axes: Sequence[str], unit: str, comm
     ]
     if "way" in axes:
         tables = [format_markdown(make_combination_cells(rows, unit), len(collect_axes(rows)))]
-    text = f"{make_legend(unit)} {'; '.join(make_remarks(rows).splitlines())}."
-    return "\n\n".join([*tables, text, describe_measurement(f"`{command}`")])
+    text = "; ".join(make_remarks(rows).splitlines())
+    return "\n\n".join([*tables, f"{text[:1].upper()}{text[1:]}.", describe_measurement(f"`{command}`")])
 
 
 def format_row(row: Row) -> str:

@@ -1,4 +1,4 @@
-"""The matrix of all implementations on a job, and its table in a text file."""
+"""The matrix: every implementation on a job, with the truth, or why not; in a page that asks for it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests import damaged_box
 from tests.needs import PLUGINS, needs_plugin
 
 BEGIN, END = make_marks("matrix")
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "measurements.md"
 JOB = """\
 version: 1
 tolerance: 0.2
@@ -75,8 +75,8 @@ def test_the_table_goes_between_the_marks_and_nowhere_else(tmp_path: Path) -> No
 
 
 @needs_plugin(*PLUGINS)
-def test_the_readmes_matrix_has_every_implementation(registry: Registry) -> None:
-    text = README.read_text().partition(BEGIN)[2].partition(END)[0]
+def test_the_matrix_in_the_docs_has_every_implementation(registry: Registry) -> None:
+    text = PAGE.read_text().partition(BEGIN)[2].partition(END)[0]
     rows = [[word.strip() for word in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
     head, rule, *body = rows
     assert head[:2] == ["stage", "implementation"]

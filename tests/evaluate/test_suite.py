@@ -1,4 +1,4 @@
-"""`damageest evaluate suite`, and its table in the README."""
+"""`damageest evaluate suite`, and its tables in the documentation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from damageest.stages.part import ReadPart
 from tests.evaluate.call import evaluate, rows_of, timeless
 from tests.needs import needs_plugin
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "measurements.md"
 BEGIN, END = make_marks("suite")
 
 
@@ -107,9 +107,9 @@ def test_a_page_without_marks_is_refused_before_anything_runs(tmp_path: Path) ->
     assert "[1/" not in done.stderr
 
 
-def test_the_readmes_table_is_of_this_suite(registry: Registry) -> None:
-    found = tables(README.read_text())
-    assert found, "the table is missing: damageest evaluate suite --write README.md"
+def test_the_table_in_the_docs_is_of_this_suite(registry: Registry) -> None:
+    found = tables(PAGE.read_text())
+    assert found, "the table is missing: damageest evaluate suite --write docs/measurements.md"
     assert found[0][0][0] == "part"
     check(found[0], {*PARTS, "all"})
     assert {line[0] for line in found[0][2:]} == {*PARTS, "all"}
@@ -121,8 +121,8 @@ def test_the_readmes_table_is_of_this_suite(registry: Registry) -> None:
 
 
 @pytest.mark.parametrize("name", ["points", "fineness", pytest.param("rivals", marks=needs_plugin("open3d")), "dense"])
-def test_the_readmes_tables_of_cost_name_what_there_is(name: str, registry: Registry) -> None:
-    (table,) = tables(README.read_text(), name)
+def test_the_tables_of_cost_in_the_docs_name_what_there_is(name: str, registry: Registry) -> None:
+    (table,) = tables(PAGE.read_text(), name)
     head, _, *body = table
     axes = head[: -len(COLUMNS)]
     assert axes

@@ -1,4 +1,4 @@
-"""The complete example in the README: run, deposit, layers."""
+"""The example of the CAM page, run as it is printed: run, deposit, layers."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import pytest
 
 from tests import damaged_box
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[1] / "docs" / "cam.md"
 
 
 def test_the_example_slices_the_deposit_into_layers(tmp_path: Path) -> None:
-    (script,) = re.findall(r"```python\n# layers\.py\n(.*?)```", README.read_text(), re.DOTALL)
+    (script,) = re.findall(r"```python\n# layers\.py\n(.*?)```", PAGE.read_text(), re.DOTALL)
     (tmp_path / "layers.py").write_text(script)
     job = damaged_box.write(tmp_path)
     command = [sys.executable, "layers.py", job.name, "0.25"]

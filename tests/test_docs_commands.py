@@ -1,0 +1,120 @@
+"""The documentation shows commands that can be called, jobs that are valid, and links to files that are there."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+from typer.main import get_command
+
+from damageest.cli import app
+from damageest.evaluate.readme import MATRIX
+from damageest.evaluate.report import make_legend
+from damageest.job import load
+from damageest.job.yamlfile import parse
+from damageest.registry import Registry
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    found = re.findall(r"^```(\w*)\n(.*?)^```$", page.read_text(), re.DOTALL | re.MULTILINE)
+    return [block for kind, block in found if kind == language]
+
+
+def commands(page: Path) -> list[list[str]]:
+    """The words of each `damageest` command in the page's blocks, without `damageest` itself."""
+    lines = [line for block in (*blocks(page, "sh"), *blocks(page, "")) for line in block.splitlines()]
+    parts = [part.strip() for line in lines for part in line.split("&&")]
+    calls = [part.removeprefix("uv run ") for part in parts]
+    return [shlex.split(call, comments=True)[1:] for call in calls if call.startswith("damageest ")]
+
+
+SHOWN = [(page, words) for page in PAGES for words in commands(page)]
+
+
+@pytest.mark.parametrize(("page", "words"), SHOWN, ids=[f"{p.name}: {' '.join(w)[:60]}" for p, w in SHOWN])
+def test_a_command_is_one(page: Path, words: list[str]) -> None:
+    command: click.Command = get_command(app)
+    context = click.Context(command, info_name="damageest")
+    while words and isinstance(command, click.Group) and not words[0].startswith("-"):
+        found = command.get_command(context, words[0])
+        assert found is not None, f"there is no command {words[0]}"
+        command, words = found, words[1:]
+    if words != ["--version"]:
+        command.make_context(command.name, list(words), parent=context)
+    named = [word for word in words if word.startswith("jobs/")]
+    written_there = {"jobs/my_block.yaml"}
+    assert all((ROOT / name).is_file() or name in written_there for name in named), "the file is there"
+
+
+def test_pages_show_commands() -> None:
+    assert {page.name for page, _ in SHOWN} >= {"README.md", "first-repair.md", "your-own-scan.md", "measurements.md"}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that the jobs in the documentation name."""
+    folder = tmp_path_factory.mktemp("docs")
+    (folder / "parts").mkdir()
+    (folder / "scans").mkdir()
+    shutil.copy(ROOT / "jobs" / "parts" / "block.stl", folder / "parts")
+    for name in ("part.step", "parts/gear.step"):
+        shutil.copy(ROOT / "jobs" / "parts" / "gear.step", folder / name)
+    for name in ("scan.ply", "view-1.ply", "view-2.ply", "scans/block_wedge.ply", "scans/gear.ply"):
+        shutil.copy(ROOT / "jobs" / "scans" / "block_wedge.ply", folder / name)
+    return folder
+
+
+JOBS = [(page, block) for page in PAGES if page.name != "plugin-guide.md" for block in blocks(page, "yaml")]
+
+
+@pytest.mark.parametrize(("page", "block"), JOBS, ids=[f"{p.name}: {b.splitlines()[0][:40]}" for p, b in JOBS])
+def test_a_job_is_valid(page: Path, block: str, files: Path, registry: Registry) -> None:
+    tree, _ = parse(block, page.name)
+    if "version" not in tree:  # some lines of one
+        block = "version: 1\npart: part.step\nscan: scan.ply\n" + block
+    (files / "job.yaml").write_text(block)
+    load(files / "job.yaml", registry)
+
+
+def test_the_first_repair_goes_as_its_page_says(tmp_path: Path) -> None:
+    """Its commands one after the other, and the table that it shows."""
+    page = ROOT / "docs" / "first-repair.md"
+    for folder in ("parts", "scans"):
+        shutil.copytree(ROOT / "jobs" / folder, tmp_path / "jobs" / folder)
+    shutil.copy(ROOT / "jobs" / "block_wedge.yaml", tmp_path / "jobs")
+    own = next(block for block in blocks(page, "yaml") if "simulate" in block)
+    (tmp_path / "jobs" / "my_block.yaml").write_text(own)
+    said = ""
+    for words in commands(page):
+        command = [sys.executable, "-c", "from damageest.cli import main; main()", *words]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        said += done.stdout
+    (shown,) = blocks(page, "text")
+    for line in shown.splitlines():
+        pattern = re.sub(r"(\d\S*)\.\d+", lambda number: re.escape(number[1]) + r"\.\\d+", " ".join(line.split()))
+        assert re.search(pattern, " ".join(said.split())), f"the run does not say: {line}"
+    assert (tmp_path / "jobs" / "out" / "block_wedge" / "deposit" / "site-1.stl").is_file()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_to_files(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text())
+    missing = [target for target in targets if not (page.parent / target).is_file()]
+    assert not [target for target in missing if target != "ARCHITECTURE.md"], "links to files that are not there"
+
+
+def test_the_legend_of_the_measurements_is_that_of_the_tables() -> None:
+    text = " ".join((ROOT / "docs" / "measurements.md").read_text().replace("\n- ", "\n").split())
+    for sentence in (*make_legend("mm").split(". "), MATRIX):
+        assert sentence.rstrip(".") in text, "docs/measurements.md explains the columns once: bring it up to date"
+        assert text.count(sentence.rstrip(".")) == 1
