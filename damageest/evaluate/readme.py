@@ -54,7 +54,8 @@ def make_matrix_table(cells: Sequence[MatrixCell], legend: bool = True) -> str:
         lines.append([stage if stage != before else "", use, *shown, *figures])
         before = stage
     notes = [f"{number}. {reason}" for number, reason in enumerate(reasons, 1)]
-    return "\n".join([format_markdown(lines, 2), "", describe_measurement(MATRIX if legend else ""), *(["", *notes] if notes else [])])
+    about = describe_measurement(MATRIX if legend else "")
+    return "\n".join([format_markdown(lines, 2), "", about, *(["", *notes] if notes else [])])
 
 
 def format_markdown(lines: Sequence[Sequence[str]], names: int = 1) -> str:
