@@ -1,4 +1,4 @@
-"""Stage `enclose`: its contract."""
+"""Stage `enclose`: its two contracts, site by site and all sites at once."""
 
 from __future__ import annotations
 

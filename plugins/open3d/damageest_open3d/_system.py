@@ -23,7 +23,7 @@ def check() -> None:
     Raises PluginError that names what is missing and how to install it.
     """
     require("Open3D", PACKAGES, load)
-    # By its name the dynamic linker takes it for the one Open3D asks for, wherever it was loaded from.
+    # The dynamic linker finds a loaded library by its name, in whatever folder it lies.
     if not can_load("libusb-1.0.so.0", load) and not can_load(_bundled_usb(), load):
         raise PluginError(
             "Open3D needs libusb-1.0.so.0, which neither the system nor the package libusb-package has here",

@@ -25,14 +25,14 @@ def slit(ring: int, wide: int) -> np.ndarray:
     return np.concatenate([quads, quads + 96])
 
 
-def directed(faces: np.ndarray) -> set[tuple[int, int]]:
+def list_directed_edges(faces: np.ndarray) -> set[tuple[int, int]]:
     return {(int(a), int(b)) for a, b in faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)}
 
 
 def test_pipe_has_two_rims_along_its_own_edges() -> None:
     surface = pipe(5, -3, 3)
     rims = AllLoops().run(surface, block(6), 0.2).loops
-    edges = directed(surface.faces)
+    edges = list_directed_edges(surface.faces)
     assert [len(loop) for loop in rims] == [96, 96]
     heights = {float(surface.vertices[loop, 2][0]) for loop in rims}
     assert heights == {-3.0, 3.0}
