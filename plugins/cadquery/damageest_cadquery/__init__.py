@@ -27,7 +27,7 @@ def damageest_stages() -> list[type[Stage]]:
 def damageest_writers() -> Mapping[str, Writer]:
     """STEP, of solids and splines."""
     from damageest.stages.export import Writer
-    from damageest_cadquery._patch import step_patch
-    from damageest_cadquery._step import step
+    from damageest_cadquery._patch import write_patch
+    from damageest_cadquery._step import write_step
 
-    return {"step": Writer(step, simplify=True, patch=step_patch)}
+    return {"step": Writer(write_step, simplify=True, patch=write_patch)}

@@ -1,4 +1,4 @@
-"""The triangles of a solid gathered into planar faces, so that a flat side of the part is one face again."""
+"""Joins the triangles of a solid to planar faces, so that a flat side of the part is one face again."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from damageest.artefacts import Floats, Ints, Solid
 
 FLAT = 1e-8
-"""Share of the solid's diagonal by which corners may lie off their common face, or off their common edge."""
+"""Largest distance of corners from their common face or edge, in diagonals of the solid."""
 
 _POINT = 1e-12
 """Length below which an edge has no direction."""
@@ -26,9 +26,9 @@ class Facet:
     loops: tuple[Ints, ...]
 
 
-def welded(solid: Solid) -> Solid:
-    """The solid with the ends of edges that have no length made one, and without the triangles that this folds away;
-    as it was, where that would open it."""
+def weld(solid: Solid) -> Solid:
+    """The solid with the two ends of each edge without length merged, and without the triangles that collapse;
+    unchanged where this would open it."""
     edges = np.concatenate([solid.faces[:, :2], solid.faces[:, 1:]])
     short = edges[np.linalg.norm(solid.vertices[edges[:, 0]] - solid.vertices[edges[:, 1]], axis=1) <= _POINT]
     if not len(short):
@@ -44,36 +44,36 @@ def welded(solid: Solid) -> Solid:
         return solid
 
 
-def facets(solid: Solid) -> list[Facet]:
+def find_facets(solid: Solid) -> list[Facet]:
     """The solid's planar faces. Each edge is shared by two of them, once in either direction."""
     vertices, faces = solid.vertices, solid.faces
     tolerance = FLAT * solid.diagonal
     edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1)  # (F,3,2)
-    other = _neighbours(edges, len(vertices))
-    label = _flat_regions(solid, other, tolerance)
-    label = _single_loops(label, edges, other, len(vertices))
-    loops, owner = _loops(label, edges, other, len(vertices))
-    loops = _straightened(loops, vertices, tolerance)
+    other = _find_neighbours(edges, len(vertices))
+    label = _find_flat_regions(solid, other, tolerance)
+    label = _split_ambiguous(label, edges, other, len(vertices))
+    loops, owner = _trace_loops(label, edges, other, len(vertices))
+    loops = _straighten(loops, vertices, tolerance)
     normal = np.zeros((label.max() + 1, 3))
     np.add.at(normal, label, solid.cross)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    area = np.array([_area(vertices[loop]) @ normal[region] for loop, region in zip(loops, owner, strict=True)])
+    area = np.array([_measure_area(vertices[loop]) @ normal[region] for loop, region in zip(loops, owner, strict=True)])
     order = np.lexsort([-area, owner])
     found: dict[int, list[Ints]] = {}
     for k in order:
         found.setdefault(int(owner[k]), []).append(loops[k])
     for region in np.flatnonzero(np.linalg.norm(normal, axis=1) < 0.5):  # without area: any plane through its line
-        normal[region] = _across(vertices[found[int(region)][0]])
+        normal[region] = _find_perpendicular(vertices[found[int(region)][0]])
     return [Facet(normal[region], tuple(mine)) for region, mine in found.items()]
 
 
-def _across(loop: Floats) -> Floats:
-    """(3,) a unit vector across points (K,3) on one line."""
+def _find_perpendicular(loop: Floats) -> Floats:
+    """(3,) a unit vector perpendicular to the line on which points (K,3) lie."""
     _, _, axes = np.linalg.svd(loop - loop.mean(0))
     return np.asarray(axes[-1])
 
 
-def _neighbours(edges: Ints, count: int) -> Ints:
+def _find_neighbours(edges: Ints, count: int) -> Ints:
     """(F,3) the triangle on the other side of each edge."""
     start, end = edges.reshape(-1, 2).T
     forward, backward = start * count + end, end * count + start
@@ -82,13 +82,14 @@ def _neighbours(edges: Ints, count: int) -> Ints:
     return other.reshape(-1, 3)
 
 
-def _flat_regions(solid: Solid, other: Ints, tolerance: float) -> Ints:
-    """(F,) number of the flat region that each triangle belongs to; alone where its neighbours lead round a bend."""
+def _find_flat_regions(solid: Solid, other: Ints, tolerance: float) -> Ints:
+    """(F,) number of the flat region of each triangle; triangles of a region that bends too much are regions of their
+    own."""
     vertices, faces, cross = solid.vertices, solid.faces, solid.cross
     size = np.linalg.norm(cross, axis=1)
     unit = cross / np.maximum(size, 1e-300)[:, None]
     one, two = np.repeat(np.arange(len(faces)), 3), other.reshape(-1)
-    # judged by the plane of the larger of the two: a sliver's own says nothing
+    # compared with the plane of the larger of the two: the plane of a sliver is not exact
     here = (size[one] > size[two]) | ((size[one] == size[two]) & (one < two))
     one, two = one[here], two[here]
     off = np.einsum("nij,nj->ni", vertices[faces[two]] - vertices[faces[one, 0]][:, None], unit[one])
@@ -104,33 +105,33 @@ def _flat_regions(solid: Solid, other: Ints, tolerance: float) -> Ints:
     low, high = np.full(len(normal), np.inf), np.full(len(normal), -np.inf)
     np.minimum.at(low, label, height.min(1))
     np.maximum.at(high, label, height.max(1))
-    return _apart(label, (high - low > 2 * tolerance)[label])
+    return _split_off(label, (high - low > 2 * tolerance)[label])
 
 
-def _apart(label: Ints, lone: NDArray[np.bool_]) -> Ints:
-    """The regions, renumbered, with each ``lone`` triangle (F,) one of its own."""
+def _split_off(label: Ints, lone: NDArray[np.bool_]) -> Ints:
+    """The regions, renumbered; each ``lone`` triangle (F,) becomes its own region."""
     label = np.where(lone, label.max() + 1 + np.arange(len(label)), label)
     return np.unique(label, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
 
-def _single_loops(label: Ints, edges: Ints, other: Ints, count: int) -> Ints:
-    """The regions without those whose outline passes a vertex twice: their loops could be told apart in two ways."""
-    region, start, _ = _outline(label, edges, other)
+def _split_ambiguous(label: Ints, edges: Ints, other: Ints, count: int) -> Ints:
+    """Splits regions whose outline passes a vertex twice into triangles: their loops would be ambiguous."""
+    region, start, _ = _find_outline(label, edges, other)
     codes, times = np.unique(region * count + start, return_counts=True)
     bad = np.unique(codes[times > 1] // count)
-    return _apart(label, np.isin(label, bad)) if len(bad) else label
+    return _split_off(label, np.isin(label, bad)) if len(bad) else label
 
 
-def _outline(label: Ints, edges: Ints, other: Ints) -> tuple[Ints, Ints, Ints]:
+def _find_outline(label: Ints, edges: Ints, other: Ints) -> tuple[Ints, Ints, Ints]:
     """The directed edges between regions: (region, start, end), each (E,)."""
     rows, sides = np.nonzero(label[:, None] != label[other])
     start, end = edges[rows, sides].T
     return label[rows], start, end
 
 
-def _loops(label: Ints, edges: Ints, other: Ints, count: int) -> tuple[list[Ints], Ints]:
+def _trace_loops(label: Ints, edges: Ints, other: Ints, count: int) -> tuple[list[Ints], Ints]:
     """The closed outlines as vertex indices, and the region (L,) that each belongs to."""
-    region, start, end = _outline(label, edges, other)
+    region, start, end = _find_outline(label, edges, other)
     code = region * count + start
     order = np.argsort(code)
     following = order[np.searchsorted(code, region * count + end, sorter=order)].tolist()
@@ -150,8 +151,8 @@ def _loops(label: Ints, edges: Ints, other: Ints, count: int) -> tuple[list[Ints
     return loops, np.array(owners, dtype=np.int64)
 
 
-def _straightened(loops: list[Ints], vertices: Floats, tolerance: float) -> list[Ints]:
-    """The loops without the vertices in the middle of a straight edge between just two faces."""
+def _straighten(loops: list[Ints], vertices: Floats, tolerance: float) -> list[Ints]:
+    """The loops without vertices in the middle of a straight edge between two faces."""
     at = np.concatenate(loops)
     before = np.concatenate([np.roll(loop, 1) for loop in loops])
     after = np.concatenate([np.roll(loop, -1) for loop in loops])
@@ -169,7 +170,7 @@ def _straightened(loops: list[Ints], vertices: Floats, tolerance: float) -> list
     return [loop[keep[loop]] for loop in loops]
 
 
-def _area(loop: Floats) -> Floats:
+def _measure_area(loop: Floats) -> Floats:
     """(3,) the vector area of a closed loop of points (K,3)."""
     off = loop - loop[0]
     return np.asarray(np.cross(off, np.roll(off, -1, axis=0)).sum(0) / 2)

@@ -1,4 +1,4 @@
-"""A B-spline surface as STEP: one face, which ends at its rims."""
+"""Writes a B-spline surface as STEP: one face, which ends at its rims."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from damageest.stages.export import Patch
 from damageest_cadquery._step import write_shape
 
 
-def step_patch(path: Path, name: str, patch: Patch, unit: str) -> None:
-    """Writes the patch. Raises OSError."""
-    write_shape(path, _face(patch, MILLIMETRES[unit]), name, unit, curves=True)
+def write_patch(path: Path, name: str, patch: Patch, unit: str) -> None:
+    """Writes the patch, with its product ``name``, in ``unit``. Raises OSError where the file cannot be written."""
+    write_shape(path, _build_face(patch, MILLIMETRES[unit]), name, unit, curves=True)
 
 
-def _face(patch: Patch, scale: float) -> Any:
+def _build_face(patch: Patch, scale: float) -> Any:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 
-    surface = _surface(patch, scale)
+    surface = _build_surface(patch, scale)
     if not patch.rims:
         return BRepBuilderAPI_MakeFace(surface, 1e-7).Face()
-    wires = [_wire(rim, surface) for rim in patch.rims]
+    wires = [_build_wire(rim, surface) for rim in patch.rims]
     maker = BRepBuilderAPI_MakeFace(surface, wires[0], True)
     for wire in wires[1:]:
         maker.Add(wire)
     return maker.Face()
 
 
-def _surface(patch: Patch, scale: float) -> Any:
+def _build_surface(patch: Patch, scale: float) -> Any:
     from OCP.Geom import Geom_BSplineSurface
     from OCP.gp import gp_Pnt
     from OCP.TColgp import TColgp_Array2OfPnt
@@ -42,20 +42,20 @@ def _surface(patch: Patch, scale: float) -> Any:
     for i, row in enumerate((patch.poles * scale).tolist(), 1):
         for j, pole in enumerate(row, 1):
             poles.SetValue(i, j, gp_Pnt(*pole))
-    said: list[Any] = []
+    arrays: list[Any] = []
     for knots in patch.knots:
         values, times = np.unique(knots, return_counts=True)
         real, whole = TColStd_Array1OfReal(1, len(values)), TColStd_Array1OfInteger(1, len(values))
         for k, (value, count) in enumerate(zip(values.tolist(), times.tolist(), strict=True), 1):
             real.SetValue(k, value)
             whole.SetValue(k, count)
-        said.append((real, whole))
-    (u, u_times), (v, v_times) = said
+        arrays.append((real, whole))
+    (u, u_times), (v, v_times) = arrays
     return Geom_BSplineSurface(poles, u, v, u_times, v_times, patch.degree, patch.degree)
 
 
-def _wire(rim: Floats, surface: Any) -> Any:
-    """A closed line of straight pieces in the surface's parameters."""
+def _build_wire(rim: Floats, surface: Any) -> Any:
+    """A closed wire of straight segments in the parameters of the surface."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeVertex, BRepBuilderAPI_MakeWire
     from OCP.BRepLib import BRepLib
     from OCP.Geom2d import Geom2d_Line

@@ -112,7 +112,7 @@ def _solids(shape: Any) -> tuple[list[Any], tuple[str, ...]]:
     if solids:
         return solids, ()
     if not explore(shape, TopAbs_FACE):
-        raise InputError("holds no faces, let alone a solid (points and curves only?); export the part as a solid")
+        raise InputError("holds neither solids nor faces, perhaps only points and curves; export the part as a solid")
     return _sewn(shape), ("the file holds surfaces only: they were sewn together into a solid",)
 
 

@@ -1,4 +1,4 @@
-"""Solids as STEP: planar faces, the job's unit, a product name, and the same bytes each time."""
+"""Writes solids as STEP: planar faces, the job's unit, a product name, and the same bytes each time."""
 
 from __future__ import annotations
 
@@ -13,43 +13,46 @@ from damageest.artefacts import Floats, Solid
 from damageest.geometry.bodies import split_shells
 from damageest.geometry.units import MILLIMETRES
 from damageest.stages.export import Body, ExportedFiles
-from damageest_cadquery._facets import FLAT, Facet, facets, welded
+from damageest_cadquery._facets import FLAT, Facet, find_facets, weld
 
 UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
-MOST = 100_000
-"""Planar faces above which a STEP file is left out; 60,000 took 11 s to write, 22 s to read, and 67 MB."""
+MAX_FACES = 100_000
+"""Largest number of planar faces in a STEP file; 60,000 took 11 s to write, 22 s to read, and 67 MB."""
 
 
-def step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> ExportedFiles:
-    """A STEP file of one solid, faceted; left out, with a note, where it would have too many faces to be of use."""
+def write_step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> ExportedFiles:
+    """Writes one solid as faceted STEP; with too many faces the file is left out, and a note says so."""
     (body,) = solids
-    parts = [[_planar(each) for each in (outer, *cavities)] for outer, cavities in split_shells(body.solid)]
+    parts = [[_find_planar_faces(each) for each in (outer, *cavities)] for outer, cavities in split_shells(body.solid)]
     count = sum(len(shell[1]) for part in parts for shell in part)
-    if count > MOST:
+    if count > MAX_FACES:
         return ExportedFiles(
             notes=(
-                f"{stem}.step was not written: {count} planar faces are more than the {MOST} that such a file "
-                "can usefully have; a larger  detail  gives fewer, or take 3mf",
+                f"{stem}.step was not written: {count} planar faces are more than the limit of {MAX_FACES}; "
+                "set a larger  detail , or use 3mf",
             )
         )
-    write_shape(folder / f"{stem}.step", _shape(parts, MILLIMETRES[unit]), body.name, unit)
+    write_shape(folder / f"{stem}.step", _build_shape(parts, MILLIMETRES[unit]), body.name, unit)
     return ExportedFiles((f"{stem}.step",))
 
 
-def _planar(solid: Solid) -> tuple[Floats, list[Facet]]:
-    solid = welded(solid)
-    return solid.vertices, facets(solid)
+def _find_planar_faces(solid: Solid) -> tuple[Floats, list[Facet]]:
+    solid = weld(solid)
+    return solid.vertices, find_facets(solid)
 
 
 def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = False) -> None:
-    """An OpenCASCADE shape, in millimetres, as STEP in ``unit``; ``curves``: with its edges as curves in the parameters
-    of its faces, which planes need not have. Raises OSError."""
+    """Writes an OpenCASCADE shape, in millimetres, as STEP in ``unit``.
+
+    ``curves``: also write edges as curves in the parameters of the faces; planes do not need them. Raises OSError where
+    the file cannot be written.
+    """
     from OCP.IFSelect import IFSelect_RetDone
     from OCP.Interface import Interface_Static
     from OCP.Message import Message
     from OCP.STEPControl import STEPControl_AsIs, STEPControl_Controller, STEPControl_Writer
 
-    Message.DefaultMessenger_s().ChangePrinters().Clear()  # else OpenCASCADE writes into the program's own output
+    Message.DefaultMessenger_s().ChangePrinters().Clear()  # else OpenCASCADE prints to the terminal
     STEPControl_Controller.Init_s()
     wanted = {"write.step.unit": UNITS[unit], "write.step.product.name": name}
     before = {key: Interface_Static.CVal_s(key) for key in wanted}
@@ -77,7 +80,7 @@ def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = Fal
     path.write_bytes(head + rest)
 
 
-def _shape(parts: list[list[tuple[Floats, list[Facet]]]], scale: float) -> Any:
+def _build_shape(parts: list[list[tuple[Floats, list[Facet]]]], scale: float) -> Any:
     """A solid, or a compound of several; the first shell of each is the outer one."""
     from OCP.BRep import BRep_Builder
     from OCP.TopoDS import TopoDS_Compound, TopoDS_Solid
@@ -88,7 +91,7 @@ def _shape(parts: list[list[tuple[Floats, list[Facet]]]], scale: float) -> Any:
         solid = TopoDS_Solid()
         builder.MakeSolid(solid)
         for number, (vertices, planar) in enumerate(part):
-            shell = _shell(vertices * scale, planar)
+            shell = _build_shell(vertices * scale, planar)
             builder.Add(solid, shell if number == 0 else shell.Reversed())
         made.append(solid)
     if len(made) == 1:
@@ -100,7 +103,7 @@ def _shape(parts: list[list[tuple[Floats, list[Facet]]]], scale: float) -> Any:
     return compound
 
 
-def _shell(vertices: Floats, planar: list[Facet]) -> Any:
+def _build_shell(vertices: Floats, planar: list[Facet]) -> Any:
     """A closed shell whose faces share their edges, and its edges their corners. Lengths in millimetres."""
     from OCP.BRep import BRep_Builder
     from OCP.Geom import Geom_Line, Geom_Plane

@@ -1,4 +1,4 @@
-"""Triangles of OpenCASCADE solids that close: faces are joined by the topology of their edges, not by coordinates."""
+"""Triangulates OpenCASCADE solids without gaps: faces are joined by the topology of their edges, not by coordinates."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Tessellation:
     error: float
 
 
-def diagonal(solids: list[Any]) -> float:
-    """Of the box around all solids."""
+def measure_diagonal(solids: list[Any]) -> float:
+    """The diagonal of the box around all solids."""
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
 
@@ -44,42 +44,42 @@ def diagonal(solids: list[Any]) -> float:
 def tessellate(solids: list[Any], chord: float, angle: float, name_of: Callable[[Any], str]) -> Tessellation:
     """Triangulates within ``chord`` and ``angle`` (degrees) and joins the faces of each solid along their edges.
 
-    On doubly curved faces the mesher can miss the chord it was asked for: where the measured error says it did, it is
-    asked once more, for less.
+    On doubly curved faces the mesher can exceed the chord. Where the measured error shows this, the mesher runs once
+    more with a smaller chord.
     """
-    first = _tessellated(solids, chord, angle, name_of)
+    first = _tessellate_once(solids, chord, angle, name_of)
     if first.error <= 1.1 * chord:
         return first
-    second = _tessellated(solids, chord * max(chord / first.error, 0.25), angle, name_of)
+    second = _tessellate_once(solids, chord * max(chord / first.error, 0.25), angle, name_of)
     return second if second.error < first.error else first
 
 
-def _tessellated(solids: list[Any], chord: float, angle: float, name_of: Callable[[Any], str]) -> Tessellation:
+def _tessellate_once(solids: list[Any], chord: float, angle: float, name_of: Callable[[Any], str]) -> Tessellation:
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
     from OCP.IMeshTools import IMeshTools_Parameters
 
-    wanted = IMeshTools_Parameters()
-    wanted.Deflection, wanted.Angle, wanted.MinSize = chord, float(np.radians(angle)), chord / 10
-    wanted.Relative = wanted.InParallel = False
-    # without it the inside of trimmed spheres and the like can be off by ten times the chord
-    wanted.EnableControlSurfaceDeflectionAllSurfaces = True
+    parameters = IMeshTools_Parameters()
+    parameters.Deflection, parameters.Angle, parameters.MinSize = chord, float(np.radians(angle)), chord / 10
+    parameters.Relative = parameters.InParallel = False
+    # without it the inside of a trimmed sphere can deviate by ten times the chord
+    parameters.EnableControlSurfaceDeflectionAllSurfaces = True
     builder = _Builder(chord, name_of)
     for solid in solids:
-        BRepTools.Clean_s(solid)  # a file may bring a coarser triangulation along
-        BRepMesh_IncrementalMesh(solid, wanted)
+        BRepTools.Clean_s(solid)  # the file may contain a coarser triangulation
+        BRepMesh_IncrementalMesh(solid, parameters)
         builder.add(solid)
     return builder.joined()
 
 
-def kind_of(adaptor: Any) -> str:
+def name_kind(adaptor: Any) -> str:
     """A surface's kind: plane, cylinder, b_spline_surface, ..."""
     kind: str = adaptor.GetType().name.removeprefix("GeomAbs_")
     return "".join(f"_{c.lower()}" if c.isupper() else c for c in kind).lstrip("_")
 
 
 class _Builder:
-    """Gathers the faces' triangulations and which of their nodes are one point."""
+    """Collects the triangulations of the faces, and which of their nodes are the same point."""
 
     def __init__(self, chord: float, name_of: Callable[[Any], str]) -> None:
         self.chord = chord
@@ -111,16 +111,16 @@ class _Builder:
             triangulation, location, start = found
             for item in explore(face, TopAbs_EDGE):
                 edge = TopoDS.Edge_s(item)
-                nodes = _edge_nodes(edge, triangulation, location)
+                nodes = _find_edge_nodes(edge, triangulation, location)
                 if nodes is None:
                     continue
                 nodes = nodes + start
                 key = edges.FindIndex(edge)
                 first = on_edge.setdefault(key, nodes)
                 if len(first) != len(nodes):
-                    raise InputError("two faces divide their common edge differently; try another chord")
+                    raise InputError("two faces divide their common edge differently; set another part.chord")
                 self.same.append((first, nodes))
-                # the edge's own sense, whichever way the face runs along it
+                # in the direction of the edge, not of the face
                 ends = (TopExp.FirstVertex_s(edge, False), TopExp.LastVertex_s(edge, False))
                 for vertex, node in zip(ends, (int(nodes[0]), int(nodes[-1])), strict=True):
                     if not vertex.IsNull():
@@ -138,7 +138,7 @@ class _Builder:
         adaptor = BRepAdaptor_Surface(face)
         number = len(self.names)
         self.names.append(self.name_of(face))
-        self.kinds.append(kind_of(adaptor))
+        self.kinds.append(name_kind(adaptor))
         if triangulation is None:
             return None  # a face narrower than the mesher's resolution: its edges coincide
         move = location.Transformation()
@@ -150,7 +150,7 @@ class _Builder:
         triangles = triangles - 1
         if triangulation.HasUVNodes() and self.kinds[-1] != "plane" and len(triangles):
             uv = np.array([triangulation.UVNode(i).Coord() for i in nodes])
-            self.error = max(self.error, _distance(adaptor, points, uv, triangles, self.chord))
+            self.error = max(self.error, _measure_error(adaptor, points, uv, triangles, self.chord))
         if face.Orientation() == TopAbs_REVERSED:
             triangles = triangles[:, ::-1]
         start = self.count
@@ -165,7 +165,7 @@ class _Builder:
         from scipy.sparse.csgraph import connected_components
 
         if not self.count:
-            raise InputError("none of its faces could be triangulated; try another chord")
+            raise InputError("none of its faces could be triangulated; set another part.chord")
         a = np.concatenate([pair[0] for pair in self.same] or [np.empty(0, np.int64)])
         b = np.concatenate([pair[1] for pair in self.same] or [np.empty(0, np.int64)])
         graph = coo_matrix((np.ones(len(a), bool), (a, b)), shape=(self.count, self.count))
@@ -185,8 +185,8 @@ class _Builder:
         )
 
 
-def _edge_nodes(edge: Any, triangulation: Any, location: Any) -> Ints | None:
-    """The triangulation's nodes along an edge, in the edge's own sense, from 0."""
+def _find_edge_nodes(edge: Any, triangulation: Any, location: Any) -> Ints | None:
+    """The triangulation's nodes along an edge, in the direction of the edge, counted from 0."""
     from OCP.BRep import BRep_Tool
 
     polygon = BRep_Tool.PolygonOnTriangulation_s(edge, triangulation, location)
@@ -195,32 +195,32 @@ def _edge_nodes(edge: Any, triangulation: Any, location: Any) -> Ints | None:
     return np.array([polygon.Node(i) for i in range(1, polygon.NbNodes() + 1)], dtype=np.int64) - 1
 
 
-def _distance(adaptor: Any, points: Floats, uv: Floats, triangles: Ints, chord: float) -> float:
+def _measure_error(adaptor: Any, points: Floats, uv: Floats, triangles: Ints, chord: float) -> float:
     """The largest distance from triangle centres and edge midpoints to the surface.
 
-    Each is compared with the surface at the same place in the surface's parameters, along the normal there. Where that
-    is more than ``chord``, the place is first moved to the foot of the perpendicular (Gauss-Newton): on cones and
-    splines parameters run unevenly. Of a face with many triangles, about 2,000 spread over it are checked.
+    Each is compared with the surface point at the same parameters, along the normal there. Where the distance is more
+    than ``chord``, the parameters are first moved to the foot of the perpendicular by Gauss-Newton steps: on cones and
+    splines parameters are not proportional to length. Of a face with many triangles, about 2,000 are checked.
     """
     some = triangles[:: max(1, len(triangles) // _CHECKED)]
     weights = np.array([[1 / 3, 1 / 3, 1 / 3], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
     flat = np.einsum("wc,tcj->twj", weights, points[some]).reshape(-1, 3)
     where = np.einsum("wc,tcj->twj", weights, uv[some]).reshape(-1, 2)
     low, high = uv.min(0), uv.max(0)
-    found, tangent = _offsets(adaptor, flat, where)
-    doubtful = np.flatnonzero(found > chord)
+    found, tangent = _measure_offsets(adaptor, flat, where)
+    far = np.flatnonzero(found > chord)
     for _ in range(4):
-        if not len(doubtful):
+        if not len(far):
             break
         # a vanishing tangent, as at a pole, makes the step 0 along it
-        step = np.einsum("nij,nj->ni", np.linalg.pinv(tangent[doubtful][:, :2].swapaxes(1, 2)), tangent[doubtful, 2])
-        where[doubtful] = np.clip(where[doubtful] + step, low, high)
-        better, tangent[doubtful] = _offsets(adaptor, flat[doubtful], where[doubtful])
-        found[doubtful] = better
+        step = np.einsum("nij,nj->ni", np.linalg.pinv(tangent[far][:, :2].swapaxes(1, 2)), tangent[far, 2])
+        where[far] = np.clip(where[far] + step, low, high)
+        better, tangent[far] = _measure_offsets(adaptor, flat[far], where[far])
+        found[far] = better
     return float(found.max())
 
 
-def _offsets(adaptor: Any, points: Floats, uv: Floats) -> tuple[Floats, NDArray[np.float64]]:
+def _measure_offsets(adaptor: Any, points: Floats, uv: Floats) -> tuple[Floats, NDArray[np.float64]]:
     """Distances (N,) of points to the surface at ``uv`` along its normal; (N,3,3): both tangents and the offset."""
     from OCP.gp import gp_Pnt, gp_Vec
 
@@ -232,6 +232,6 @@ def _offsets(adaptor: Any, points: Floats, uv: Floats) -> tuple[Floats, NDArray[
     rows[:, 2] = points - rows[:, 2]
     normal = np.cross(rows[:, 0], rows[:, 1])
     length = np.linalg.norm(normal, axis=1)
-    sound = length > 1e-9 * np.linalg.norm(rows[:, 0], axis=1).max() * np.linalg.norm(rows[:, 1], axis=1).max()
-    along = np.abs(np.einsum("ij,ij->i", rows[:, 2], normal)) / np.where(sound, length, 1)
-    return np.where(sound, along, np.linalg.norm(rows[:, 2], axis=1)), rows
+    regular = length > 1e-9 * np.linalg.norm(rows[:, 0], axis=1).max() * np.linalg.norm(rows[:, 1], axis=1).max()
+    along = np.abs(np.einsum("ij,ij->i", rows[:, 2], normal)) / np.where(regular, length, 1)
+    return np.where(regular, along, np.linalg.norm(rows[:, 2], axis=1)), rows

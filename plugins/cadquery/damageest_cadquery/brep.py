@@ -1,4 +1,4 @@
-"""The part from a CAD file with a boundary representation."""
+"""Reads the part from a CAD file with a boundary representation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from damageest.stages.part import CadFace, ReadPart
 
 
 class Brep(ReadPart):
-    """A part from STEP, IGES or BREP, triangulated by OpenCASCADE so that neighbouring faces share points."""
+    """Reads the part from STEP, IGES or BREP; OpenCASCADE triangulates it, neighbouring faces share points."""
 
     use: Literal["brep"] = "brep"
     reads: ClassVar[tuple[str, ...]] = (".step", ".stp", ".iges", ".igs", ".brep")
@@ -28,34 +28,35 @@ class Brep(ReadPart):
         None,
         gt=0,
         description="largest distance between CAD surface and triangles, in the job's unit; "
-        "default: an eighth of the tolerance, or 5e-5 of the part's diagonal where that is auto",
+        "default: an eighth of the tolerance, or 5e-5 of the part's diagonal where the tolerance is auto",
     )
     angle: float = Field(
-        30.0, gt=0, le=180, description="largest turn from one triangle to the next on a curved face, degrees"
+        30.0, gt=0, le=180, description="largest angle between neighbouring triangles on a curved face, in degrees"
     )
     unit: Unit | None = Field(
-        None, description="unit of the file's numbers; default: what the file says, for BREP the job's `units`"
+        None, description="unit of the file's lengths; default: the file's own, for BREP the job's `units`"
     )
 
     def run(self, unit: str, tolerance: float | None) -> Part:
         """The part in ``unit``. Raises InputError for a file that OpenCASCADE cannot read or that holds no solid."""
         suffix = check_file(self.path, self.reads, "a part")
         from damageest_cadquery._read import read
-        from damageest_cadquery._tessellate import diagonal, tessellate
+        from damageest_cadquery._tessellate import measure_diagonal, tessellate
 
         with _name_faults(self.path, suffix):
             model = read(self.path, suffix)
             source = self.unit or model.unit or unit
-            # what OpenCASCADE's own lengths have to be multiplied by to be in the job's unit
+            # the factor from OpenCASCADE's lengths to the job's unit
             scale = unit_factor(source, unit) / model.length
-            chord = self.chord or (tolerance / 8 if tolerance else 5e-5 * diagonal(model.solids) * scale)
+            chord = self.chord or (tolerance / 8 if tolerance else 5e-5 * measure_diagonal(model.solids) * scale)
             mesh = tessellate(model.solids, chord / scale, self.angle, model.name_of)
         notes = list(model.notes)
         if canonical_unit(source) != canonical_unit(unit):
             notes.append(f"converted from {canonical_unit(source)} to {canonical_unit(unit)}")
         if mesh.error * scale > 1.5 * chord:
             notes.append(
-                f"triangles are up to {mesh.error * scale:.3g} {unit} off the CAD surface; {chord:.3g} was asked"
+                f"triangles deviate by up to {mesh.error * scale:.3g} {unit} from the CAD surface, more than the chord "
+                f"of {chord:.3g}"
             )
         return make_part(
             mesh.vertices * scale,
@@ -71,15 +72,15 @@ class Brep(ReadPart):
         )
 
     def cad_faces(self, unit: str) -> tuple[CadFace, ...]:
-        """The model's faces, in the order in which `run` numbers them."""
+        """The faces of the CAD model, in the order in which `run` numbers them."""
         suffix = check_file(self.path, self.reads, "a part")
-        from damageest_cadquery._faces import faces
+        from damageest_cadquery._faces import list_faces
         from damageest_cadquery._read import read
 
         with _name_faults(self.path, suffix):
             model = read(self.path, suffix)
             source = self.unit or model.unit or unit
-            return faces(model, unit_factor(source, unit) / model.length)
+            return list_faces(model, unit_factor(source, unit) / model.length)
 
 
 @contextmanager

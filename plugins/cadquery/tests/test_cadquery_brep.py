@@ -153,4 +153,4 @@ def test_real_files_are_watertight(name: str, extents: tuple[float, ...]) -> Non
     np.testing.assert_allclose(sorted(np.ptp(part.vertices, axis=0), reverse=True), extents, atol=0.1)
     assert part.faces_brep is not None
     assert part.tessellation_error < 5e-4 * part.diagonal  # a spline of the first is hard on the mesher; it is told
-    assert part.tessellation_error < 7.5e-5 * part.diagonal or any("off the CAD surface" in n for n in part.notes)
+    assert part.tessellation_error < 7.5e-5 * part.diagonal or any("from the CAD surface" in n for n in part.notes)

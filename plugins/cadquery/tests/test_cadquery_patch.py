@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damageest_cadquery._patch import step_patch
+from damageest_cadquery._patch import write_patch
 
 from damageest.artefacts import Surface
 from damageest.geometry.units import MILLIMETRES
@@ -52,9 +52,9 @@ def test_the_face_is_where_the_surface_is(hole: float, unit: str, tmp_path: Path
     surface = bowl(hole=hole)
     patch = patch_of(surface, 0.05)
     assert len(patch.rims) == (2 if hole else 1)
-    step_patch(tmp_path / "a.step", "damage surface", patch, unit)
+    write_patch(tmp_path / "a.step", "damage surface", patch, unit)
     first = (tmp_path / "a.step").read_bytes()
-    step_patch(tmp_path / "a.step", "damage surface", patch, unit)
+    write_patch(tmp_path / "a.step", "damage surface", patch, unit)
     assert (tmp_path / "a.step").read_bytes() == first
     assert b"B_SPLINE_SURFACE" in first
     (face,) = cq.importers.importStep(str(tmp_path / "a.step")).faces().vals()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from damageest_cadquery import _step
-from damageest_cadquery._facets import facets
+from damageest_cadquery._facets import find_facets
 from manifold3d import Manifold
 
 from damageest.artefacts import Solid
@@ -38,7 +38,7 @@ def bitten() -> Any:
 
 
 def written(made: Solid, folder: Path, unit: str = "mm") -> Any:
-    done = _step.step(folder, "a", [Body("deposit 'site-1'", made, (1, 2, 3))], unit)
+    done = _step.write_step(folder, "a", [Body("deposit 'site-1'", made, (1, 2, 3))], unit)
     assert done.files == ("a.step",)
     assert done.notes == ()
     return cq.importers.importStep(str(folder / "a.step"))
@@ -65,7 +65,7 @@ def test_volume_and_unit(unit: str, tmp_path: Path) -> None:
 
 def test_flat_sides_are_one_face_with_their_holes(tmp_path: Path) -> None:
     made = solid(Manifold.cube((40, 30, 20)) - Manifold.cylinder(30, 4, 4, 48).translate((30, 20, -5)))
-    planar = facets(made)
+    planar = find_facets(made)
     assert len(planar) == 6 + 48
     assert sorted(len(face.loops) for face in planar)[-2:] == [2, 2], "the hole goes through two of the sides"
     back = written(made, tmp_path)
@@ -122,8 +122,8 @@ def test_the_same_bytes_each_time_and_its_name(tmp_path: Path) -> None:
 
 
 def test_too_many_faces_are_left_out_and_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_step, "MOST", 100)
-    done = _step.step(tmp_path, "a", [Body("x", solid(bitten()), (1, 2, 3))], "mm")
+    monkeypatch.setattr(_step, "MAX_FACES", 100)
+    done = _step.write_step(tmp_path, "a", [Body("x", solid(bitten()), (1, 2, 3))], "mm")
     assert done.files == ()
     assert "a.step was not written" in done.notes[0]
     assert not list(tmp_path.iterdir())
