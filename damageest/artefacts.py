@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+Vector = tuple[float, float, float]
 
 INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
 """Labels of a scan point: on the nominal surface; on an inner damage surface; outside the part by more than the

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Evidence, Floats, Mesh, Part, Scan, Solid
-from damageest.geometry.distance import Flags, closest_on_mesh, distance_to_mesh
+from damageest.artefacts import INTACT, Deviation, Evidence, Flags, Floats, Mesh, Part, Scan, Solid
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_in_box
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces

@@ -6,15 +6,17 @@ import typer
 
 
 def command() -> None:
-    """List installed plugins with licence and stages, and broken plugins with the reason."""
+    """List installed plugins with licence, stages and export formats, and broken plugins with the reason."""
     from damageest.registry import Registry
 
     registry = Registry.discover()
     for provider in registry.providers:
         stages = [f"{i.contract.stage}: {i.name}" for i in registry.implementations if i.provider == provider]
         broken = [b for b in registry.broken if b.provider == provider]
-        shown = ", ".join(stages) if len(stages) <= 6 else f"{len(stages)} stage implementations"
-        typer.echo(f"{provider}  {provider.licence}  {shown or ('broken' if broken else 'no stages')}")
+        formats = [name for name, owner in registry.formats.items() if owner == provider]
+        shown = stages if len(stages) <= 6 else [f"{len(stages)} stage implementations"]
+        shown += [f"export formats: {', '.join(formats)}"] if formats else []
+        typer.echo(f"{provider}  {provider.licence}  {', '.join(shown) or ('broken' if broken else 'no stages')}")
         for item in broken:
             typer.echo(f"  broken: {item.reason}\n  try: {item.remedy}")
     for group in registry.clashes:

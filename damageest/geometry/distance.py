@@ -11,11 +11,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from damageest.artefacts import Floats, Ints, Mesh
-
-Flags = NDArray[np.bool_]
+from damageest.artefacts import Flags, Floats, Ints, Mesh
 
 
 class Closest(NamedTuple):

@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid
 
-Flags = NDArray[np.bool_]
 Exact = Callable[[Floats], tuple[Floats, Ints]]
 
 PER_CELL = 16

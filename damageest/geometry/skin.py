@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Part, Solid, Surface
-from damageest.geometry.distance import Flags, distance_to_mesh
+from damageest.artefacts import Flags, Part, Solid, Surface
+from damageest.geometry.distance import distance_to_mesh
 
 
 def find_inner_faces(damage: Solid, part: Part) -> Flags:

@@ -61,7 +61,7 @@ def _check_unit(name: str) -> str:
         raise ValueError(str(error)) from None
 
 
-Unit = Annotated[str, AfterValidator(_check_unit), Field(examples=list(MILLIMETRES))]
+UnitOption = Annotated[str, AfterValidator(_check_unit), Field(examples=list(MILLIMETRES))]
 """A unit as an option of a stage: checked with the job, and replaced by its short name."""
 
 

@@ -42,7 +42,7 @@ class Implementation:
 @dataclass(frozen=True)
 class Registry:
     """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them.
-    ``writers``: the formats that `export` can write, by name."""
+    ``writers``: the formats that `export` can write, by name; ``formats``: the provider of each."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]
@@ -50,6 +50,7 @@ class Registry:
     clashes: tuple[tuple[Implementation, ...], ...]
     hooks: pluggy.PluginManager = field(repr=False)
     writers: Mapping[str, Writer] = field(default_factory=dict, compare=False)
+    formats: Mapping[str, Provider] = field(default_factory=dict, compare=False)
 
     @classmethod
     def discover(cls, observers: Iterable[object] = ()) -> Registry:
@@ -57,14 +58,17 @@ class Registry:
         manager, loaded, broken = load(observers)
         found: list[Implementation] = []
         writers: dict[str, Writer] = {}
+        formats: dict[str, Provider] = {}
         for plugin, provider in loaded:
             try:
                 with ignore_shadow_warnings():
                     classes = _read_offered(plugin)
-                    writers |= _read_writers(plugin, writers)
+                    added = _read_writers(plugin, writers)
             except (Exception, SystemExit) as error:
                 broken.append(describe_broken(error, provider))
                 continue
+            writers |= added
+            formats |= dict.fromkeys(added, provider)
             for stage in classes:
                 try:
                     found.append(_check_implementation(stage, provider))
@@ -77,7 +81,7 @@ class Registry:
         single = tuple(group[0] for group in groups.values() if len(group) == 1)
         clashes = tuple(group for group in groups.values() if len(group) > 1)
         providers = tuple(dict.fromkeys([p for _, p in loaded] + [b.provider for b in broken]))
-        return cls(single, providers, tuple(broken), clashes, manager, writers)
+        return cls(single, providers, tuple(broken), clashes, manager, writers, formats)
 
     def of(self, stage: str) -> tuple[Implementation, ...]:
         """The implementations of a stage, defaults first, then by name."""

@@ -6,11 +6,10 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from damageest.artefacts import Deposit, Floats
+from damageest.artefacts import Deposit, Floats, Vector
 from damageest.result import Result, Site
 from damageest.stages.export import ExportedFiles
 
-Vector = tuple[float, float, float]
 _NOTHING = ExportedFiles()
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from damageest.errors import InputError
-from damageest.geometry.units import MILLIMETRES, Unit, canonical_unit, diagnose_scale, unit_factor
+from damageest.geometry.units import MILLIMETRES, UnitOption, canonical_unit, diagnose_scale, unit_factor
 
 units = st.sampled_from(sorted(MILLIMETRES))
 
@@ -34,7 +34,7 @@ def test_an_unknown_unit_names_the_near_miss_and_the_valid_ones():
 
 def test_as_an_option_it_is_checked_and_shortened():
     class Options(BaseModel):
-        unit: Unit
+        unit: UnitOption
 
     assert Options(unit="inch").unit == "in"
     with pytest.raises(ValidationError, match="unknown unit 'parsec'"):

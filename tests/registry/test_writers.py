@@ -31,6 +31,7 @@ def damageest_writers():
 def test_a_plugins_format_is_written_listed_and_cleared_away(site: Site, tmp_path: Path) -> None:  # noqa: F811
     site.add("acme-count", COUNTED.replace("NAME", "'count'"))
     path = damaged_box.write(tmp_path, damaged_box.JOB + "export: {format: [count, stl], frame: both}\n")
+    assert Registry.discover().formats["count"].name == "acme-count"
     damageest.run(path, output=True)
     out = tmp_path / "out/job"
     faces = (out / "damage/site-1.count").read_text()

@@ -7,9 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator
 
-from damageest.artefacts import Floats
-
-Vector = tuple[float, float, float]
+from damageest.artefacts import Floats, Vector
 
 
 def _check_not_zero(value: Vector | str) -> Vector | str:
@@ -18,10 +16,10 @@ def _check_not_zero(value: Vector | str) -> Vector | str:
     return value
 
 
-Axis = Annotated[Literal["auto", "x", "y", "z"] | Vector, AfterValidator(_check_not_zero)]
+AxisOption = Annotated[Literal["auto", "x", "y", "z"] | Vector, AfterValidator(_check_not_zero)]
 
 
-def fit_axis(points: Floats, axis: Axis) -> tuple[Floats, Floats, float]:
+def fit_axis(points: Floats, axis: AxisOption) -> tuple[Floats, Floats, float]:
     """The smallest cylinder round points (N,3) along an axis, as (frame, centre, radius).
 
     The rows of ``frame`` (3,3) are two directions across the axis, and the axis. ``centre`` (2,), in these two

@@ -7,11 +7,9 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from damageest.artefacts import Floats, Part, Samples, Solid, Surface
+from damageest.artefacts import Floats, Part, Samples, Solid, Surface, Vector
 from damageest.errors import StageError
 from damageest.stages.background import Background
-
-Vector = tuple[float, float, float]
 
 
 class BuildVolume(Background):

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Floats, Part, Surface
-from damageest.stages.background._axis import Axis, count_segments, fit_axis, take_hull_points
+from damageest.stages.background._axis import AxisOption, count_segments, fit_axis, take_hull_points
 from damageest.stages.background._shape import ShapeBackground
 
 
@@ -16,7 +16,7 @@ class Capsule(ShapeBackground):
     """The cylinder with domed ends round the part (paper 3.2): for turned parts with rounded or tapered ends."""
 
     use: Literal["capsule"] = "capsule"
-    axis: Axis = Field(
+    axis: AxisOption = Field(
         "auto", description="x, y, z or a vector, in the part's frame; auto: the axis of the smallest capsule"
     )
 

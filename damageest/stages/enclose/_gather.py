@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Floats, Ints, Part, Samples, Scan, Sites
+from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Samples, Scan, Sites
 from damageest.geometry.local_fits import average_points
 from damageest.geometry.neighbourhoods import find_neighbours, measure_local_areas, pick_one_per_cube, thin_points
 from damageest.geometry.orientation import turn_toward_void
 from damageest.geometry.poisson import Grid, GridValues, refine_field
 from damageest.geometry.voxels import number_cubes
-from damageest.stages.enclose._skin import Flags, SkinSamples, push_outward, sample_skin_near
+from damageest.stages.enclose._skin import SkinSamples, push_outward, sample_skin_near
 
 APART = 0.75
 """Edge of the cubes with one averaged point each, in cells of the surface."""

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from damageest.artefacts import INTACT, Deviation, Floats, Part, Samples, Scan, Sites
+from damageest.artefacts import INTACT, Deviation, Flags, Floats, Part, Samples, Scan, Sites
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
-
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

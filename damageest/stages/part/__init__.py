@@ -6,11 +6,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from damageest.artefacts import Part
+from damageest.artefacts import Part, Vector
 from damageest.errors import InputError
 from damageest.stages import Stage, asked_by_name
-
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from damageest.artefacts import Part
-from damageest.geometry.units import Unit
+from damageest.geometry.units import UnitOption
 from damageest.io.meshes import MESH_SUFFIXES
 from damageest.io.parts import read_part
 from damageest.stages import JobPath
@@ -20,7 +20,7 @@ class PartFile(ReadPart):
     use: Literal["file"] = "file"
     reads: ClassVar[tuple[str, ...]] = MESH_SUFFIXES
     path: JobPath = Field(description="the file, relative to the job's folder")
-    unit: Unit | None = Field(
+    unit: UnitOption | None = Field(
         None, description="unit of the file's lengths; default: the file's own (3MF), else the job's `units`"
     )
     repair: bool = Field(

@@ -12,7 +12,7 @@ from pydantic import Field
 from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.errors import InputError
 from damageest.geometry.distance import distance_to_mesh
-from damageest.geometry.units import Unit
+from damageest.geometry.units import UnitOption
 from damageest.io.files import file_sha256
 from damageest.io.scans import read_scan
 from damageest.stages import JobPath
@@ -36,7 +36,7 @@ class PartFromScan(ReadPart):
     path: JobPath | tuple[JobPath, ...] = Field(
         description="the specimen's scan, a file or a list of files in one frame, relative to the job's folder"
     )
-    unit: Unit | None = Field(
+    unit: UnitOption | None = Field(
         None, description="unit of the files' lengths; default: the file's own (E57: m), else the job's `units`"
     )
     cell: float | None = Field(

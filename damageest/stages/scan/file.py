@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from damageest.artefacts import Scan
-from damageest.geometry.units import Unit
+from damageest.geometry.units import UnitOption
 from damageest.io.points import READERS
 from damageest.io.scans import read_scan
 from damageest.stages import JobPath
@@ -23,7 +23,7 @@ class ScanFile(ReadScan):
     path: JobPath | tuple[JobPath, ...] = Field(
         description="the file, or a list of files in one frame, relative to the job's folder"
     )
-    unit: Unit | None = Field(
+    unit: UnitOption | None = Field(
         None, description="unit of the files' lengths; default: the file's own (E57: m), else the job's `units`"
     )
     columns: str | None = Field(

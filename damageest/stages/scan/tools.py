@@ -14,8 +14,8 @@ from damageest.stages import JobPath
 from damageest.stages.scan import _random_field
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-Row = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
-Matrix = tuple[Row, Row, Row, Row]
+MatrixRow = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
+Matrix = tuple[MatrixRow, MatrixRow, MatrixRow, MatrixRow]
 
 
 def _check_not_zero(value: Vector) -> Vector:

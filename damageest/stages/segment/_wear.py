@@ -11,12 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from damageest.artefacts import Floats, Ints, Part, Scan
+from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.geometry.voxels import CHUNK, number_cubes, number_faced_cubes
-
-Flags = NDArray[np.bool_]
 
 NEIGHBOURS = 48
 """Largest number of points that a mean is taken over."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from damageest.stages.part import CadFace, Vector
+from damageest.artefacts import Vector
+from damageest.stages.part import CadFace
 from damageest_cadquery._read import Model, explore
 from damageest_cadquery._tessellate import name_kind
 

@@ -12,7 +12,7 @@ from pydantic import Field
 from damageest.artefacts import Part
 from damageest.errors import InputError
 from damageest.geometry.make_part import make_part
-from damageest.geometry.units import Unit, canonical_unit, unit_factor
+from damageest.geometry.units import UnitOption, canonical_unit, unit_factor
 from damageest.io.files import check_file, file_sha256, raise_environment_fault, shorten_error
 from damageest.stages import JobPath
 from damageest.stages.part import CadFace, ReadPart
@@ -33,7 +33,7 @@ class Brep(ReadPart):
     angle: float = Field(
         30.0, gt=0, le=180, description="largest angle between neighbouring triangles on a curved face, in degrees"
     )
-    unit: Unit | None = Field(
+    unit: UnitOption | None = Field(
         None, description="unit of the file's lengths; default: the file's own, for BREP the job's `units`"
     )
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from damageest.artefacts import INTACT, Deviation, Floats, Ints, Part, Scan, Sites
+from damageest.artefacts import INTACT, Deviation, Flags, Floats, Ints, Part, Scan, Sites
 from damageest.geometry.distance import signed_distance
 from damageest_octree.tree import Tree, build_tree, dilate, encode
 
-Flags = NDArray[np.bool_]
 PROBES = 5000
 LEAK = 0.03
 """Share of the probes under intact skin that the flood may reach without a leak, by stray points of a thin wall."""
