@@ -16,6 +16,8 @@ from damageest.geometry.orientation import turn_toward_void
 
 FEWEST = 16
 """Points needed to reconstruct an inner damage surface."""
+MOST_CELLS = 3e6
+"""Cells in the bounding box of a damage, at most. VTK visits each, in about 2 microseconds."""
 FIT_COUNT = 32
 """Neighbours of each local fit."""
 
@@ -28,6 +30,16 @@ def centre_points(points: Floats) -> Floats:
             "method: implicit",
         )
     return np.asarray(points.mean(axis=0))
+
+
+def choose_cell(size: Floats, tolerance: float, spacing: float, wanted: float | None = None) -> float:
+    """Edge of the cells for a damage whose bounding box along its own axes has the sides ``size`` (3,).
+
+    ``wanted``, where it is given; else the larger of the tolerance and the scan's point spacing, or more where the box
+    would need over MOST_CELLS cells.
+    """
+    least = float(np.prod(size) / MOST_CELLS) ** (1 / 3)
+    return wanted or max(tolerance, spacing, least)
 
 
 def thin_for_surface(points: Floats, cell: float) -> Floats:

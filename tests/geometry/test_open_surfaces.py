@@ -9,7 +9,9 @@ from damageest.artefacts import Part, Surface
 from damageest.errors import StageError
 from damageest.geometry.open_surfaces import (
     FEWEST,
+    MOST_CELLS,
     centre_points,
+    choose_cell,
     faces_skin,
     orient_points,
     take_largest_piece,
@@ -87,3 +89,12 @@ def test_the_largest_piece_is_a_manifold() -> None:
 def test_a_surface_faces_the_skin_or_not() -> None:
     assert faces_skin(PIT, PART)
     assert not faces_skin(Surface(PIT.vertices, PIT.faces[:, ::-1]), PART)
+
+
+def test_a_cell_follows_tolerance_and_spacing_and_bounds_their_number() -> None:
+    size = np.array([10.0, 20.0, 5.0])
+    assert choose_cell(size, 0.2, 0.1) == 0.2
+    assert choose_cell(size, 0.2, 0.3) == 0.3
+    assert choose_cell(size, 0.2, 0.3, 0.05) == 0.05
+    coarse = choose_cell(100 * size, 0.2, 0.3)
+    assert np.prod(100 * size / coarse) == pytest.approx(MOST_CELLS)

@@ -9,13 +9,11 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Part, Surface
 from damageest.geometry.local_fits import smooth_points
-from damageest.geometry.open_surfaces import centre_points, thin_for_surface, trim_surface
+from damageest.geometry.open_surfaces import centre_points, choose_cell, thin_for_surface, trim_surface
 from damageest.stages.reconstruct import Reconstruct
 
 FIT_POINTS = 32
 """Points of each local fit. It fits curvature too, and so averages less than a plane through as many points."""
-MOST_CELLS = 3e6
-"""Cells in the bounding box of a damage, at most. VTK visits each, in about 2 microseconds."""
 
 
 class PyVista(Reconstruct):
@@ -43,8 +41,7 @@ class PyVista(Reconstruct):
         # VTK fills the bounding box with cells. Along the damage's own axes that box is much smaller.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         local = (points - origin) @ axes
-        least = float(np.prod(np.ptp(local, axis=0)) / MOST_CELLS) ** (1 / 3)
-        cell = self.spacing or max(tolerance, spacing, least)
+        cell = choose_cell(np.ptp(local, axis=0), tolerance, spacing, self.spacing)
         cloud = thin_for_surface(local, cell)
         count = min(self.neighbours, len(cloud) // 2)
         cloud, _, _ = smooth_points(cloud, noise, min(max(count, FIT_POINTS), len(cloud) // 2))

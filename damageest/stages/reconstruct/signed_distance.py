@@ -8,11 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Floats, Ints, Part, Surface
-from damageest.geometry.open_surfaces import centre_points, orient_points, trim_surface
+from damageest.geometry.open_surfaces import centre_points, choose_cell, orient_points, trim_surface
 from damageest.stages.reconstruct import Reconstruct
-
-MOST_CELLS = 3e6
-"""Cells in the bounding box of a damage, at most."""
 
 
 class SignedDistance(Reconstruct):
@@ -43,8 +40,7 @@ class SignedDistance(Reconstruct):
         # VTK fills the bounding box with cells. Along the damage's own axes that box is much smaller.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         local = (points - origin) @ axes
-        least = float(np.prod(np.ptp(local, axis=0)) / MOST_CELLS) ** (1 / 3)
-        cell = self.spacing or max(tolerance, spacing, least)
+        cell = choose_cell(np.ptp(local, axis=0), tolerance, spacing, self.spacing)
         cloud, normals = orient_points(points, part, cell, noise)
         vertices, faces = _extract_zero_level((cloud - origin) @ axes, normals @ axes, cell, self.radius * cell)
         if np.linalg.det(axes) < 0:

@@ -12,8 +12,6 @@ from damageest.errors import StageError
 from damageest.stages.reconstruct import Reconstruct
 
 Filter = Literal["apss", "rimls", "ball_pivoting", "screened_poisson"]
-MOST_CELLS = 3e6
-"""Cells in the bounding box of a damage, at most; marching cubes visits each."""
 MOST_LEVELS = 11
 """Most levels of the Poisson octree; one more takes four times the memory."""
 
@@ -44,15 +42,14 @@ class PyMeshLabReconstruct(Reconstruct):
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
         """Raises StageError where the points are too few, or where no surface can be reconstructed."""
-        from damageest.geometry.open_surfaces import centre_points, orient_points, trim_surface
+        from damageest.geometry.open_surfaces import centre_points, choose_cell, orient_points, trim_surface
 
         origin = centre_points(points)
         # Marching cubes fills the bounding box with cells. Along the damage's own axes that box is much smaller.
         axes = np.linalg.eigh((points - origin).T @ (points - origin))[1]
         axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # a rotation, so that faces keep their orientation
         size = np.ptp((points - origin) @ axes, axis=0)
-        least = float(np.prod(size) / MOST_CELLS) ** (1 / 3)
-        cell = self.spacing or max(tolerance, spacing, least)
+        cell = choose_cell(size, tolerance, spacing, self.spacing)
         cloud, normals = orient_points(points, part, cell, noise)
         vertices, faces = _apply_filter(
             (cloud - origin) @ axes, normals @ axes, *self._choose_filter(cell, float(size.max()))
