@@ -1,4 +1,4 @@
-"""What is known at a point of the route: typed values, each with the key that says how it came about.
+"""What is known at a point of the route: typed values, each with the key that says how it was computed.
 
 The keys are those of the cache: equal keys mean equal values. A contract's ``gives`` and the parameters of its ``run``
 name values of these classes.
@@ -74,7 +74,7 @@ class State:
     def with_named(self, name: str, content: Any, key: str) -> Self:
         """As `with_value`, for a stage's result, whose name its contract gives."""
         if not key:
-            raise ValueError(f"the value '{name}' needs a key that says how it came about")
+            raise ValueError(f"the value '{name}' needs a key that says how it was computed")
         return replace(self, values={**self.values, name: content}, keys={**self.keys, name: key})
 
     def derive(self, value: Value[T], content: T, *sources: Value[Any]) -> Self:

@@ -47,8 +47,8 @@ def run(scene: tuple[Part, Scan, float], **stages: Any) -> Result:
 
 
 def right(result: Result, scan: Scan, least: float = 0.98) -> bool:
-    sound = all(site.evidence.consistent and site.method == "surface" for site in result.sites)
-    return sound and result.status == "ok" and iou([site.damage for site in result.sites], [truth(scan)]) > least
+    agrees = all(site.evidence.consistent and site.method == "surface" for site in result.sites)
+    return agrees and result.status == "ok" and iou([site.damage for site in result.sites], [truth(scan)]) > least
 
 
 @pytest.fixture(scope="module")

@@ -77,7 +77,7 @@ def test_a_stage_that_prints_leaves_json_alone(site: Site, tmp_path: Path) -> No
 
 MISBEHAVIOUR = {
     "edits its inputs": ("damage.vertices[0] = 0; return damage", "tried to edit what it was given"),
-    "open mesh": ("return Solid(damage.vertices, damage.faces[1:])", "gave an artefact that is none: not watertight"),
+    "open mesh": ("return Solid(damage.vertices, damage.faces[1:])", "gave a result that is not valid: not watertight"),
     "raises": ("raise IndexError('7')", "failed unexpectedly: IndexError: 7"),
     "lacks a module": ("import nonexistent_thing", "the Python module nonexistent_thing is not installed"),
     "lacks a library": (
@@ -138,10 +138,10 @@ def test_a_stage_that_hangs_can_be_stopped(number: int, status: int, site: Site,
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site.folder), os.environ.get("PYTHONPATH", "")])}
     stuck = [*command, "--set", "allowance=doubled"]
 
-    def heeding() -> None:
+    def allow_interrupts() -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # shells let what runs in the background ignore it
 
-    with subprocess.Popen(stuck, env=env, stderr=subprocess.PIPE, text=True, preexec_fn=heeding) as process:
+    with subprocess.Popen(stuck, env=env, stderr=subprocess.PIPE, text=True, preexec_fn=allow_interrupts) as process:
         try:
             while not hung.exists():
                 assert process.poll() is None, process.communicate()[1]
