@@ -10,10 +10,12 @@ from pathlib import Path
 from damageest.job.reference import COMMAND, write_reference
 from damageest.registry import Registry
 from tests.job.test_schema import own
+from tests.needs import PLUGINS, needs_plugin
 
 PAGE = Path(__file__).parents[2] / "docs" / "job-reference.md"
 
 
+@needs_plugin(*PLUGINS)
 def test_the_job_reference_is_current(registry: Registry) -> None:
     current = write_reference(own(registry))
     assert PAGE.read_text() == current, f"run: {COMMAND}"
