@@ -19,6 +19,7 @@ from damageest.evaluate.report import make_legend
 from damageest.job import load
 from damageest.job.yamlfile import parse
 from damageest.registry import Registry
+from tests.needs import PLUGINS, needs_plugin
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -76,6 +77,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 JOBS = [(page, block) for page in PAGES if page.name != "plugin-guide.md" for block in blocks(page, "yaml")]
 
 
+@needs_plugin(*PLUGINS)
 @pytest.mark.parametrize(("page", "block"), JOBS, ids=[f"{p.name}: {b.splitlines()[0][:40]}" for p, b in JOBS])
 def test_a_job_is_valid(page: Path, block: str, files: Path, registry: Registry) -> None:
     tree, _ = parse(block, page.name)

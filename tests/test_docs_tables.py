@@ -9,6 +9,7 @@ import pytest
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS, STAGES
 from tests.job.test_schema import own
+from tests.needs import PLUGINS, needs_plugin
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -26,6 +27,7 @@ def list_provided(registry: Registry) -> dict[str, list[str]]:
     return {stage: [item.name for item in own(registry).of(stage)] for stage in STAGES}
 
 
+@needs_plugin(*PLUGINS)
 def test_the_readme_lists_every_implementation(registry: Registry) -> None:
     rows = read_table((ROOT / "README.md").read_text(), "| stage | what it does | implementations |\n")
     assert [row[0] for row in rows] == list(STAGES)
@@ -37,6 +39,7 @@ def test_the_readme_lists_every_implementation(registry: Registry) -> None:
         assert names[0] in {name for contract, name in DEFAULTS.items() if contract.stage == stage}, "default first"
 
 
+@needs_plugin(*PLUGINS)
 def test_the_page_of_stages_lists_every_implementation(registry: Registry) -> None:
     rows = read_table((DOCS / "stages.md").read_text(), "| stage | implementation | when to take it |\n")
     listed: dict[str, list[str]] = {}
