@@ -44,7 +44,9 @@ def written(made: Solid, folder: Path, unit: str = "mm") -> Any:
     return cq.importers.importStep(str(folder / "a.step"))
 
 
-@pytest.mark.parametrize("unit", ["um", "mm", "cm", "m", "in", "ft"])
+@pytest.mark.parametrize(
+    "unit", ["mm", "in", *(pytest.param(unit, marks=pytest.mark.slow) for unit in ("um", "cm", "m", "ft"))]
+)
 def test_volume_and_unit(unit: str, tmp_path: Path) -> None:
     scale = 1 / MILLIMETRES[unit]  # the same block, whatever the unit
     made = solid(bitten().scale((scale,) * 3))

@@ -65,7 +65,10 @@ def make_case(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit]:
     return part, lost, chosen, deposit
 
 
-@pytest.mark.parametrize("seed", range(CASES))
+# every second one by default; the others by -m slow
+@pytest.mark.parametrize(
+    "seed", [seed if seed % 2 else pytest.param(seed, marks=pytest.mark.slow) for seed in range(CASES)]
+)
 def test_guarantees(seed: int) -> None:
     part, lost, chosen, deposit = make_case(seed)
     assert open_edges(deposit.faces) == 0

@@ -20,8 +20,10 @@ pytestmark = needs_plugin("cadquery")
 cq = import_for("cadquery", "cadquery")
 
 
-@pytest.mark.parametrize("units", ["mm", "in"])
-@pytest.mark.parametrize("detail", [None, 0.0])
+@pytest.mark.parametrize(
+    ("detail", "units"),
+    [(None, "mm"), (0.0, "in"), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((None, "in"), (0.0, "mm")))],
+)
 def test_volumes_and_unit(units: str, detail: float | None, tmp_path: Path, registry: Registry) -> None:
     scale = MILLIMETRES[units]
     result = results.make(units, 1 / scale)
