@@ -93,7 +93,7 @@ def test_round_trip(value: Any, tmp_path: Path) -> None:
 
 def test_what_is_no_artefact_is_refused_and_leaves_no_entry(tmp_path: Path) -> None:
     cache = Cache(tmp_path)
-    with pytest.raises(TypeError, match="no artefact"):
+    with pytest.raises(TypeError, match="not an artefact"):
         cache.put("stage", "k", {1, 2})
     assert cache.get("stage", "k") == (False, None)
 

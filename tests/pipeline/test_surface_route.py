@@ -78,7 +78,7 @@ def test_the_background_does_not_matter_where_it_is_valid(
 def test_where_it_is_not_valid_it_says_so(background: str) -> None:
     tool = {"tool": "cylinder", "point": [0, 0, 0], "axis": [1, 0, 0], "length": 50, "radius": 6}
     scene = scanned(PARTS["tube"](), tool)
-    with pytest.raises(StageError, match="leads through the part"):
+    with pytest.raises(StageError, match="runs through the part"):
         run(scene, background=background)
     assert right(run(scene), scene[1])  # a wall worn through: both rims reach the background
 
