@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from damageest.artefacts import ArtefactError, Floats, Ints, Solid
 from damageest.geometry.distance import is_inside
@@ -61,6 +59,9 @@ def label_pieces(faces: Ints) -> Ints:
 
     Faces that share a vertex are in one piece.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     size = int(faces.max(initial=-1)) + 1
     links = coo_array((np.ones(2 * len(faces)), np.concatenate([faces[:, :2], faces[:, 1:]]).T), shape=(size, size))
     label = connected_components(links, directed=False)[1][faces[:, 0]]

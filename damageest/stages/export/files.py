@@ -17,7 +17,6 @@ from damageest.geometry.transforms import invert_pose, move_mesh
 from damageest.io.meshes import write_ply, write_points
 from damageest.stages.export import Body, Export, ExportedFiles, Patch, Writer
 from damageest.stages.export._options import Formats, check_spline_writer
-from damageest.stages.export._spline import fit_spline
 
 if TYPE_CHECKING:
     from damageest.result import Result
@@ -52,6 +51,8 @@ class Files(Export):
 
     def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles:
         """Writes into ``folder``; gives the paths relative to it. The same result gives the same bytes."""
+        from damageest.stages.export._spline import fit_spline
+
         splines = {s.id: fit_spline(s.surface, result.tolerance) for s in result.sites} if self.spline else {}
         detail = result.tolerance / 10 if self.detail is None else self.detail
         bodies, coarse = _collect_bodies(result), {}

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from damageest.artefacts import Floats, Ints, Solid
 
@@ -33,6 +31,9 @@ def weld(solid: Solid) -> Solid:
     short = edges[np.linalg.norm(solid.vertices[edges[:, 0]] - solid.vertices[edges[:, 1]], axis=1) <= _POINT]
     if not len(short):
         return solid
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     size = len(solid.vertices)
     graph = coo_array((np.ones(len(short), bool), (short[:, 0], short[:, 1])), shape=(size, size))
     _, first, same = np.unique(connected_components(graph, directed=False)[1], return_index=True, return_inverse=True)
@@ -96,6 +97,9 @@ def _find_flat_regions(solid: Solid, other: Ints, tolerance: float) -> Ints:
     sliver = size[two] <= tolerance * solid.diagonal
     flat = (np.abs(off).max(1) <= tolerance) & ((np.einsum("ij,ij->i", unit[one], unit[two]) > 0) | sliver)
     one, two = one[flat], two[flat]
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     graph = coo_array((np.ones(len(one), bool), (one, two)), shape=(len(faces), len(faces)))
     label = connected_components(graph, directed=False)[1].astype(np.int64)
     normal = np.zeros((label.max() + 1, 3))
