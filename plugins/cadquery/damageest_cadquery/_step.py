@@ -75,8 +75,9 @@ def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = Fal
     data = path.read_bytes()
     head, rest = data[:4096], data[4096:]
     head = re.sub(rb"'\d{4}-\d\d-\d\dT[\d:]+[^']*'", b"'1970-01-01T00:00:00'", head)
-    # OpenCASCADE numbers the products that a process writes
-    head = re.sub(rb"PRODUCT\('(.*?) \d+',\s*'.*? \d+',", rb"PRODUCT('\1','\1',", head, flags=re.DOTALL)
+    # OpenCASCADE numbers the products that a process writes, and breaks the line by the length of the number
+    product = rb"PRODUCT\('(.*?) \d+',\s*'.*? \d+',\s*'',\s*\(\s*(#\d+)\s*\)\s*\);"
+    head = re.sub(product, rb"PRODUCT('\1','\1','',(\2));", head, flags=re.DOTALL)
     path.write_bytes(head + rest)
 
 
