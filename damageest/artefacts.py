@@ -206,7 +206,9 @@ class Scan(_Arrays):
     """Points (N,3) on the damaged part; ``normals`` (N,3) outward, or None.
 
     ``noise`` is the measured standard deviation of the points off the local surface and ``spacing`` the median distance
-    to the nearest neighbours that a reconstructed surface has to bridge; both 0 until measured.
+    to the nearest neighbours that a reconstructed surface has to bridge; both 0 until measured. ``viewpoints`` (V,3):
+    where the scanner stood for each view, in the frame of the points; ``view`` (N,): the number of each point's view,
+    -1 where its scanner position is not known. Both None where no position is known.
     """
 
     points: Floats
@@ -217,7 +219,14 @@ class Scan(_Arrays):
     spacing: float = 0.0
     truth: Truth | None = None
     notes: tuple[str, ...] = ()
-    _dtypes: ClassVar[dict[str, Any]] = {"points": np.float64, "normals": np.float64}
+    viewpoints: Floats | None = None
+    view: NDArray[np.int32] | None = None
+    _dtypes: ClassVar[dict[str, Any]] = {
+        "points": np.float64,
+        "normals": np.float64,
+        "viewpoints": np.float64,
+        "view": np.int32,
+    }
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -225,6 +234,15 @@ class Scan(_Arrays):
             raise ArtefactError(f"points: expected (N,3), got {self.points.shape}")
         if self.normals is not None and self.normals.shape != self.points.shape:
             raise ArtefactError(f"normals: expected {self.points.shape}, got {self.normals.shape}")
+        if (self.viewpoints is None) != (self.view is None):
+            raise ArtefactError("viewpoints and view: give both or none")
+        if self.viewpoints is not None and self.view is not None:
+            if self.viewpoints.ndim != 2 or self.viewpoints.shape[1] != 3:
+                raise ArtefactError(f"viewpoints: expected (V,3), got {self.viewpoints.shape}")
+            if self.view.shape != (len(self.points),):
+                raise ArtefactError(f"view: expected ({len(self.points)},), got {self.view.shape}")
+            if len(self.view) and not -1 <= self.view.min() <= self.view.max() < len(self.viewpoints):
+                raise ArtefactError(f"view: number outside the {len(self.viewpoints)} viewpoints")
 
     def move(self, T: Floats) -> Scan:
         """The same scan in another frame; T is 4x4, rigid."""
@@ -232,7 +250,13 @@ class Scan(_Arrays):
         points = np.einsum("ij,kj->ik", self.points, T[:3, :3])
         points += T[:3, 3]
         normals = None if self.normals is None else np.einsum("ij,kj->ik", self.normals, T[:3, :3])
-        return replace(self, points=points, normals=normals)
+        viewpoints = None if self.viewpoints is None else self.viewpoints @ T[:3, :3].T + T[:3, 3]
+        return replace(self, points=points, normals=normals, viewpoints=viewpoints)
+
+    def take(self, index: Ints | Flags) -> Scan:
+        """The scan with some of its points: their numbers (M,), or whether each is taken (N,)."""
+        rows = {name: getattr(self, name) for name in ("points", "normals", "view")}
+        return replace(self, **{name: None if value is None else value[index] for name, value in rows.items()})
 
 
 @dataclass(frozen=True, eq=False)

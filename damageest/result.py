@@ -1,4 +1,4 @@
-"""What a run found, as values; `report.py` has what result.json says of them."""
+"""What a run found, as values; `report/` has what result.json says of them."""
 
 from __future__ import annotations
 
@@ -10,9 +10,95 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Deviation, Evidence, Floats, Mesh, Part, Pose, Scan, Solid, Surface
+from damageest.artefacts import (
+    Deviation,
+    Evidence,
+    Flags,
+    Floats,
+    Ints,
+    Mesh,
+    Part,
+    Pose,
+    Scan,
+    Solid,
+    Surface,
+)
 from damageest.geometry.transforms import invert_pose
 from damageest.io.conversions import as_manifold, as_trimesh
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a damage volume is worth: ``level``, and ``reasons`` that speak against it, in words.
+
+    `proven`: all that could contradict it was asked, and agrees. `likely`: nothing contradicts it, but not all could be
+    asked. `doubtful`: something contradicts it, or what it rests on cannot be told from errors of the scan.
+    """
+
+    level: Literal["proven", "likely", "doubtful"] = "proven"
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class UnseenRegion:
+    """Connected skin without scan points.
+
+    ``centre`` (3,) and ``bounds`` (2,3) of its cells; ``faces``: numbers of its CAD faces, empty where the part has
+    none; ``volume``: the most that can be lost behind it without a trace in the scan. ``why``: `hidden`: the part
+    itself is between it and every scanner position; `outside`: no view reached there; `no points`: a view reached there
+    and gave no points; `unknown`: no scanner position is known.
+    """
+
+    area: float
+    centre: Floats
+    bounds: Floats
+    faces: tuple[int, ...]
+    volume: float
+    why: Literal["unknown", "hidden", "outside", "no points"] = "unknown"
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """What the scan shows of the part's skin.
+
+    ``seen``: its share of the skin's area. ``skin``: the skin cut into cells, triangles of similar size, F of them.
+    ``is_seen`` (F,): whether the scan has points on a cell; ``distance`` (F,): their mean signed distance, NaN where
+    there are none; ``is_lost`` (F,): whether rays of the scanner passed through the metal behind it; ``region`` (F,):
+    the cell's place in ``unseen``, -1 for a cell in none. ``unseen``: largest first.
+    """
+
+    seen: float
+    unseen: tuple[UnseenRegion, ...]
+    skin: Mesh
+    is_seen: Flags
+    distance: Floats
+    is_lost: Flags
+    region: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Surplus:
+    """Metal or other matter outside the nominal surface.
+
+    ``points`` (M,) indices into the scan, ``share`` of it; ``solid``: its volume as a closed mesh, None where it cannot
+    be closed; ``height``: its largest distance from the skin; ``area``: skin that it covers. ``kind``: `surplus`, as a
+    weld bead or dirt; `displaced piece`, with losses of like size beside it; `surroundings`, as a fixture, a table or a
+    second specimen. ``clusters``: the point clusters of the losses beside it. ``notes`` say what was recognised.
+    """
+
+    id: int
+    points: NDArray[np.int64]
+    share: float
+    solid: Solid | None
+    height: float
+    area: float
+    kind: Literal["surplus", "displaced piece", "surroundings"] = "surplus"
+    clusters: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def volume(self) -> float | None:
+        return self.solid.volume if self.solid else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +107,8 @@ class Site:
 
     After a cut-back, DV and IDS are those of the enlarged cavity. ``refused``: the stage `allowance` failed, and what
     to deposit is not known. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into
-    the scan; ``max_depth``: the farthest of them below the nominal surface.
+    the scan; ``max_depth``: the farthest of them below the nominal surface. ``accepted``: whether the site is part of
+    `Result.damage`; a doubtful one is where the job accepts it.
     """
 
     id: int
@@ -35,6 +122,8 @@ class Site:
     max_depth: float
     warnings: tuple[str, ...] = ()
     refused: bool = False
+    verdict: Verdict = Verdict()
+    accepted: bool = True
 
     @cached_property
     def centroid(self) -> Floats:
@@ -77,8 +166,8 @@ class StageRecord:
 class Result:
     """Everything a run computed. Lengths in ``units``; meshes in the part's frame.
 
-    ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of all DVs and
-    ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which sites have no DV
+    ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of the DVs of all accepted
+    sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which sites have no DV
     or no deposit and why: then ``status`` is ``incomplete``.
     """
 
@@ -98,6 +187,8 @@ class Result:
     failures: tuple[str, ...]
     truth: Floats | None
     stages: tuple[StageRecord, ...] = ()
+    coverage: Coverage | None = None
+    surplus: tuple[Surplus, ...] = ()
 
     @property
     def status(self) -> Literal["ok", "incomplete"]:
