@@ -166,9 +166,9 @@ class StageRecord:
 class Result:
     """Everything a run computed. Lengths in ``units``; meshes in the part's frame.
 
-    ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of the DVs of all accepted
-    sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which sites have no DV
-    or no deposit and why: then ``status`` is ``incomplete``.
+    ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of the DVs of all
+    accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
+    sites have no DV or no deposit and why: then ``status`` is ``incomplete``.
     """
 
     name: str
