@@ -283,7 +283,8 @@ class Pose(_Arrays):
     """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
 
     ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is
-    one of several right ones. ``notes`` say so in words.
+    one of several right ones. ``notes`` say so in words. ``doubts``: those of the notes that make the verdict on every
+    site doubtful, such as a small share of the scan on the part, or other poses that fit and are no symmetries.
     """
 
     T_part_scan: Floats
@@ -291,6 +292,7 @@ class Pose(_Arrays):
     inliers: float = 1.0
     alternatives: Floats | None = None
     notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
     _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64}
 
 

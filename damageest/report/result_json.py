@@ -43,6 +43,7 @@ class AlignmentReport(_Model):
     inliers: float = Field(description="share of the scan's points")
     alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
     notes: list[str]
+    doubts: list[str] = Field(description="those of the notes that make every site doubtful")
 
 
 class EvidenceReport(_Model):
@@ -194,6 +195,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             inliers=pose.inliers,
             alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
             notes=list(pose.notes),
+            doubts=list(pose.doubts),
         ),
         sites=sites,
         export=ExportReport(files=list(written.files), notes=list(written.notes)),

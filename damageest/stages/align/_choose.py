@@ -172,28 +172,31 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
     return ()
 
 
-def describe_choice(choice: Choice, target: PartSurface) -> tuple[str, ...]:
+def describe_choice(choice: Choice) -> tuple[str, ...]:
     """Notes for the user about the other poses; empty where there are none."""
-    notes: list[str] = []
     if choice.axis is not None:
         x, y, z = choice.axis.direction + 0.0
-        notes.append(
+        return (
             f"the part fits at any angle about the axis ({x:.3f}, {y:.3f}, {z:.3f}) of its own frame "
             "(continuous symmetry): the pose is one of infinitely many correct ones; the alternatives list quarter "
-            "turns"
-        )
-    elif len(choice.others):
-        notes.append(
-            f"the part fits in {len(choice.others) + 1} poses equally well; the others are listed as alternatives"
+            "turns",
         )
     if len(choice.others):
-        surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
-        motions = choice.others @ np.linalg.inv(choice.pose)
-        apart = max(float((np.abs(target.closest(move_points(D, surface))[0]) > choice.band).mean()) for D in motions)
-        if apart > 0.002:
-            notes.append(
-                f"these poses are not all symmetries of the part (up to {apart:.1%} of its surface differs): the "
-                "surface that would distinguish them is missing or was not seen, so the damage found depends on the "
-                "pose; where the pose is known, give it to align: icp or align: none"
-            )
-    return tuple(notes)
+        return (f"the part fits in {len(choice.others) + 1} poses equally well; the others are listed as alternatives",)
+    return ()
+
+
+def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[str, ...]:
+    """A note where other poses fit as well and are not symmetries of the part; empty where there are none."""
+    if not len(choice.others):
+        return ()
+    surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
+    motions = choice.others @ np.linalg.inv(choice.pose)
+    apart = max(float((np.abs(target.closest(move_points(D, surface))[0]) > choice.band).mean()) for D in motions)
+    if apart <= 0.002:
+        return ()
+    return (
+        f"the poses that fit are not all symmetries of the part (up to {apart:.1%} of its surface differs): the "
+        "surface that would distinguish them is missing or was not seen, so the damage found depends on the pose; "
+        "where the pose is known, give it to align: icp or align: none",
+    )

@@ -31,7 +31,13 @@ class Register(Align):
         or most of it is not the part."""
         from damageest.errors import StageError
         from damageest.stages.align._check_pose import check_pose
-        from damageest.stages.align._choose import COARSE, choose_pose, describe_choice, note_free_motion
+        from damageest.stages.align._choose import (
+            COARSE,
+            choose_pose,
+            describe_choice,
+            note_ambiguity,
+            note_free_motion,
+        )
         from damageest.stages.align._field import PlaneGrid
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import MIN_POINTS, Frame
@@ -63,5 +69,6 @@ class Register(Align):
                 "where the pose is known, give it to align: icp or align: none"
             )
         others = np.array([frame.unscale_pose(pose) for pose in choice.others]) if len(choice.others) else None
-        notes = describe_choice(choice, target) + note_free_motion(best.pose, target, fine, best.band)
-        return Pose(frame.unscale_pose(best.pose), check.rms * frame.size, check.inliers, others, notes)
+        doubts = note_ambiguity(choice, target) + note_free_motion(best.pose, target, fine, best.band)
+        notes = describe_choice(choice) + doubts
+        return Pose(frame.unscale_pose(best.pose), check.rms * frame.size, check.inliers, others, notes, doubts)
