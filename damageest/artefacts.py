@@ -194,10 +194,12 @@ class Part(Solid):
 
 @dataclass(frozen=True, eq=False)
 class Truth(_Arrays):
-    """The truth of a virtual scan: the true ``damage`` in the part's frame (None if there is none), and the pose."""
+    """The truth of a virtual scan: the true ``damage`` in the part's frame (None if there is none), the pose, and the
+    metal ``added`` outside the part, in the part's frame (None if there is none)."""
 
     damage: Solid | None
     T_part_scan: Floats
+    added: Solid | None = None
     _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64}
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Floats, Mesh, Part, Solid
+from damageest.artefacts import Floats, Ints, Mesh, Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.scan.tools import Tool
@@ -32,13 +32,9 @@ def apply_tools(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None,
     whole = to_manifold(part, origin)
     cuts = []
     for number, tool in enumerate(tools, 1):
-        cut = _build_cut(tool, number, origin, part.diagonal)
+        cut = build_tool(tool, f"damage tool {number}", origin, part.diagonal)
         if (whole ^ cut).volume() < DUST * part.volume:
-            raise StageError(
-                f"damage tool {number} ({tool.tool}) misses the part, which reaches from "
-                f"{_format_point(part.bounds[0])} to {_format_point(part.bounds[1])} {part.unit}",
-                remedy="move the tool; its coordinates are in the part's frame, in the job's unit",
-            )
+            raise make_missed_error(f"damage tool {number} ({tool.tool})", part)
         cuts.append(cut)
     cutter = Manifold.batch_boolean(cuts, OpType.Add)
     kept, lost, loose, cavities = [], [], [], 0
@@ -71,8 +67,9 @@ def apply_tools(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None,
     return _drop_dust(Manifold.compose(kept), origin, part.volume), damage, tuple(notes)
 
 
-def _build_cut(tool: Tool, number: int, origin: Floats, diagonal: float) -> Any:
-    """The tool as a Manifold relative to ``origin`` (3,). Raises StageError where it is not a solid."""
+def build_tool(tool: Tool, name: str, origin: Floats, diagonal: float) -> Any:
+    """The tool as a Manifold relative to ``origin`` (3,). Raises StageError, which begins with ``name``, where it is
+    not a solid."""
     from manifold3d import Error
 
     try:
@@ -82,8 +79,17 @@ def _build_cut(tool: Tool, number: int, origin: Floats, diagonal: float) -> Any:
     except ValueError as error:
         fault = str(error)
     if fault:
-        raise StageError(f"damage tool {number} ({tool.tool}) is not a solid: {fault}", remedy="change its options")
+        raise StageError(f"{name} ({tool.tool}) is not a solid: {fault}", remedy="change its options")
     return body
+
+
+def make_missed_error(name: str, part: Part) -> StageError:
+    """The error for a tool that is not where the part is."""
+    return StageError(
+        f"{name} misses the part, which reaches from {_format_point(part.bounds[0])} to "
+        f"{_format_point(part.bounds[1])} {part.unit}",
+        remedy="move the tool; its coordinates are in the part's frame, in the job's unit",
+    )
 
 
 def _format_point(point: Floats) -> str:
@@ -126,43 +132,48 @@ Weigh = Callable[[Floats], Floats]
 
 def sample_seen(
     mesh: Mesh, faces: NDArray[np.bool_], count: int, rng: np.random.Generator, weigh: Weigh | None, spare: float
-) -> Floats:
-    """(count,3) random points on the triangles that are seen, ``faces`` (F,), uniform by area or weighted by ``weigh``.
+) -> tuple[Floats, Ints]:
+    """Random points (count,3) on the triangles that are seen, ``faces`` (F,), uniform by area or weighted by ``weigh``,
+    and the triangle (count,) of each.
 
     ``spare``: how many points to draw for each that is kept, where they are weighted. Raises StageError where the
     scanner sees nothing.
     """
     area = np.linalg.norm(mesh.cross, axis=1) * faces
     if not area.any():
-        raise _make_unseen_error()
+        raise make_unseen_error()
     if weigh is None:
         return _sample_faces(mesh, area, count, rng)
     drawn: list[Floats] = []
+    on: list[Ints] = []
     keys: list[Floats] = []
     have, tried = 0, 0
     while have < spare * count:
-        points = _sample_faces(mesh, area, int(spare * count), rng)
+        points, face = _sample_faces(mesh, area, int(spare * count), rng)
         weights = weigh(points)
         seen = weights > 0
         drawn.append(points[seen])
+        on.append(face[seen])
         # the smallest of exponential variables over weight: a weighted draw without replacement
         keys.append(rng.exponential(size=int(seen.sum())) / weights[seen])
         have, tried = have + int(seen.sum()), tried + 1
         if have < 1e-3 * tried * count:
-            raise _make_unseen_error()
+            raise make_unseen_error()
     key = np.concatenate(keys)
     chosen = np.argpartition(key, count - 1)[:count]
-    return np.asarray(np.concatenate(drawn)[chosen])
+    return np.concatenate(drawn)[chosen], np.concatenate(on)[chosen]
 
 
-def _make_unseen_error() -> StageError:
+def make_unseen_error() -> StageError:
+    """The error for a scan without surface to draw points on."""
     return StageError(
         "the virtual scanner sees nothing of the part: 'unseen' covers all of it", remedy="make 'unseen' smaller"
     )
 
 
-def _sample_faces(mesh: Mesh, area: Floats, count: int, rng: np.random.Generator) -> Floats:
-    """(count,3) random points, uniform over the triangles, with probabilities proportional to ``area`` (F,)."""
+def _sample_faces(mesh: Mesh, area: Floats, count: int, rng: np.random.Generator) -> tuple[Floats, Ints]:
+    """Random points (count,3), uniform over the triangles, with probabilities proportional to ``area`` (F,), and the
+    triangle (count,) of each."""
     total = np.cumsum(area)
     face = np.searchsorted(total, rng.random(count) * total[-1], side="right")
     face = np.minimum(face, int(np.flatnonzero(area)[-1]))
@@ -171,4 +182,5 @@ def _sample_faces(mesh: Mesh, area: Floats, count: int, rng: np.random.Generator
     a, b = np.where(over, 1 - a, a), np.where(over, 1 - b, b)
     corner = mesh.vertices[mesh.faces[face]]
     origin = corner[:, 0]
-    return np.asarray(origin + a[:, None] * (corner[:, 1] - origin) + b[:, None] * (corner[:, 2] - origin))
+    points = origin + a[:, None] * (corner[:, 1] - origin) + b[:, None] * (corner[:, 2] - origin)
+    return np.asarray(points), face

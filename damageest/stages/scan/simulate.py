@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic import types as kinds
 
-from damageest.artefacts import Floats, Part, Scan, Solid, Truth
+from damageest.artefacts import Floats, Ints, Part, Scan, Truth
 from damageest.geometry.units import canonical_unit
-from damageest.stages.scan import ReadScan, _random_field
-from damageest.stages.scan.scanner import apply_tools, sample_seen
-from damageest.stages.scan.tools import AnyTool, Direction, RigidMatrix, Vector
+from damageest.stages.scan import ReadScan, _errors, _random_field, _views
+from damageest.stages.scan._scene import DetachedPiece, Scene, Table, build_scene
+from damageest.stages.scan.scanner import sample_seen
+from damageest.stages.scan.tools import AnyTool, Direction, RigidMatrix, SolidTool, Vector
 
 
 class UnseenRegion(BaseModel):
@@ -32,23 +34,87 @@ class UnseenRegion(BaseModel):
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Draw:
+    """Points (N,3) without errors, ``toward`` (N,3): the unit vector along which depth errors move each, ``view`` (N,)
+    the number of its scanner of ``scanners`` (V,3)."""
+
+    points: Floats
+    toward: Floats
+    view: Ints
+    scanners: Floats
+    notes: tuple[str, ...] = ()
+
+
 class Simulate(ReadScan):
     """A virtual scanner: removes damage from the part with tools, then draws points on what is left.
 
-    The scan's `truth` holds the true damage and pose. Lengths are in the job's unit, tools in the part's frame. Surface
-    that the part itself would hide from a scanner has points too; exclude such regions with `unseen`.
+    The scan's `truth` holds the true damage, added metal and pose. Lengths are in the job's unit, tools and scanners in
+    the part's frame. With `scanners`, points are only where a straight line from a scanner reaches the surface. Without
+    them, surface that the part itself would hide has points too; exclude such regions with `unseen`.
     """
 
     use: Literal["simulate"] = "simulate"
     damage: tuple[AnyTool, ...] = Field(
         (), description="tools, each of which removes material; none: an undamaged part"
     )
+    added: tuple[SolidTool, ...] = Field(
+        (), description="tools, each of which adds material to the part: a weld bead, spatter"
+    )
+    detached: tuple[DetachedPiece, ...] = Field((), description="pieces of the part that are moved, not removed")
+    surroundings: tuple[SolidTool, ...] = Field(
+        (), description="tools that are bodies beside the part, such as a fixture: scanned with it, and they hide it"
+    )
+    table: Table | None = Field(None, description="a plane plate that the part stands on; default: none")
     points: kinds.PositiveInt = Field(150_000, description="number of points, outliers included")
+    scanners: Annotated[int, Field(ge=1, le=1000)] | Annotated[tuple[Vector, ...], Field(min_length=1)] | None = Field(
+        None,
+        description="scanner positions, in the part's frame: a list of [x, y, z], or a number of positions spread "
+        "evenly around the part at 3 of its diagonals; default: no scanner, points on all of the surface",
+    )
+    max_incidence: float = Field(
+        80.0,
+        gt=0,
+        le=90,
+        description="with `scanners`: no points where the angle between ray and surface normal is larger, in degrees",
+    )
+    positions_known: bool = Field(True, description="whether the scan says where its scanners stood")
     noise: float | None = Field(
         None,
         ge=0,
         description="standard deviation of the noise along each axis, in the job's unit; default: 0.0005 of the part's "
         "diagonal",
+    )
+    waviness: float = Field(
+        0.0,
+        ge=0,
+        description="standard deviation of a smooth error along the ray, in the job's unit, different in each view; "
+        "without `scanners` along the surface normal",
+    )
+    wavelength: kinds.PositiveFloat | None = Field(
+        None, description="wavelength of `waviness`, in the job's unit; default: a fifth of the part's diagonal"
+    )
+    depth_step: float = Field(
+        0.0,
+        ge=0,
+        description="step to which the distance from the scanner is rounded, in the job's unit; without `scanners`: "
+        "of the z coordinate in the scanner's frame; 0: no rounding",
+    )
+    mixed: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="with `scanners`: share of points that are mixed pixels, between foreground and background at the "
+        "edge of a surface that is in front of another",
+    )
+    misplaced: float = Field(
+        0.0,
+        ge=0,
+        description="error of registration of the views, in the job's unit: each view of `scanners` after the first is "
+        "moved by a shift of this length and a rotation that moves the part's ends by about as much",
+    )
+    scale: kinds.PositiveFloat = Field(
+        1.0, description="factor on all lengths of the scan, such as 1.002 for a wrong scale bar"
     )
     outliers: float = Field(
         0.0, ge=0, lt=1, description="share of points placed at random in the part's bounding box, enlarged by a fifth"
@@ -62,31 +128,58 @@ class Simulate(ReadScan):
     )
     seed: int = Field(0, ge=0, description="seed of all random draws, except the shapes of the tools")
 
+    @model_validator(mode="after")
+    def _check_scanners(self) -> Self:
+        if self.scanners is None:
+            for name in ("mixed", "misplaced"):
+                if getattr(self, name):
+                    raise ValueError(f"{name}: needs `scanners`")
+        elif self.misplaced and (self.scanners if isinstance(self.scanners, int) else len(self.scanners)) < 2:
+            raise ValueError("misplaced: needs at least 2 positions in `scanners`; the first view is not moved")
+        return self
+
     def run(self, unit: str, part: Part) -> Scan:
         """The scan in the scanner's frame. Raises StageError for a tool that misses the part or is not a solid, and
         where nothing is left of the part or to be seen."""
         rng = np.random.default_rng([4409, self.seed])
         pose = self._choose_pose(part, rng)
-        left, damage, notes = apply_tools(part, self.damage)
+        scene = build_scene(part, self.damage, self.added, self.detached, self.surroundings, self.table)
         sigma = 0.0005 * part.diagonal if self.noise is None else self.noise
         outlier_count = round(self.outliers * self.points)
-        points = self._sample_seen(left, self.points - outlier_count, part.diagonal, rng)
-        points += rng.normal(scale=sigma, size=points.shape) if sigma else 0.0
+        draw = self._draw(scene, part, self.points - outlier_count, rng)
+        points, view, scanners = self._add_errors(draw, part, sigma, rng)
         if outlier_count:
             margin = 0.1 * (part.bounds[1] - part.bounds[0])
             outliers = rng.uniform(part.bounds[0] - margin, part.bounds[1] + margin, (outlier_count, 3))
-            points = np.concatenate([points, outliers])[rng.permutation(self.points)]
+            order = rng.permutation(self.points)
+            points = np.concatenate([points, outliers])[order]
+            view = np.concatenate([view, rng.integers(max(1, len(scanners)), size=outlier_count)])[order]
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
         if not np.array_equal(pose, np.eye(4)):
-            points = points @ pose[:3, :3].T + pose[:3, 3]
-        notes = (f"simulated: damage tools: {len(self.damage)}, noise {sigma:.4g} {canonical_unit(unit)}", *notes)
-        return Scan(points, None, canonical_unit(unit), truth=Truth(damage, inverse), notes=notes)
+            points, scanners = (at @ pose[:3, :3].T + pose[:3, 3] for at in (points, scanners))
+        if self.depth_step and self.scanners is None:
+            points = points.copy()
+            points[:, 2] = self.depth_step * np.round(points[:, 2] / self.depth_step)
+        if self.scale != 1:
+            points, scanners = self.scale * points, self.scale * scanners
+        notes = (f"simulated: damage tools: {len(self.damage)}, noise {sigma:.4g} {canonical_unit(unit)}", *scene.notes)
+        known = self.scanners is not None and self.positions_known
+        return Scan(
+            points,
+            None,
+            canonical_unit(unit),
+            truth=Truth(scene.damage, inverse, scene.added),
+            notes=(*notes, *draw.notes),
+            viewpoints=scanners if known else None,
+            view=view.astype(np.int32) if known else None,
+        )
 
-    def _sample_seen(self, left: Solid, count: int, diagonal: float, rng: np.random.Generator) -> Floats:
-        normal = left.cross / np.maximum(np.linalg.norm(left.cross, axis=1), 1e-300)[:, None]
-        faces = np.ones(len(left.faces), dtype=bool)
+    def _draw(self, scene: Scene, part: Part, count: int, rng: np.random.Generator) -> _Draw:
+        """Points without errors, in the part's frame."""
+        normal = scene.body.cross / np.maximum(np.linalg.norm(scene.body.cross, axis=1), 1e-300)[:, None]
+        faces = ~scene.bare
         planes = []
         for item in self.unseen:
             toward = np.array(item.direction) / np.linalg.norm(item.direction)
@@ -94,7 +187,7 @@ class Simulate(ReadScan):
                 faces &= normal @ toward < np.cos(np.radians(item.angle))
             else:
                 planes.append((toward, float(toward @ item.beyond)))
-        field = _random_field.RandomField.build(diagonal / 2, 1, self.seed, waves=8)
+        field = _random_field.RandomField.build(part.diagonal / 2, 1, self.seed, waves=8)
 
         def weigh(points: Floats) -> Floats:
             weights = np.exp(self.density * field.evaluate(points)) if self.density else np.ones(len(points))
@@ -103,7 +196,47 @@ class Simulate(ReadScan):
             return weights
 
         uneven = bool(self.density or planes)
-        return sample_seen(left, faces, count, rng, weigh if uneven else None, 2.5 if self.density else 1.0)
+        if self.scanners is None:
+            spare = 2.5 if self.density else 1.0
+            points, face = sample_seen(scene.body, faces, count, rng, weigh if uneven else None, spare)
+            return _Draw(points, normal[face], np.zeros(len(points), np.int64), np.empty((0, 3)))
+        if isinstance(self.scanners, int):
+            scanners = _views.spread_scanners(self.scanners, part.bounds.mean(axis=0), 3 * part.diagonal, rng)
+        else:
+            scanners = np.array(self.scanners, dtype=np.float64)
+        highest = np.exp(2.5 * self.density)
+        keep = (lambda points: weigh(points) / highest) if uneven else None
+        seen = _views.sample_views(scene.body, faces, scanners, count, self.max_incidence, rng, keep)
+        points, view, notes = seen.points, seen.view, []
+        if mixed_count := round(self.mixed * self.points):
+            mixed, owner = _views.find_mixed(scene.body, scanners, seen, mixed_count, rng)
+            points = np.concatenate([points[len(mixed) :], mixed])
+            view = np.concatenate([view[len(mixed) :], owner])
+            if not len(mixed):
+                notes.append("no mixed pixels: no surface is in front of another")
+        way = scanners[view] - points
+        blind = [str(number + 1) for number in range(len(scanners)) if not (view == number).any()]
+        if blind:
+            notes.append(f"no points from scanner {', '.join(blind)}")
+        return _Draw(points, way / np.linalg.norm(way, axis=1, keepdims=True), view, scanners, tuple(notes))
+
+    def _add_errors(
+        self, draw: _Draw, part: Part, sigma: float, rng: np.random.Generator
+    ) -> tuple[Floats, Ints, Floats]:
+        """Points, view and scanners with the errors that do not depend on the scanner's frame."""
+        points, view, scanners = draw.points, draw.view, draw.scanners
+        if self.waviness:
+            wavelength = self.wavelength or part.diagonal / 5
+            points = _errors.add_waviness(points, draw.toward, view, self.waviness, wavelength, self.seed)
+        points = points + (rng.normal(scale=sigma, size=points.shape) if sigma else 0.0)
+        if self.depth_step and len(scanners):
+            points = _errors.quantise_depth(points, scanners[view], self.depth_step)
+        if self.misplaced:
+            centre = part.bounds.mean(axis=0)
+            points, scanners = _errors.misplace_views(
+                points, view, scanners, centre, part.diagonal / 2, self.misplaced, rng
+            )
+        return points, view, scanners
 
     def _choose_pose(self, part: Part, rng: np.random.Generator) -> Floats:
         if self.pose == "identity":

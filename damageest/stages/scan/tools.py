@@ -1,4 +1,4 @@
-"""Tools that remove virtual damage from a part: each is a solid, in the part's frame and the job's unit."""
+"""Tools of the virtual scanner: solids in the part's frame and the job's unit, which remove or add material."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Seed = Annotated[int, Field(ge=0, description="seed of the random shape; the sam
 
 
 class Tool(BaseModel, ABC):
-    """Base of the tools that remove material."""
+    """Base of the tools."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     tool: str
@@ -208,6 +208,9 @@ class MeshTool(Tool):
         body = to_manifold(solid).transform(np.ascontiguousarray(T[:3]))
         return body.translate(tuple(-origin))
 
+
+SolidTool = Annotated[SphereTool | BoxTool | CylinderTool | BlobTool | MeshTool, Field(discriminator="tool")]
+"""A tool that is a body by itself."""
 
 AnyTool = Annotated[SphereTool | BoxTool | CylinderTool | PlaneTool | BlobTool | MeshTool, Field(discriminator="tool")]
 
