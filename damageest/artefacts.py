@@ -257,8 +257,10 @@ class Scan(_Arrays):
 
     def take(self, index: Ints | Flags) -> Scan:
         """The scan with some of its points: their numbers (M,), or whether each is taken (N,)."""
-        rows = {name: getattr(self, name) for name in ("points", "normals", "view")}
-        return replace(self, **{name: None if value is None else value[index] for name, value in rows.items()})
+        normals = None if self.normals is None else self.normals[index]
+        return replace(
+            self, points=self.points[index], normals=normals, view=None if self.view is None else self.view[index]
+        )
 
 
 @dataclass(frozen=True, eq=False)
