@@ -22,11 +22,16 @@ WEDGE = 5929.0
 """Volume in mm3 of the wedge that jobs/make_inputs.py cuts off the block before it scans it."""
 
 
+SLOW = {"cylinder_two_sides", "half_torus", "stock_uniform", "worn_bore"}
+"""Jobs that are run by -m slow only."""
+
+
 def mark_job(name: str) -> Any:
     """The name of a job; its tests are skipped where its part needs a plugin that cannot be used."""
+    slow = [pytest.mark.slow] if name in SLOW else []
     part = yamlfile.read(JOBS / f"{name}.yaml")[0]["part"]
     suffix = Path(part["path"] if isinstance(part, dict) else part).suffix
-    return pytest.param(name, marks=needs_plugin("cadquery") if suffix == ".step" else ())
+    return pytest.param(name, marks=[*slow, needs_plugin("cadquery")] if suffix == ".step" else slow)
 
 
 def test_every_job_is_listed() -> None:

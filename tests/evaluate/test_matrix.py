@@ -39,6 +39,7 @@ def job(tmp_path: Path) -> Path:
     return tmp_path / "box.yaml"
 
 
+@pytest.mark.slow
 def test_every_implementation_of_a_stage_is_run(job: Path, registry: Registry) -> None:
     told: list[MatrixCell] = []
     cells = run_matrix([job], registry, ["boundary", "align", "export"], workers=2, tell=told.append)

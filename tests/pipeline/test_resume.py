@@ -30,7 +30,13 @@ damageest.run(sys.argv[1], output=True, registry=Registry.discover([Killer()]), 
 ROUTE = ["part", "scan", "sample", "align", "segment", "cluster", "enclose", "boolean", "allowance", "export"]
 
 
-@pytest.mark.parametrize("stage", ROUTE)
+@pytest.mark.parametrize(
+    "stage",
+    [
+        stage if stage in ("scan", "enclose", "export") else pytest.param(stage, marks=pytest.mark.slow)
+        for stage in ROUTE
+    ],
+)
 def test_killed_in(stage: str, tmp_path: Path) -> None:
     path = damaged_box.write(tmp_path)
     damageest.run(path, output=True)

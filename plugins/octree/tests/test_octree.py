@@ -114,7 +114,9 @@ def test_a_grid_round_a_loss_that_does_not_fit_into_memory_is_refused(monkeypatc
     assert Octree(cell=read_advice(caught.value, "cell")).run(**inputs).items
 
 
-@pytest.mark.parametrize("options", [{"cell": 0.05}, {"depth": 12}, {"cell": 0.13}])
+@pytest.mark.parametrize(
+    "options", [{"cell": 0.05}, {"depth": 12}, pytest.param({"cell": 0.13}, marks=pytest.mark.slow)]
+)
 def test_cells_finer_than_the_scan_are_refused(options: dict[str, Any]) -> None:
     case = scene("pit")
     with pytest.raises(StageError, match=r"points 0\.32 apart") as caught:

@@ -76,7 +76,9 @@ def read_sliver_note(enclosures: Enclosures) -> tuple[int, int, float]:
     return int(found[1]), int(found[2]), float(found[3])
 
 
-@pytest.mark.parametrize("name", TOOLS)
+@pytest.mark.parametrize(
+    "name", [name if name == "end" else pytest.param(name, marks=pytest.mark.slow) for name in TOOLS]
+)
 def test_the_part_inside_it_is_the_damage_and_slivers(name: str) -> None:
     enclosures = enclose(name)
     truth = to_solid(Manifold.cube(tuple(SIZE), True) ^ TOOLS[name]())
@@ -87,6 +89,7 @@ def test_the_part_inside_it_is_the_damage_and_slivers(name: str) -> None:
     assert (item.solid.bounds[0] < -SIZE / 2 - 1).all()
 
 
+@pytest.mark.slow
 def test_the_note_counts_the_slivers_and_all_are_kept() -> None:
     enclosures = enclose("half ball")
     volumes = sorted(body.volume() for body in intersect(enclosures).decompose() if body.volume() > 0)
@@ -96,6 +99,7 @@ def test_the_note_counts_the_slivers_and_all_are_kept() -> None:
     assert percent == pytest.approx(100 * sum(volumes[:-1]) / sum(volumes), abs=0.06)
 
 
+@pytest.mark.slow
 def test_noise_adds_slivers_and_rounded_edges_are_lost_even_without_noise() -> None:
     clean, noisy = (enclose("half ball", noise) for noise in (0.0, NOISE))
     ball = 2 / 3 * np.pi * 6**3
@@ -104,11 +108,13 @@ def test_noise_adds_slivers_and_rounded_edges_are_lost_even_without_noise() -> N
     assert read_sliver_note(noisy)[2] > 2 * read_sliver_note(clean)[2]
 
 
+@pytest.mark.slow
 def test_a_body_in_two_pieces_is_kept_and_noted() -> None:
     (item,) = enclose("middle").items
     assert any("2 closed surfaces" in note for note in item.notes)
 
 
+@pytest.mark.slow
 def test_fewer_levels_give_a_rounder_body() -> None:
     truth = to_solid(Manifold.cube(tuple(SIZE), True) ^ TOOLS["half ball"]())
     coarse, fine = (iou(to_solid(intersect(enclose("half ball", depth=depth))), truth) for depth in (5, 7))

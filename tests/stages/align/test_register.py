@@ -11,7 +11,9 @@ from damageest.errors import StageError
 from damageest.stages.align.register import Register
 
 
-@pytest.mark.parametrize("name", ["block", "half_torus", "blade", "grille"])
+@pytest.mark.parametrize(
+    "name", ["block", "blade", *(pytest.param(name, marks=pytest.mark.slow) for name in ("half_torus", "grille"))]
+)
 def test_pose_with_a_third_missing(name: str) -> None:
     part, scan = scene(name, seed=3, missing=0.33)
     pose = Register().run(scan, part, 4 * scan.noise)
