@@ -312,6 +312,11 @@ class Deviation(_Arrays):
     notes: tuple[str, ...] = ()
     _dtypes: ClassVar[dict[str, Any]] = {"distance": np.float64, "face": np.int64, "label": np.uint8}
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if wrong := int((~np.isfinite(self.distance)).sum()):
+            raise ArtefactError(f"distance: {wrong} of {len(self.distance)} are not finite numbers")
+
 
 @dataclass(frozen=True, eq=False)
 class Sites(_Arrays):
@@ -358,6 +363,8 @@ class Evidence:
     ``intact_points_inside``: intact scan points on the skin that the DV removes.
     ``skin_contradicted``: share of the part's skin that the DV removes which intact scan points lie on.
     ``skin_unseen``: share of the part's skin beside the DV that has no scan point: no evidence either way.
+    ``intact_share``: of the scan points over the skin that the DV removes, the share that lies on that skin. Unlike the
+    two figures before it, it is measured on shallow sites too.
     ``consistent``: whether the scan agrees with the DV. ``reasons`` say why not.
     """
 
@@ -365,5 +372,6 @@ class Evidence:
     intact_points_inside: int = 0
     skin_contradicted: float = 0.0
     skin_unseen: float = 0.0
+    intact_share: float = 0.0
     consistent: bool = True
     reasons: tuple[str, ...] = field(default=())

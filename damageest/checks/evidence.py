@@ -16,6 +16,13 @@ from damageest.geometry.skin import find_inner_faces
 
 MOST = 20_000
 """Points looked at for each figure; more points do not change its second digit."""
+FEWEST_INTACT = 6
+"""Intact points over a damage volume below which they do not contradict it."""
+HALF = 0.5
+"""Share of intact points over a damage volume from which they contradict it. On the rim of a pit two tolerances deep, a
+quarter of its area is shallower than half a tolerance."""
+UNSEEN = 0.25
+"""Share of the skin beside a damage volume that may be unseen."""
 
 
 def weigh_evidence(
@@ -55,6 +62,8 @@ def weigh_evidence(
         asked = on_skin[_measure_gap(on_skin, on_ids, 1.5 * reach) > 1.5 * reach]
         contradicted = 1 - _share_far(asked, taken, max(spacing, tolerance)) if len(asked) > 20 else 0.0
     unseen = _share_unseen(part, damage, points, on_skin, reach)
+    over = _count_intact_over(damage, inner, part, aligned, deviation, tolerance)
+    intact_share = over / max(over + len(ids_points), 1)
 
     reasons = []
     if residual > 1.5 * tolerance + 0.25 * spacing:
@@ -65,9 +74,28 @@ def weigh_evidence(
         reasons.append(f"intact points lie on {contradicted:.0%} of the skin that it removes")
     if bare > 0.1:
         reasons.append(f"{bare:.0%} of its inner surface has no scan point nearby")
-    if unseen > 0.25:
+    if over >= FEWEST_INTACT and intact_share > HALF:
+        reasons.append(f"of the scan points over the skin that it removes, {intact_share:.0%} lie on that skin")
+    if unseen > UNSEEN:
         reasons.append(f"{unseen:.0%} of the skin beside it has no scan point: the damage may extend there")
-    return Evidence(residual, inside, contradicted, unseen, not reasons, tuple(reasons))
+    return Evidence(residual, inside, contradicted, unseen, intact_share, not reasons, tuple(reasons))
+
+
+def _count_intact_over(
+    damage: Solid, inner: Flags, part: Part, aligned: Scan, deviation: Deviation, tolerance: float
+) -> float:
+    """How many intact scan points lie on the skin that a DV removes: those nearer to it than half a tolerance."""
+    here = find_in_box(aligned.points, damage.bounds[0] - tolerance, damage.bounds[1] + tolerance)
+    here = here[(deviation.label[here] == INTACT) & (np.abs(deviation.distance[here]) < 0.5 * tolerance)]
+    if not len(here):
+        return 0.0
+    step = max(1, len(here) // MOST)
+    here = here[::step]
+    cross = part.cross[deviation.face[here]]
+    normals = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    feet = aligned.points[here] - deviation.distance[here, None] * normals
+    distance, face, _ = closest_on_mesh(feet, damage)
+    return float(step * ((distance < 0.02 * tolerance) & ~inner[face]).sum())
 
 
 def _measure_gap(places: Floats, points: Floats, most: float) -> Floats:

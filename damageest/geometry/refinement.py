@@ -50,14 +50,21 @@ def halve_edges(mesh: Mesh, edge: float) -> Mesh:
 
     A closed mesh stays closed, and the surface is the same set of points.
     """
+    return cut_into_cells(mesh, edge)[0]
+
+
+def cut_into_cells(mesh: Mesh, edge: float) -> tuple[Mesh, Ints]:
+    """As `halve_edges`, with the face (F,) of ``mesh`` that each new face is a part of."""
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
+    origin = np.arange(len(faces))
     for _ in range(MOST_ROUNDS):
         corners = vertices[faces]
         long = (np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2) > edge).any(axis=1)
         if not long.any():
             break
-        vertices, faces, _ = _bisect_faces(vertices, faces, np.flatnonzero(long))
-    return Mesh(vertices, faces)
+        vertices, faces, parent = _bisect_faces(vertices, faces, np.flatnonzero(long))
+        origin = origin[parent]
+    return Mesh(vertices, faces), origin
 
 
 def _bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, Ints]:

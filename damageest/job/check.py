@@ -101,6 +101,8 @@ class _Check:
             implementations={c: pair[0] for c, pair in pairs.items() if pair},
             output=(self.folder / expand_home(output)).resolve(),
             source=self.source,
+            sites=header.sites,
+            accept=header.accept,
             given=self.given,
         )
 

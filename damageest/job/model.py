@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt
 
 from damageest.registry.contracts import DEFAULTS, SURFACE_ONLY, Contract
 from damageest.registry.registry import Implementation
@@ -16,6 +16,28 @@ from damageest.stages import Stage
 from damageest.stages.enclose import EncloseAll
 
 Unit = Literal["um", "mm", "cm", "m", "in", "ft"]
+
+
+Corner = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+
+
+class Box(BaseModel):
+    """A box along the axes of the part's frame."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    min: Corner = Field(description="lowest corner, in the job's unit")
+    max: Corner = Field(description="highest corner, in the job's unit")
+
+
+class SiteChoice(BaseModel):
+    """What a person decides about the sites, by their numbers in the table of a run without these decisions."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    drop: tuple[PositiveInt, ...] = Field((), description="numbers of sites that are no damage")
+    merge: tuple[tuple[PositiveInt, ...], ...] = Field(
+        (), description="lists of numbers of sites that are one; the site gets the lowest number"
+    )
+    keep: Box | None = Field(None, description="only sites whose centre of mass is in this box; default: all")
 
 
 class Header(BaseModel):
@@ -33,6 +55,10 @@ class Header(BaseModel):
         description="the route; surface: site by site; implicit: all sites at once; auto: implicit, then surface for "
         "sites that it fails on or that the scan contradicts; plugins may add others",
     )
+    sites: SiteChoice = Field(SiteChoice(), description="sites to drop, to merge and to keep")
+    accept: Literal["all"] | tuple[PositiveInt, ...] = Field(
+        (), description="numbers of doubtful sites to take over as damage all the same, or all; default: none"
+    )
     output: Path | None = Field(None, description="output folder; default: out/<name>, beside the job file")
 
 
@@ -49,12 +75,15 @@ class Job:
     implementations: Mapping[Contract, Implementation]
     output: Path
     source: str
+    sites: SiteChoice = SiteChoice()
+    accept: Literal["all"] | tuple[int, ...] = ()
     given: Mapping[Contract, Any] = field(default_factory=dict)
 
     def to_values(self, beside: Path) -> dict[str, Any]:
         """The job as plain values with every default, its paths relative to the folder ``beside``."""
         head = {"version": 1, "name": self.name, "units": self.units, "tolerance": self.tolerance or "auto"}
-        head |= {"method": self.method}
+        head |= {"method": self.method, "sites": to_plain(self.sites.model_dump(), beside)}
+        head |= {"accept": to_plain(self.accept, beside)}
         whole_job = EncloseAll in self.stages
         used = [c for c in DEFAULTS if c in self.stages and not (whole_job and c in SURFACE_ONLY)]
         body = {c.stage: to_plain(self.stages[c].model_dump(), beside) for c in used}

@@ -7,15 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
+from damageest.checks.verdict import FEW
 from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid, unite
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.result import Result, Site
-
-FEW = 100
-"""Damaged points below which a site's volume is only a rough figure: a chip of 30 points came out 15 % small."""
 
 
 def collect_result(engine: Engine, work: Work) -> Work:
@@ -31,11 +29,13 @@ def collect_result(engine: Engine, work: Work) -> Work:
     kept = deviation.label.copy()
     kept[(kept == DAMAGE) & (state.sites.label == 0)] = OUTLIER
     origin = part.bounds.mean(axis=0)
-    lost = unite((site.damage for site in sites), origin)
+    lost = unite((site.damage for site in sites if site.accepted), origin)
     damage = to_solid(lost, origin)
     # a cut-back is no damage: what was found is compared as it was found
     cut_back = any(site.damage is not found.damage for site, found in zip(sites, work.sites, strict=True))
-    found = to_solid(unite((site.damage for site in work.sites), origin), origin) if cut_back else damage
+    found = (
+        to_solid(unite((site.damage for site in work.sites if site.accepted), origin), origin) if cut_back else damage
+    )
     result = Result(
         name=engine.job.name,
         units=engine.job.units,
@@ -53,6 +53,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
         failures=tuple(str(error) for error in work.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance),
         stages=tuple(engine.records),
+        coverage=state.coverage,
     )
     key = digest(
         engine.job.name, [state.keys[name] for name in sorted(state.keys)], [s.key("deposit") for s in work.sites]
@@ -63,12 +64,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
 def _describe_site(found: FoundSite) -> Site:
     evidence, members, warnings = found.evidence, found.members, found.notes
     if len(members) < FEW:
-        warnings = (
-            f"only {len(members)} scan points lie on it; scan it more densely for a reliable volume",
-            *warnings,
-        )
-    if not evidence.consistent:
-        warnings = (f"the scan contradicts this damage volume: {'; '.join(evidence.reasons)}", *warnings)
+        warnings = ("scan it more densely for a reliable volume", *warnings)
     deposit, damage = found.deposit, found.damage
     if isinstance(deposit, Deposit):
         damage = deposit.cavity or damage
@@ -81,6 +77,8 @@ def _describe_site(found: FoundSite) -> Site:
         surface=extract_ids(damage, found.job.part),
         deposit=deposit,
         refused=found.refused,
+        verdict=found.verdict,
+        accepted=found.accepted,
         method=found.method,
         evidence=evidence,
         max_depth=max(float(-found.job.deviation.distance[members].min()), 0.0),

@@ -19,15 +19,19 @@ SPECK, TOLD = 1e-9, 1e-5
 
 
 def make_deposits(allowance: Contract) -> Step:
-    """A step that calls the contract on each site. A site that it refuses keeps its damage volume; what to deposit is
-    not known."""
+    """A step that calls the contract on each accepted site. A site that it refuses keeps its damage volume; what to
+    deposit is not known."""
 
     def run(engine: Engine, work: Work) -> Work:
         told = "others" in type(engine.job.stages[allowance]).needs()
         done: list[FoundSite] = []
         failures: list[StageError] = []
         for site in work.sites:
-            rest = [other for other in work.sites if other is not site]
+            if not site.accepted:
+                key = digest("not accepted", site.key("damage"))
+                done.append(site.with_value(FoundSite.deposit, None, key))
+                continue
+            rest = [other for other in work.sites if other is not site and other.accepted]
             others = _unite([other.damage for other in rest]) if told else None
             key = digest("others", [other.key("damage") for other in rest])
             site = site.with_value(FoundSite.others, others, key)

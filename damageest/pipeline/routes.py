@@ -7,12 +7,14 @@ all of the work and gives it changed; some steps call contracts themselves, and 
 from __future__ import annotations
 
 from damageest.pipeline.collect import collect_result
+from damageest.pipeline.coverage import describe_coverage, inspect_skin
 from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
 from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.prepare import gather_intact, measure_scan, place_scan
 from damageest.pipeline.sites import gather_sites, number_sites, take_clusters, take_enclosures, where_damaged
+from damageest.pipeline.verdicts import choose_sites, judge_sites
 from damageest.stages.align import Align
 from damageest.stages.allowance import Allowance
 from damageest.stages.background import Background
@@ -28,12 +30,17 @@ from damageest.stages.sample import Sample
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
-ACQUIRE: Route = (ReadPart, ReadScan, measure_scan, Sample, Align, place_scan, Segment, Cluster, gather_intact)
+ACQUIRE: Route = (
+    ReadPart, ReadScan, measure_scan, Sample, Align, place_scan, Segment, inspect_skin, Cluster,
+    gather_intact,
+)  # fmt: skip
 BY_SITE: Route = (
     take_clusters, Reconstruct, Boundary, enclose_grouped(Background, Enclose), Repair, Boolean, gather_sites,
 )  # fmt: skip
 AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
-CLOSE: Route = (number_sites, make_deposits(Allowance), separate_deposits, collect_result)
+CLOSE: Route = (
+    number_sites, choose_sites, describe_coverage, judge_sites, make_deposits(Allowance), separate_deposits, collect_result,
+)  # fmt: skip
 
 WRITE: Route = (Export,)
 """After one of the routes, where the result goes to files."""

@@ -29,9 +29,10 @@ from damageest.artefacts import (
     Solid,
     Surface,
 )
+from damageest.checks.coverage import SkinView
 from damageest.errors import StageError
 from damageest.pipeline.cache import digest
-from damageest.result import Result
+from damageest.result import Coverage, Result, Verdict
 from damageest.stages.export import ExportedFiles, Writer
 
 T = TypeVar("T")
@@ -99,6 +100,8 @@ class JobState(State):
     deviation = Value[Deviation]()
     sites = Value[Sites]()
     intact = Value[Floats]()
+    skin = Value[SkinView]()
+    coverage = Value[Coverage]()
     enclosures = Value[Enclosures]()
     result = Value[Result]()
     folder = Value[Path]()
@@ -147,7 +150,8 @@ class Candidate(_SiteState):
 
 @dataclass(frozen=True, eq=False)
 class FoundSite(_SiteState):
-    """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit."""
+    """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
+    ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -155,6 +159,8 @@ class FoundSite(_SiteState):
     evidence: Evidence = field(default_factory=Evidence)
     notes: tuple[str, ...] = ()
     refused: bool = False
+    verdict: Verdict = field(default_factory=Verdict)
+    accepted: bool = True
 
     damage = Value[Solid]()
     others = Value[Solid | None]()

@@ -1,0 +1,128 @@
+"""What the scan shows of the part's skin, and what unseen skin may hide."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Ints, Part, Solid
+from damageest.checks.ray_evidence import RayEvidence
+from damageest.checks.skin_cells import SkinCells
+from damageest.geometry.distance import distance_to_mesh, is_inside
+from damageest.geometry.neighbourhoods import find_neighbours
+from damageest.result import Coverage, UnseenRegion
+
+LEAST_EDGE = 4.0
+"""Edge of a square, in tolerances, whose area an unseen region has at least; smaller ones count in the share only."""
+MOST_REGIONS = 50
+VOLUME_POINTS = 20_000
+"""Random points in the part that the volume behind each region is counted from."""
+
+Why = Literal["unknown", "hidden", "outside", "no points"]
+
+
+@dataclass(frozen=True, eq=False)
+class SkinView:
+    """The skin in ``cells``; for each (F,) whether the scan has points on it, ``seen``, and their mean signed
+    ``distance``, NaN without points; ``rays``: None where no scanner position is known."""
+
+    cells: SkinCells
+    seen: Flags
+    distance: Floats
+    rays: RayEvidence | None
+
+
+def measure_coverage(part: Part, skin: SkinView, losses: Sequence[Solid], tolerance: float, spacing: float) -> Coverage:
+    """Describes what the scan shows. ``losses``: the damage volumes; skin that they remove was seen to be gone."""
+    cells, rays = skin.cells, skin.rays
+    seen = skin.seen | _find_removed(cells, skin.seen, losses, max(tolerance, spacing))
+    label = cells.label_connected(~seen)
+    regions, region = _describe_regions(part, cells, label, rays, (LEAST_EDGE * max(tolerance, spacing)) ** 2)
+    share = float(cells.areas[seen].sum() / cells.areas.sum())
+    lost = rays.lost & ~seen if rays else np.zeros(len(seen), bool)
+    return Coverage(share, regions, cells.mesh, seen, skin.distance, lost, region)
+
+
+def _find_removed(cells: SkinCells, seen: Flags, losses: Sequence[Solid], reach: float) -> Flags:
+    """Which unseen cells (F,) a damage volume removes."""
+    removed = np.zeros(len(seen), bool)
+    for loss in losses:
+        low, high = loss.bounds[0] - reach, loss.bounds[1] + reach
+        near = ~seen & (cells.centres > low).all(axis=1) & (cells.centres < high).all(axis=1)
+        index = np.flatnonzero(near)
+        if not len(index):
+            continue
+        inward = cells.centres[index] - 0.2 * reach * cells.normals[index]
+        touching = distance_to_mesh(cells.centres[index], loss) < reach
+        removed[index[touching | is_inside(inward, loss)]] = True
+    return removed
+
+
+def _describe_regions(
+    part: Part, cells: SkinCells, label: Ints, rays: RayEvidence | None, least: float
+) -> tuple[tuple[UnseenRegion, ...], Ints]:
+    """The unseen regions, largest first, and the place (F,) of each cell in them, -1 for a cell in none."""
+    region = np.full(len(label), -1, np.int64)
+    if not (label >= 0).any():
+        return (), region
+    area = np.bincount(label[label >= 0], weights=cells.areas[label >= 0])
+    chosen = [int(k) for k in np.argsort(-area, kind="stable")[:MOST_REGIONS] if area[k] >= least]
+    place = np.full(len(area), -1, np.int64)
+    place[chosen] = np.arange(len(chosen))
+    region[label >= 0] = place[label[label >= 0]]
+    volumes = _measure_volumes_behind(part, cells, region, len(chosen))
+    out = []
+    for number, volume in enumerate(volumes):
+        own = np.flatnonzero(region == number)
+        weight = cells.areas[own]
+        corners = cells.mesh.triangles[own].reshape(-1, 3)
+        faces = () if part.faces_brep is None else tuple(np.unique(part.faces_brep[cells.parent[own]]).tolist())
+        out.append(
+            UnseenRegion(
+                float(weight.sum()),
+                np.average(cells.centres[own], axis=0, weights=weight),
+                np.array([corners.min(axis=0), corners.max(axis=0)]),
+                faces,
+                volume,
+                _explain(own, weight, rays),
+            )
+        )
+    return tuple(out), region
+
+
+def _explain(own: Ints, weight: Floats, rays: RayEvidence | None) -> Why:
+    """The cause that most of a region's area has."""
+    if rays is None:
+        return "unknown"
+    outside = rays.outside[own]
+    hidden = rays.hidden[own] & ~outside
+    shares: dict[Why, float] = {
+        "hidden": float(weight[hidden].sum()),
+        "outside": float(weight[outside].sum()),
+        "no points": float(weight[~hidden & ~outside].sum()),
+    }
+    return max(shares, key=lambda name: shares[name])
+
+
+def _measure_volumes_behind(part: Part, cells: SkinCells, region: Ints, count: int) -> list[float]:
+    """For each region the volume of the part that is nearer to its skin than to any other skin.
+
+    A loss behind the region leaves no trace in the scan as long as it is within this volume.
+    """
+    if not count:
+        return []
+    rng = np.random.default_rng(0)
+    low, high = part.bounds
+    tried = rng.uniform(low, high, (4 * VOLUME_POINTS, 3))
+    inside = tried[is_inside(tried, part)]
+    found = np.zeros(count)
+    if len(inside):
+        nearest = region[find_neighbours(inside, 1, cells.centres)[1][:, 0]]
+        found = np.bincount(nearest[nearest >= 0], minlength=count) * part.volume / len(inside)
+    area = np.bincount(region[region >= 0], weights=cells.areas[region >= 0], minlength=count)
+    coarse = 30 * part.volume / max(len(inside), 1)
+    volumes = np.where(found > coarse, found, np.maximum(found, np.minimum(area**1.5 / 6, coarse)))
+    return [float(volume) for volume in volumes]

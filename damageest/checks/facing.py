@@ -1,0 +1,80 @@
+"""Points near the skin that lie on another surface: the normal of the scan there tells them from intact ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import INTACT, Deviation, Flags, Floats, Ints, Part, Scan
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
+
+STEP = 1.25
+"""How far from a point the part is asked for metal, in tolerances."""
+DEPTH = 0.35
+"""Depth inside the part, in tolerances, from which there is metal on a side of a point."""
+TURNED = 0.85
+"""Cosine of the angle between the normals of scan and skin below which a point may lie on another surface."""
+NEIGHBOURS = (12, 48)
+"""Fewest and most points that a normal is fitted to."""
+FLAT = 0.35
+"""Largest thickness of a patch over its width: a patch across an edge has no clear normal."""
+
+
+def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: float) -> Flags:
+    """Which points (N,) within the tolerance of the skin lie on a surface with metal on both of its sides as designed.
+
+    The root of a thin wall that broke off lies within a tolerance of the wall's two faces, and the wall of a narrow
+    groove within a tolerance of the skin above. At a step along the local normal of the scan, either way, the part as
+    designed has metal. On intact skin one of the two places is outside.
+    """
+    turned = np.zeros(len(aligned.points), bool)
+    if not (aligned.spacing and len(aligned.points) > NEIGHBOURS[0]):
+        return turned
+    near = deviation.label == INTACT
+    asked = np.flatnonzero(near & (deviation.distance < -max(aligned.noise, 0.1 * tolerance)))
+    cross = part.cross[deviation.face]
+    for _ in range(2):  # the second round asks the neighbours of what the first one found
+        if not len(asked):
+            return turned
+        normals, clear = _fit_normals(aligned, asked, tolerance)
+        asked, normals = asked[clear], normals[clear]
+        if not turned.any():
+            skin = cross[asked] / np.maximum(np.linalg.norm(cross[asked], axis=1), 1e-300)[:, None]
+            differs = np.abs(np.einsum("ij,ij->i", normals, skin)) < TURNED
+            asked, normals = asked[differs], normals[differs]
+        turned[asked[_is_buried(aligned.points[asked], normals, part, tolerance)]] = True
+        if not turned.any():
+            return turned
+        found = np.flatnonzero(turned)
+        reach = 2 * aligned.spacing
+        around = find_nearby(aligned.points, aligned.points[found], reach)
+        around = around[near[around] & ~turned[around] & (deviation.distance[around] < 0)]
+        gap = find_neighbours(aligned.points[around], 1, aligned.points[found], reach)[0][:, 0] if len(around) else []
+        asked = around[np.isfinite(gap)] if len(around) else around
+    return turned
+
+
+def _fit_normals(aligned: Scan, asked: Ints, tolerance: float) -> tuple[Floats, Flags]:
+    """Unit normals (A,3) of the scan at some of its points, of either sign, and whether each is clear (A,)."""
+    density = (1.1 / aligned.spacing) ** 2
+    count = int(np.clip(np.pi * tolerance**2 * density, *NEIGHBOURS))
+    places = aligned.points[asked]
+    around = find_nearby(aligned.points, places, 3 * max(tolerance, 2 * aligned.spacing))
+    among = aligned.points[around]
+    _, index = find_neighbours(places, count, among)
+    patches = among[index] - places[:, None]
+    patches -= patches.mean(axis=1, keepdims=True)
+    spread, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", patches, patches))
+    width = np.sqrt(np.maximum(spread, 0))
+    clear = (width[:, 0] < FLAT * width[:, 1]) & (width[:, 1] > 0.2 * width[:, 2])
+    return np.asarray(axes[:, :, 0]), np.asarray(clear)
+
+
+def _is_buried(points: Floats, normals: Floats, part: Part, tolerance: float) -> Flags:
+    """Whether each of the points (A,3) has metal of the part as designed on both sides, along its normal (A,3)."""
+    buried = np.ones(len(points), bool)
+    for side in (1.0, -1.0):
+        some = np.flatnonzero(buried)
+        distance, _ = signed_distance(points[some] + side * STEP * tolerance * normals[some], part)
+        buried[some[distance > -DEPTH * tolerance]] = False
+    return buried

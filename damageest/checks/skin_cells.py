@@ -1,0 +1,150 @@
+"""The skin of the part cut into cells, and which of them the scan shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Mesh, Part, Scan
+from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.refinement import cut_into_cells
+
+MOST_CELLS = 60_000
+"""Cells that the skin is cut into, apart from those of a part with more triangles than this."""
+NEIGHBOURS = 6
+"""Scan points that the local spacing is measured from: a disc with six points has 1.25 spacings as radius."""
+FACING = 1.5
+"""Weight of a difference of normals, in reaches: points on the far side of a thin wall do not show the near side."""
+
+
+@dataclass(frozen=True, eq=False)
+class SkinCells:
+    """The skin as F triangles of similar size: ``mesh``; ``parent`` (F,): the part's triangle that each is a piece of;
+    ``edge``: the length that no edge of a cell exceeds."""
+
+    mesh: Mesh
+    parent: Ints
+    edge: float
+
+    @cached_property
+    def centres(self) -> Floats:
+        """(F,3) the centres of the cells."""
+        return np.asarray(self.mesh.triangles.mean(axis=1))
+
+    @cached_property
+    def areas(self) -> Floats:
+        """(F,) the areas of the cells."""
+        return np.asarray(np.linalg.norm(self.mesh.cross, axis=1) / 2)
+
+    @cached_property
+    def normals(self) -> Floats:
+        """(F,3) the outward unit normals of the cells."""
+        return np.asarray(self.mesh.cross / np.maximum(2 * self.areas, 1e-300)[:, None])
+
+    @cached_property
+    def neighbours(self) -> Ints:
+        """(K,2) pairs of cells that share an edge."""
+        edges = np.sort(self.mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        code = edges[:, 0] * len(self.mesh.vertices) + edges[:, 1]
+        order = np.argsort(code, kind="stable")
+        same = np.flatnonzero(np.diff(code[order]) == 0)
+        return np.stack([order[same] // 3, order[same + 1] // 3], axis=1)
+
+    def label_connected(self, chosen: Flags) -> Ints:
+        """(F,) the number, from 0, of the connected region of each chosen cell; -1 for the others."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        pairs = self.neighbours[chosen[self.neighbours].all(axis=1)]
+        count = len(chosen)
+        links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+        label = np.full(count, -1, np.int64)
+        component = connected_components(links, directed=False)[1][chosen]
+        label[chosen] = np.unique(component, return_inverse=True)[1]
+        return label
+
+
+def cut_skin(part: Part, tolerance: float, spacing: float) -> SkinCells:
+    """Cuts the part's skin into cells about as large as two tolerances or two spacings of the scan."""
+    edge = max(2 * tolerance, 2 * spacing, 2.2 * float(np.sqrt(part.area / MOST_CELLS)))
+    mesh, parent = cut_into_cells(part, edge)
+    return SkinCells(mesh, parent, edge)
+
+
+def find_seen(
+    cells: SkinCells, part: Part, aligned: Scan, deviation: Deviation, tolerance: float
+) -> tuple[Flags, Floats]:
+    """Whether the scan shows each cell (F,), and the mean signed distance (F,) of the points on it, NaN without points.
+
+    A cell is seen where an intact point lies within the local spacing of the points, or added metal covers it. Points
+    count for skin that faces as the skin nearest to them. The area that a point stands for reaches beyond the edge of
+    what was scanned; it is removed again.
+    """
+    count = len(cells.areas)
+    intact = np.flatnonzero(deviation.label == INTACT)
+    seen, mean = np.zeros(count, bool), np.full(count, np.nan)
+    if len(intact):
+        chosen = intact[pick_one_per_cube(aligned.points[intact], 0.35 * max(tolerance, aligned.spacing))]
+        cross = part.cross[deviation.face[chosen]]
+        facing = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+        points = aligned.points[chosen]
+        reach = np.maximum(find_neighbours(points, NEIGHBOURS + 1)[0][:, -1], tolerance)
+        reach = np.minimum(reach, 3 * max(float(np.median(reach)), tolerance))
+        weight = FACING * float(np.median(reach))
+        among = np.concatenate([points, weight * facing], axis=1)
+        places = np.concatenate([cells.centres, weight * cells.normals], axis=1)
+        gap, index = find_neighbours(places, 1, among, float(reach.max()) * 1.001 + cells.edge / 3)
+        near = np.flatnonzero(np.isfinite(gap[:, 0]))
+        index = index[near, 0]
+        hit = gap[near, 0] <= reach[index] + cells.edge / 3
+        seen[near[hit]] = True
+        mean[near[hit]] = _average_on_cells(cells, near[hit], points, deviation.distance[chosen], weight, facing)
+        seen = _trim_edges(cells, seen, float(np.median(reach)) + cells.edge / 3, weight)
+    covered = _find_covered(cells, aligned, deviation, max(2 * tolerance, 1.5 * aligned.spacing))
+    mean[~seen] = np.nan
+    return seen | covered, mean
+
+
+def _average_on_cells(
+    cells: SkinCells, which: Ints, points: Floats, distance: Floats, weight: float, facing: Floats
+) -> Floats:
+    """Mean distance of the eight points nearest to each of some cells."""
+    among = np.concatenate([points, weight * facing], axis=1)
+    places = np.concatenate([cells.centres[which], weight * cells.normals[which]], axis=1)
+    _, index = find_neighbours(places, 8, among)
+    return np.asarray(distance[index].mean(axis=1))
+
+
+def _trim_edges(cells: SkinCells, seen: Flags, reach: float, weight: float) -> Flags:
+    """The seen cells (F,) without small gaps, and without the margin by which they reach beyond the points."""
+    bare = cells.label_connected(~seen)
+    if not (bare >= 0).any():
+        return seen
+    size = np.bincount(bare[bare >= 0], weights=cells.areas[bare >= 0])
+    small = size < 4 * reach**2
+    open_ = (bare >= 0) & ~small[np.maximum(bare, 0)]
+    filled = ~open_
+    if not open_.any():
+        return filled
+    places = np.concatenate([cells.centres, weight * cells.normals], axis=1)
+    gap = find_neighbours(places[filled], 1, places[open_], 0.7 * reach)[0][:, 0]
+    result = filled.copy()
+    result[np.flatnonzero(filled)[np.isfinite(gap)]] = False
+    return result
+
+
+def _find_covered(cells: SkinCells, aligned: Scan, deviation: Deviation, reach: float) -> Flags:
+    """Which cells (F,) lie under added metal: an added point is above them, about as far as it is from the skin."""
+    added = np.flatnonzero(deviation.label == ADDED)
+    covered = np.zeros(len(cells.areas), bool)
+    if not len(added):
+        return covered
+    added = added[pick_one_per_cube(aligned.points[added], 0.5 * reach)]
+    gap, index = find_neighbours(cells.centres, 1, aligned.points[added])
+    index = added[index[:, 0]]
+    way = aligned.points[index] - cells.centres
+    above = np.einsum("ij,ij->i", way, cells.normals) > 0.5 * gap[:, 0]
+    covered[above & (gap[:, 0] < deviation.distance[index] + reach)] = True
+    return covered

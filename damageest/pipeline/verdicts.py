@@ -1,0 +1,98 @@
+"""Steps that judge the sites, and follow what a person decided about them in the job."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import Flags
+from damageest.checks.coverage import SkinView
+from damageest.checks.evidence import weigh_evidence
+from damageest.checks.verdict import judge_site, measure_limits
+from damageest.errors import StageError
+from damageest.geometry.distance import is_inside
+from damageest.geometry.solids import to_solid, unite
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import FoundSite, Work
+
+BY_RAYS = 0.5
+"""Share of a site's unseen skin that rays have to have passed through, for the loss to be proven by them."""
+
+
+def choose_sites(engine: Engine, work: Work) -> Work:
+    """Drops and merges sites as the job says. Numbers stay those of a run without these decisions."""
+    choice = engine.job.sites
+    _check_numbers("sites.drop", choice.drop, work.sites)
+    for group in choice.merge:
+        _check_numbers("sites.merge", group, work.sites)
+    sites = {site.number: site for site in work.sites if site.number not in choice.drop}
+    warnings = [f"site {number} was dropped, as the job says" for number in choice.drop]
+    for group in choice.merge:
+        members = [sites.pop(number) for number in sorted(set(group)) if number in sites]
+        if members:
+            sites[members[0].number] = _merge(engine, members)
+            warnings.append(f"sites {', '.join(str(one.number) for one in members)} were merged, as the job says")
+    if choice.keep is not None:
+        low, high = np.array(choice.keep.min), np.array(choice.keep.max)
+        for number, site in list(sites.items()):
+            middle = site.damage.bounds.mean(axis=0)
+            if not ((middle >= low) & (middle <= high)).all():
+                del sites[number]
+                warnings.append(f"site {number} was dropped: its middle is outside the box of sites.keep")
+    ordered = tuple(sites[number] for number in sorted(sites))
+    return replace(work, sites=ordered, warnings=(*work.warnings, *warnings))
+
+
+def judge_sites(engine: Engine, work: Work) -> Work:
+    """Gives each site its verdict. A doubtful site is no part of the damage unless the job accepts it."""
+    state, accept = work.job, engine.job.accept
+    if accept != "all":
+        _check_numbers("accept", accept, work.sites)
+    limits = measure_limits(state.skin, state.aligned)
+    done = []
+    for site in work.sites:
+        by_rays = _is_proven_by_rays(state.skin, site)
+        verdict = judge_site(
+            site.evidence, site.members, state.deviation, state.pose, limits, state.tolerance, state.unit, by_rays
+        )
+        accepted = verdict.level != "doubtful" or accept == "all" or site.number in accept
+        done.append(replace(site, verdict=verdict, accepted=accepted))
+    return replace(work, sites=tuple(done))
+
+
+def _check_numbers(field: str, numbers: Iterable[int], sites: tuple[FoundSite, ...]) -> None:
+    known = [site.number for site in sites]
+    if unknown := [number for number in numbers if number not in known]:
+        there = f"there are: {', '.join(map(str, known))}" if known else "no site was found"
+        raise StageError(f"{field} names site {unknown[0]}; {there}", f"change {field} in the job")
+
+
+def _merge(engine: Engine, members: list[FoundSite]) -> FoundSite:
+    first, job = members[0], members[0].job
+    origin = first.damage.bounds.mean(axis=0)
+    damage = to_solid(unite((site.damage for site in members), origin), origin) or first.damage
+    points = np.unique(np.concatenate([site.members for site in members]))
+    evidence = weigh_evidence(damage, job.aligned.points[points], job.aligned, job.deviation, job.part, job.tolerance)
+    whole = replace(
+        first,
+        clusters=tuple(sorted({cluster for site in members for cluster in site.clusters})),
+        members=points,
+        evidence=evidence,
+        notes=tuple(dict.fromkeys(note for site in members for note in site.notes)),
+    )
+    return whole.with_value(FoundSite.damage, damage, digest(damage))
+
+
+def _is_proven_by_rays(skin: SkinView, site: FoundSite) -> bool:
+    """Whether rays passed through most of the skin that the site removes and that has no scan points."""
+    if skin.rays is None:
+        return False
+    cells, damage = skin.cells, site.damage
+    near: Flags = ((cells.centres > damage.bounds[0]) & (cells.centres < damage.bounds[1])).all(axis=1)
+    index = np.flatnonzero(near & ~skin.seen)
+    index = index[is_inside(cells.centres[index] - 0.05 * cells.edge * cells.normals[index], damage)]
+    area = cells.areas[index]
+    return bool(len(index)) and float(area[skin.rays.lost[index]].sum()) > BY_RAYS * float(area.sum())
