@@ -67,19 +67,21 @@ class PluginError(DamageestError):
 class StageError(DamageestError):
     """A stage failed, or refused an input that is valid.
 
-    Raise it with what is wrong and, as ``remedy``, what the user may try. The engine adds stage and site.
+    Raise it with what is wrong and, as ``remedy``, what the user may try. The engine adds stage and site, or for points
+    that are no site yet their ``place``, in words.
     """
 
     exit_status = 1
 
     def __init__(self, message: str, remedy: str = "") -> None:
         self.message, self.remedy = message, remedy
-        self.stage, self.use, self.site = "", "", 0
+        self.stage, self.use, self.site, self.place = "", "", 0, ""
         super().__init__(message)
 
     def __str__(self) -> str:
         place = f"{self.stage}: {self.use}" if self.stage else ""
-        place += f" (site {self.site})" if self.site else ""
+        where = self.place or (f"site {self.site}" if self.site else "")
+        place += f" ({where})" if where else ""
         text = f"{place}: {self.message}" if place else self.message
         return f"{text}\n  try: {self.remedy}" if self.remedy else text
 

@@ -42,7 +42,7 @@ def measure_coverage(part: Part, skin: SkinView, losses: Sequence[Solid], tolera
     label = cells.label_connected(~seen)
     regions, region = _describe_regions(part, cells, label, rays, (LEAST_EDGE * max(tolerance, spacing)) ** 2)
     share = float(cells.areas[seen].sum() / cells.areas.sum())
-    lost = rays.lost & ~seen if rays else np.zeros(len(seen), bool)
+    lost = rays.lost if rays else np.zeros(len(seen), bool)
     return Coverage(share, regions, cells.mesh, seen, skin.distance, lost, region)
 
 

@@ -49,8 +49,8 @@ def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: floa
         reach = 2 * aligned.spacing
         around = find_nearby(aligned.points, aligned.points[found], reach)
         around = around[near[around] & ~turned[around] & (deviation.distance[around] < 0)]
-        gap = find_neighbours(aligned.points[around], 1, aligned.points[found], reach)[0][:, 0] if len(around) else []
-        asked = around[np.isfinite(gap)] if len(around) else around
+        gap = find_neighbours(aligned.points[around], 1, aligned.points[found], reach)[0]
+        asked = around[np.isfinite(gap).ravel()]
     return turned
 
 

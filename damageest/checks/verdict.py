@@ -24,28 +24,26 @@ UNSEEN = 0.5
 
 @dataclass(frozen=True)
 class ScanLimits:
-    """What the whole scan cannot tell apart from damage. ``systematic``: standard deviation of the mean distances of
-    intact cells of the skin that noise does not explain; ``added_area`` and ``lost_area``: skin that deviates outward
-    and inward by more than the tolerance, without clear edges; in the job's unit and its square."""
+    """What the whole scan cannot tell apart from damage. ``systematic``: standard deviation, in the job's unit, of the
+    mean distances of intact cells of the skin that noise does not explain."""
 
     systematic: float
-    patches: int
 
 
 def measure_limits(skin: SkinView, aligned: Scan) -> ScanLimits:
     """How far intact skin deviates from the part over whole cells, beyond what the noise of eight points explains."""
     distance = skin.distance[skin.seen & np.isfinite(skin.distance)]
     if len(distance) < 30:
-        return ScanLimits(0.0, len(distance))
+        return ScanLimits(0.0)
     # half the width of the middle 90 %, in standard deviations of a normal distribution
     low, high = np.quantile(distance, [0.05, 0.95])
     spread = float(max(-low, high)) / 1.645
-    return ScanLimits(float(np.sqrt(max(spread**2 - aligned.noise**2 / 8, 0.0))), len(distance))
+    return ScanLimits(float(np.sqrt(max(spread**2 - aligned.noise**2 / 8, 0.0))))
 
 
 def judge_site(
-    evidence: Evidence, members: Ints, deviation: Deviation, pose: Pose, limits: ScanLimits, tolerance: float, unit: str,
-    proven_by_rays: bool, beside: tuple[str, ...] = (),
+    evidence: Evidence, members: Ints, deviation: Deviation, pose: Pose, limits: ScanLimits, tolerance: float,
+    unit: str, proven_by_rays: bool, beside: tuple[str, ...] = (),
 ) -> Verdict:  # fmt: skip
     """Weighs all that speaks for and against a damage volume.
 

@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from damageest.result import Result
+
+
+MOST_UNSEEN = 5
+"""Unseen regions that are printed; result.json has all."""
+UNSEEN_WHY = {
+    "hidden": "hidden by the part from every scanner position",
+    "outside": "outside every view",
+    "no points": "in view, but without points",
+}
 
 
 def command(
@@ -63,11 +74,52 @@ def command(
             typer.echo(json.dumps(json.loads((target / "result.json").read_text())))
         elif not quiet:
             _print_table(result, target)
+        if result.sites and not any(site.accepted for site in result.sites):
+            status = max(status, 1)
+            typer.echo(
+                f"error: {job.source}: all sites are doubtful, and none is part of the damage; see the reasons, and "
+                "take over those that are damage with  accept: [1]  or  accept: all  in the job",
+                err=True,
+            )
         if result.failures:
             status = max(status, 1)
             for failure in result.failures if quiet or as_json else ():
                 typer.echo(f"error: {failure}", err=True)
     raise typer.Exit(status)
+
+
+def _list_reasons(result: Result) -> list[str]:
+    return [
+        f"site {site.id} is {site.verdict.level}: {reason}" for site in result.sites for reason in site.verdict.reasons
+    ]
+
+
+def _list_warnings(result: Result) -> list[str]:
+    return [f"site {site.id}: {note}" for site in result.sites for note in site.warnings]
+
+
+def _on_seen(result: Result) -> str:
+    """Where the scan shows a part of the skin only, the share that a statement about all of it is limited to."""
+    coverage = result.coverage
+    return f" on the {coverage.seen:.0%} of the skin that the scan shows" if coverage and coverage.seen < 0.995 else ""
+
+
+def _print_coverage(result: Result, console: Console) -> None:
+    """Prints how much of the skin the scan shows, and the largest of the rest."""
+    coverage = result.coverage
+    if coverage is None:
+        return
+    unit = result.units
+    console.print(f"tolerance: {result.tolerance:.4g} {unit}; the scan shows {coverage.seen:.0%} of the skin")
+    for region in coverage.unseen[:MOST_UNSEEN]:
+        x, y, z = region.centre
+        why = "" if region.why == "unknown" else f" ({UNSEEN_WHY[region.why]})"
+        console.print(
+            f"unseen: {region.area:.4g} {unit}² near ({x:.4g}, {y:.4g}, {z:.4g}){why}; a loss of up to "
+            f"{region.volume:.4g} {unit}³ there would not show"
+        )
+    if more := coverage.unseen[MOST_UNSEEN:]:
+        console.print(f"unseen: {len(more)} smaller regions, {sum(one.area for one in more):.4g} {unit}²")
 
 
 def _report_failure(error: Exception, source: str, as_json: bool, debug: bool) -> int:
@@ -94,24 +146,26 @@ def _print_table(result: Result, target: Path) -> None:
         heads = ["site", f"volume {unit}³", f"area {unit}²", f"depth {unit}"]
         if any(site.deposit for site in result.sites):
             heads += [f"deposit {unit}³", f"stock {unit}³"]
-        for name in (*heads, "method", "check against scan"):
-            table.add_column(name, justify="left" if name in ("method", "check against scan") else "right")
+        for name in (*heads, "method", "verdict"):
+            table.add_column(name, justify="left" if name in ("method", "verdict") else "right")
         for site in result.sites:
-            check = "passed" if site.evidence.consistent else "FAILED: " + "; ".join(site.evidence.reasons)
+            verdict = site.verdict.level + ("" if site.accepted == (site.verdict.level != "doubtful") else ", accepted")
             numbers = [f"{site.damage.volume:.6g}", f"{site.surface.area:.6g}", f"{site.max_depth:.4g}"]
             if len(heads) > 4:
                 stock = getattr(site.deposit, "stock_volume", None)
                 numbers += [f"{site.deposit.volume:.6g}" if site.deposit else "–"]
                 numbers += ["–" if stock is None else f"{stock:.6g}"]
-            table.add_row(str(site.id), *numbers, site.method, check)
+            table.add_row(str(site.id), *numbers, site.method, verdict)
         console.print(table)
         console.print(
             f"damage volume: {result.damage_volume:.6g} {unit}³; part volume: {result.part.volume:.6g} {unit}³"
         )
     elif not result.failures:
-        console.print(f"no damage deeper than the tolerance of {result.tolerance:.4g} {unit} was found")
+        depth = f"{result.tolerance:.4g} {unit}"
+        console.print(f"no damage deeper than the tolerance of {depth} was found{_on_seen(result)}")
+    _print_coverage(result, console)
     for text in result.failures:
         console.print(f"[red]failed:[/red] {text}")
-    for text in (*result.warnings, *(f"site {site.id}: {note}" for site in result.sites for note in site.warnings)):
+    for text in (*result.warnings, *_list_reasons(result), *_list_warnings(result)):
         console.print(f"[yellow]note:[/yellow] {text}")
     console.print(f"written to {target}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -82,27 +83,38 @@ def _read_stl(path: Path) -> tuple[Floats, Ints]:
     return corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int64).reshape(-1, 3)
 
 
-def write_ply(path: Path, mesh: Mesh) -> None:
-    """Writes a mesh as binary little-endian PLY with coordinates in double precision."""
-    table = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3)])
+PLY_TYPES = {"f8": "double", "f4": "float", "u1": "uchar", "i4": "int"}
+"""numpy's types as PLY names them."""
+
+
+def write_ply(path: Path, mesh: Mesh, columns: Mapping[str, NDArray[Any]] | None = None) -> None:
+    """Writes a mesh as binary little-endian PLY with coordinates in double precision.
+
+    ``columns``: properties of the faces, each (F,), in the type of the column.
+    """
+    columns = columns or {}
+    more = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
+    table = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3), *more])
     table["count"], table["corners"] = 3, mesh.faces
+    for name, values in columns.items():
+        table[name] = values
+    listed = "".join(f"property {PLY_TYPES[v.dtype.str[1:]]} {name}\n" for name, v in columns.items())
     head = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\n"
         "property double x\nproperty double y\nproperty double z\n"
-        f"element face {len(mesh.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+        f"element face {len(mesh.faces)}\nproperty list uchar int vertex_indices\n{listed}end_header\n"
     )
     path.write_bytes(head.encode() + mesh.vertices.astype("<f8").tobytes() + table.tobytes())
 
 
 def write_points(path: Path, columns: dict[str, NDArray[Any]]) -> None:
     """Writes points as binary little-endian PLY, with one property per column (N,), in the type of the column."""
-    names = {"f8": "double", "f4": "float", "u1": "uchar", "i4": "int"}
     kind = np.dtype([(name, values.dtype.newbyteorder("<")) for name, values in columns.items()])
     table = np.empty(len(next(iter(columns.values()))), kind)
     for name, values in columns.items():
         table[name] = values
     head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(table)}\n"
-    head += "".join(f"property {names[values.dtype.str[1:]]} {name}\n" for name, values in columns.items())
+    head += "".join(f"property {PLY_TYPES[values.dtype.str[1:]]} {name}\n" for name, values in columns.items())
     path.write_bytes(head.encode() + b"end_header\n" + table.tobytes())
 
 

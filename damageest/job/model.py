@@ -75,7 +75,7 @@ class Job:
     implementations: Mapping[Contract, Implementation]
     output: Path
     source: str
-    sites: SiteChoice = SiteChoice()
+    sites: SiteChoice = field(default_factory=SiteChoice)
     accept: Literal["all"] | tuple[int, ...] = ()
     given: Mapping[Contract, Any] = field(default_factory=dict)
 

@@ -33,9 +33,8 @@ def collect_result(engine: Engine, work: Work) -> Work:
     damage = to_solid(lost, origin)
     # a cut-back is no damage: what was found is compared as it was found
     cut_back = any(site.damage is not found.damage for site, found in zip(sites, work.sites, strict=True))
-    found = (
-        to_solid(unite((site.damage for site in work.sites if site.accepted), origin), origin) if cut_back else damage
-    )
+    taken = (site.damage for site in work.sites if site.accepted)
+    found = to_solid(unite(taken, origin), origin) if cut_back else damage
     result = Result(
         name=engine.job.name,
         units=engine.job.units,

@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
+import numpy as np
+
 from damageest.artefacts import ArtefactError
 from damageest.errors import DamageestError, InputError, StageError, describe_missing_library, is_interrupt
 from damageest.job.model import Job
@@ -56,7 +58,7 @@ class Engine:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
             _tell(hooks.damageest_stage_failed, **named, error=error)
-            raise _locate(error, item, state.number) from error
+            raise _locate(error, item, state) from error
         seconds = time.perf_counter() - start
         self.records.append(StageRecord(*where[:2], str(item.provider), state.number, round(seconds, 3), cached))
         _tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
@@ -136,7 +138,7 @@ def _check_type(value: Any, contract: Contract) -> Any:
     return value
 
 
-def _locate(error: Exception, item: Implementation, site: int) -> DamageestError:
+def _locate(error: Exception, item: Implementation, state: JobState | Candidate | FoundSite) -> DamageestError:
     """The error with the stage it came from. One of another kind becomes a StageError that names the provider."""
     stage = item.contract.stage
     if isinstance(error, DamageestError) and not isinstance(error, StageError):
@@ -146,8 +148,19 @@ def _locate(error: Exception, item: Implementation, site: int) -> DamageestError
     if isinstance(error, OSError) and stage in ("part", "scan"):
         return InputError(f"{stage}: {item.name}: {error}")
     placed = error if isinstance(error, StageError) else _explain(error, f"{item.provider}")
-    placed.stage, placed.use, placed.site = stage, item.name, site
+    placed.stage, placed.use, placed.site = stage, item.name, state.number
+    if isinstance(state, Candidate):
+        placed.place = describe_points(state.job, state.clusters)
     return placed
+
+
+def describe_points(state: JobState, clusters: tuple[int, ...]) -> str:
+    """Where the points of some clusters lie, in words: they have no site number, since they are no site yet."""
+    members = np.flatnonzero(np.isin(state.sites.label, clusters))
+    if not len(members):
+        return "no points"
+    x, y, z = np.median(state.aligned.points[members], axis=0)
+    return f"{len(members)} points near ({x:.4g}, {y:.4g}, {z:.4g})"
 
 
 def _explain(error: Exception, provider: str) -> StageError:

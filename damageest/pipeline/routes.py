@@ -13,7 +13,14 @@ from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
 from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.prepare import gather_intact, measure_scan, place_scan
-from damageest.pipeline.sites import gather_sites, number_sites, take_clusters, take_enclosures, where_damaged
+from damageest.pipeline.sites import (
+    gather_sites,
+    number_sites,
+    set_specks_aside,
+    take_clusters,
+    take_enclosures,
+    where_damaged,
+)
 from damageest.pipeline.verdicts import choose_sites, judge_sites
 from damageest.stages.align import Align
 from damageest.stages.allowance import Allowance
@@ -39,7 +46,8 @@ BY_SITE: Route = (
 )  # fmt: skip
 AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
 CLOSE: Route = (
-    number_sites, choose_sites, describe_coverage, judge_sites, make_deposits(Allowance), separate_deposits, collect_result,
+    set_specks_aside, number_sites, choose_sites, describe_coverage, judge_sites, make_deposits(Allowance),
+    separate_deposits, collect_result,
 )  # fmt: skip
 
 WRITE: Route = (Export,)

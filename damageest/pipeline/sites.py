@@ -10,10 +10,13 @@ from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
 from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine, Step, follow
+from damageest.pipeline.engine import Engine, Step, describe_points, follow
 from damageest.pipeline.state import Candidate, FoundSite, Work
 from damageest.registry.contracts import Contract
 from damageest.stages.enclose import Enclose, EncloseAll
+
+SPECK = 50
+"""Points of a cluster below which a failure to enclose it is a warning and not a failure of the run."""
 
 
 def where_damaged(*route: Contract | Step) -> Step:
@@ -87,6 +90,7 @@ def gather_sites(engine: Engine, work: Work) -> Work:
             "no damage volume could be computed from its points", "the other method, or a smaller tolerance"
         )
         error.stage, error.use, error.site = "boolean", method, cluster
+        error.place = describe_points(state, (cluster,))
         failures.append(error)
     warnings = []
     if dropped > 1e-3 * sum(site.damage.volume for site in out):
@@ -95,6 +99,22 @@ def gather_sites(engine: Engine, work: Work) -> Work:
         work, candidates=(), sites=tuple(out), failures=(*work.failures, *failures),
         warnings=(*work.warnings, *warnings),
     )  # fmt: skip
+
+
+def set_specks_aside(engine: Engine, work: Work) -> Work:
+    """Turns failures on clusters that are too small to be enclosed into warnings: stray points form such clusters."""
+    failures, warnings = [], []
+    state = work.job
+    for error in work.failures:
+        members = state.sites.members(error.site) if error.place and error.site else np.empty(0, np.int64)
+        if 0 < len(members) < SPECK:
+            depth = float(-state.deviation.distance[members].min())
+            warnings.append(
+                f"{error.place}, up to {depth:.3g} {state.unit} deep, are too few to bound a volume and were left out"
+            )
+        else:
+            failures.append(error)
+    return replace(work, failures=tuple(failures), warnings=(*work.warnings, *warnings))
 
 
 def number_sites(engine: Engine, work: Work) -> Work:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from damageest.artefacts import Deposit, Floats, Vector
-from damageest.result import Result, Site
+from damageest.result import Coverage, Result, Site
 from damageest.stages.export import ExportedFiles
 
 _NOTHING = ExportedFiles()
@@ -51,8 +51,31 @@ class EvidenceReport(_Model):
     intact_points_inside: int = Field(description="intact scan points on the skin that it removes")
     skin_contradicted: float = Field(description="share of the removed skin that intact scan points lie on")
     skin_unseen: float = Field(description="share of the skin beside the damage that the scan does not show")
+    intact_share: float = Field(description="of the scan points over the skin that it removes, the share on that skin")
     consistent: bool = Field(description="whether the scan agrees with the damage volume")
     reasons: list[str] = Field(description="why it is not")
+
+
+class VerdictReport(_Model):
+    level: Literal["proven", "likely", "doubtful"]
+    reasons: list[str] = Field(description="what speaks against it, or could not be tested")
+
+
+class UnseenReport(_Model):
+    area: float
+    centre: Vector
+    bounds: tuple[Vector, Vector]
+    faces: list[int] = Field(description="numbers of its CAD faces; empty without B-rep")
+    volume: float = Field(description="of the part behind it: the most that can be lost without a trace in the scan")
+    why: Literal["unknown", "hidden", "outside", "no points"] = Field(
+        description="hidden: by the part itself; outside: of every view; no points: though a view shows its place; "
+        "unknown: no scanner position is known"
+    )
+
+
+class CoverageReport(_Model):
+    seen: float = Field(description="share of the skin's area that the scan shows, or shows to be lost")
+    unseen: list[UnseenReport] = Field(description="connected regions without scan points, largest first")
 
 
 class FilesReport(_Model):
@@ -109,7 +132,11 @@ class SiteReport(_Model):
     bounds: tuple[Vector, Vector]
     method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
     evidence: EvidenceReport
-    deposit: DepositReport | None = Field(description="null where the stage allowance refused the site")
+    verdict: VerdictReport
+    accepted: bool = Field(description="whether it is part of damage_volume; a doubtful site is where the job says so")
+    deposit: DepositReport | None = Field(
+        description="null where the stage allowance refused the site, or it is not accepted"
+    )
     files: FilesReport
     spline: SplineReport | None = Field(description="null where the job asks for none")
     warnings: list[str]
@@ -143,6 +170,7 @@ class Report(_Model):
     part: PartReport
     scan: ScanReport
     alignment: AlignmentReport
+    coverage: CoverageReport | None
     sites: list[SiteReport]
     export: ExportReport
     damage_volume: float
@@ -197,6 +225,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             notes=list(pose.notes),
             doubts=list(pose.doubts),
         ),
+        coverage=_report_coverage(result.coverage),
         sites=sites,
         export=ExportReport(files=list(written.files), notes=list(written.notes)),
         damage_volume=result.damage_volume,
@@ -218,11 +247,31 @@ def _to_quaternion(T: Floats) -> tuple[float, float, float, float]:
     return w, x, y, z
 
 
+def _report_coverage(coverage: Coverage | None) -> CoverageReport | None:
+    if coverage is None:
+        return None
+    regions = []
+    for region in coverage.unseen:
+        low, high = region.bounds.tolist()
+        regions.append(
+            UnseenReport(
+                area=region.area,
+                centre=tuple(region.centre.tolist()),
+                bounds=(tuple(low), tuple(high)),
+                faces=list(region.faces),
+                volume=region.volume,
+                why=region.why,
+            )
+        )
+    return CoverageReport(seen=coverage.seen, unseen=regions)
+
+
 def _report_site(site: Site, written: ExportedFiles) -> SiteReport:
     kinds = ("damage", "surface", "deposit")
+    folders = dict(zip(kinds, kinds if site.accepted else ("doubtful", "doubtful/surface", "deposit"), strict=True))
     own = {
-        kind: [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"{kind}/site-{site.id}.")]
-        for kind in kinds
+        kind: [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"{folder}/site-{site.id}.")]
+        for kind, folder in folders.items()
     }
     spline = written.splines.get(site.id)
 
@@ -239,6 +288,8 @@ def _report_site(site: Site, written: ExportedFiles) -> SiteReport:
         method=site.method,
         deposit=_report_deposit(site),
         evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
+        verdict=VerdictReport(level=site.verdict.level, reasons=list(site.verdict.reasons)),
+        accepted=site.accepted,
         files=FilesReport(
             **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
         ),
@@ -248,7 +299,7 @@ def _report_site(site: Site, written: ExportedFiles) -> SiteReport:
 
 
 def _report_deposit(site: Site) -> DepositReport | None:
-    if site.refused:
+    if site.refused or not site.accepted:
         return None
     deposit = site.deposit or site.damage
     if not isinstance(deposit, Deposit):

@@ -16,12 +16,13 @@ from damageest.geometry.simplification import simplify_within
 from damageest.geometry.transforms import invert_pose, move_mesh
 from damageest.io.meshes import write_ply, write_points
 from damageest.stages.export import Body, Export, ExportedFiles, Patch, Writer
+from damageest.stages.export._coverage import write_coverage
 from damageest.stages.export._options import Formats, check_spline_writer
 
 if TYPE_CHECKING:
     from damageest.result import Result
 
-UNDAMAGED, DAMAGE, DEPOSIT = (150, 155, 165), (215, 50, 40), (40, 130, 205)
+UNDAMAGED, DAMAGE, DEPOSIT, DOUBTFUL = (150, 155, 165), (215, 50, 40), (40, 130, 205), (225, 165, 40)
 
 
 class Files(Export):
@@ -78,10 +79,13 @@ class Files(Export):
         """Writes surfaces and scan below ``place``; ``T`` (4,4) takes a point from the part's frame to theirs."""
         done = []
         for site in result.sites:
-            path = _make_folder(folder, f"{place}surface/site-{site.id}.ply")
+            group = "surface" if site.accepted else "doubtful/surface"
+            path = _make_folder(folder, f"{place}{group}/site-{site.id}.ply")
             write_ply(path, move_mesh(site.surface, T))
             done.append(ExportedFiles((path.relative_to(folder).as_posix(),)))
         done.append(_write_scan(result, result.aligned if T is None else result.scan, folder, f"{place}scan.ply"))
+        if result.coverage is not None:
+            done.append(write_coverage(result.coverage, T, folder, place))
         return done
 
     def _write_truth(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles:
@@ -106,6 +110,9 @@ def _collect_bodies(result: Result) -> dict[str, Body]:
         ("undamaged", "undamaged part", result.undamaged, UNDAMAGED),
     ]
     for site in result.sites:
+        if not site.accepted:
+            found.append((f"doubtful/site-{site.id}", f"doubtful site-{site.id}", site.damage, DOUBTFUL))
+            continue
         found.append((f"damage/site-{site.id}", f"damage site-{site.id}", site.damage, DAMAGE))
         found.append((f"deposit/site-{site.id}", f"deposit site-{site.id}", site.deposit, DEPOSIT))
     return {stem: Body(name, solid, colour) for stem, name, solid, colour in found if solid is not None}
@@ -114,11 +121,15 @@ def _collect_bodies(result: Result) -> dict[str, Body]:
 def _write_solids(
     writer: Writer, folder: Path, place: str, bodies: Mapping[str, Body], T: Floats | None, unit: str
 ) -> list[ExportedFiles]:
-    """Writes one file for each body, or one of all bodies; that leaves out the union of the damage volumes."""
+    """Writes one file for each body; or one of all bodies but the union of the damage volumes, and one of what is
+    doubtful."""
     here = {stem: replace(body, solid=move_mesh(body.solid, T)) for stem, body in bodies.items()}
     if writer.one_file:
-        pieces = [body for stem, body in here.items() if stem != "damage"]
-        return [_write(writer, folder, f"{place}result", pieces, unit)]
+        doubtful = [body for stem, body in here.items() if stem.startswith("doubtful/")]
+        pieces = [body for stem, body in here.items() if stem != "damage" and not stem.startswith("doubtful/")]
+        done = [_write(writer, folder, f"{place}result", pieces, unit)]
+        # apart from the others: what is doubtful is not to reach the machine unasked
+        return done + ([_write(writer, folder, f"{place}doubtful/result", doubtful, unit)] if doubtful else [])
     return [_write(writer, folder, f"{place}{stem}", [body], unit) for stem, body in here.items()]
 
 
