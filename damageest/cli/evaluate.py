@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from damageest.cli import honesty
+
 if TYPE_CHECKING:
     from damageest.evaluate.case import DamageCase
     from damageest.evaluate.matrix import MatrixCell
 
 app = typer.Typer(no_args_is_help=True, help="Measure accuracy and cost against known truth.")
+app.command("honesty")(honesty.command)
 
 Vary = Annotated[
     list[str] | None,

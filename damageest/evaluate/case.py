@@ -13,7 +13,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -53,6 +53,7 @@ class DamageCase:
     use. ``varied``: the values under which the case is listed in the tables.
     """
 
+    module: ClassVar[str] = "damageest.evaluate.case"
     part: str
     seed: int
     first: str
@@ -70,14 +71,13 @@ class DamageCase:
         values = {name: value for name, value in vars(self).items() if name not in ("job", "file", "varied")}
         return hashlib.sha256(json.dumps(values).encode()).hexdigest()[:16]
 
-
-def make_blank_row(case: DamageCase) -> dict[str, Any]:
-    """The row of a case that has no result yet."""
-    row: dict[str, Any] = {"key": case.compute_key(), "part": case.part, "seed": case.seed, "size": case.size}
-    row |= {"varied": dict(case.varied), "noise": case.scanner["noise"], "points": case.scanner["points"]}
-    row |= {"tolerance": case.tolerance, "kinds": [], "share": 0.0, "depth": 0.0, "error": "", "skipped": False}
-    row |= {"iou": 0.0, "found": 0, "missed": int(case.size != 0), "false_sites": 0, "sites": 0, "flagged": False}
-    return row | {"methods": [], "failures": [], "reasons": [], "seconds": 0.0}
+    def make_blank_row(self) -> dict[str, Any]:
+        """The row of a case that has no result yet."""
+        row: dict[str, Any] = {"key": self.compute_key(), "part": self.part, "seed": self.seed, "size": self.size}
+        row |= {"varied": dict(self.varied), "noise": self.scanner["noise"], "points": self.scanner["points"]}
+        row |= {"tolerance": self.tolerance, "kinds": [], "share": 0.0, "depth": 0.0, "error": "", "skipped": False}
+        row |= {"iou": 0.0, "found": 0, "missed": int(self.size != 0), "false_sites": 0, "sites": 0, "flagged": False}
+        return row | {"methods": [], "failures": [], "reasons": [], "seconds": 0.0}
 
 
 def save_part(part: Part, path: Path) -> None:
@@ -125,7 +125,7 @@ def run_case(case: DamageCase) -> dict[str, Any]:
 def _run_measured(case: DamageCase, meter: Meter, start_seconds: float) -> dict[str, Any]:
     import damageest
 
-    part, row = load_part(case), make_blank_row(case)
+    part, row = load_part(case), case.make_blank_row()
     try:
         scan, kinds = simulate_scan(case, part)
     except (LookupError, DamageestError) as error:

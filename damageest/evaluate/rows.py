@@ -8,13 +8,34 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any, ClassVar, Protocol
 
-from damageest.evaluate.case import DamageCase, make_blank_row
 from damageest.evaluate.processes import Row, run_in_process
 
 
+class EvaluationCase(Protocol):
+    """A case that can be run in a process of its own: a dataclass whose fields JSON can hold.
+
+    ``module`` runs it: ``python -m module CASE`` prints its row. ``varied``: the values under which it is listed.
+    """
+
+    module: ClassVar[str]
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def varied(self) -> Mapping[str, float | str]: ...
+
+    def compute_key(self) -> str:
+        """The case's identifier in a file of rows."""
+        ...
+
+    def make_blank_row(self) -> Row:
+        """The row of the case without a result."""
+        ...
+
+
 def run_all(
-    cases: Sequence[DamageCase], out: Path | None, jobs: int, timeout: float, tell: Callable[[Row], None]
+    cases: Sequence[EvaluationCase], out: Path | None, jobs: int, timeout: float, tell: Callable[[Row], None]
 ) -> list[Row]:
     """The rows of all cases, in the order of the cases.
 
@@ -41,7 +62,7 @@ def run_all(
     return _collect_rows(cases, rows_by_key)
 
 
-def _collect_rows(cases: Sequence[DamageCase], rows_by_key: Mapping[str, Row]) -> list[Row]:
+def _collect_rows(cases: Sequence[EvaluationCase], rows_by_key: Mapping[str, Row]) -> list[Row]:
     """The stored rows in the order of the cases, each with the ``varied`` of its case, which may have changed."""
     return [
         rows_by_key[case.compute_key()] | {"varied": dict(case.varied)}
@@ -50,10 +71,10 @@ def _collect_rows(cases: Sequence[DamageCase], rows_by_key: Mapping[str, Row]) -
     ]
 
 
-def _compute_row(case: DamageCase, timeout: float) -> Row:
+def _compute_row(case: EvaluationCase, timeout: float) -> Row:
     """The case's row. A crash or a timeout gives a row with ``error``, not flagged."""
-    row = run_in_process("damageest.evaluate.case", asdict(case), timeout)
-    return row if isinstance(row, dict) else make_blank_row(case) | {"error": row, "seconds": timeout}
+    row = run_in_process(case.module, asdict(case), timeout)
+    return row if isinstance(row, dict) else case.make_blank_row() | {"error": row, "seconds": timeout}
 
 
 def read_rows(out: Path | None) -> list[Row]:

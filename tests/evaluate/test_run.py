@@ -11,7 +11,7 @@ import pytest
 
 from damageest.evaluate import processes
 from damageest.evaluate import rows as rows_module
-from damageest.evaluate.case import DamageCase, make_blank_row
+from damageest.evaluate.case import DamageCase
 
 CASES = [
     DamageCase("cuboid", seed, "pit", 0.2, scanner={"noise": noise, "points": 10}, varied={"noise": noise})
@@ -27,7 +27,7 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     def row(case: DamageCase, timeout: float) -> dict[str, Any]:
         keys.append(case.compute_key())
-        return make_blank_row(case) | {"seconds": timeout}
+        return case.make_blank_row() | {"seconds": timeout}
 
     monkeypatch.setattr(rows_module, "_compute_row", row)
     return keys
@@ -35,7 +35,7 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def test_rows_on_file_are_not_run_again_and_new_ones_are_appended(tmp_path: Path, ran: list[str]) -> None:
     out, told = tmp_path / "cases.jsonl", []
-    out.write_text(json.dumps(make_blank_row(CASES[1]) | {"iou": 0.5}) + '\n{"key": "cut sh')
+    out.write_text(json.dumps(CASES[1].make_blank_row() | {"iou": 0.5}) + '\n{"key": "cut sh')
     rows = rows_module.run_all(CASES, out, 2, 10, told.append)
     assert sorted(ran) == sorted(CASES[k].compute_key() for k in (0, 2, 3))
     assert [row["key"] for row in rows] == [case.compute_key() for case in CASES]
