@@ -203,7 +203,10 @@ class Result:
         return self.undamaged.volume if self.undamaged else 0.0
 
     def mesh(self, what: str, site: int | None = None) -> Mesh:
-        """Without ``site``: part, damage or undamaged; of a site: damage, surface or deposit. Raises ValueError."""
+        """Without ``site``: part, damage or undamaged; of a site: damage, surface or deposit; `surplus` with the number
+        of a surplus. Raises ValueError."""
+        if what == "surplus":
+            return self._find_surplus(site)
         if site is None:
             found = {"part": self.part, "damage": self.damage, "undamaged": self.undamaged}
             return _choose_mesh(found, what, "the result")
@@ -213,6 +216,15 @@ class Result:
                 f"there is no site {site}; there are: {', '.join(str(s.id) for s in self.sites) or 'none'}"
             )
         return own.mesh(what)  # type: ignore[arg-type]
+
+    def _find_surplus(self, number: int | None) -> Solid:
+        item = next((each for each in self.surplus if each.id == number), None)
+        if item is None:
+            known = ", ".join(str(each.id) for each in self.surplus) or "none"
+            raise ValueError(f"there is no surplus {number}; there are: {known}")
+        if item.solid is None:
+            raise ValueError(f"surplus {number} has no closed volume" + "".join(f"; {note}" for note in item.notes))
+        return item.solid
 
     def as_trimesh(self, what: str, site: int | None = None, frame: Literal["part", "scan"] = "part") -> Any:
         """A ``trimesh.Trimesh`` in the part's frame or the scanner's; see `mesh`."""

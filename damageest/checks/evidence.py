@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Evidence, Flags, Floats, Mesh, Part, Scan, Solid
+from damageest.artefacts import ADDED, INTACT, Deviation, Evidence, Flags, Floats, Mesh, Part, Scan, Solid
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
-from damageest.geometry.neighbourhoods import find_in_box
+from damageest.geometry.neighbourhoods import find_in_box, pick_one_per_cube
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
 
@@ -61,7 +61,8 @@ def weigh_evidence(
         inside = len(taken)
         asked = on_skin[_measure_gap(on_skin, on_ids, 1.5 * reach) > 1.5 * reach]
         contradicted = 1 - _share_far(asked, taken, max(spacing, tolerance)) if len(asked) > 20 else 0.0
-    unseen = _share_unseen(part, damage, points, on_skin, reach)
+    covered = _find_covered(aligned, deviation, part, low, high, reach)
+    unseen = _share_unseen(part, damage, np.concatenate([points, covered]), on_skin, reach)
     over = _count_intact_over(damage, inner, part, aligned, deviation, tolerance)
     intact_share = over / max(over + len(ids_points), 1)
 
@@ -110,6 +111,17 @@ def _measure_gap(places: Floats, points: Floats, most: float) -> Floats:
 def _share_far(places: Floats, points: Floats, distance: float) -> float:
     """Share of the places (N,3) that have no point within a distance."""
     return float((_measure_gap(places, points, distance) > distance).mean()) if len(places) else 0.0
+
+
+def _find_covered(aligned: Scan, deviation: Deviation, part: Part, low: Floats, high: Floats, reach: float) -> Floats:
+    """Places (K,3) on the skin in the box from ``low`` to ``high`` (3,) below points on added metal."""
+    added = np.flatnonzero(deviation.label == ADDED)
+    if not len(added):
+        return np.empty((0, 3))
+    height = float(deviation.distance[added].max())
+    above = aligned.points[added]
+    above = above[find_in_box(above, low - height, high + height)]
+    return closest_on_mesh(above[pick_one_per_cube(above, 0.5 * reach)], part).place if len(above) else above
 
 
 def _share_unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: float) -> float:

@@ -13,7 +13,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from damageest.result import Result
+    from damageest.result import Result, Surplus
 
 
 MOST_UNSEEN = 5
@@ -164,8 +164,21 @@ def _print_table(result: Result, target: Path) -> None:
         depth = f"{result.tolerance:.4g} {unit}"
         console.print(f"no damage deeper than the tolerance of {depth} was found{_on_seen(result)}")
     _print_coverage(result, console)
+    for item in result.surplus:
+        console.print(_describe_surplus(item, unit))
     for text in result.failures:
         console.print(f"[red]failed:[/red] {text}")
     for text in (*result.warnings, *_list_reasons(result), *_list_warnings(result)):
         console.print(f"[yellow]note:[/yellow] {text}")
     console.print(f"written to {target}")
+
+
+def _describe_surplus(item: Surplus, unit: str) -> str:
+    volume = "no closed volume" if item.volume is None else f"{item.volume:.6g} {unit}³"
+    size = f"{item.height:.4g} {unit} high, {item.area:.4g} {unit}²"
+    if item.kind == "surroundings":
+        size = f"up to {item.height:.4g} {unit} from the part"
+    words = [*([volume] if item.kind != "surroundings" else []), size, f"{item.share:.1%} of the scan"]
+    named = "" if item.kind == "surplus" else f" ({item.kind})"
+    notes = item.notes if item.kind == "surplus" and item.solid else ()  # the others are among the warnings
+    return f"surplus {item.id}{named}: {', '.join(words)}" + "".join(f"; {note}" for note in notes)

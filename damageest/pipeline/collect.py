@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
+from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
 from damageest.checks.verdict import FEW
 from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid, unite
@@ -28,6 +28,8 @@ def collect_result(engine: Engine, work: Work) -> Work:
         label[site.points] = site.id
     kept = deviation.label.copy()
     kept[(kept == DAMAGE) & (state.sites.label == 0)] = OUTLIER
+    for item in state.surplus:  # those of surroundings are outliers until here
+        kept[item.points] = ADDED
     origin = part.bounds.mean(axis=0)
     lost = unite((site.damage for site in sites if site.accepted), origin)
     damage = to_solid(lost, origin)
@@ -53,6 +55,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance),
         stages=tuple(engine.records),
         coverage=state.coverage,
+        surplus=state.surplus,
     )
     key = digest(
         engine.job.name, [state.keys[name] for name in sorted(state.keys)], [s.key("deposit") for s in work.sites]

@@ -16,7 +16,7 @@ from damageest.errors import DamageestError, InputError, StageError, describe_mi
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache, digest
 from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
-from damageest.registry.contracts import Contract
+from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.registry import Implementation, Registry
 from damageest.result import StageRecord
 from damageest.stages import Stage
@@ -26,7 +26,8 @@ S = TypeVar("S", JobState, Candidate, FoundSite)
 
 @dataclass
 class Engine:
-    """One run of a job. ``records`` grow as it goes; ``stems`` are the cache entries that it used."""
+    """One run of a job. ``records`` grow as it goes; ``stems`` are the cache entries that it used. ``silent``: it
+    calls stages on values that are not the job's own, and observers do not get these calls."""
 
     job: Job
     registry: Registry
@@ -34,6 +35,19 @@ class Engine:
     records: list[StageRecord] = field(default_factory=list)
     stems: list[str] = field(default_factory=list)
     memo: dict[str, Any] = field(default_factory=dict)
+    silent: bool = False
+
+    def make_silent(self, *contracts: Contract) -> Engine:
+        """An engine for calls of stages on other values than the job's own: with the same cache, without records.
+
+        ``contracts``: those that have their default implementation where the job's route has none of them.
+        """
+        stages, items = dict(self.job.stages), dict(self.job.implementations)
+        for contract in contracts:
+            if contract not in stages:
+                item = self.registry.get(contract.stage, DEFAULTS[contract])
+                stages[contract], items[contract] = item.cls.model_validate({}), item
+        return replace(self, job=replace(self.job, stages=stages, implementations=items), records=[], silent=True)
 
     def call(self, contract: Contract, state: S) -> S:
         """Runs the job's implementation of a contract on a state, or takes what it gave before on the same."""
@@ -45,7 +59,8 @@ class Engine:
         named = dict(zip(("stage", "use", "site"), where, strict=True))
         needs = item.cls.needs()
         key = digest(*where[:2], item.provider.fingerprint, stage.model_dump(), [state.key(name) for name in needs])
-        _tell(hooks.damageest_before_stage, **named)
+        if not self.silent:
+            _tell(hooks.damageest_before_stage, **named)
         start = time.perf_counter()
         try:
             cached, value = self.remember(
@@ -57,11 +72,13 @@ class Engine:
         except Exception as error:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
-            _tell(hooks.damageest_stage_failed, **named, error=error)
+            if not self.silent:
+                _tell(hooks.damageest_stage_failed, **named, error=error)
             raise _locate(error, item, state) from error
         seconds = time.perf_counter() - start
         self.records.append(StageRecord(*where[:2], str(item.provider), state.number, round(seconds, 3), cached))
-        _tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
+        if not self.silent:
+            _tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
         return state.with_named(contract.gives, value, key)
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:

@@ -21,6 +21,7 @@ from damageest.pipeline.sites import (
     take_enclosures,
     where_damaged,
 )
+from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.verdicts import choose_sites, judge_sites
 from damageest.stages.align import Align
 from damageest.stages.allowance import Allowance
@@ -39,15 +40,15 @@ from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
     ReadPart, ReadScan, measure_scan, Sample, Align, place_scan, Segment, inspect_skin, Cluster,
-    gather_intact,
+    find_surplus, gather_intact,
 )  # fmt: skip
 BY_SITE: Route = (
     take_clusters, Reconstruct, Boundary, enclose_grouped(Background, Enclose), Repair, Boolean, gather_sites,
 )  # fmt: skip
 AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
 CLOSE: Route = (
-    set_specks_aside, number_sites, choose_sites, describe_coverage, judge_sites, make_deposits(Allowance),
-    separate_deposits, collect_result,
+    set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus, judge_sites,
+    make_deposits(Allowance), separate_deposits, collect_result,
 )  # fmt: skip
 
 WRITE: Route = (Export,)

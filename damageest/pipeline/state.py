@@ -32,7 +32,7 @@ from damageest.artefacts import (
 from damageest.checks.coverage import SkinView
 from damageest.errors import StageError
 from damageest.pipeline.cache import digest
-from damageest.result import Coverage, Result, Verdict
+from damageest.result import Coverage, Result, Surplus, Verdict
 from damageest.stages.export import ExportedFiles, Writer
 
 T = TypeVar("T")
@@ -102,6 +102,7 @@ class JobState(State):
     intact = Value[Floats]()
     skin = Value[SkinView]()
     coverage = Value[Coverage]()
+    surplus = Value[tuple[Surplus, ...]]()
     enclosures = Value[Enclosures]()
     result = Value[Result]()
     folder = Value[Path]()

@@ -22,7 +22,7 @@ from damageest.pipeline.cache import Cache
 
 _OURS = re.compile(
     r"result\.json|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?(scan\.ply|result\.3mf"
-    r"|(damage|undamaged|(damage|surface|deposit)/site-\d+)\.(stl|ply|step))"
+    r"|(damage|undamaged|(damage|surface|deposit|surplus)/site-\d+)\.(stl|ply|step))"
 )
 """What a run writes, by its path in the output folder. Other files are the user's and stay, unless the
 old result.json lists them, as those that a plugin wrote in another format."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from damageest.artefacts import Deposit, Floats, Vector
-from damageest.result import Coverage, Result, Site
+from damageest.result import Coverage, Result, Site, Surplus
 from damageest.stages.export import ExportedFiles
 
 _NOTHING = ExportedFiles()
@@ -142,6 +143,26 @@ class SiteReport(_Model):
     warnings: list[str]
 
 
+class SurplusReport(_Model):
+    """Matter outside the nominal surface."""
+
+    id: int
+    kind: Literal["surplus", "displaced piece", "surroundings"] = Field(
+        description="surplus: added metal or dirt; displaced piece: losses of like size are beside it; surroundings: a "
+        "fixture, a table or a second specimen"
+    )
+    points: int
+    share: float = Field(description="of the scan's points")
+    volume: float | None = Field(description="null where it does not close, and for surroundings")
+    height: float = Field(description="largest distance of its points from the nominal surface")
+    area: float = Field(description="of the skin that it covers")
+    centre: Vector = Field(description="of the bounds")
+    bounds: tuple[Vector, Vector] = Field(description="of the volume; of the points where there is none")
+    file: str | None = Field(description="the first one of the volume; null where there is none")
+    beside: list[int] = Field(description="numbers of the sites beside it")
+    notes: list[str]
+
+
 class TruthReport(_Model):
     """Only after a virtual scan: how far the result is from the known truth."""
 
@@ -172,6 +193,7 @@ class Report(_Model):
     alignment: AlignmentReport
     coverage: CoverageReport | None
     sites: list[SiteReport]
+    surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
     export: ExportReport
     damage_volume: float
     undamaged_volume: float
@@ -227,6 +249,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
         ),
         coverage=_report_coverage(result.coverage),
         sites=sites,
+        surplus=[_report_surplus(item, result, written) for item in result.surplus],
         export=ExportReport(files=list(written.files), notes=list(written.notes)),
         damage_volume=result.damage_volume,
         undamaged_volume=result.undamaged_volume,
@@ -295,6 +318,27 @@ def _report_site(site: Site, written: ExportedFiles) -> SiteReport:
         ),
         spline=SplineReport(**vars(spline)) if spline else None,
         warnings=list(site.warnings),
+    )
+
+
+def _report_surplus(item: Surplus, result: Result, written: ExportedFiles) -> SurplusReport:
+    points = result.aligned.points[item.points]
+    bounds = np.array([points.min(axis=0), points.max(axis=0)]) if item.solid is None else item.solid.bounds
+    low, high = bounds.tolist()
+    own = [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"surplus/site-{item.id}.")]
+    return SurplusReport(
+        id=item.id,
+        kind=item.kind,
+        points=len(item.points),
+        share=item.share,
+        volume=item.volume,
+        height=item.height,
+        area=item.area,
+        centre=tuple(bounds.mean(axis=0).tolist()),
+        bounds=(tuple(low), tuple(high)),
+        file=next(iter(own), None),
+        beside=[site.id for site in result.sites if set(site.clusters) & set(item.clusters)],
+        notes=list(item.notes),
     )
 
 

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Flags, Floats, Part, Samples, Scan, Sites
-from damageest.geometry.distance import signed_distance
+from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Part, Samples, Scan, Sites
+from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
 
 
 @dataclass(frozen=True, eq=False)
 class SkinSamples:
     """``points`` (S,3) on the part's skin round the damage, and their outward ``normals`` (S,3). ``bare`` (S,): whether
-    no intact scan point is near, though the scan is dense enough there. ``usual`` (S,): the usual gap between the
-    scan's points there."""
+    no intact scan point is near and no added metal lies on it, though the scan is dense enough there. ``usual`` (S,):
+    the usual gap between the scan's points there."""
 
     points: Floats
     normals: Floats
@@ -30,19 +30,25 @@ def sample_skin_near(
     from scipy.spatial import cKDTree
 
     intact = (deviation.label == INTACT) & ~grown
+    added = deviation.label == ADDED
     flat = samples.kind == 0
     points, normals = samples.points[flat], samples.normals[flat]
-    skin, hits = _select_cubes(aligned.points, sites.label > 0, intact, points, 40 * tolerance)
+    skin, hits = _select_cubes(aligned.points, sites.label > 0, intact | added, points, 40 * tolerance)
     points, normals = points[skin], normals[skin]
-    keep = np.flatnonzero(hits)
+    keep = np.flatnonzero(hits & intact)
     hit = aligned.points[keep]
     if not len(hit) or not len(points):
         return SkinSamples(points, normals, np.ones(len(points), bool), np.full(len(points), aligned.spacing))
     thin = pick_one_per_cube(hit, 0.35 * tolerance)
     hit, face = hit[thin], deviation.face[keep][thin]
+    usual = _measure_usual_gap(points, hit, tolerance)
+    # Skin under added metal has no scan points, but no metal is lost there: the places below the added points cover it.
+    above = aligned.points[hits & added]
+    if len(above):
+        _, below, places = closest_on_mesh(above[pick_one_per_cube(above, 0.7 * tolerance)], part)
+        hit, face = np.concatenate([hit, places]), np.concatenate([face, below])
     cross = part.cross[face]
     outward = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
-    usual = _measure_usual_gap(points, hit, tolerance)
     clear = np.maximum(1.5 * usual, 2 * tolerance)
     # The normal counts as fourth to sixth coordinate: points on the far side of a thin wall must not count here.
     weight = 1.5 * tolerance

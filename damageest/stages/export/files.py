@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from damageest.result import Result
 
 UNDAMAGED, DAMAGE, DEPOSIT, DOUBTFUL = (150, 155, 165), (215, 50, 40), (40, 130, 205), (225, 165, 40)
+SURPLUS = (150, 90, 190)
 
 
 class Files(Export):
@@ -115,6 +116,8 @@ def _collect_bodies(result: Result) -> dict[str, Body]:
             continue
         found.append((f"damage/site-{site.id}", f"damage site-{site.id}", site.damage, DAMAGE))
         found.append((f"deposit/site-{site.id}", f"deposit site-{site.id}", site.deposit, DEPOSIT))
+    for item in result.surplus:
+        found.append((f"surplus/site-{item.id}", f"surplus site-{item.id}", item.solid, SURPLUS))
     return {stem: Body(name, solid, colour) for stem, name, solid, colour in found if solid is not None}
 
 

@@ -1,0 +1,159 @@
+"""Steps for what lies outside the nominal surface: what it is, its volume, and the sites beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import ADDED, DAMAGE, Sites
+from damageest.checks.surplus import close_surplus, describe_surplus, join_surplus
+from damageest.errors import DamageestError, StageError
+from damageest.geometry.complement import complement_deviation, complement_part, complement_samples, label_strays
+from damageest.geometry.pieces import JoinedPieces, find_pieces, join_pieces
+from damageest.geometry.solids import to_manifold, to_solid
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.result import Surplus
+from damageest.stages.cluster import Cluster
+from damageest.stages.enclose import EncloseAll
+
+MARGIN = 80.0
+"""Distance in tolerances between the surplus and the sides of the complement's box; more than an enclosure needs."""
+MOST_CLOSED = 40
+"""Number of surplus clusters, largest first, whose volume is computed."""
+MOST_SKIN = 0.5
+"""Share of the part's skin from which surplus is an error of the pose, of the unit or of the tolerance."""
+
+
+def find_surplus(engine: Engine, work: Work) -> Work:
+    """Finds added metal and surroundings, and the volume of the former.
+
+    A surplus is a loss of the part's complement: the job's implementations of `cluster` and `enclose` are called on
+    that. Points outside the skin that are in no cluster, or in surroundings, become outliers in the deviation, so that
+    they do not count as metal on the skin. Where a stage fails, the sites are found all the same.
+    """
+    state = work.job
+    if not (state.deviation.label == ADDED).any():
+        return replace(work, job=state.derive(JobState.surplus, (), JobState.deviation))
+    turned = state.derive(JobState.deviation, complement_deviation(state.deviation), JobState.deviation)
+    own = engine.make_silent(EncloseAll)
+    try:
+        clusters = own.call(Cluster, turned).sites
+    except StageError as error:
+        warning = f"points outside the nominal surface could not be grouped: {error}"
+        state = state.derive(JobState.surplus, (), JobState.deviation)
+        return replace(work, job=state, warnings=(*work.warnings, warning))
+    found = describe_surplus(clusters, state.sites, state.aligned, state.deviation, state.part, state.tolerance)
+    kept = _keep_metal(clusters, found)
+    deviation = label_strays(state.deviation, ADDED, kept)
+    surplus = _close(own, turned, found, kept) if kept.count else found
+    surplus = tuple(replace(item, id=number) for number, item in enumerate(_sort(surplus), 1))
+    sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.sites, JobState.samples)
+    key = digest("surplus", [state.key(source.name) for source in (*sources, JobState.tolerance)])
+    if deviation is not state.deviation:
+        state = state.derive(JobState.deviation, deviation, JobState.deviation, JobState.sites, JobState.tolerance)
+    return replace(work, job=state.with_value(JobState.surplus, surplus, key))
+
+
+def relate_surplus(engine: Engine, work: Work) -> Work:
+    """Names the surplus beside each site, and says what is to be done about surroundings."""
+    state, sites, warnings = work.job, list(work.sites), []
+    reach = max(2 * state.tolerance, 1.5 * state.aligned.spacing)
+    for item in state.surplus:
+        if item.kind == "surroundings":
+            continue
+        beside = [site for site in sites if set(site.clusters) & set(item.clusters)]
+        for site in beside:
+            if _is_touching(state, item, site, reach):
+                note = (
+                    f"surplus {item.id} lies at the edge of this damage: whether more is lost under it cannot be seen"
+                )
+                sites[sites.index(site)] = replace(site, notes=(*site.notes, note))
+        warnings += [f"surplus {item.id}: {note}" for note in item.notes if item.solid is None]
+        if item.kind == "displaced piece":
+            of = " and ".join(f"site {site.number} with a volume of {site.damage.volume:.4g}" for site in beside)
+            own = "" if item.volume is None else f" with a volume of {item.volume:.4g}"
+            warnings.append(
+                f"surplus {item.id}{own} may be a piece of the part that was displaced"
+                + (f", and {of} its place" if of else "")
+                + ": put it back and scan again, or repair the part as if the piece were lost"
+            )
+    if outside := [item for item in state.surplus if item.kind == "surroundings"]:
+        names = "; ".join(f"surplus {item.id}: {item.share:.1%} of the scan, {item.notes[0]}" for item in outside[:5])
+        warnings.append(
+            f"{sum(item.share for item in outside):.1%} of the scan does not belong to the part ({names}). It was left "
+            "out; crop the scan to the part to be sure"
+        )
+    return replace(work, sites=tuple(sites), warnings=(*work.warnings, *warnings))
+
+
+def _is_touching(state: JobState, item: Surplus, site: FoundSite, reach: float) -> bool:
+    from scipy.spatial import cKDTree
+
+    points = state.aligned.points
+    gap = cKDTree(points[item.points]).query(points[site.members], distance_upper_bound=reach, workers=2)[0]
+    return bool(np.isfinite(gap).any())
+
+
+def _keep_metal(clusters: Sites, found: tuple[Surplus, ...]) -> Sites:
+    """The clusters that are not surroundings, numbered anew."""
+    number = np.zeros(clusters.count + 1, np.int32)
+    kept = [item.id for item in found if item.kind != "surroundings"]
+    number[kept] = np.arange(1, len(kept) + 1)
+    return Sites(number[clusters.label], len(kept))
+
+
+def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: Sites) -> list[Surplus]:
+    """The surplus with solids where they close; ``turned`` is the state of the part's complement."""
+    metal = [item for item in found if item.kind != "surroundings"]
+    done = [item for item in found if item.kind == "surroundings"]
+    if sum(item.area for item in metal) > MOST_SKIN * turned.part.area:
+        note = "surplus covers most of the part: check pose, unit and tolerance; its volume was not computed"
+        return done + [replace(item, notes=(*item.notes, note)) for item in metal]
+    few = Sites(np.where(kept.label > MOST_CLOSED, 0, kept.label), min(kept.count, MOST_CLOSED))
+    reason, pieces = "no closed surface could be reconstructed through its points", []
+    try:
+        pieces = _enclose(engine, turned, few)
+    except (DamageestError, ValueError) as error:
+        reason = str(error)
+    left = dict(enumerate(metal, 1))
+    for piece in pieces:
+        item = join_surplus([metal[number - 1] for number in piece.clusters])
+        solid = close_surplus(item, piece.damage, turned.aligned, turned.part, turned.tolerance)
+        if solid is not None:
+            done.append(solid)
+            left = {number: other for number, other in left.items() if number not in piece.clusters}
+    for number, item in left.items():
+        why = reason if number <= MOST_CLOSED else f"only the {MOST_CLOSED} largest are closed"
+        done.append(replace(item, notes=(*item.notes, f"its volume was not computed: {why}")))
+    return done
+
+
+def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces]:
+    """Volumes outside the part, and the clusters that bound each."""
+    part, points, label = turned.part, turned.aligned.points, kept.label
+    members = np.flatnonzero(label)
+    deviation = label_strays(turned.deviation, DAMAGE, kept)
+    sources = (JobState.part, JobState.deviation, JobState.sites)
+    box = complement_part(part, points[members], MARGIN * turned.tolerance)
+    state = turned.derive(JobState.part, box, *sources)
+    state = state.derive(JobState.deviation, deviation, *sources)
+    state = state.derive(JobState.sites, kept, *sources)
+    state = state.derive(JobState.samples, complement_samples(turned.samples), JobState.samples)
+    origin = part.bounds.mean(axis=0)
+    whole = to_manifold(part, origin)
+    reach = max(2 * turned.tolerance, turned.aligned.spacing)
+    pieces = []
+    for enclosure in engine.call(EncloseAll, state).enclosures.items:
+        outside = to_solid(to_manifold(enclosure.solid, origin) - whole, origin)
+        if outside is not None:
+            pieces += find_pieces(outside, points[members], label[members], reach)[0]
+    return join_pieces(pieces)
+
+
+def _sort(items: Sequence[Surplus]) -> list[Surplus]:
+    """Largest volume first; then what has none, surroundings last."""
+    return sorted(items, key=lambda item: (item.kind == "surroundings", -(item.volume or 0.0), -item.share))
