@@ -29,6 +29,8 @@ from damageest.evaluate.honesty.kinds import TROUBLES
 from damageest.evaluate.honesty.scene import Scanning, TroubleScene
 from damageest.evaluate.processes import MARK
 from damageest.geometry.transforms import invert_pose
+from damageest.registry import Registry
+from damageest.registry.hookspecs import hookimpl
 from damageest.result import Result
 
 
@@ -63,7 +65,24 @@ class TroubleCase:
         row |= {"key": self.compute_key(), "outcome": "silent", "reason": "", "iou": None, "unseen": 0}
         row |= {"cautious": False, "refused": False, "skipped": False, "error": "", "texts": [], "sites": 0}
         row |= {"accepted": 0, "true_volume": 0.0, "found_volume": 0.0, "seen": None, "seen_reported": None}
-        return row | {"seen_error": None, "seconds": 0.0, "stage_seconds": {}, "step_seconds": 0.0}
+        return row | {"seen_error": None, "seconds": 0.0, "cpu_seconds": 0.0, "step_seconds": 0.0}
+
+
+class StageClock:
+    """Adds up the processor time of the stages of a run. What is left of the run's time are its steps."""
+
+    def __init__(self) -> None:
+        self.stage_seconds = 0.0
+        self._start = 0.0
+
+    @hookimpl
+    def damageest_before_stage(self, stage: str) -> None:
+        """Takes the time before a stage."""
+        self._start = time.process_time()
+
+    @hookimpl
+    def damageest_after_stage(self, stage: str) -> None:
+        self.stage_seconds += time.process_time() - self._start
 
 
 def make_scene(case: TroubleCase) -> TroubleScene:
@@ -104,27 +123,28 @@ def run_case(case: TroubleCase) -> dict[str, Any]:
     scanning = Scanning(case.part, case.seed, amount=case.amount)
     settings = ["allowance=none", f"tolerance={scanning.tolerance:.6g}"]
     settings += ["align=none"] if case.pose == "known" else []
-    start = time.perf_counter()
+    settings += scene.settings
+    clock = StageClock()
+    registry = Registry.discover([clock])
+    start, cpu_start = time.perf_counter(), time.process_time()
     try:
-        result = damageest.run({"version": 1}, part=scene.part, scan=scan, settings=[*settings, *scene.settings])
+        result = damageest.run({"version": 1}, part=scene.part, scan=scan, settings=settings, registry=registry)
     except (StageError, InputError) as error:
         message = " ".join(str(error).split())
         row["seconds"] = time.perf_counter() - start
         return row | vars(judge_error(message, names)) | {"iou": None, "error": message}
     except DamageestError as error:  # the job of the evaluation itself is at fault
         raise RuntimeError(f"the job of case {case.number} is not valid: {error}") from error
-    row["seconds"] = time.perf_counter() - start
-    row |= _describe_result(result, row["seconds"], scene)
+    row["seconds"], row["cpu_seconds"] = time.perf_counter() - start, time.process_time() - cpu_start
+    row["step_seconds"] = row["cpu_seconds"] - clock.stage_seconds
+    row |= _describe_result(result, scene)
     state = TrueState(scene.part, scene.damage, pose if scene.has_pose else None, names)
     row |= vars(judge(result, state))
     return {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in row.items()}
 
 
-def _describe_result(result: Result, seconds: float, scene: TroubleScene) -> dict[str, Any]:
+def _describe_result(result: Result, scene: TroubleScene) -> dict[str, Any]:
     """The fields of a row that come from the result."""
-    stages: dict[str, float] = {}
-    for record in result.stages:
-        stages[record.stage] = round(stages.get(record.stage, 0.0) + record.seconds, 3)
     reported = None if result.coverage is None else result.coverage.seen
     return {
         "texts": [" ".join(text.split()) for text in collect_texts(result)],
@@ -133,8 +153,6 @@ def _describe_result(result: Result, seconds: float, scene: TroubleScene) -> dic
         "found_volume": sum(site.damage.volume for site in result.sites if site.accepted),
         "seen_reported": reported,
         "seen_error": measure_seen_error(result.coverage, scene.seen),
-        "stage_seconds": stages,
-        "step_seconds": round(seconds - sum(stages.values()), 3),
     }
 
 

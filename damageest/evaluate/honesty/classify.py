@@ -64,20 +64,24 @@ def judge_error(message: str, names: Sequence[str]) -> Judgement:
 
 def judge(result: Result, true: TrueState) -> Judgement:
     """The judgement on a run that gave a result."""
-    bodies = _split_damage(true, result.pose, result.tolerance)
-    unseen = [body for body in bodies if _is_unseen(body, result)]
-    seen = [body for body in bodies if not any(body is other for other in unseen)]
-    has_pose = true.pose is not None and is_pose_right(true.part, result.pose, true.pose, result.tolerance)
+    tolerance = result.tolerance
+    bodies = _split_damage(true, result.pose, tolerance)
+    unseen = [body for body in bodies if _share_reported(body, result, "unseen") >= UNSEEN_SHARE]
+    seen = _leave_out(bodies, unseen)
+    has_pose = true.pose is not None and is_pose_right(true.part, result.pose, true.pose, tolerance)
     accepted = [site.damage for site in result.sites if site.accepted]
     faults = [] if has_pose else ["the pose is wrong"]
-    faults += find_faults(accepted, seen, unseen, true.part, result.tolerance)
-    value = _compare(accepted, seen, true.part, result.tolerance)[0]
+    faults += find_faults(accepted, seen, unseen, true.part, tolerance)
+    value = _compare(accepted, seen, true.part, tolerance)[0]
     if not faults:
         return Judgement("right", "", value, len(unseen))
     why = "; ".join(faults)
     doubtful = [site.damage for site in result.sites if not site.accepted]
-    if doubtful and _is_rest_right(accepted, doubtful, seen, unseen, true.part, result.tolerance, has_pose):
-        all_faults = find_faults([*accepted, *doubtful], seen, unseen, true.part, result.tolerance)
+    lost = [body for body in seen if _share_reported(body, result, "lost") >= UNSEEN_SHARE]
+    if lost and has_pose and not find_faults(accepted, _leave_out(seen, lost), [*unseen, *lost], true.part, tolerance):
+        return Judgement("said", f"named: {why} | skin reported as lost", value, len(unseen))
+    if doubtful and _is_rest_right(accepted, doubtful, seen, unseen, true.part, tolerance, has_pose):
+        all_faults = find_faults([*accepted, *doubtful], seen, unseen, true.part, tolerance)
         return Judgement("said", f"doubtful: {why}", value, len(unseen), cautious=has_pose and not all_faults)
     if text := find_name(collect_texts(result), true.names):
         return Judgement("said", f"named: {why} | {text}", value, len(unseen))
@@ -158,8 +162,7 @@ def _is_rest_right(
     if not has_pose:
         return not accepted
     touched = [body for body in seen if _share_inside(body, accepted) < MATCH <= _share_inside(body, doubtful)]
-    rest = [body for body in seen if not any(body is other for other in touched)]
-    return not find_faults(accepted, rest, [*unseen, *touched], part, tolerance)
+    return not find_faults(accepted, _leave_out(seen, touched), [*unseen, *touched], part, tolerance)
 
 
 def is_pose_right(part: Part, found: Pose, true: Floats, tolerance: float) -> bool:
@@ -187,17 +190,23 @@ def _split_damage(true: TrueState, pose: Pose, tolerance: float) -> list[Solid]:
     return [piece for piece in pieces if piece is not None]
 
 
-def _is_unseen(body: Solid, result: Result) -> bool:
-    """Whether the result reports the skin of a damage as unseen."""
+def _share_reported(body: Solid, result: Result, what: Literal["unseen", "lost"]) -> float:
+    """Share of a damage's skin that the result reports as unseen, or as lost because rays passed through it."""
     coverage = result.coverage
     if coverage is None or not len(coverage.skin.faces):
-        return False
+        return 0.0
     points = sample_by_area(body, 2000, np.random.default_rng(3))[0]
     skin = points[distance_to_mesh(points, result.part) < 1e-5 * result.part.diagonal]
     if not len(skin):
-        return False
+        return 0.0
     cell = closest_on_mesh(skin, coverage.skin)[1]
-    return bool((coverage.region[cell] >= 0).mean() >= UNSEEN_SHARE)
+    is_lost = coverage.is_lost[cell]
+    reported = is_lost if what == "lost" else (coverage.region[cell] >= 0) & ~is_lost
+    return float(reported.mean())
+
+
+def _leave_out(bodies: Sequence[Solid], others: Sequence[Solid]) -> list[Solid]:
+    return [body for body in bodies if not any(body is other for other in others)]
 
 
 def collect_texts(result: Result) -> list[str]:

@@ -57,7 +57,8 @@ def format_trouble_row(row: Row) -> str:
     """The line that is printed when a case is finished."""
     if row["skipped"]:
         return f"{describe_case(row)}: skipped: {row['error']}"
-    reason = row["reason"] or (f"IoU {row['iou']:.3f}" if row["iou"] is not None else "no damage, none found")
+    found = "damage on skin reported as unseen" if row["unseen"] else "no damage, none found"
+    reason = row["reason"] or (f"IoU {row['iou']:.3f}" if row["iou"] is not None else found)
     return f"{describe_case(row)}: {row['outcome']}, {row['seconds']:.1f} s: {reason[:300]}"
 
 
@@ -84,12 +85,13 @@ def summarise_troubles(rows: Sequence[Row]) -> list[str]:
             f"share of seen skin of undamaged parts: off by {np.median(errors):.1f} points of per cent in the median "
             f"of {len(errors)} cases, at most by {max(errors):.1f}"
         )
-    if run := [row for row in done if row["stage_seconds"]]:
+    if run := [row for row in done if row["cpu_seconds"]]:
         steps = [row["step_seconds"] for row in run]
-        share = sum(steps) / max(sum(row["seconds"] for row in run), 1e-9)
+        total = sum(row["cpu_seconds"] for row in run)
         lines.append(
-            f"time outside the stages (checks and other steps): {np.median(steps):.1f} s in the median, {share:.0%} of "
-            f"all; {sum(row['seconds'] for row in done):.0f} s for all runs"
+            f"processor time of the steps between the stages, with all checks: {np.median(steps):.1f} s in the median, "
+            f"at most {max(steps):.1f} s, {sum(steps) / total:.0%} of all; time of all runs: "
+            f"{sum(row['seconds'] for row in done):.0f} s, on processors {total:.0f} s"
         )
     return lines
 

@@ -112,6 +112,13 @@ def test_a_missed_damage_on_skin_reported_as_unseen_is_right_and_counted() -> No
     assert elsewhere.outcome == "silent"
 
 
+def test_a_missed_damage_on_skin_reported_as_lost_is_said() -> None:
+    coverage = _make_coverage((20, 10, 19), (40, 30, 21))
+    found = _judge(_make_result(_make_site(DENT), coverage=replace(coverage, is_lost=coverage.region >= 0)))
+    assert (found.outcome, found.unseen) == ("said", 0)
+    assert found.reason.endswith("skin reported as lost")
+
+
 def test_a_doubtful_site_on_the_damage_is_said() -> None:
     found = _judge(_make_result(_make_site(DENT), _make_site(OTHER, False)))
     assert (found.outcome, found.cautious) == ("said", True)

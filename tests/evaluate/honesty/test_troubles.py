@@ -93,7 +93,7 @@ def test_kinds_and_parts_are_chosen_by_their_names() -> None:
 
 def test_the_table_counts_and_names_the_silent_cases() -> None:
     wall = [case for case in CASES if case.kind == "lost wall"][:3]
-    right, said, silent = (case.make_blank_row() | {"seconds": 2.0, "stage_seconds": {"align": 1.5}} for case in wall)
+    right, said, silent = (case.make_blank_row() | {"seconds": 2.0, "cpu_seconds": 1.5} for case in wall)
     right |= {"outcome": "right", "unseen": 1, "iou": 0.99, "step_seconds": 0.5}
     said |= {"outcome": "said", "reason": "doubtful: 1 damages missed", "cautious": True}
     silent |= {"reason": "1 damages missed", "seen_error": 1.5}
