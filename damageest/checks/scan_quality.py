@@ -2,18 +2,47 @@
 
 from __future__ import annotations
 
-from damageest.artefacts import Part, Scan
+import numpy as np
+
+from damageest.artefacts import Floats, Part, Scan
+from damageest.errors import StageError
 
 AUTO_TOLERANCE = 4.0
 """Lambda over the scan's noise where the job says auto: 6 in 100,000 intact points deviate by more."""
 
+AUTO_STEPS = 1.5
+"""Least lambda over the step of the scan's depth where the job says auto; a point is off by up to half a step."""
 
-def choose_tolerance(wanted: float | None, scan: Scan, part: Part) -> tuple[float, list[str]]:
-    """Lambda in the job's unit, and what is doubtful about it, in words. ``wanted`` None: from the scan's noise."""
+RAISE = 1.5
+"""How many times larger the tolerance has to become before auto raises it after the alignment."""
+
+NEAR_PART = 0.03
+"""Distance from the part up to which a point is near it, in diagonals, and at least in twice the tolerance."""
+
+MIN_INTACT = 0.25
+"""Least share of the points near the part that must be intact."""
+
+
+def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float = 0.0) -> tuple[float, list[str]]:
+    """Lambda in the job's unit, and what is doubtful about it, in words.
+
+    ``wanted`` None: from the scan's noise and from the ``step`` of its depth (0: continuous).
+    """
     least = 1e-4 * part.diagonal
-    tolerance = wanted or max(AUTO_TOLERANCE * scan.noise, 2 * part.tessellation_error, least)
+    auto = max(AUTO_TOLERANCE * scan.noise, AUTO_STEPS * step, 2 * part.tessellation_error, least)
+    tolerance = wanted or auto
     warnings = []
-    if tolerance < 3 * scan.noise:
+    if step:
+        warnings.append(
+            f"the scan's depth has steps of {step:.3g}, as of a depth camera: damage shallower than about "
+            f"{AUTO_STEPS * step:.3g} cannot be found in it"
+        )
+    if step and tolerance < step:
+        warnings.append(
+            f"the tolerance {tolerance:.3g} is less than one step of the scan's depth: intact surface may be taken for "
+            f"damage; {AUTO_STEPS * step:.3g} would be safe"
+        )
+    elif tolerance < 3 * scan.noise:
         warnings.append(
             f"the tolerance {tolerance:.3g} is less than three times the scan's noise {scan.noise:.3g}: intact surface "
             f"may be taken for damage; {AUTO_TOLERANCE * scan.noise:.3g} would be safe"
@@ -29,3 +58,83 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part) -> tuple[floa
             "surface between them is interpolated"
         )
     return tolerance, warnings
+
+
+def measure_form_deviation(distance: Floats, within: float) -> float:
+    """The scale of a standard deviation of the intact points' distances to the part, whatever makes them deviate:
+    noise, form errors of scanner or part, an inexact pose.
+
+    Only points outside the part (positive ``distance`` (N,)) are used, because damage is inside. Of these, the ones
+    farther than 3.5 deviations are left out, again and again from ``within`` on, until nothing changes. 0 where the
+    points are not concentrated at the surface.
+    """
+    outside = np.sort(distance[(distance > 0) & (distance < within)])
+    band = within
+    for _ in range(60):
+        kept = outside[: np.searchsorted(outside, band)]
+        if len(kept) < 30:
+            return 0.0
+        narrower = 3.5 * 1.4826 * float(np.median(kept))
+        if narrower >= 0.999 * band:
+            break
+        band = narrower
+    return band / 3.5 if band < 0.5 * within else 0.0
+
+
+def raise_tolerance(tolerance: float, distance: Floats, part: Part, noise: float) -> tuple[float, list[str]]:
+    """Lambda for a scan whose intact points deviate by more than its noise, and a warning that says so; else the same.
+
+    ``tolerance``: chosen from the noise before the alignment. ``distance`` (N,): signed, of the aligned points.
+    """
+    deviation = measure_form_deviation(distance, NEAR_PART * part.diagonal)
+    needed = AUTO_TOLERANCE * deviation
+    if needed <= RAISE * tolerance:
+        return tolerance, []
+    return needed, [
+        f"intact surface deviates from the part by {deviation:.3g} (standard deviation), far more than the scan's "
+        f"noise of {noise:.3g}: form errors of scanner or part, or an inexact pose; tolerance: auto was raised from "
+        f"{tolerance:.3g} to {needed:.3g}, and shallower damage is not found"
+    ]
+
+
+def require_intact(distance: Floats, tolerance: float, part: Part) -> None:
+    """Raises StageError where few of the points near the part are intact: nothing shows then what is damage.
+
+    ``distance`` (N,): signed, of the aligned points.
+    """
+    size = np.abs(distance)
+    near = np.sort(size[size < max(NEAR_PART * part.diagonal, 2 * tolerance)])
+    if len(near) < 50:
+        return
+    share = float((near <= tolerance).mean())
+    if share >= MIN_INTACT:
+        return
+    better = float(np.quantile(near, 0.75))
+    raise StageError(
+        f"only {share:.0%} of the scan points near the part are intact, which means within the tolerance of "
+        f"{tolerance:.3g} {part.unit}; at least {MIN_INTACT:.0%} have to be: damage cannot be told from errors of scan "
+        "or pose",
+        f"check the pose first; then a larger tolerance: 75 % of these points lie within {better:.2g} {part.unit}",
+    )
+
+
+def check_walls(tolerance: float, part: Part) -> list[str]:
+    """A warning where the tolerance is so large that damage cannot be found in the part's walls; else nothing."""
+    from damageest.geometry.rays import RayCaster
+    from damageest.geometry.sampling import sample_by_area
+
+    points, face = sample_by_area(part, 2000, np.random.default_rng(0))
+    normals = part.cross[face] / np.maximum(np.linalg.norm(part.cross[face], axis=1), 1e-300)[:, None]
+    start = points - 1e-5 * part.diagonal * normals
+    thickness = RayCaster(part).find_first(start, -normals)[0]
+    thickness = thickness[np.isfinite(thickness)]
+    if not len(thickness):
+        return []
+    thin = float((thickness < 2 * tolerance).mean())
+    if thin < 0.1:
+        return []
+    walls = f"{float(np.quantile(thickness, 0.1)):.3g} {part.unit} thick where they are thin"
+    return [
+        f"the tolerance {tolerance:.3g} {part.unit} is more than half the thickness of the part's walls on {thin:.0%} "
+        f"of its surface (walls are {walls}): no damage can be found there"
+    ]

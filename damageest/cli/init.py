@@ -44,7 +44,7 @@ def command(
         *(f"# CAUTION: {caution}" for caution in cautions),
         "version: 1",
         f"units: {units:<20} # of all lengths in this file, and of files without a unit",
-        f"tolerance: {tolerance:<16.4g} # lambda: points closer to the nominal surface are intact; auto: 4 x noise",
+        f"tolerance: {tolerance:<16.4g} # lambda: points closer to the nominal surface are intact; or auto",
         f"part: {_quote(paths[0])}",
         f"scan: {_quote(paths[1])}",
         "align: register             # for any start pose; icp or none if the scan is already in the part's frame",

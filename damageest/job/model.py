@@ -48,7 +48,9 @@ class Header(BaseModel):
     name: str = Field("", pattern=r"^[^/\\\x00]*$", description="name of the job; default: the file's stem")
     units: Unit = Field("mm", description="unit of every length in the job, and of files that carry none")
     tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] | Literal["auto"] = Field(
-        "auto", description="lambda, the threshold of accuracy, in the job's unit; auto: four times the scan's noise"
+        "auto",
+        description="lambda, the threshold of accuracy, in the job's unit; auto: four times the scan's noise, "
+        "more where its depth has steps or intact surface deviates by more",
     )
     method: str = Field(
         "auto",

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from damageest.artefacts import INTACT, Part, Scan
-from damageest.checks.scan_quality import choose_tolerance
-from damageest.errors import InputError
+from damageest.checks.scan_quality import check_walls, choose_tolerance, raise_tolerance, require_intact
+from damageest.errors import InputError, StageError
+from damageest.geometry.depth_steps import measure_depth_step
+from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.units import diagnose_scale
 from damageest.job.model import Job
@@ -16,6 +19,10 @@ from damageest.pipeline.state import JobState, Work
 from damageest.registry.registry import Registry
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
+from damageest.stages.segment import Segment
+
+COMPARED = 20_000
+"""Points that the tolerance is chosen from after the alignment."""
 
 
 def measure_scan(engine: Engine, work: Work) -> Work:
@@ -24,14 +31,22 @@ def measure_scan(engine: Engine, work: Work) -> Work:
     scan, part = state.scan, state.part
     if wrong_size := diagnose_scale(scan.points, part.vertices, part.unit):
         raise InputError(f"scan: {wrong_size}")
+    step = 0.0
     if not scan.noise:
-        key = digest("measure", state.key("scan"))
-        _, (noise, spacing) = engine.remember("measure", key, lambda: measure_noise_and_spacing(scan.points))
+        key = digest("measure with steps", state.key("scan"))
+        _, (noise, spacing, step) = engine.remember("measure", key, lambda: _measure(scan))
         scan = replace(scan, noise=noise, spacing=spacing)
-    tolerance, warnings = choose_tolerance(engine.job.tolerance, scan, part)
+    tolerance, warnings = choose_tolerance(engine.job.tolerance, scan, part, step)
     state = state.derive(JobState.scan, scan, JobState.scan)
     state = state.with_value(JobState.tolerance, tolerance, digest(tolerance))
     return replace(work, job=state, warnings=(*work.warnings, *warnings))
+
+
+def _measure(scan: Scan) -> tuple[float, float, float]:
+    """Noise, spacing, and the step of the depth (0: continuous); rounding to steps counts as noise."""
+    noise, spacing = measure_noise_and_spacing(scan.points)
+    step = measure_depth_step(scan.points, scan.viewpoints, scan.view)
+    return max(noise, step / math.sqrt(12)), spacing, step
 
 
 def place_scan(engine: Engine, work: Work) -> Work:
@@ -42,6 +57,31 @@ def place_scan(engine: Engine, work: Work) -> Work:
     state = state.derive(JobState.noise, scan.noise, JobState.scan)
     state = state.derive(JobState.spacing, scan.spacing, JobState.scan)
     return replace(work, job=state, warnings=(*work.warnings, *pose.notes))
+
+
+def settle_tolerance(engine: Engine, work: Work) -> Work:
+    """Where the tolerance is auto: raises it if intact surface deviates from the part by far more than the noise.
+    Warns of a tolerance that the part's walls are too thin for."""
+    state = work.job
+    part, points, tolerance = state.part, state.aligned.points, state.tolerance
+    warnings: list[str] = []
+    if engine.job.tolerance is None and len(points):
+        distance = signed_distance(points[:: max(1, math.ceil(len(points) / COMPARED))], part)[0]
+        tolerance, warnings = raise_tolerance(tolerance, distance, part, state.noise)
+        state = state.with_value(JobState.tolerance, tolerance, digest(tolerance))
+    warnings += check_walls(tolerance, part)
+    return replace(work, job=state, warnings=(*work.warnings, *warnings))
+
+
+def check_intact(engine: Engine, work: Work) -> Work:
+    """Stops with a StageError where too few points near the part are intact."""
+    state = work.job
+    try:
+        require_intact(state.deviation.distance, state.tolerance, state.part)
+    except StageError as error:
+        error.stage, error.use = "segment", engine.job.implementations[Segment].name
+        raise
+    return work
 
 
 def gather_intact(engine: Engine, work: Work) -> Work:
@@ -62,7 +102,7 @@ def inspect_inputs(job: Job, registry: Registry) -> tuple[Part, Scan, float, lis
     """Part, measured scan, a tolerance for them, and what is doubtful; for a new job."""
     part, scan = read_inputs(job, registry)
     doubts = [doubt] if (doubt := diagnose_scale(scan.points, part.vertices, part.unit)) else []
-    noise, spacing = measure_noise_and_spacing(scan.points)
+    noise, spacing, step = _measure(scan)
     scan = replace(scan, noise=noise, spacing=spacing)
-    tolerance, more = choose_tolerance(None, scan, part)
-    return part, scan, tolerance, doubts + more
+    tolerance, more = choose_tolerance(None, scan, part, step)
+    return part, scan, tolerance, doubts + more + check_walls(tolerance, part)

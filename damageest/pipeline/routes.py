@@ -12,7 +12,7 @@ from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
 from damageest.pipeline.grouped_enclosure import enclose_grouped
-from damageest.pipeline.prepare import gather_intact, measure_scan, place_scan
+from damageest.pipeline.prepare import check_intact, gather_intact, measure_scan, place_scan, settle_tolerance
 from damageest.pipeline.sites import (
     gather_sites,
     number_sites,
@@ -39,8 +39,8 @@ from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
-    ReadPart, ReadScan, measure_scan, Sample, Align, place_scan, Segment, inspect_skin, Cluster,
-    find_surplus, gather_intact,
+    ReadPart, ReadScan, measure_scan, Sample, Align, place_scan, settle_tolerance,
+    Segment, check_intact, inspect_skin, Cluster, find_surplus, gather_intact,
 )  # fmt: skip
 BY_SITE: Route = (
     take_clusters, Reconstruct, Boundary, enclose_grouped(Background, Enclose), Repair, Boolean, gather_sites,

@@ -1,0 +1,71 @@
+"""The tolerance follows noise, steps of the depth and form errors; damage does not change it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from damageest.artefacts import Floats, Scan
+from damageest.checks.scan_quality import (
+    check_walls,
+    choose_tolerance,
+    measure_form_deviation,
+    raise_tolerance,
+    require_intact,
+)
+from damageest.errors import StageError
+from damageest.evaluate.parts import PARTS
+
+PART = PARTS["block"]()
+SCAN = Scan(np.zeros((1, 3)), noise=0.05, spacing=0.1)
+
+
+def deviate(sigma: float, worn: float = 0.0, depth: float = 0.5) -> Floats:
+    """Signed distances: noise, of which the share ``worn`` is moved inward by ``depth``."""
+    rng = np.random.default_rng(1)
+    distance = rng.normal(0, sigma, 20_000)
+    distance[: round(worn * len(distance))] -= depth
+    return distance
+
+
+def test_auto_is_four_times_the_noise() -> None:
+    assert choose_tolerance(None, SCAN, PART) == (pytest.approx(0.2), [])
+
+
+def test_auto_with_steps() -> None:
+    tolerance, warnings = choose_tolerance(None, SCAN, PART, step=1.0)
+    assert tolerance == 1.5
+    assert "steps of 1" in warnings[0]
+    tolerance, warnings = choose_tolerance(0.3, SCAN, PART, step=1.0)
+    assert tolerance == 0.3
+    assert any("less than one step" in text for text in warnings)
+
+
+@pytest.mark.parametrize("worn", [0.0, 0.3, 0.6])
+def test_damage_does_not_change_the_deviation(worn: float) -> None:
+    assert measure_form_deviation(deviate(0.05, worn), 3.0) == pytest.approx(0.05, rel=0.1)
+    assert raise_tolerance(0.2, deviate(0.05, worn), PART, 0.05) == (0.2, [])
+
+
+def test_nothing_at_the_surface() -> None:
+    assert measure_form_deviation(np.random.default_rng(0).uniform(-3, 3, 20_000), 3.0) == 0
+    assert measure_form_deviation(np.empty(0), 3.0) == 0
+
+
+def test_form_errors_raise_the_tolerance() -> None:
+    tolerance, warnings = raise_tolerance(0.2, deviate(0.3, 0.2, 5.0), PART, 0.05)
+    assert tolerance == pytest.approx(1.2, rel=0.1)
+    assert "was raised from 0.2" in warnings[0]
+
+
+def test_few_intact_points_stop_the_run() -> None:
+    require_intact(deviate(0.05, 0.6), 0.2, PART)
+    require_intact(np.empty(0), 0.2, PART)
+    with pytest.raises(StageError, match="only 16% of the scan points near the part are intact") as caught:
+        require_intact(deviate(0.05), 0.01, PART)
+    assert "75 % of these points lie within 0.057 mm" in caught.value.remedy
+
+
+def test_a_tolerance_beyond_the_walls() -> None:
+    assert not check_walls(0.2, PART)
+    assert "no damage can be found there" in check_walls(12.0, PART)[0]
