@@ -55,9 +55,7 @@ def _find_removed(cells: SkinCells, seen: Flags, losses: Sequence[Solid], reach:
         index = np.flatnonzero(near)
         if not len(index):
             continue
-        inward = cells.centres[index] - 0.2 * reach * cells.normals[index]
-        touching = distance_to_mesh(cells.centres[index], loss) < reach
-        removed[index[touching | is_inside(inward, loss)]] = True
+        removed[index[distance_to_mesh(cells.centres[index], loss) < 0.5 * reach]] = True
     return removed
 
 

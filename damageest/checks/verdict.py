@@ -57,25 +57,27 @@ def judge_site(
     for reason in evidence.reasons:
         unseen_only = reason.endswith("the damage may extend there") and evidence.skin_unseen <= UNSEEN
         (open_questions if unseen_only or (proven_by_rays and "no scan point" in reason) else against).append(reason)
-    if deepest < SYSTEMATIC * limits.systematic and limits.systematic > 0.15 * tolerance:
+    if not proven_by_rays and deepest < SYSTEMATIC * limits.systematic and limits.systematic > 0.15 * tolerance:
         against.append(
             f"it is {deepest:.3g} {unit} deep, and intact skin deviates by {limits.systematic:.3g} {unit} over whole "
             "areas (pose, form of the part, or scanner): it cannot be told from that"
         )
-    elif typical < SYSTEMATIC * limits.systematic and limits.systematic > 0.15 * tolerance:
+    elif not proven_by_rays and typical < SYSTEMATIC * limits.systematic and limits.systematic > 0.15 * tolerance:
         open_questions.append(
             f"intact skin deviates by {limits.systematic:.3g} {unit} over whole areas, which changes its volume"
         )
-    if len(members) < TOO_FEW:
+    if proven_by_rays:
+        pass
+    elif len(members) < TOO_FEW:
         against.append(f"only {len(members)} scan points lie on it; stray points explain it")
     elif len(members) < FEW:
         open_questions.append(f"only {len(members)} scan points lie on it")
-    if evidence.consistent and evidence.intact_share > MIXED:
+    if evidence.consistent and evidence.intact_share > MIXED and not proven_by_rays:
         open_questions.append(
             f"{evidence.intact_share:.0%} of the scan points over the skin that it removes lie on that skin: its rim "
             "is not clear"
         )
-    if deepest < SHALLOW * tolerance:
+    if deepest < SHALLOW * tolerance and not proven_by_rays:
         open_questions.append(f"it is less than {SHALLOW:g} tolerances deep: its rim fades out below the tolerance")
     against += [*pose_doubts(pose), *beside]
     if against:

@@ -65,7 +65,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
 
 def _describe_site(found: FoundSite) -> Site:
     evidence, members, warnings = found.evidence, found.members, found.notes
-    if len(members) < FEW:
+    if 0 < len(members) < FEW:
         warnings = ("scan it more densely for a reliable volume", *warnings)
     deposit, damage = found.deposit, found.damage
     if isinstance(deposit, Deposit):
@@ -83,7 +83,7 @@ def _describe_site(found: FoundSite) -> Site:
         accepted=found.accepted,
         method=found.method,
         evidence=evidence,
-        max_depth=max(float(-found.job.deviation.distance[members].min()), 0.0),
+        max_depth=max(float(-found.job.deviation.distance[members].min(initial=0.0)), 0.0),
         warnings=warnings,
     )
 

@@ -12,6 +12,7 @@ from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
 from damageest.pipeline.grouped_enclosure import enclose_grouped
+from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.prepare import check_intact, gather_intact, measure_scan, place_scan, settle_tolerance
 from damageest.pipeline.sites import (
     gather_sites,
@@ -47,8 +48,8 @@ BY_SITE: Route = (
 )  # fmt: skip
 AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
 CLOSE: Route = (
-    set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus, judge_sites,
-    make_deposits(Allowance), separate_deposits, collect_result,
+    add_lost_bodies, set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus,
+    judge_sites, make_deposits(Allowance), separate_deposits, collect_result,
 )  # fmt: skip
 
 WRITE: Route = (Export,)

@@ -12,7 +12,7 @@ from damageest.checks.coverage import SkinView
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.verdict import judge_site, measure_limits
 from damageest.errors import StageError
-from damageest.geometry.distance import is_inside
+from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import to_solid, unite
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
@@ -93,6 +93,6 @@ def _is_proven_by_rays(skin: SkinView, site: FoundSite) -> bool:
     cells, damage = skin.cells, site.damage
     near: Flags = ((cells.centres > damage.bounds[0]) & (cells.centres < damage.bounds[1])).all(axis=1)
     index = np.flatnonzero(near & ~skin.seen)
-    index = index[is_inside(cells.centres[index] - 0.05 * cells.edge * cells.normals[index], damage)]
+    index = index[distance_to_mesh(cells.centres[index], damage) < 1e-3 * cells.edge] if len(index) else index
     area = cells.areas[index]
     return bool(len(index)) and float(area[skin.rays.lost[index]].sum()) > BY_RAYS * float(area.sum())

@@ -1,0 +1,48 @@
+"""The step for bodies of the part that are gone altogether: no inner damage surface is left of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import Evidence, Solid
+from damageest.geometry.bodies import label_pieces
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import FoundSite, Work
+
+SEEN = 0.02
+"""Share of a body's skin that the scan may show though the body is gone: points of a body that it touched."""
+PASSED = 0.1
+"""Share of a body's skin that rays have to have passed through."""
+
+
+def add_lost_bodies(engine: Engine, work: Work) -> Work:
+    """Makes a site of each connected body of the part of which the scan shows nothing, and through which rays of the
+    scanner passed."""
+    state = work.job
+    part, skin = state.part, state.skin
+    if skin.rays is None or not skin.rays.lost.any():
+        return work
+    piece = label_pieces(part.faces)
+    if piece.max() == 0:
+        return work
+    cells, owner = skin.cells, piece[skin.cells.parent]
+    total, seen, passed = (
+        np.bincount(owner, weights=cells.areas * chosen)
+        for chosen in (np.ones(len(owner)), skin.seen, skin.rays.lost & ~skin.seen)
+    )
+    found = []
+    for number in np.flatnonzero((seen < SEEN * total) & (passed > PASSED * total)):
+        used, renumbered = np.unique(part.faces[piece == number], return_inverse=True)
+        try:
+            body = Solid(part.vertices[used], renumbered.reshape(-1, 3))
+        except ValueError:  # a cavity
+            continue
+        low, high = body.bounds
+        if any((site.damage.bounds[0] < high).all() and (site.damage.bounds[1] > low).all() for site in work.sites):
+            continue
+        site = FoundSite(job=state, method="rays", evidence=Evidence())
+        found.append(site.with_value(FoundSite.damage, body, digest(body)))
+    return replace(work, sites=(*work.sites, *found))
