@@ -12,6 +12,8 @@ from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, Work
 
+BY_RAYS_ALONE = "rays"
+"""The method of a site without scan points on it."""
 SEEN = 0.02
 """Share of a body's skin that the scan may show though the body is gone: points of a body that it touched."""
 PASSED = 0.1
@@ -43,6 +45,6 @@ def add_lost_bodies(engine: Engine, work: Work) -> Work:
         low, high = body.bounds
         if any((site.damage.bounds[0] < high).all() and (site.damage.bounds[1] > low).all() for site in work.sites):
             continue
-        site = FoundSite(job=state, method="rays", evidence=Evidence())
+        site = FoundSite(job=state, method=BY_RAYS_ALONE, evidence=Evidence())
         found.append(site.with_value(FoundSite.damage, body, digest(body)))
     return replace(work, sites=(*work.sites, *found))

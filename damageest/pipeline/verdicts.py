@@ -16,6 +16,7 @@ from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import to_solid, unite
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
 from damageest.pipeline.state import FoundSite, Work
 
 BY_RAYS = 0.5
@@ -90,6 +91,8 @@ def _is_proven_by_rays(skin: SkinView, site: FoundSite) -> bool:
     """Whether rays passed through most of the skin that the site removes and that has no scan points."""
     if skin.rays is None:
         return False
+    if site.method == BY_RAYS_ALONE:
+        return True
     cells, damage = skin.cells, site.damage
     near: Flags = ((cells.centres > damage.bounds[0]) & (cells.centres < damage.bounds[1])).all(axis=1)
     index = np.flatnonzero(near & ~skin.seen)
