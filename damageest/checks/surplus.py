@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Deviation, Floats, Ints, Part, Scan, Sites, Solid
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
-from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, measure_local_areas, pick_one_per_cube
+from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
 from damageest.result import Surplus
@@ -20,12 +20,13 @@ FAR, FAR_SHARE = 0.15, 0.25
 points beyond it from which the cluster is not on the part."""
 FLAT_SHARE = 0.9
 """Share of a cluster's points that are within two tolerances of one plane, where it is a plane."""
-ALIKE = 2.0
-"""Largest ratio of the areas, and of the mean heights, of a displaced piece and of the loss beside it."""
+ALIKE, AREA_ALIKE = 2.0, 3.0
+"""Largest ratio of the volumes, and of the areas of skin, of a displaced piece and of the loss beside it."""
 NEAR = 10.0
 """Distance in tolerances up to which a loss is beside a surplus."""
 UNSEEN = 0.1
 """Share of a solid's surface without scan points from which a note says so."""
+DISPLACED = "it may be a displaced piece of the part"
 MOST = 20_000
 """Points of a cluster looked at."""
 
@@ -33,7 +34,8 @@ MOST = 20_000
 @dataclass(frozen=True, eq=False)
 class _Patch:
     """A cluster of deviating points, thinned: ``points`` (M,3), their ``feet`` (M,3), which are the nearest places on
-    the skin; the ``area`` of the points, that of their feet as ``covered``, and the ``mean`` distance between both."""
+    the skin, and the ``mean`` distance between both. The ``area`` of the points and that of their feet, ``covered``,
+    are those of the cubes of a grid that they touch."""
 
     points: Floats
     feet: Floats
@@ -49,7 +51,7 @@ def describe_surplus(
 
     ``losses``: the clusters of damaged points. Scan and deviation are in the part's frame.
     """
-    cell = max(tolerance, 0.7 * aligned.spacing)
+    cell = max(tolerance, 1.5 * aligned.spacing)
     found: list[Surplus] = []
     if not clusters.count:
         return ()
@@ -67,6 +69,15 @@ def describe_surplus(
         )
         found.append(_name_kind(surplus, patch, deviation, aligned, part, patches, tolerance))
     return tuple(found)
+
+
+def compare_with_losses(surplus: Surplus, volumes: Sequence[float]) -> Surplus:
+    """The surplus, which is no displaced piece where the ``volumes`` of the losses beside it differ from its own."""
+    if surplus.kind != "displaced piece" or surplus.volume is None or not volumes:
+        return surplus
+    if any(1 / ALIKE <= volume / surplus.volume <= ALIKE for volume in (*volumes, sum(volumes))):
+        return surplus
+    return replace(surplus, kind="surplus", notes=tuple(n for n in surplus.notes if not n.startswith(DISPLACED)))
 
 
 def join_surplus(items: Sequence[Surplus]) -> Surplus:
@@ -132,7 +143,7 @@ def _name_kind(
     best = min(like, key=lambda one: abs(np.log(sum(losses[k].covered for k in one) / patch.covered)))
     area, mean = sum(losses[k].covered for k in best), _average_mean([losses[k] for k in best])
     note = (
-        f"it may be a displaced piece of the part: it covers {patch.covered:.4g} in area and is {patch.mean:.3g} high "
+        f"{DISPLACED}: it covers {patch.covered:.4g} in area and is {patch.mean:.3g} high "
         f"on average, and beside it {area:.4g} in area is lost, {mean:.3g} deep on average"
     )
     clusters = tuple(sorted({*surplus.clusters, *best}))
@@ -141,13 +152,13 @@ def _name_kind(
 
 def _measure_patch(aligned: Scan, part: Part, members: Ints, cell: float) -> _Patch:
     points = aligned.points[members]
-    points = points[pick_one_per_cube(points, cell)]
-    while len(points) > MOST:
-        cell *= 1.5
-        points = points[pick_one_per_cube(points, cell)]
+    fine, kept = cell / 2, points[pick_one_per_cube(points, cell / 2)]
+    while len(kept) > MOST:
+        fine *= 1.5
+        kept = kept[pick_one_per_cube(kept, fine)]
+    points, cell = kept, 2 * fine
     distance, _, feet = closest_on_mesh(points, part)
-    thin = feet[pick_one_per_cube(feet, cell)]
-    area, covered = (float(measure_local_areas(one).sum()) for one in (points, thin))
+    area, covered = (len(pick_one_per_cube(one, cell)) * cell**2 for one in (points, feet))
     return _Patch(points, feet, area, covered, float(distance.mean()))
 
 
@@ -193,8 +204,9 @@ def _is_opposite(patch: _Patch, loss: _Patch) -> bool:
 
 
 def _is_alike(patch: _Patch, losses: Sequence[_Patch]) -> bool:
-    area, mean = sum(loss.covered for loss in losses) / patch.covered, _average_mean(losses) / patch.mean
-    return 1 / ALIKE <= area <= ALIKE and 1 / ALIKE <= mean <= ALIKE
+    area = sum(loss.covered for loss in losses) / patch.covered
+    volume = area * _average_mean(losses) / patch.mean
+    return 1 / AREA_ALIKE <= area <= AREA_ALIKE and 1 / ALIKE <= volume <= ALIKE
 
 
 def _average_mean(losses: Sequence[_Patch]) -> float:

@@ -43,17 +43,18 @@ def measure_limits(skin: SkinView, aligned: Scan) -> ScanLimits:
 
 def judge_site(
     evidence: Evidence, members: Ints, deviation: Deviation, pose: Pose, limits: ScanLimits, tolerance: float,
-    unit: str, proven_by_rays: bool, beside: tuple[str, ...] = (),
+    unit: str, proven_by_rays: bool, beside: tuple[str, ...] = (), unknown: tuple[str, ...] = (),
 ) -> Verdict:  # fmt: skip
     """Weighs all that speaks for and against a damage volume.
 
     ``members``: numbers of the scan points on it; ``proven_by_rays``: rays passed through the metal that it removes;
-    ``beside``: what lies beside it and makes it doubtful, such as surplus of like size.
+    ``beside``: what lies beside it and makes it doubtful, such as surplus of like size; ``unknown``: what the scan does
+    not show of it.
     """
     depth: Floats = -deviation.distance[members]
     typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
     against: list[str] = []
-    open_questions: list[str] = []
+    open_questions = list(unknown)
     for reason in evidence.reasons:
         unseen_only = reason.endswith("the damage may extend there") and evidence.skin_unseen <= UNSEEN
         (open_questions if unseen_only or (proven_by_rays and "no scan point" in reason) else against).append(reason)

@@ -152,7 +152,8 @@ class Candidate(_SiteState):
 @dataclass(frozen=True, eq=False)
 class FoundSite(_SiteState):
     """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
-    ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage."""
+    ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
+    ``questions``: what the scan leaves open about it."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -162,6 +163,7 @@ class FoundSite(_SiteState):
     refused: bool = False
     verdict: Verdict = field(default_factory=Verdict)
     accepted: bool = True
+    questions: tuple[str, ...] = ()
 
     damage = Value[Solid]()
     others = Value[Solid | None]()

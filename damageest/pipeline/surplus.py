@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, Sites
-from damageest.checks.surplus import close_surplus, describe_surplus, join_surplus
+from damageest.checks.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
 from damageest.errors import DamageestError, StageError
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples, label_strays
 from damageest.geometry.pieces import JoinedPieces, find_pieces, join_pieces
@@ -60,18 +60,18 @@ def find_surplus(engine: Engine, work: Work) -> Work:
 
 def relate_surplus(engine: Engine, work: Work) -> Work:
     """Names the surplus beside each site, and says what is to be done about surroundings."""
-    state, sites, warnings = work.job, list(work.sites), []
+    state, sites, warnings, done = work.job, list(work.sites), [], []
     reach = max(2 * state.tolerance, 1.5 * state.aligned.spacing)
     for item in state.surplus:
+        beside = [site for site in sites if set(site.clusters) & set(item.clusters)]
+        item = compare_with_losses(item, [site.damage.volume for site in beside])
+        done.append(item)
         if item.kind == "surroundings":
             continue
-        beside = [site for site in sites if set(site.clusters) & set(item.clusters)]
         for site in beside:
             if _is_touching(state, item, site, reach):
-                note = (
-                    f"surplus {item.id} lies at the edge of this damage: whether more is lost under it cannot be seen"
-                )
-                sites[sites.index(site)] = replace(site, notes=(*site.notes, note))
+                note = f"surplus {item.id} lies on its skin: whether more is lost under it cannot be seen"
+                sites[sites.index(site)] = replace(site, questions=(*site.questions, note))
         warnings += [f"surplus {item.id}: {note}" for note in item.notes if item.solid is None]
         if item.kind == "displaced piece":
             of = " and ".join(f"site {site.number} with a volume of {site.damage.volume:.4g}" for site in beside)
@@ -81,13 +81,15 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
                 + (f", and {of} its place" if of else "")
                 + ": put it back and scan again, or repair the part as if the piece were lost"
             )
-    if outside := [item for item in state.surplus if item.kind == "surroundings"]:
+    if outside := [item for item in done if item.kind == "surroundings"]:
         names = "; ".join(f"surplus {item.id}: {item.share:.1%} of the scan, {item.notes[0]}" for item in outside[:5])
         warnings.append(
             f"{sum(item.share for item in outside):.1%} of the scan does not belong to the part ({names}). It was left "
             "out; crop the scan to the part to be sure"
         )
-    return replace(work, sites=tuple(sites), warnings=(*work.warnings, *warnings))
+    key = digest("related", state.key("surplus"), [site.key("damage") for site in sites])
+    state = state.with_value(JobState.surplus, tuple(done), key)
+    return replace(work, job=state, sites=tuple(sites), warnings=(*work.warnings, *warnings))
 
 
 def _is_touching(state: JobState, item: Surplus, site: FoundSite, reach: float) -> bool:

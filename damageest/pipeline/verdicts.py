@@ -57,8 +57,9 @@ def judge_sites(engine: Engine, work: Work) -> Work:
     for site in work.sites:
         by_rays = _is_proven_by_rays(state.skin, site)
         verdict = judge_site(
-            site.evidence, site.members, state.deviation, state.pose, limits, state.tolerance, state.unit, by_rays
-        )
+            site.evidence, site.members, state.deviation, state.pose, limits, state.tolerance, state.unit, by_rays,
+            unknown=site.questions,
+        )  # fmt: skip
         accepted = verdict.level != "doubtful" or accept == "all" or site.number in accept
         done.append(replace(site, verdict=verdict, accepted=accepted))
     return replace(work, sites=tuple(done))

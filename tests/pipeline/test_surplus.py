@@ -1,0 +1,58 @@
+"""Added metal on the way through the route: its volume, and the losses beside it, against known truth."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import damageest
+from damageest.artefacts import ADDED, Floats
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.solids import iou, to_solid
+from damageest.result import Result
+from tests.surplus_scenes import TOLERANCE, ball, block, part, scan, slab, table
+
+
+def run(points: Floats, **more: Any) -> Result:
+    job = {"version": 1, "tolerance": TOLERANCE, "align": "none", "method": "implicit", **more}
+    return damageest.run(job, part=part(), scan=points)
+
+
+def test_a_bead_and_a_loss_beside_it_are_both_right() -> None:
+    actual = block() - ball(3, -4, 0, 7.5) + slab((8, 10, 2), 3, 0, 6)  # 0.4 apart
+    result = run(np.concatenate([scan(actual), table()]))
+    (site,) = result.sites
+    assert iou(to_solid(block() - actual), site.damage) > 0.9
+    bead, plane = result.surplus
+    assert bead.solid is not None
+    assert iou(to_solid(actual - block()), bead.solid) > 0.9
+    assert signed_distance(bead.solid.vertices, part())[0].min() > -1e-6
+    assert abs(bead.area - 80) < 8
+    assert bead.clusters == site.clusters
+    assert (plane.kind, plane.solid) == ("surroundings", None)
+    assert [text for text in result.warnings if "crop the scan" in text and "surplus 2" in text]
+    assert (result.deviation.label[plane.points] == ADDED).all()
+    assert result.mesh("surplus", 1) is bead.solid
+    assert {"cluster": 1, "enclose": 1}.items() <= {s.stage: 1 for s in result.stages}.items()
+    assert [s.stage for s in result.stages].count("cluster") == 1
+
+
+def test_a_loss_under_a_bead_is_right_where_it_is_seen_and_named() -> None:
+    actual = block() - ball(4, 0, 0, 6) + slab((6, 10, 4), 3, 0, 6)
+    result = run(scan(actual))
+    (site,) = result.sites
+    assert iou(to_solid(block() - actual), site.damage) > 0.85
+    assert site.verdict.level == "likely"
+    assert any("surplus 1 lies on its skin" in text for text in site.verdict.reasons)
+
+
+def test_without_added_metal_there_is_no_surplus() -> None:
+    assert run(scan(block() - ball(3, 0, 0, 7))).surplus == ()
+
+
+def test_a_scan_that_is_outside_everywhere_gets_no_volume() -> None:
+    result = run(scan(slab((25, 19, 13), 0, 0, 0)))
+    (item,) = result.surplus
+    assert item.solid is None
+    assert any("check pose, unit and tolerance" in text for text in result.warnings)
