@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Annotated
 
 import numpy as np
@@ -131,6 +132,8 @@ def diagnose_scale(
                 elif best is not None and cost <= best[0] + 1e-9:
                     best = (best[0], best[1], f"{best[2]}, or {culprit}.unit: {other} if the {culprit}'s are")
     if best is None:
+        best = _find_two_units(ratio, here)
+    if best is None:
         return (
             f"the scan's size is {apart}, and no wrong unit explains it; "
             "check that the scan is of this part, and crop the scan to the part"
@@ -138,6 +141,42 @@ def diagnose_scale(
     return (
         f"the scan's size is {apart}: one of the two was probably read in the wrong unit, "
         f"{_format_ratio(best[1])} off; {best[2]}"
+    )
+
+
+def _find_two_units(ratio: float, here: str) -> tuple[float, float, str] | None:
+    """The metric units of scan and part that explain a ratio of sizes where both were read in the wrong unit: the cost,
+    the ratio that they explain, and what to set. In a job in millimetres, centimetres against metres give 100."""
+    found = []
+    for scan, part in itertools.permutations(("mm", "cm", "m"), 2):
+        off = unit_factor(here, scan) / unit_factor(here, part)
+        if here not in (scan, part) and 0.4 <= ratio / off <= 1.3:
+            advice = (
+                f"set scan.unit: {scan} and part.unit: {part} if the scan's numbers are in {FULL_NAMES[scan]} and the "
+                f"part's in {FULL_NAMES[part]}"
+            )
+            found.append((abs(float(np.log(ratio / off))), off, advice))
+    return min(found, default=None)
+
+
+SMALLEST, LARGEST = 1.0, 200_000.0
+"""Millimetres across, beyond which the size of a part is doubtful."""
+
+
+def diagnose_size(part_vertices: Floats, unit: str) -> str | None:
+    """A message where a part is so small or so large that the job's unit is doubtful, None where it is not.
+
+    A scan and a part in metres, in a job in millimetres, agree with each other; their size alone shows it. A job in
+    micrometres may have a part of any size.
+    """
+    here = canonical_unit(unit)
+    across = float(np.ptp(part_vertices, axis=0).max()) * MILLIMETRES[here]
+    if here == "um" or SMALLEST <= across <= LARGEST:
+        return None
+    shown = f"{across:.2g} mm" if across < SMALLEST else f"{across / 1000:.4g} m"
+    return (
+        f"the part is {shown} across; is `units: {here}` right? Set it to the unit of the numbers in part and scan, or "
+        "give  unit: ...  for each of them"
     )
 
 

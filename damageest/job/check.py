@@ -142,6 +142,9 @@ class _Check:
         if value is None or not isinstance(value, (str, list, dict)) or (isinstance(value, list) and key != "scan"):
             self.add_fault(f"give a name, or a mapping with  use: <name>  and options; not {value!r}", key)
             return None
+        if isinstance(value, list):  # a list is short for the option `path`: its faults are where its items are
+            spelled = {(key, "path", *place[1:]): at for place, at in self.positions.items() if place[:1] == (key,)}
+            self.positions = self.positions | spelled
         value = dict(value) if isinstance(value, dict) else _spell_out(key, value, self.registry)
         name = value.pop("use", self.usual_name(key))
         if name == "file" and "path" in value:
@@ -163,7 +166,15 @@ class _Check:
 
     def find_reader(self, key: str, paths: Any) -> str | None:
         """The implementation that reads such a file; None leaves it to `file`, which says what it can read."""
-        suffix = Path(str(paths[0] if isinstance(paths, list) and paths else paths)).suffix.lower()
+        if paths == []:
+            self.add_fault("the list of files is empty", key, "path")
+            return None
+        first = paths[0] if isinstance(paths, list) else paths
+        if isinstance(first, dict):
+            first = first.get("path", "")
+            if not isinstance(first, str) or not first:
+                return None  # its own check says what is missing
+        suffix = Path(str(first)).suffix.lower()
         readers = [item for item in self.registry.of(key) if suffix in item.cls.reads]
         if not readers and suffix in (".step", ".stp", ".iges", ".igs", ".brep") and key == "part":
             self.add_fault(f"'{suffix}' needs {self.registry.describe_plugin('damageest-cadquery')}", key, "path")
@@ -225,10 +236,10 @@ class _Check:
                 told.append(((key, *(place or fault["loc"])), describe_fault(fault, options, valid, item.name)))
             self.add_faults(told)
             return None
-        for path in _find_paths(stage.model_dump()):
+        for place, path in _find_paths(stage.model_dump()):
             if not path.is_file():
                 what = "is a folder, not a file" if path.is_dir() else "there is no such file"
-                self.add_fault(f"{path}: {what}", key, "path")
+                self.add_fault(f"{path}: {what}", key, *place)
         return stage
 
 
@@ -238,8 +249,10 @@ def _spell_out(key: str, value: str | list[Any], registry: Registry) -> dict[str
     return {"use": "file", "path": value} if is_file else {"use": value}
 
 
-def _find_paths(value: Any) -> list[Path]:
+def _find_paths(value: Any, place: tuple[str | int, ...] = ()) -> list[tuple[tuple[str | int, ...], Path]]:
+    """The paths among the options of a stage, each with its place."""
     if isinstance(value, Path):
-        return [value]
-    items = value.values() if isinstance(value, Mapping) else value if isinstance(value, (list, tuple)) else ()
-    return [path for item in items for path in _find_paths(item)]
+        return [(place, value)]
+    items: Any = value.items() if isinstance(value, Mapping) else ()
+    items = enumerate(value) if isinstance(value, (list, tuple)) else items
+    return [found for step, item in items for found in _find_paths(item, (*place, step))]

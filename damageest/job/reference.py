@@ -66,8 +66,14 @@ def _describe_fields(registry: Registry) -> Iterator[str]:
     schema = Header.model_json_schema()
     schema["properties"]["method"]["enum"] = list(registry.methods())
     yield "## Fields that are not stages\n"
-    yield from _table(schema, {}, "")
+    shared = schema.get("$defs", {})
+    yield from _table(schema, shared, "job")
     yield ""
+    for name, inner in shared.items():
+        yield f"#### {_name_model(name, inner)} {{: #{_anchor('job', name)} }}\n"
+        yield f"{_flow(inner.get('description', ''))}\n"
+        yield from _table(inner, shared, "job")
+        yield ""
 
 
 def _describe_stage(stage: str, registry: Registry) -> Iterator[str]:

@@ -19,6 +19,7 @@ def job_schema(registry: Registry) -> dict[str, Any]:
     references, shared = models_json_schema([(cls, "validation") for cls in classes], ref_template="#/$defs/{model}")
     definitions: dict[str, Any] = shared.get("$defs", {})
     head = Header.model_json_schema()
+    definitions |= head.get("$defs", {})
     properties: dict[str, Any] = head["properties"]
     properties["method"]["enum"] = list(registry.methods())
     for stage in STAGES:
@@ -35,7 +36,8 @@ def job_schema(registry: Registry) -> dict[str, Any]:
         if stage in ("part", "scan"):
             choices.append({"type": "string", "description": "path of a file, relative to the job file"})
         if stage == "scan":
-            views = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+            items_of_views = [{"type": "string"}, {"$ref": "#/$defs/ViewFile"}]
+            views = {"type": "array", "items": {"anyOf": items_of_views}, "minItems": 1}
             choices.append(views | {"description": "files of several views, already in one frame"})
         properties[stage] = {"description": _summary(items), "anyOf": choices + mappings}
     return {

@@ -8,10 +8,11 @@ from dataclasses import replace
 from damageest.artefacts import INTACT, Part, Scan
 from damageest.checks.scan_quality import check_walls, choose_tolerance, raise_tolerance, require_intact
 from damageest.errors import InputError, StageError
+from damageest.geometry.crops import crop_points
 from damageest.geometry.depth_steps import measure_depth_step
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import measure_noise_and_spacing
-from damageest.geometry.units import diagnose_scale
+from damageest.geometry.units import diagnose_scale, diagnose_size
 from damageest.job.model import Job
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
@@ -23,6 +24,15 @@ from damageest.stages.segment import Segment
 
 COMPARED = 20_000
 """Points that the tolerance is chosen from after the alignment."""
+
+
+def crop_scan(engine: Engine, work: Work) -> Work:
+    """Removes the points that the job's crops remove. Raises InputError where no point is left."""
+    stage = engine.job.stages.get(ReadScan)
+    if not isinstance(stage, ReadScan) or not stage.crop:
+        return work
+    state = work.job
+    return replace(work, job=state.derive(JobState.scan, crop_points(state.scan, stage.crop), JobState.scan))
 
 
 def measure_scan(engine: Engine, work: Work) -> Work:
@@ -37,6 +47,8 @@ def measure_scan(engine: Engine, work: Work) -> Work:
         _, (noise, spacing, step) = engine.remember("measure", key, lambda: _measure(scan))
         scan = replace(scan, noise=noise, spacing=spacing)
     tolerance, warnings = choose_tolerance(engine.job.tolerance, scan, part, step)
+    if wrong_unit := diagnose_size(part.vertices, part.unit):
+        warnings = [wrong_unit, *warnings]
     state = state.derive(JobState.scan, scan, JobState.scan)
     state = state.with_value(JobState.tolerance, tolerance, digest(tolerance))
     return replace(work, job=state, warnings=(*work.warnings, *warnings))
@@ -94,7 +106,7 @@ def gather_intact(engine: Engine, work: Work) -> Work:
 
 def read_inputs(job: Job, registry: Registry) -> tuple[Part, Scan]:
     """The part and the scan of a job, as their stages read them."""
-    state = follow((ReadPart, ReadScan), Engine(job, registry), start(job)).job
+    state = follow((ReadPart, ReadScan, crop_scan), Engine(job, registry), start(job)).job
     return state.part, state.scan
 
 
@@ -102,6 +114,7 @@ def inspect_inputs(job: Job, registry: Registry) -> tuple[Part, Scan, float, lis
     """Part, measured scan, a tolerance for them, and what is doubtful; for a new job."""
     part, scan = read_inputs(job, registry)
     doubts = [doubt] if (doubt := diagnose_scale(scan.points, part.vertices, part.unit)) else []
+    doubts += [doubt] if (doubt := diagnose_size(part.vertices, part.unit)) else []
     noise, spacing, step = _measure(scan)
     scan = replace(scan, noise=noise, spacing=spacing)
     tolerance, more = choose_tolerance(None, scan, part, step)

@@ -13,7 +13,14 @@ from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
 from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.lost_bodies import add_lost_bodies
-from damageest.pipeline.prepare import check_intact, gather_intact, measure_scan, place_scan, settle_tolerance
+from damageest.pipeline.prepare import (
+    check_intact,
+    crop_scan,
+    gather_intact,
+    measure_scan,
+    place_scan,
+    settle_tolerance,
+)
 from damageest.pipeline.sites import (
     gather_sites,
     number_sites,
@@ -40,7 +47,7 @@ from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
-    ReadPart, ReadScan, measure_scan, Sample, Align, place_scan, settle_tolerance,
+    ReadPart, ReadScan, crop_scan, measure_scan, Sample, Align, place_scan, settle_tolerance,
     Segment, check_intact, inspect_skin, Cluster, find_surplus, gather_intact,
 )  # fmt: skip
 BY_SITE: Route = (

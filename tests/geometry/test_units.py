@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from damageest.errors import InputError
-from damageest.geometry.units import MILLIMETRES, UnitOption, canonical_unit, diagnose_scale, unit_factor
+from damageest.geometry.units import MILLIMETRES, UnitOption, canonical_unit, diagnose_scale, diagnose_size, unit_factor
 
 units = st.sampled_from(sorted(MILLIMETRES))
 
@@ -96,3 +96,29 @@ def test_sizes_that_no_unit_explains_are_said_not_to_fit():
     said = diagnose_scale(scanned("block") * 3.6, PARTS["block"].vertices)
     assert said is not None
     assert "no wrong unit explains" in said
+
+
+@pytest.mark.parametrize(("scan", "part"), [("cm", "m"), ("m", "cm"), ("cm", "mm"), ("mm", "cm"), ("m", "mm")])
+@pytest.mark.parametrize("job", ["mm", "cm", "m"])
+def test_metric_units_are_told_apart_in_a_job_of_any_unit(scan, part, job):
+    """The numbers of scan and part are each in a unit of their own, and both are read as the job's."""
+    points = scanned("block") * unit_factor("mm", scan)
+    vertices = PARTS["block"].vertices * unit_factor("mm", part)
+    said = diagnose_scale(points, vertices, job)
+    assert said is not None
+    if job != scan:
+        assert f"scan.unit: {scan}" in said or f"part.unit: {part}" in said or "or part.unit" in said
+    if job not in (scan, part) and {scan, part} == {"cm", "m"}:
+        assert f"set scan.unit: {scan} and part.unit: {part}" in said
+        assert "100" in said
+
+
+def test_a_part_of_doubtful_size():
+    block = PARTS["block"].vertices
+    assert diagnose_size(block, "mm") is None
+    assert diagnose_size(block / 1000, "m") is None
+    said = diagnose_size(block / 1000, "mm")
+    assert said is not None
+    assert said.startswith("the part is 0.08 mm across; is `units: mm` right?")
+    assert diagnose_size(block, "um") is None
+    assert "8000 m across" in str(diagnose_size(100 * block, "m"))

@@ -10,14 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from damageest.errors import JobError
+from damageest.errors import InputError, JobError
 from damageest.job import load, yamlfile
+from damageest.pipeline.prepare import read_inputs
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS
 from damageest.stages.cluster import Cluster
 from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.part import ReadPart
 from damageest.stages.reconstruct import Reconstruct
+from damageest.stages.scan import ReadScan
 
 JobFile = Callable[..., Path]
 
@@ -182,3 +184,56 @@ def test_any_mapping_is_sound_or_a_job_error(tree: dict[str, object], registry: 
 def test_written_yaml_reads_back_the_same(value: object) -> None:
     again, _ = yamlfile.parse(yamlfile.write({"v": value}), "text")
     assert repr(again["v"]) == repr(value)
+
+
+HEAD = "version: 1\npart: box.stl\n"
+
+
+def test_a_file_may_say_where_its_scanner_stood(job_file: JobFile, registry: Registry) -> None:
+    items = "[{path: scan.xyz, viewpoint: [1, 2, 3]}, scan.xyz]"
+    bare, spelled = (
+        load(job_file("", head=f"{HEAD}scan: {text}\n"), registry) for text in (items, f"{{use: file, path: {items}}}")
+    )
+    assert bare.stages[ReadScan] == spelled.stages[ReadScan]
+    again = bare.to_values(job_file().parent)
+    assert load(job_file("", head=yamlfile.write(again)), registry).stages[ReadScan] == bare.stages[ReadScan]
+    single = load(job_file("", head=f"{HEAD}scan: {{path: scan.xyz, viewpoint: [1, 2, 3]}}\n"), registry)
+    assert single.stages[ReadScan].model_dump()["viewpoint"] == (1, 2, 3)
+
+
+@pytest.mark.parametrize(
+    ("scan", "says"),
+    [
+        (
+            "\n  - {path: scan.xyz, viewpoint: [1, 2]}",
+            "4:22: scan.path.0.viewpoint.2: the list is too short: value 3 is",
+        ),
+        ("\n  - scan.xyz\n  - {path: scan.xyz, viewpoin: [1, 2, 3]}", "5:22: scan.path.1.viewpoin: unknown option"),
+        ("\n  - scan.xyz\n  - {viewpoint: [1, 2, 3]}", "5:5: scan.path.1.path: missing: give  path: ..."),
+        ("\n  - {viewpoint: [1, 2, 3]}", "4:5: scan.path.0.path: missing: give  path: ..."),
+        ("\n  - scan.xyz\n  - 7", "5:5: scan.path.1: expected the path of a file, not 7"),
+        ("\n  - scan.xyz\n  - {path: gone.xyz}", "5:6: scan.path.1.path: "),
+        (" []", "3:1: scan.path: the list of files is empty"),
+        (" {path: [scan.xyz], viewpoint: [1, 2, 3]}", "viewpoint: is for a single file"),
+        (" {path: scan.xyz, viewpoint: 7}", "3:24: scan.viewpoint: expected a list, not 7"),
+        (" {path: scan.xyz, crop: [{keep: sphere}]}", "3:31: scan.crop.0: give  keep: box"),
+        (" {path: scan.xyz, crop: [{keep: above}]}", "3:31: scan.crop.0: missing: give  point"),
+    ],
+)
+def test_faults_of_scans_are_told_where_they_are(scan: str, says: str, job_file: JobFile, registry: Registry) -> None:
+    told = faults(job_file("", head=f"{HEAD}scan:{scan}\n"), registry)
+    assert len(told) == 1
+    assert says in told[0]
+
+
+@pytest.mark.parametrize("scan", ["{use: simulate, points: 4000, noise: 0", "{path: scan.xyz"])
+def test_crops_belong_to_every_reader(scan: str, job_file: JobFile, registry: Registry) -> None:
+    """The note says what was removed; the points above the plane are gone."""
+    whole_job = load(job_file("", head=f"{HEAD}scan: {scan}}}\n"), registry)
+    job = load(job_file("", head=f"{HEAD}scan: {scan}, crop: [{{drop: above, point: [0, 0, 0.1]}}]}}\n"), registry)
+    (_, whole), (_, left) = read_inputs(whole_job, registry), read_inputs(job, registry)
+    assert whole.points[:, 2].max() >= 0.1 > left.points[:, 2].max()
+    assert left.notes[-1].startswith("crop 1 (drop above): removed")
+    job = load(job_file("", head=f"{HEAD}scan: {scan}, crop: [{{keep: above, point: [0, 0, 1e6]}}]}}\n"), registry)
+    with pytest.raises(InputError, match=r"crop 1 \(keep above\) leaves no points"):
+        read_inputs(job, registry)

@@ -2,6 +2,7 @@
 
 To add a format, add a module here with ``read(path, columns) -> PointFile``. ``columns`` names the columns of text.
 It raises `FormatError` with what is wrong in the file, and imports its library inside ``read``.
+Where the file says where its scanner stood, the reader gives `viewpoints` and `view` too.
 Add a line to READERS: the suffix, and the module's name. `read_points` imports the module when it is needed.
 Add a file of tests in tests/io: a good file, a truncated one, one without points, and one of another format.
 """
@@ -12,7 +13,7 @@ import importlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Ints
 from damageest.errors import InputError
 from damageest.io.files import check_file, raise_environment_fault, shorten_error
 
@@ -22,12 +23,16 @@ class PointFile:
     """The content of one file.
 
     ``points`` (N,3), which may be not finite; ``normals`` (N,3) or None; ``unit`` if the file states one, else None.
+    ``viewpoints`` (V,3): scanner positions in the frame of the points; ``view`` (N,): the number of each point's
+    position, -1 where it is not known. Both None where the file has none.
     """
 
     points: Floats
     normals: Floats | None = None
     unit: str | None = None
     notes: tuple[str, ...] = ()
+    viewpoints: Floats | None = None
+    view: Ints | None = None
 
 
 class FormatError(ValueError):
@@ -49,6 +54,7 @@ READERS = {
     ".las": "las",
     ".laz": "las",
     ".e57": "e57",
+    ".ptx": "ptx",
 }
 """Suffix of a file: the module of this folder that reads it."""
 

@@ -12,7 +12,13 @@ from damageest.io.points import FormatError, PointFile
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """The points of all scans in the common frame of the file, without those that are marked as invalid."""
+    """The points of all scans in the common frame of the file, without those that are marked as invalid.
+
+    The scanner position of a scan is the origin of its own frame, moved by its pose. Programs also write scans that
+    they have moved or merged, with a pose that changes nothing. So the position is known only where the scan has a pose
+    that changes something, rows and columns, or spherical coordinates, or where another scan of the file has such a
+    pose.
+    """
     import pye57
 
     with path.open("rb") as stream:
@@ -20,23 +26,49 @@ def read(path: Path, columns: str | None = None) -> PointFile:
             raise FormatError("not an E57 file: it does not start with 'ASTM-E57'")
     pieces: list[Floats] = []
     normals: list[Floats | None] = []
+    positions: list[Floats] = []
+    known: list[bool] = []
+    posed = False
     with pye57.E57(str(path)) as file:
         for index in range(file.scan_count):
-            points, normal = _read_scan(file, index)
+            header, raw = file.get_header(index), file.read_scan_raw(index)
+            points, normal = _read_scan(header, raw, index)
             pieces.append(points)
             normals.append(normal)
+            pose = _read_pose(header)
+            positions.append(pose[:3, 3])
+            known.append("sphericalRange" in raw or _is_range_image(raw))
+            posed |= not np.array_equal(pose, np.eye(4))
     if not pieces:
         raise FormatError("the E57 file has no scans")
     whole = [n for n in normals if n is not None]
     notes = (f"{len(pieces)} scans in one E57 file",) if len(pieces) > 1 else ()
+    numbers = np.where(np.array(known) | posed, np.arange(len(pieces)), -1)
     return PointFile(
-        np.concatenate(pieces), np.concatenate(whole) if len(whole) == len(normals) else None, unit="m", notes=notes
+        np.concatenate(pieces),
+        np.concatenate(whole) if len(whole) == len(normals) else None,
+        unit="m",
+        notes=notes,
+        viewpoints=np.array(positions) if (numbers >= 0).any() else None,
+        view=np.repeat(numbers, [len(piece) for piece in pieces]) if (numbers >= 0).any() else None,
     )
 
 
-def _read_scan(file: Any, index: int) -> tuple[Floats, Floats | None]:
-    header = file.get_header(index)
-    raw = file.read_scan_raw(index)
+def _read_pose(header: Any) -> Floats:
+    """The pose (4,4) of a scan in the frame of the file; identity where it has none."""
+    pose = np.eye(4)
+    if header.has_pose():
+        pose[:3, :3] = np.asarray(header.rotation_matrix, dtype=np.float64)
+        pose[:3, 3] = np.asarray(header.translation, dtype=np.float64)
+    return pose
+
+
+def _is_range_image(raw: dict[str, Any]) -> bool:
+    """Whether the points have rows and columns, of which there are several each."""
+    return all(name in raw and np.ptp(raw[name]) > 0 for name in ("rowIndex", "columnIndex"))
+
+
+def _read_scan(header: Any, raw: dict[str, Any], index: int) -> tuple[Floats, Floats | None]:
     if "cartesianX" in raw:
         points = np.column_stack([raw[f"cartesian{axis}"] for axis in "XYZ"]).astype(np.float64)
         state = raw.get("cartesianInvalidState")
@@ -56,7 +88,8 @@ def _read_scan(file: Any, index: int) -> tuple[Floats, Floats | None]:
         points = points[valid]
         normals = None if normals is None else normals[valid]
     if header.has_pose():
-        R = np.asarray(header.rotation_matrix, dtype=np.float64)
-        points = points @ R.T + np.asarray(header.translation, dtype=np.float64)
+        pose = _read_pose(header)
+        R = pose[:3, :3]
+        points = points @ R.T + pose[:3, 3]
         normals = None if normals is None else normals @ R.T
     return points, normals

@@ -31,7 +31,11 @@ def _read_header(data: bytes) -> tuple[dict[str, list[str]], int]:
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """The fields x, y, z and, if present, normal_x, normal_y, normal_z."""
+    """The fields x, y, z and, if present, normal_x, normal_y, normal_z.
+
+    The scanner position is the origin of a range image of a camera (HEIGHT above 1), else the VIEWPOINT. The default
+    VIEWPOINT, 0 0 0 1 0 0 0, stands in files of any origin: then the position is not known.
+    """
     data = path.read_bytes()
     head, start = _read_header(data)
     try:
@@ -78,20 +82,57 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         return np.column_stack([column(name).astype(np.float64) for name in which])
 
     wanted = ("normal_x", "normal_y", "normal_z")
-    view = head.get("VIEWPOINT", [])
-    notes = (
-        ("the VIEWPOINT of the PCD file is not applied to its points",)
-        if view and view != _NO_VIEW and any(map(_is_nonzero, view[:3]))
-        else ()
+    xyz = stack("x", "y", "z")
+    position, notes = _find_viewpoint(head, xyz)
+    return PointFile(
+        xyz,
+        stack(*wanted) if set(wanted) <= set(names) else None,
+        notes=notes,
+        viewpoints=None if position is None else position[None],
+        view=None if position is None else np.zeros(len(xyz), np.int64),
     )
-    return PointFile(stack("x", "y", "z"), stack(*wanted) if set(wanted) <= set(names) else None, notes=notes)
+
+
+def _find_viewpoint(head: dict[str, list[str]], points: Floats) -> tuple[Floats | None, tuple[str, ...]]:
+    """The scanner position (3,), None where it is not known, and notes."""
+    try:
+        width, height = int(head["WIDTH"][0]), int(head["HEIGHT"][0])
+        view = np.array([float(word) for word in head.get("VIEWPOINT", _NO_VIEW)])
+    except (KeyError, IndexError, ValueError):
+        return None, ()
+    if view.shape != (7,) or not np.isfinite(view).all():
+        return None, ()
+    if height > 1 and width > 1 and width * height == len(points) and _is_range_image(points, width):
+        return np.zeros(3), ("the PCD file is a range image; its origin is taken as the scanner position",)
+    if np.array_equal(view, [float(word) for word in _NO_VIEW]):
+        return None, ()
+    note = "the VIEWPOINT of the PCD file is taken as the scanner position; it is not applied to the points"
+    return view[:3], (note,)
 
 
 _NO_VIEW = ["0", "0", "0", "1", "0", "0", "0"]
 
 
-def _is_nonzero(word: str) -> bool:
-    return word.strip("-+0.eE") != ""
+def _is_range_image(points: Floats, width: int) -> bool:
+    """Whether rows of ``width`` points are an image of a camera at the origin that looks along z.
+
+    Then x/z and y/z are linear in column and row, whatever the depth. The residual has to be below 0.2
+    pixels, and the depth has to vary enough that a grid of another kind would have a residual of more than one.
+    """
+    finite = np.isfinite(points).all(axis=1) & (np.nan_to_num(points[:, 2]) > 0)
+    index = np.flatnonzero(finite)
+    if len(index) < 100:
+        return False
+    index = index[:: max(1, len(index) // 20_000)]
+    x, y, z = points[index].T
+    pixel = np.column_stack([index % width, index // width, np.ones(len(index))]).astype(np.float64)
+    slope, *_ = np.linalg.lstsq(pixel, np.column_stack([x / z, y / z]), rcond=None)
+    step = np.linalg.norm(slope[:2], axis=1)
+    if not step.min() > 0:
+        return False
+    residual = np.sqrt((((pixel @ slope) - np.column_stack([x / z, y / z])) ** 2).mean())
+    relief = z.std() / z.mean() * np.ptp(pixel[:, :2], axis=0).max() / 2
+    return bool(residual < 0.2 * step.min() and relief > 1)
 
 
 def _read_ascii(data: bytes, points: int, width: int) -> Floats:

@@ -5,7 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
+from pydantic import Field
+
 from damageest.artefacts import Part, Scan
+from damageest.geometry.crops import AnyCrop
 from damageest.stages import Stage, asked_by_name
 
 
@@ -13,7 +16,8 @@ class ReadScan(Stage, ABC):
     """Reads the scan from files, or makes one.
 
     ``reads``: the file suffixes, in lower case with the dot, that an implementation with an option ``path`` reads. A
-    bare path in the job chooses the implementation by its suffix.
+    bare path in the job chooses the implementation by its suffix. The option ``crop`` belongs to every implementation;
+    it is applied to what ``run`` gives, so ``run`` leaves it alone.
 
     Args of ``run``:
         unit: the job's unit, one of um, mm, cm, m, in, ft.
@@ -21,8 +25,9 @@ class ReadScan(Stage, ABC):
 
     Returns:
         N points (N,3), finite, in the scanner's frame and in ``unit``; outward ``normals`` (N,3), or None where the
-        file has none. Leave ``noise`` and ``spacing`` at 0: they are measured afterwards. A virtual scanner adds the
-        ``truth``: the true damage in the part's frame, and the true pose.
+        file has none; ``viewpoints`` (V,3) and ``view`` (N,) where the scanner's positions are known. Leave ``noise``
+        and ``spacing`` at 0: they are measured afterwards. A virtual scanner adds the ``truth``: the true damage in the
+        part's frame, and the true pose.
 
     Raises:
         InputError: where a file cannot be read or holds no points. Begin the message with the file's name.
@@ -56,6 +61,11 @@ class ReadScan(Stage, ABC):
 
     stage: ClassVar[str] = "scan"
     gives: ClassVar[str] = "scan"
+
+    crop: tuple[AnyCrop, ...] = Field(
+        (),
+        description="points to keep or to drop, one crop after the other; in the scan's own frame, in the job's unit",
+    )
 
     @asked_by_name
     @abstractmethod

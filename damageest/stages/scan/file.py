@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
 
 from damageest.artefacts import Scan
 from damageest.geometry.units import UnitOption
@@ -14,17 +14,42 @@ from damageest.io.scans import read_scan
 from damageest.stages import JobPath
 from damageest.stages.scan import ReadScan
 
+Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+
+
+class ViewFile(BaseModel):
+    """One file of several, with the position of its scanner."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    path: JobPath = Field(description="the file, relative to the job's folder")
+    viewpoint: Vector | None = Field(
+        None,
+        description="where the scanner stood: [x, y, z] in the file's unit and frame; default: what the file says",
+    )
+
+
+Entry = Annotated[
+    Annotated[JobPath, Tag("file alone")] | Annotated[ViewFile, Tag("file with viewpoint")],
+    Discriminator(lambda value: "file with viewpoint" if isinstance(value, (dict, ViewFile)) else "file alone"),
+]
+
 
 class ScanFile(ReadScan):
     """Reads a scan from one file, or from several views in one frame: point clouds or meshed scans."""
 
     use: Literal["file"] = "file"
     reads: ClassVar[tuple[str, ...]] = tuple(READERS)
-    path: JobPath | tuple[JobPath, ...] = Field(
-        description="the file, or a list of files in one frame, relative to the job's folder"
+    path: Annotated[
+        Annotated[JobPath, Tag("one file")] | Annotated[tuple[Entry, ...], Tag("several files")],
+        Discriminator(lambda value: "several files" if isinstance(value, (list, tuple)) else "one file"),
+    ] = Field(description="the file, or a list of files in one frame, relative to the job's folder")
+    viewpoint: Vector | None = Field(
+        None,
+        description="where the scanner stood for all points of a single file: [x, y, z] in the file's unit and frame; "
+        "default: what the file says",
     )
     unit: UnitOption | None = Field(
-        None, description="unit of the files' lengths; default: the file's own (E57: m), else the job's `units`"
+        None, description="unit of the files' lengths; default: the file's own (E57, PTX: m), else the job's `units`"
     )
     columns: str | None = Field(
         None,
@@ -32,7 +57,17 @@ class ScanFile(ReadScan):
         "number",
     )
 
+    @model_validator(mode="after")
+    def _check_viewpoint(self) -> Self:
+        if self.viewpoint is not None and not isinstance(self.path, Path):
+            raise ValueError("viewpoint: is for a single file; of several, give each as {path: ..., viewpoint: ...}")
+        return self
+
     def run(self, unit: str) -> Scan:
         """The points in ``unit``, the job's. Raises InputError for a file that cannot be read or has no points."""
-        paths = (self.path,) if isinstance(self.path, Path) else self.path
-        return read_scan(paths, unit, self.unit, self.columns)
+        if isinstance(self.path, Path):
+            return read_scan((self.path,), unit, self.unit, self.columns, (self.viewpoint,))
+        files = [item if isinstance(item, ViewFile) else ViewFile(path=item) for item in self.path]
+        return read_scan(
+            [file.path for file in files], unit, self.unit, self.columns, [file.viewpoint for file in files]
+        )
