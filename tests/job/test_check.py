@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from damageest.errors import InputError, JobError
 from damageest.job import load, yamlfile
-from damageest.pipeline.prepare import read_inputs
+from damageest.pipeline.prepare import inspect_inputs, read_inputs
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS
 from damageest.stages.cluster import Cluster
@@ -237,3 +237,12 @@ def test_crops_belong_to_every_reader(scan: str, job_file: JobFile, registry: Re
     job = load(job_file("", head=f"{HEAD}scan: {scan}, crop: [{{keep: above, point: [0, 0, 1e6]}}]}}\n"), registry)
     with pytest.raises(InputError, match=r"crop 1 \(keep above\) leaves no points"):
         read_inputs(job, registry)
+
+
+def test_a_part_of_doubtful_size_is_named(job_file: JobFile, registry: Registry) -> None:
+    """Part and scan in metres, in a job in millimetres: only their size shows it."""
+    head = "version: 1\npart: {path: box.stl, unit: um}\nscan: {use: simulate, points: 4000}\n"
+    doubts = inspect_inputs(load(job_file("", head=head), registry), registry)[3]
+    assert any("the part is 0.04 mm across; is `units: mm` right?" in doubt for doubt in doubts)
+    head = head.replace("unit: um", "unit: mm")
+    assert not any("across" in doubt for doubt in inspect_inputs(load(job_file("", head=head), registry), registry)[3])

@@ -215,9 +215,11 @@ class Simulate(ReadScan):
             if not len(mixed):
                 notes.append("no mixed pixels: no surface is in front of another")
         way = scanners[view] - points
-        blind = [str(number + 1) for number in range(len(scanners)) if not (view == number).any()]
-        if blind:
-            notes.append(f"no points from scanner {', '.join(blind)}")
+        used, view = np.unique(view, return_inverse=True)
+        if len(used) < len(scanners):  # a view without points is no view
+            blind = sorted(set(range(len(scanners))) - set(used.tolist()))
+            notes.append(f"no points from scanner {', '.join(str(number + 1) for number in blind)}")
+            scanners = scanners[used]
         return _Draw(points, way / np.linalg.norm(way, axis=1, keepdims=True), view, scanners, tuple(notes))
 
     def _add_errors(

@@ -150,7 +150,11 @@ def test_positions_may_be_unknown(cuboid: Part) -> None:
 def test_a_scanner_that_sees_nothing(cuboid: Part) -> None:
     with pytest.raises(StageError, match="sees nothing"):
         simulate(cuboid, scanners=[(0, 0, 0)])
-    assert "no points from scanner 2" in simulate(cuboid, scanners=[ABOVE, (0, 0, 0)]).notes
+    scan = simulate(cuboid, scanners=[(0, 0, 0), ABOVE])
+    assert "no points from scanner 1" in scan.notes
+    assert np.array_equal(scan.viewpoints, [ABOVE])
+    assert scan.view is not None
+    assert not scan.view.any()
 
 
 def test_depth_steps_along_the_ray(cuboid: Part) -> None:
