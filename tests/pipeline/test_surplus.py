@@ -51,8 +51,7 @@ def test_without_added_metal_there_is_no_surplus() -> None:
     assert run(scan(block() - ball(3, 0, 0, 7))).surplus == ()
 
 
-def test_a_scan_that_is_outside_everywhere_gets_no_volume() -> None:
-    result = run(scan(slab((25, 19, 13), 0, 0, 0)))
-    (item,) = result.surplus
-    assert item.solid is None
+def test_surplus_over_most_of_the_skin_gets_no_volume() -> None:
+    result = run(scan(slab((24, 18, 13), 0, 0, 0) + slab((12, 19, 13), 0, 0, 0)))
+    assert {item.solid for item in result.surplus} == {None}
     assert any("check pose, unit and tolerance" in text for text in result.warnings)
