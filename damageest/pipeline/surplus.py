@@ -85,7 +85,7 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
         names = "; ".join(f"surplus {item.id}: {item.share:.1%} of the scan, {item.notes[0]}" for item in outside[:5])
         warnings.append(
             f"{sum(item.share for item in outside):.1%} of the scan does not belong to the part ({names}). It was left "
-            "out; crop the scan to the part to be sure"
+            "out; crop the scan to the part to be sure (scan: {crop: ...} in the job)"
         )
     key = digest("related", state.key("surplus"), [site.key("damage") for site in sites])
     state = state.with_value(JobState.surplus, tuple(done), key)
