@@ -66,7 +66,8 @@ def judge(result: Result, true: TrueState) -> Judgement:
     """The judgement on a run that gave a result."""
     tolerance = result.tolerance
     bodies = _split_damage(true, result.pose, tolerance)
-    unseen = [body for body in bodies if _share_reported(body, result, "unseen") >= UNSEEN_SHARE]
+    reported = {id(body): _find_report(body, result) for body in bodies}
+    unseen = [body for body in bodies if reported[id(body)] == "unseen"]
     seen = _leave_out(bodies, unseen)
     has_pose = true.pose is not None and is_pose_right(true.part, result.pose, true.pose, tolerance)
     accepted = [site.damage for site in result.sites if site.accepted]
@@ -77,7 +78,7 @@ def judge(result: Result, true: TrueState) -> Judgement:
         return Judgement("right", "", value, len(unseen))
     why = "; ".join(faults)
     doubtful = [site.damage for site in result.sites if not site.accepted]
-    lost = [body for body in seen if _share_reported(body, result, "lost") >= UNSEEN_SHARE]
+    lost = [body for body in seen if reported[id(body)] == "lost"]
     if lost and has_pose and not find_faults(accepted, _leave_out(seen, lost), [*unseen, *lost], true.part, tolerance):
         return Judgement("said", f"named: {why} | skin reported as lost", value, len(unseen))
     if doubtful and _is_rest_right(accepted, doubtful, seen, unseen, true.part, tolerance, has_pose):
@@ -190,19 +191,21 @@ def _split_damage(true: TrueState, pose: Pose, tolerance: float) -> list[Solid]:
     return [piece for piece in pieces if piece is not None]
 
 
-def _share_reported(body: Solid, result: Result, what: Literal["unseen", "lost"]) -> float:
-    """Share of a damage's skin that the result reports as unseen, or as lost because rays passed through it."""
+def _find_report(body: Solid, result: Result) -> Literal["unseen", "lost", ""]:
+    """What the result reports of most of a damage's skin: unseen, or lost as rays passed through it; empty: neither."""
     coverage = result.coverage
     if coverage is None or not len(coverage.skin.faces):
-        return 0.0
+        return ""
     points = sample_by_area(body, 2000, np.random.default_rng(3))[0]
     skin = points[distance_to_mesh(points, result.part) < 1e-5 * result.part.diagonal]
     if not len(skin):
-        return 0.0
+        return ""
     cell = closest_on_mesh(skin, coverage.skin)[1]
-    is_lost = coverage.is_lost[cell]
-    reported = is_lost if what == "lost" else (coverage.region[cell] >= 0) & ~is_lost
-    return float(reported.mean())
+    lost = float(coverage.is_lost[cell].mean())
+    both = float((coverage.is_lost[cell] | (coverage.region[cell] >= 0)).mean())
+    if both < UNSEEN_SHARE:
+        return ""
+    return "lost" if lost > both / 2 else "unseen"
 
 
 def _leave_out(bodies: Sequence[Solid], others: Sequence[Solid]) -> list[Solid]:

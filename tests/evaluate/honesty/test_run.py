@@ -5,7 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from damageest.cli import app
+from damageest.errors import InputError
 from damageest.evaluate.honesty.case import run_case
 from damageest.evaluate.honesty.suite import make_trouble_cases
 from damageest.evaluate.rows import read_rows
@@ -29,12 +32,12 @@ def test_a_scan_in_another_unit_is_refused_and_said() -> None:
 
 
 def test_the_command_lists_cases_and_names_what_is_unknown() -> None:
-    done = evaluate("honesty", "--kinds", "lost wall", "--list")
-    assert done.returncode == 0
+    done = CliRunner().invoke(app, ["evaluate", "honesty", "--kinds", "lost wall", "--list"])
+    assert done.exit_code == 0
     assert "lost wall: wall_plate, known pose, 8 positions, not given, amount 4" in done.stdout
-    done = evaluate("honesty", "--seeds", "one")
-    assert done.returncode == 2
-    assert "--seeds: 'one' is not valid" in done.stderr
+    done = CliRunner().invoke(app, ["evaluate", "honesty", "--seeds", "one"])
+    assert isinstance(done.exception, InputError)
+    assert "--seeds: 'one' is not valid" in str(done.exception)
 
 
 @pytest.mark.slow

@@ -49,13 +49,13 @@ def test_each_kind_makes_a_scan_with_its_truth(case: TroubleCase) -> None:
         assert np.median(distance) < 0.05 * scene.part.diagonal
 
 
-@pytest.mark.parametrize("kind", ["waviness", "mixed pixels", "stray cluster and damage"])
+@pytest.mark.parametrize("kind", ["waviness", "stray cluster"])
 def test_equal_cases_make_equal_scans_and_seeds_differ(kind: str) -> None:
     case = next(case for case in CASES if case.kind == kind)
     first, again = (make_scan(case, make_scene(case))[0] for _ in range(2))
     assert np.array_equal(first.points, again.points)
-    other = make_scene(replace(case, seed=1)).points
-    assert not np.array_equal(first.points, other)
+    other = make_scan(case, make_scene(replace(case, seed=1)))[0]
+    assert not np.array_equal(first.points, other.points)
 
 
 def test_positions_see_one_side_and_all_sides() -> None:
