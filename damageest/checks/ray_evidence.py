@@ -12,7 +12,10 @@ from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.rays import Crossings, RayCaster
 
-MOST_RAYS = 200_000
+MOST_RAYS = 100_000
+"""Scan points whose rays are followed through the part."""
+MOST_WAYS = 20_000
+"""Rays of a view that are compared with the directions of unseen cells."""
 FEWEST = 3
 """Rays through a cell's neighbourhood that prove a loss; single ones may be stray points."""
 
@@ -48,7 +51,7 @@ def trace_rays(part: Part, cells: SkinCells, seen: Flags, aligned: Scan, toleran
     lost = _find_lost(cells, seen, np.concatenate([enter[deep], exit_[deep & ~reached]]), aligned.spacing)
     roots = _find_roots(cells, lost, enter, ray, reached & (leave - hits.distance[entry] > margin))
     hidden, outside = _explain_unseen(
-        caster, cells, aligned.points, aligned.viewpoints, np.asarray(aligned.view, np.int64), tolerance
+        caster, cells, seen, aligned.points, aligned.viewpoints, np.asarray(aligned.view, np.int64), tolerance
     )
     return RayEvidence(lost, np.unique(used[roots]), hidden, outside)
 
@@ -103,22 +106,35 @@ def _find_roots(cells: SkinCells, lost: Flags, enter: Floats, ray: Ints, ends_in
 
 
 def _explain_unseen(
-    caster: RayCaster, cells: SkinCells, points: Floats, viewpoints: Floats, view: Ints, tolerance: float
+    caster: RayCaster, cells: SkinCells, seen: Flags, points: Floats, viewpoints: Floats, view: Ints, tolerance: float
 ) -> tuple[Flags, Flags]:
-    """Whether each cell (F,) is hidden by the part from every scanner position, and whether it lies in no view."""
-    hidden, outside = np.ones(len(cells.areas), bool), np.ones(len(cells.areas), bool)
-    places = cells.centres + 0.1 * tolerance * cells.normals
+    """Whether each unseen cell (F,) is hidden from every scanner position, by the part or by what else was scanned, and
+    whether it lies in no view."""
+    bare = np.flatnonzero(~seen)
+    hidden, outside = np.ones(len(bare), bool), np.ones(len(bare), bool)
+    places = cells.centres[bare] + 0.1 * tolerance * cells.normals[bare]
     for number, viewpoint in enumerate(viewpoints):
         own = np.flatnonzero(view == number)
-        if not len(own):
+        if not len(own) or not len(bare):
             continue
-        way = places - viewpoint
-        length = np.linalg.norm(way, axis=1)
-        direction = way / np.maximum(length, 1e-300)[:, None]
+        direction, length = _point_at(places, viewpoint)
         first = caster.find_first(np.broadcast_to(viewpoint, places.shape), direction)[0]
-        hidden &= (np.einsum("ij,ij->i", direction, cells.normals) > -0.05) | (first < length - 0.2 * tolerance)
-        seen = points[own[:: max(1, len(own) // 5000)]] - viewpoint
-        seen /= np.maximum(np.linalg.norm(seen, axis=1), 1e-300)[:, None]
-        axis = seen.mean(axis=0) / max(float(np.linalg.norm(seen.mean(axis=0))), 1e-300)
-        outside &= direction @ axis < float((seen @ axis).min()) - 1e-3
-    return hidden, outside
+        away = np.einsum("ij,ij->i", direction, cells.normals[bare]) > -0.05
+        ways, reached = _point_at(points[own[:: max(1, len(own) // MOST_WAYS)]], viewpoint)
+        apart = float(np.median(find_neighbours(ways[:2000], 2, ways)[0][:, -1]))
+        _, index = find_neighbours(direction, 1, ways, 3 * apart)
+        # where the nearest ray ended before the cell, a body that is not the part hides it
+        stopped = np.append(reached, np.inf)[index[:, 0]] < length - 2 * tolerance
+        hidden &= away | (first < length - 0.2 * tolerance) | stopped
+        axis = ways.mean(axis=0) / max(float(np.linalg.norm(ways.mean(axis=0))), 1e-300)
+        outside &= direction @ axis < float((ways @ axis).min()) - 1e-3
+    whole = np.zeros((2, len(seen)), bool)
+    whole[:, bare] = hidden, outside
+    return whole[0], whole[1]
+
+
+def _point_at(places: Floats, viewpoint: Floats) -> tuple[Floats, Floats]:
+    """Unit directions (N,3) from a viewpoint (3,) to places (N,3), and their distances (N,)."""
+    way = places - viewpoint
+    length = np.linalg.norm(way, axis=1)
+    return way / np.maximum(length, 1e-300)[:, None], length

@@ -11,10 +11,14 @@ from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, M
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
 from damageest.geometry.refinement import cut_into_cells
 
-MOST_CELLS = 60_000
+MOST_CELLS = 40_000
 """Cells that the skin is cut into, apart from those of a part with more triangles than this."""
 NEIGHBOURS = 6
 """Scan points that the local spacing is measured from: a disc with six points has 1.25 spacings as radius."""
+AVERAGED = 8
+"""Scan points that the mean distance of a cell is taken of."""
+MOST_REACHES = 20_000
+"""Places at which the local spacing is measured."""
 FACING = 1.5
 """Weight of a difference of normals, in reaches: points on the far side of a thin wall do not show the near side."""
 
@@ -67,8 +71,8 @@ class SkinCells:
 
 
 def cut_skin(part: Part, tolerance: float, spacing: float) -> SkinCells:
-    """Cuts the part's skin into cells about as large as two tolerances or two spacings of the scan."""
-    edge = max(2 * tolerance, 2 * spacing, 2.2 * float(np.sqrt(part.area / MOST_CELLS)))
+    """Cuts the part's skin into cells about as large as three tolerances or three spacings of the scan."""
+    edge = max(3 * tolerance, 3 * spacing, 2.2 * float(np.sqrt(part.area / MOST_CELLS)))
     mesh, parent = cut_into_cells(part, edge)
     return SkinCells(mesh, parent, edge)
 
@@ -90,31 +94,28 @@ def find_seen(
         cross = part.cross[deviation.face[chosen]]
         facing = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
         points = aligned.points[chosen]
-        reach = np.maximum(find_neighbours(points, NEIGHBOURS + 1)[0][:, -1], tolerance)
-        reach = np.minimum(reach, 3 * max(float(np.median(reach)), tolerance))
-        weight = FACING * float(np.median(reach))
+        reach = np.maximum(_measure_reach(points, cells.centres), tolerance)
+        usual = float(np.median(reach))
+        reach = np.minimum(reach, 3 * max(usual, tolerance)) + cells.edge / 3
+        weight = FACING * usual
         among = np.concatenate([points, weight * facing], axis=1)
         places = np.concatenate([cells.centres, weight * cells.normals], axis=1)
-        gap, index = find_neighbours(places, 1, among, float(reach.max()) * 1.001 + cells.edge / 3)
-        near = np.flatnonzero(np.isfinite(gap[:, 0]))
-        index = index[near, 0]
-        hit = gap[near, 0] <= reach[index] + cells.edge / 3
-        seen[near[hit]] = True
-        mean[near[hit]] = _average_on_cells(cells, near[hit], points, deviation.distance[chosen], weight, facing)
-        seen = _trim_edges(cells, seen, float(np.median(reach)) + cells.edge / 3, weight)
+        gap, index = find_neighbours(places, AVERAGED, among, float(reach.max()) * 1.001)
+        seen = gap[:, 0] <= reach
+        near = np.isfinite(gap)
+        distance = np.append(deviation.distance[chosen], 0.0)[index]  # the index of a missing neighbour is the last
+        mean = np.where(near, distance, 0.0).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
+        seen = _trim_edges(cells, seen, usual + cells.edge / 3, weight)
     covered = _find_covered(cells, aligned, deviation, max(2 * tolerance, 1.5 * aligned.spacing))
     mean[~seen] = np.nan
     return seen | covered, mean
 
 
-def _average_on_cells(
-    cells: SkinCells, which: Ints, points: Floats, distance: Floats, weight: float, facing: Floats
-) -> Floats:
-    """Mean distance of the eight points nearest to each of some cells."""
-    among = np.concatenate([points, weight * facing], axis=1)
-    places = np.concatenate([cells.centres[which], weight * cells.normals[which]], axis=1)
-    _, index = find_neighbours(places, 8, among)
-    return np.asarray(distance[index].mean(axis=1))
+def _measure_reach(points: Floats, places: Floats) -> Floats:
+    """Radius (F,) about each place that holds `NEIGHBOURS` of the points, measured at the nearest of some of them."""
+    some = points[:: max(1, len(points) // MOST_REACHES)]
+    radius = find_neighbours(some, NEIGHBOURS + 1, points)[0][:, -1]
+    return np.asarray(radius[find_neighbours(places, 1, some)[1][:, 0]])
 
 
 def _trim_edges(cells: SkinCells, seen: Flags, reach: float, weight: float) -> Flags:
