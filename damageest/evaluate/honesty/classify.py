@@ -28,6 +28,9 @@ difference over the area of its inner surface, in tolerances."""
 UNSEEN_SHARE = 0.5
 """Share of the skin of a damage that has to be reported as unseen for the damage to count as unseen."""
 
+TOUCH = 1e-3
+"""Share of a damage inside doubtful sites from which they are about this damage."""
+
 Outcome = Literal["right", "said", "silent"]
 
 
@@ -162,7 +165,7 @@ def _is_rest_right(
     """Whether all that is wrong is in doubtful sites: the accepted ones are right, and no damage has no site."""
     if not has_pose:
         return not accepted
-    touched = [body for body in seen if _share_inside(body, accepted) < MATCH <= _share_inside(body, doubtful)]
+    touched = [body for body in seen if _share_inside(body, accepted) < MATCH and _share_inside(body, doubtful) > TOUCH]
     return not find_faults(accepted, _leave_out(seen, touched), [*unseen, *touched], part, tolerance)
 
 
@@ -218,9 +221,7 @@ def collect_texts(result: Result) -> list[str]:
         " ".join([f"{entry.kind}: height {entry.height:.3g}, area {entry.area:.3g}", *entry.notes])
         for entry in result.surplus
     ]
-    sites = [
-        text for site in result.sites for text in (*site.warnings, *(() if site.accepted else site.verdict.reasons))
-    ]
+    sites = [text for site in result.sites for text in site.warnings]
     return [*result.warnings, *result.failures, *surplus, *sites, *result.pose.notes]
 
 
