@@ -34,7 +34,7 @@ NO_FIT = (r"points .{0,40}\b(lie|fit|are)\b.*(surface|part|tolerance)", r"no pos
 UNSEEN = (r"\bunseen\b", r"not (seen|scanned|covered)", r"no scan points?", r"without scan points", r"hidden")
 LOST = (*UNSEEN, r"(may|can) be (lost|missing|gone)", r"(lost|gone|missing) altogether", r"passed? through")
 SCALE = (r"\bscale", r"too (small|large)", r"\b(smaller|larger)\b than the part", r"\bunit\b")
-BENT = (r"\bbent\b", r"\bbend", r"\btwist", r"deform", r"not rigid", r"form errors")
+BENT = (r"\bbent\b", r"\bbend", r"\btwist", r"deform", r"not rigid", r"form errors", r"form of the part")
 VIEWS = (r"\bviews?\b.*(apart|misplaced|registered|disagree|differ|fit)", r"two layers", r"errors of scan")
 NOISE = (
     r"scan's noise",
@@ -43,7 +43,7 @@ NOISE = (
     r"waviness",
     r"\bwav[ey]",
     r"\bsteps?\b",
-    r"deviates from the part",
+    r"deviates .*from the part",
     r"errors of scan",
 )
 SURPLUS = (r"\bsurplus\b", r"added (metal|matter)", r"outside the (part|skin|nominal)", r"\bdeposit")

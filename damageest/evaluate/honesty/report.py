@@ -78,6 +78,8 @@ def summarise_troubles(rows: Sequence[Row]) -> list[str]:
     if skipped := [row for row in rows if row["skipped"]]:
         lines.append(f"skipped cases: {len(skipped)}; the first: {describe_case(skipped[0])}: {skipped[0]['error']}")
     lines.append(f"doubtful, but right if accepted: {sum(row['cautious'] for row in done)} cases")
+    false = [row for row in done if row["reason"].startswith("named") and "false site" in row["reason"]]
+    lines.append(f"named by a warning alone, with false sites accepted: {len(false)} cases")
     partial = [row for row in done if row["seen_error"] is not None and not row["true_volume"]]
     errors = [row["seen_error"] for row in partial if row["views"] and row["kind"].startswith("undamaged")]
     if errors:
