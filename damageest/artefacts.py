@@ -363,8 +363,10 @@ class Evidence:
     ``intact_points_inside``: intact scan points on the skin that the DV removes.
     ``skin_contradicted``: share of the part's skin that the DV removes which intact scan points lie on.
     ``skin_unseen``: share of the part's skin beside the DV that has no scan point: no evidence either way.
-    ``intact_share``: of the scan points over the skin that the DV removes, the share that lies on that skin. Unlike the
-    two figures before it, it is measured on shallow sites too.
+    ``ids_unseen``: share of its inner surface without scan points near: there it is interpolated. ``ids_gap``: area of
+    the largest connected piece of that.
+    ``intact_share``: share of the skin that the DV removes on which intact points lie as densely as elsewhere, also
+    near the rim. Unlike ``skin_contradicted``, it is measured on shallow and small sites too.
     ``consistent``: whether the scan agrees with the DV. ``reasons`` say why not.
     """
 
@@ -372,6 +374,8 @@ class Evidence:
     intact_points_inside: int = 0
     skin_contradicted: float = 0.0
     skin_unseen: float = 0.0
+    ids_unseen: float = 0.0
+    ids_gap: float = 0.0
     intact_share: float = 0.0
     consistent: bool = True
     reasons: tuple[str, ...] = field(default=())

@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import ADDED, INTACT, Deviation, Evidence, Flags, Floats, Mesh, Part, Scan, Solid
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_in_box, pick_one_per_cube
+from damageest.geometry.point_pieces import number_pieces
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
 
@@ -44,7 +45,11 @@ def weigh_evidence(
     inner = find_inner_faces(damage, part)
     on_ids = _spread(damage, inner, MOST // 2)
     on_skin = _spread(damage, ~inner, MOST // 2)
-    bare = _share_far(on_ids, points, 1.5 * reach)
+    gaps = _measure_gap(on_ids, points, 1.5 * reach)
+    bare = float((gaps > 1.5 * reach).mean()) if len(on_ids) else 0.0
+    far = gaps > max(1.5 * tolerance, 1.6 * spacing)
+    ids_unseen = float(far.mean()) if len(on_ids) else 0.0
+    ids_gap = _measure_largest_gap(on_ids, far, float(np.linalg.norm(damage.cross[inner], axis=1).sum() / 2), spacing)
     # Close to the rim, intact points are near any skin. So only skin away from the inner surface is compared.
     intact = points[label == INTACT]
     grain = float(np.sqrt(np.linalg.norm(damage.cross[~inner], axis=1).sum() / MOST))
@@ -64,7 +69,10 @@ def weigh_evidence(
     covered = _find_covered(aligned, deviation, part, low, high, reach)
     unseen = _share_unseen(part, damage, np.concatenate([points, covered]), on_skin, reach)
     over = _count_intact_over(damage, inner, part, aligned, deviation, tolerance)
-    intact_share = over / max(over + len(ids_points), 1)
+    # as many as on intact skin of this area, or as many as there are points of the site: either shows intact skin
+    skin_area = float(np.linalg.norm(damage.cross[~inner], axis=1).sum() / 2)
+    expected = min(len(ids_points) + over, skin_area * (1.1 / spacing) ** 2 if spacing else np.inf)
+    intact_share = float(min(over / max(expected, 1.0), 1.0))
 
     reasons = []
     if residual > 1.5 * tolerance + 0.25 * spacing:
@@ -76,10 +84,21 @@ def weigh_evidence(
     if bare > 0.1:
         reasons.append(f"{bare:.0%} of its inner surface has no scan point nearby")
     if over >= FEWEST_INTACT and intact_share > HALF:
-        reasons.append(f"of the scan points over the skin that it removes, {intact_share:.0%} lie on that skin")
+        reasons.append(f"intact points lie on {intact_share:.0%} of the skin that it removes, shallow as it is")
     if unseen > UNSEEN:
         reasons.append(f"{unseen:.0%} of the skin beside it has no scan point: the damage may extend there")
-    return Evidence(residual, inside, contradicted, unseen, intact_share, not reasons, tuple(reasons))
+    return Evidence(
+        residual, inside, contradicted, unseen, ids_unseen, ids_gap, intact_share, not reasons, tuple(reasons)
+    )
+
+
+def _measure_largest_gap(places: Floats, chosen: Flags, area: float, spacing: float) -> float:
+    """Area of the largest connected piece of the chosen places (N,), which are spread evenly over an ``area``."""
+    if not chosen.any():
+        return 0.0
+    each = area / len(places)
+    piece = number_pieces(places[chosen], max(0.7 * spacing, 2 * float(np.sqrt(each))))
+    return float(np.bincount(piece).max() * each)
 
 
 def _count_intact_over(

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Evidence, Floats, Ints, Pose, Scan
+from damageest.artefacts import ADDED, Deviation, Evidence, Floats, Pose, Scan
 from damageest.checks.coverage import SkinView
-from damageest.result import Verdict
+from damageest.geometry.voxels import number_cubes
+from damageest.result import Surplus, Verdict
 
 SYSTEMATIC = 4.0
 """How many times deeper than the systematic deviation of intact skin a site is to be."""
+SMALL = 0.15
+"""Systematic deviation, in tolerances, that does not matter: errors of the pose and of the triangles."""
+OUTWARD = 0.3
+"""Share of a site's area that skin which lies outside by as much has to have, to be the sign of one error."""
+ALIKE = 2.0
+"""How many times deeper than that skin is high a site is to be."""
+LAYER = 5.0
+"""Height in tolerances up to which points outside count as such skin; higher ones are added metal."""
 FEW, TOO_FEW = 100, 12
 """Scan points below which a site's volume is a rough figure, and below which stray points explain it."""
 MIXED = 0.3
 """Share of intact points over a site from which its rim is not clear."""
+BARE = 0.25
+"""Share of a site's inner surface without scan points from which its volume is open; from twice that it is doubtful."""
+GAP = 8.0
+"""The same for a connected piece of it: its area in squares of the scan's spacing, or of the tolerance."""
 SHALLOW = 1.5
 """Depth in tolerances below which a site is shallow: its rim is then as wide as itself."""
 UNSEEN = 0.5
@@ -24,68 +38,128 @@ UNSEEN = 0.5
 
 @dataclass(frozen=True)
 class ScanLimits:
-    """What the whole scan cannot tell apart from damage. ``systematic``: standard deviation, in the job's unit, of the
-    mean distances of intact cells of the skin that noise does not explain."""
+    """What the whole scan cannot tell apart from damage, in the job's ``unit``.
 
-    systematic: float
+    ``systematic``: standard deviation of the mean distances of intact cells of the skin that noise does not explain.
+    ``outward_area`` and ``outward_height``: skin that lies outside the part by some tolerances, and by how much. No
+    damage does that, so a site of like depth may come from the same error.
+    """
+
+    tolerance: float
+    spacing: float
+    unit: str
+    systematic: float = 0.0
+    outward_area: float = 0.0
+    outward_height: float = 0.0
 
 
-def measure_limits(skin: SkinView, aligned: Scan) -> ScanLimits:
-    """How far intact skin deviates from the part over whole cells, beyond what the noise of eight points explains."""
+def measure_limits(
+    skin: SkinView, aligned: Scan, deviation: Deviation, surplus: Iterable[Surplus], tolerance: float, unit: str
+) -> ScanLimits:
+    """Measures how far skin deviates that is not damaged. ``surplus``: higher one is left out, since it is metal."""
+    systematic = 0.0
     distance = skin.distance[skin.seen & np.isfinite(skin.distance)]
-    if len(distance) < 30:
-        return ScanLimits(0.0)
-    # half the width of the middle 90 %, in standard deviations of a normal distribution
-    low, high = np.quantile(distance, [0.05, 0.95])
-    spread = float(max(-low, high)) / 1.645
-    return ScanLimits(float(np.sqrt(max(spread**2 - aligned.noise**2 / 8, 0.0))))
+    if len(distance) >= 30:
+        # half the width of the middle 90 %, in standard deviations of a normal distribution
+        low, high = np.quantile(distance, [0.05, 0.95])
+        spread = float(max(-low, high)) / 1.645
+        systematic = float(np.sqrt(max(spread**2 - aligned.noise**2 / 8, 0.0)))
+    layer = (deviation.label == ADDED) & (deviation.distance < LAYER * tolerance)
+    for one in surplus:
+        if one.height > LAYER * tolerance or one.kind == "surroundings":
+            layer[one.points] = False
+    area, height = 0.0, 0.0
+    if layer.any():
+        area = measure_area(aligned.points[layer], skin.cells.edge)
+        height = float(np.quantile(deviation.distance[layer], 0.9))
+    return ScanLimits(tolerance, aligned.spacing, unit, systematic, area, height)
+
+
+def measure_area(points: Floats, edge: float, fewest: int = 3) -> float:
+    """Area that points (N,3) on a surface cover: that of the cubes' sides with at least ``fewest`` of them."""
+    count = np.unique(number_cubes(points, edge)[1], return_counts=True)[1]
+    return float((count >= fewest).sum() * edge**2)
+
+
+@dataclass
+class _Reasons:
+    """Reasons against a site, and questions that stay open about it, as they are found."""
+
+    against: list[str]
+    questions: list[str]
+
+    def add(self, is_against: bool, text: str) -> None:
+        (self.against if is_against else self.questions).append(text)
 
 
 def judge_site(
-    evidence: Evidence, members: Ints, deviation: Deviation, pose: Pose, limits: ScanLimits, tolerance: float,
-    unit: str, proven_by_rays: bool, beside: tuple[str, ...] = (), unknown: tuple[str, ...] = (),
+    evidence: Evidence, depth: Floats, area: float, pose: Pose, limits: ScanLimits, proven_by_rays: bool,
+    unknown: tuple[str, ...] = (), doubts: tuple[str, ...] = (),
 ) -> Verdict:  # fmt: skip
     """Weighs all that speaks for and against a damage volume.
 
-    ``members``: numbers of the scan points on it; ``proven_by_rays``: rays passed through the metal that it removes;
-    ``beside``: what lies beside it and makes it doubtful, such as surplus of like size; ``unknown``: what the scan does
-    not show of it.
+    Args:
+        depth: (M,) depth of each of its scan points below the skin, in the job's unit.
+        area: skin that these points cover.
+        proven_by_rays: whether rays passed through the metal that it removes. Depth and number of points then do not
+            matter.
+        unknown: what the scan does not show of it. doubts: what else makes it doubtful, such as a displaced piece.
     """
-    depth: Floats = -deviation.distance[members]
-    typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
-    against: list[str] = []
-    open_questions = list(unknown)
+    found = _Reasons([*pose.doubts, *doubts], list(unknown))
     for reason in evidence.reasons:
-        unseen_only = reason.endswith("the damage may extend there") and evidence.skin_unseen <= UNSEEN
-        (open_questions if unseen_only or (proven_by_rays and "no scan point" in reason) else against).append(reason)
-    if not proven_by_rays and deepest < SYSTEMATIC * limits.systematic and limits.systematic > 0.15 * tolerance:
-        against.append(
+        unseen = reason.endswith("the damage may extend there")
+        found.add(not (unseen and evidence.skin_unseen <= UNSEEN) and not (proven_by_rays and _is_bare(reason)), reason)
+    _ask_inner_surface(found, evidence, limits)
+    if not proven_by_rays:
+        _ask_depth(found, depth, area, limits)
+        _ask_points(found, evidence, len(depth))
+    if found.against:
+        return Verdict("doubtful", (*found.against, *found.questions))
+    return Verdict("likely" if found.questions else "proven", tuple(found.questions))
+
+
+def _is_bare(reason: str) -> bool:
+    return "no scan point" in reason
+
+
+def _ask_inner_surface(found: _Reasons, evidence: Evidence, limits: ScanLimits) -> None:
+    gap = evidence.ids_gap / max(limits.tolerance, limits.spacing) ** 2
+    if gap > GAP or evidence.ids_unseen > BARE:
+        found.add(
+            gap > 2 * GAP or evidence.ids_unseen > 2 * BARE,
+            f"{evidence.ids_unseen:.0%} of its inner surface has no scan points near, {evidence.ids_gap:.3g} "
+            f"{limits.unit}² in one piece: it may be deeper there",
+        )
+
+
+def _ask_depth(found: _Reasons, depth: Floats, area: float, limits: ScanLimits) -> None:
+    typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
+    unit = limits.unit
+    if limits.systematic > SMALL * limits.tolerance and typical < SYSTEMATIC * limits.systematic:
+        found.add(
+            deepest < SYSTEMATIC * limits.systematic,
             f"it is {deepest:.3g} {unit} deep, and intact skin deviates by {limits.systematic:.3g} {unit} over whole "
-            "areas (pose, form of the part, or scanner): it cannot be told from that"
+            "areas (pose, form of the part, or scanner)",
         )
-    elif not proven_by_rays and typical < SYSTEMATIC * limits.systematic and limits.systematic > 0.15 * tolerance:
-        open_questions.append(
-            f"intact skin deviates by {limits.systematic:.3g} {unit} over whole areas, which changes its volume"
+    if limits.outward_area > OUTWARD * area and typical < ALIKE * limits.outward_height:
+        found.add(
+            deepest < ALIKE * limits.outward_height,
+            f"it is {deepest:.3g} {unit} deep, and {limits.outward_area:.3g} {unit}² of the scan lie up to "
+            f"{limits.outward_height:.3g} {unit} outside the part: both may come from one error (scale, pose, form of "
+            "the part, or scanner)",
         )
-    if proven_by_rays:
-        pass
-    elif len(members) < TOO_FEW:
-        against.append(f"only {len(members)} scan points lie on it; stray points explain it")
-    elif len(members) < FEW:
-        open_questions.append(f"only {len(members)} scan points lie on it")
-    if evidence.consistent and evidence.intact_share > MIXED and not proven_by_rays:
-        open_questions.append(
-            f"{evidence.intact_share:.0%} of the scan points over the skin that it removes lie on that skin: its rim "
-            "is not clear"
-        )
-    if deepest < SHALLOW * tolerance and not proven_by_rays:
-        open_questions.append(f"it is less than {SHALLOW:g} tolerances deep: its rim fades out below the tolerance")
-    against += [*pose_doubts(pose), *beside]
-    if against:
-        return Verdict("doubtful", (*against, *open_questions))
-    return Verdict("likely" if open_questions else "proven", tuple(open_questions))
+    if deepest < SHALLOW * limits.tolerance:
+        found.add(False, f"it is less than {SHALLOW:g} tolerances deep: its rim fades out below the tolerance")
 
 
-def pose_doubts(pose: Pose) -> tuple[str, ...]:
-    """What makes every site doubtful because the pose is not sure."""
-    return tuple(getattr(pose, "doubts", ()))
+def _ask_points(found: _Reasons, evidence: Evidence, count: int) -> None:
+    if count < FEW:
+        found.add(
+            count < TOO_FEW,
+            f"only {count} scan points lie on it" + ("; stray points explain it" if count < TOO_FEW else ""),
+        )
+    if evidence.consistent and evidence.intact_share > MIXED:
+        found.add(
+            False,
+            f"intact points lie on {evidence.intact_share:.0%} of the skin that it removes: its rim is not clear",
+        )

@@ -163,6 +163,7 @@ class FoundSite(_SiteState):
     refused: bool = False
     verdict: Verdict = field(default_factory=Verdict)
     accepted: bool = True
+    doubts: tuple[str, ...] = ()
     questions: tuple[str, ...] = ()
 
     damage = Value[Solid]()

@@ -28,6 +28,10 @@ MOST_SKIN = 0.5
 """Share of the part's skin from which surplus is an error of the pose, of the unit or of the tolerance."""
 
 
+EQUAL = 1.35
+"""Largest ratio of the volumes of a displaced piece and of the place that it left."""
+
+
 def find_surplus(engine: Engine, work: Work) -> Work:
     """Finds added metal and surroundings, and the volume of the former.
 
@@ -76,6 +80,12 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
         if item.kind == "displaced piece":
             of = " and ".join(f"site {site.number} with a volume of {site.damage.volume:.4g}" for site in beside)
             own = "" if item.volume is None else f" with a volume of {item.volume:.4g}"
+            equal = [site.number for site in beside if _is_equal(item, [other.damage.volume for other in beside], site)]
+            doubt = (
+                f"surplus {item.id} beside it{own} is as large: a piece of the part may be displaced, or the part be "
+                "bent, and no metal be lost"
+            )
+            sites = [replace(s, doubts=(*s.doubts, doubt)) if s.number in equal else s for s in sites]
             warnings.append(
                 f"surplus {item.id}{own} may be a piece of the part that was displaced"
                 + (f", and {of} its place" if of else "")
@@ -90,6 +100,13 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
     key = digest("related", state.key("surplus"), [site.key("damage") for site in sites])
     state = state.with_value(JobState.surplus, tuple(done), key)
     return replace(work, job=state, sites=tuple(sites), warnings=(*work.warnings, *warnings))
+
+
+def _is_equal(item: Surplus, volumes: list[float], site: FoundSite) -> bool:
+    """Whether a displaced piece is as large as a loss beside it, or as all losses beside it."""
+    if item.volume is None:
+        return False
+    return any(1 / EQUAL < volume / item.volume < EQUAL for volume in (site.damage.volume, sum(volumes)))
 
 
 def _is_touching(state: JobState, item: Surplus, site: FoundSite, reach: float) -> bool:

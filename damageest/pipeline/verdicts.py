@@ -10,7 +10,7 @@ import numpy as np
 from damageest.artefacts import Flags
 from damageest.checks.coverage import SkinView
 from damageest.checks.evidence import weigh_evidence
-from damageest.checks.verdict import judge_site, measure_limits
+from damageest.checks.verdict import judge_site, measure_area, measure_limits
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import to_solid, unite
@@ -52,13 +52,13 @@ def judge_sites(engine: Engine, work: Work) -> Work:
     state, accept = work.job, engine.job.accept
     if accept != "all":
         _check_numbers("accept", accept, work.sites)
-    limits = measure_limits(state.skin, state.aligned)
+    limits = measure_limits(state.skin, state.aligned, state.deviation, state.surplus, state.tolerance, state.unit)
     done = []
     for site in work.sites:
-        by_rays = _is_proven_by_rays(state.skin, site)
+        area = measure_area(state.aligned.points[site.members], state.skin.cells.edge, 1) if len(site.members) else 0.0
         verdict = judge_site(
-            site.evidence, site.members, state.deviation, state.pose, limits, state.tolerance, state.unit, by_rays,
-            unknown=site.questions,
+            site.evidence, -state.deviation.distance[site.members], area, state.pose, limits,
+            _is_proven_by_rays(state.skin, site), site.questions, site.doubts,
         )  # fmt: skip
         accepted = verdict.level != "doubtful" or accept == "all" or site.number in accept
         done.append(replace(site, verdict=verdict, accepted=accepted))

@@ -52,7 +52,9 @@ class EvidenceReport(_Model):
     intact_points_inside: int = Field(description="intact scan points on the skin that it removes")
     skin_contradicted: float = Field(description="share of the removed skin that intact scan points lie on")
     skin_unseen: float = Field(description="share of the skin beside the damage that the scan does not show")
-    intact_share: float = Field(description="of the scan points over the skin that it removes, the share on that skin")
+    ids_unseen: float = Field(description="share of its inner surface without scan points near, interpolated")
+    ids_gap: float = Field(description="area of the largest connected piece of inner surface without scan points near")
+    intact_share: float = Field(description="share of the removed skin, rim included, that intact points lie on")
     consistent: bool = Field(description="whether the scan agrees with the damage volume")
     reasons: list[str] = Field(description="why it is not")
 
