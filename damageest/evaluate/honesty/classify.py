@@ -36,12 +36,16 @@ Outcome = Literal["right", "said", "silent"]
 
 @dataclass(frozen=True, eq=False)
 class TrueState:
-    """The truth of a run. ``pose`` (4,4) T_part_scan, None where no pose is right; ``damage`` in the part's frame."""
+    """The truth of a run. ``pose`` (4,4) T_part_scan, None where no pose is right; ``damage`` in the part's frame. ``names``:
+    patterns that name the trouble. ``tolerance``: the one that the scan allows; a larger one of the job does not make
+    damage tiny or a pose right.
+    """
 
     part: Part
     damage: Solid | None
     pose: Floats | None
     names: tuple[str, ...] = ()
+    tolerance: float = float("inf")
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ def judge_error(message: str, names: Sequence[str]) -> Judgement:
 
 def judge(result: Result, true: TrueState) -> Judgement:
     """The judgement on a run that gave a result."""
-    tolerance = result.tolerance
+    tolerance = min(result.tolerance, true.tolerance)
     bodies = _split_damage(true, result.pose, tolerance)
     reported = {id(body): _find_report(body, result) for body in bodies}
     unseen = [body for body in bodies if reported[id(body)] == "unseen"]

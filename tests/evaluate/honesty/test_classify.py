@@ -103,6 +103,8 @@ def test_a_missed_damage_is_silent_unless_it_is_tiny() -> None:
     tiny = _make_box((25, 15, 19.3), (25.8, 15.8, 20))
     assert tiny.volume < (4 * TOLERANCE) ** 3
     assert _judge(_make_result(), tiny).outcome == "right"
+    coarse = judge(_make_result(tolerance=2.0), TrueState(PART, DENT, EYE, tolerance=TOLERANCE))
+    assert coarse.outcome == "silent", "a coarse tolerance does not make the damage tiny"
 
 
 def test_a_missed_damage_on_skin_reported_as_unseen_is_right_and_counted() -> None:
