@@ -18,6 +18,7 @@ def damageest_stages() -> list[type[Stage]]:
 
     from damageest.stages.align.icp import Icp
     from damageest.stages.align.none import KnownPose
+    from damageest.stages.align.points import Points
     from damageest.stages.align.register import Register
     from damageest.stages.allowance.milling import Milling
     from damageest.stages.allowance.none import NoAllowance as NoAllowance
@@ -48,9 +49,9 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.segment.mesh_distance import MeshDistance
 
     return [
-        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, MeshDistance, Dbscan, PyVista, LargestLoop,
-        AllLoops, Offset, BoundingBox, Capsule, CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive,
-        Implicit,
+        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, Points, MeshDistance, Dbscan, PyVista,
+        LargestLoop, AllLoops, Offset, BoundingBox, Capsule, CylinderBackground, Minkowski, BuildVolume, ShortestPath,
+        Adaptive, Implicit,
         NoRepair, Manifold, NoAllowance, Milling, Files, Uniform, CloudDistance, SignedDistance, PartFromScan,
     ]  # fmt: skip
 

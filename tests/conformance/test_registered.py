@@ -24,6 +24,9 @@ write_stl(FOLDER / "prism.stl", _scene.make_prism())
 write_points(FOLDER / "prism.ply", dict(zip("xyz", SPECIMEN.T, strict=True)))
 VOLUME = _scene.make_prism().volume
 
+_POSE = conformance.AlignContract.pose
+PAIRS = [[((p - _POSE[:3, 3]) @ _POSE[:3, :3]).tolist(), p.tolist()] for p in (*np.diag([8.0, 6, 4]), -np.ones(3))]
+
 WITH: dict[str, dict[str, Any]] = {
     "part file": {"options": {"path": FOLDER / "prism.stl"}, "volume": VOLUME},
     "part reconstruct": {"options": {"path": FOLDER / "prism.ply"}, "volume": VOLUME, "error": 0.02},
@@ -36,6 +39,7 @@ WITH: dict[str, dict[str, Any]] = {
     "scan simulate": {"options": {"points": 20_000}},
     "align icp": {"pose": NEAR},
     "align none": {"pose": np.eye(4)},
+    "align points": {"options": {"pairs": PAIRS}},
     "allowance milling": {"options": {"outer": 0.3}, "lengths": ("outer",)},
     "background build_volume": {
         "options": {"size": (60.0, 60.0, 60.0)},

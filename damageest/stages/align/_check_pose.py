@@ -16,6 +16,14 @@ MIN_ON_PART, MIN_ON_PART_IF_COVERED, MIN_COVER = 0.38, 0.15, 0.45
 """Share of the scanned area that must lie on the part. The second, smaller share is enough where points cover
 `MIN_COVER` of the part's surface, as when a fixture was scanned with the part."""
 
+MIN_AGREEMENT, DOUBTFUL_AGREEMENT = 0.55, 0.72
+"""Share on the surface of the scanned area that is on the part, inside it, or outside it by less than `NEAR`. In right
+poses it was 0.74 or more with a third of the metal missing, with surroundings 0.79; with wrong parts 0.5 or less. Below
+the first the pose is refused, below the second it is doubtful."""
+
+NEAR = 0.05
+"""Distance outside the part, in diagonals, from which a point shows something beside the part, such as a table."""
+
 CHECKED_POINTS = 15_000
 """Number of points that each share is estimated from; enough for half a percent."""
 
@@ -24,7 +32,8 @@ CHECKED_POINTS = 15_000
 class PoseCheck:
     """How well a pose explains a scan.
 
-    ``on``, ``inside``, ``outside``: shares of the scanned area on the part's surface, inside the part and outside it.
+    ``on``, ``inside``, ``outside``: shares of the scanned area on the part's surface, inside the part and outside it;
+    ``beside``: the share outside, but near it, which no damage explains.
     ``cover``: share of the part's surface that has scan points on it. ``rms``: of the distances of the inliers, the
     points on the surface. ``inliers``: their share of all scan points.
     """
@@ -32,21 +41,43 @@ class PoseCheck:
     on: float
     inside: float
     outside: float
+    beside: float
     cover: float
     rms: float
     inliers: float
 
     @property
+    def agreement(self) -> float:
+        """Share on the surface, of what is on the part, inside it or beside it."""
+        return self.on / max(self.on + self.inside + self.beside, 1e-9)
+
+    @property
     def is_acceptable(self) -> bool:
         """Whether enough of the scan lies on the part."""
-        return self.on >= MIN_ON_PART or (self.on >= MIN_ON_PART_IF_COVERED and self.cover >= MIN_COVER)
+        enough = self.on >= MIN_ON_PART or (self.on >= MIN_ON_PART_IF_COVERED and self.cover >= MIN_COVER)
+        return enough and self.agreement >= MIN_AGREEMENT
+
+    def describe(self) -> str:
+        """The shares in words."""
+        return (
+            f"{self.on:.0%} of the scanned surface lies on the part ({self.inside:.0%} inside it, {self.outside:.0%} "
+            f"outside) and covers {self.cover:.0%} of the part's surface"
+        )
+
+    def note_doubts(self) -> tuple[str, ...]:
+        """A note where the pose is acceptable, but little of the scan agrees with the part."""
+        if self.agreement >= DOUBTFUL_AGREEMENT:
+            return ()
+        return (
+            f"only {self.agreement:.0%} of the scan near the part lies on its surface in the best pose: it may show "
+            "another part, or another revision of it",
+        )
 
     def build_error(self, remedy: str) -> StageError:
         """The error for a pose that is not acceptable."""
         return StageError(
-            f"no pose found that explains the scan: in the best pose {self.on:.0%} of the scanned surface lies on the "
-            f"part ({self.inside:.0%} inside it, {self.outside:.0%} outside) and covers {self.cover:.0%} of the part's "
-            f"surface; at least {MIN_ON_PART:.0%} should lie on the part",
+            f"no pose found that explains the scan: in the best pose {self.describe()}; at least {MIN_ON_PART:.0%} "
+            f"should lie on the part, and {MIN_AGREEMENT:.0%} of what is near it",
             remedy,
         )
 
@@ -78,6 +109,7 @@ def check_pose(target: PartSurface, best: Fit, even: Floats, raw: Floats, tolera
         float(on.mean()),
         float((distance < -band).mean()),
         float((distance > band).mean()),
+        float(((distance > band) & (distance < NEAR)).mean()),
         cover,
         rms,
         float(hit.mean()),

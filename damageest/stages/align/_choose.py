@@ -23,6 +23,10 @@ COARSE = 0.008
 FAR = 4 * COARSE
 """Distance, in diagonals, from which on the cost of a point no longer depends on its exact distance."""
 
+APART = 0.02
+"""Distance of two poses, in diagonals, below which they are counted once: copies that the fit cannot distinguish, or
+one that slid a little."""
+
 FIRST_POINTS, SECOND_POINTS = 1500, 10_000
 """Number of points for the first comparison of poses and the fits before it, and for the second comparison."""
 
@@ -63,8 +67,9 @@ def choose_pose(
     costs = [robust_cost(_measure_distance(target, field, points, pose), band) for pose in poses]
     best = int(np.argmin([cost.sum() for cost in costs]))
     equal = np.array([not is_worse(cost, costs[best]) for cost in costs])
-    equal[best] = False
     pose, others = poses[best], poses[equal]
+    order = np.array([cost.sum() for cost, same in zip(costs, equal, strict=True) if same])
+    others = others[select_distinct(others, -order, max(APART, 6 * band), MAX_POSES)][1:]
     if axis is not None:
         # Fitted again: the axis is only as exact as the poses that it was computed from.
         turned = axis.make_turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose

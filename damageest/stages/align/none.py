@@ -16,7 +16,8 @@ from damageest.stages.align._frame import RigidPose
 class KnownPose(Align):
     """Uses the given pose, by default the identity, and fits nothing.
 
-    The result tells how well the scan lies on the part in that pose.
+    Where the scan does not lie on the part in that pose, or lies on it much better in a pose nearby, the pose is
+    refused.
     """
 
     use: Literal["none"] = "none"
@@ -28,18 +29,20 @@ class KnownPose(Align):
 
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The given pose; its inliers are the scan points within the tolerance of the part, of about 100,000 at
-        most."""
+        most. Raises StageError where the scan contradicts it."""
+        from damageest.stages.align._check_given import check_given
         from damageest.stages.align._field import PartSurface
+        from damageest.stages.align._frame import MIN_POINTS
 
         T = np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan)
         if not len(scan.points):
             return Pose(T, inliers=0.0, notes=("the scan has no points",))
         if not np.isfinite(scan.points).all():
             raise StageError("the scan has points that are not finite", "remove these points from the file")
+        # fewer points show no pose to compare the given one with
+        doubts = check_given(T, scan, part, tolerance) if len(scan.points) >= MIN_POINTS else ()
         points = scan.points[:: max(1, len(scan.points) // 100_000)]
         distance = PartSurface(part).closest(points @ T[:3, :3].T + T[:3, 3])[0]
         hit = np.abs(distance) <= tolerance
         rms = float(np.sqrt((distance[hit] ** 2).mean())) if hit.any() else 0.0
-        share = float(hit.mean())
-        doubt = f"only {share:.0%} of the scan points lie on the part in the given pose; check T_part_scan"
-        return Pose(T, rms, share, notes=() if share >= 0.35 else (doubt,))
+        return Pose(T, rms, float(hit.mean()), notes=doubts, doubts=doubts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -30,7 +31,7 @@ class Register(Align):
         """The fitted pose. Raises StageError where no pose explains the scan: it shows another part, has another unit,
         or most of it is not the part."""
         from damageest.errors import StageError
-        from damageest.stages.align._check_pose import check_pose
+        from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, check_pose
         from damageest.stages.align._choose import (
             COARSE,
             choose_pose,
@@ -41,8 +42,16 @@ class Register(Align):
         from damageest.stages.align._field import PlaneGrid
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import MIN_POINTS, Frame
+        from damageest.stages.align._largest_piece import prefer_largest_piece
+        from damageest.stages.align._mirror import fit_reflections, refuse_mirrored
         from damageest.stages.align._pairs import propose_poses
-        from damageest.stages.align._points import draw_evenly, draw_stratified, orient_scan, orient_surface
+        from damageest.stages.align._points import (
+            OrientedPoints,
+            draw_evenly,
+            draw_stratified,
+            orient_scan,
+            orient_surface,
+        )
         from damageest.stages.align._refine_pose import refine_pose
         from damageest.stages.align._search import search
 
@@ -61,14 +70,26 @@ class Register(Align):
         few = oriented.take(draw_stratified(len(oriented.points), 1500, rng))
         fine = rng.permutation(dense[draw_evenly(dense, weights, self.points, rng)])
         choice = choose_pose(search(rough, oriented, field, rng), target, field, few, fine, noise)
-        best = refine_pose(target, fine, fit(target, fine, choice.pose, COARSE / 2, noise, 30))
+        best = fit(target, fine, choice.pose, COARSE / 2, noise, 30)
+        best = refine_pose(target, fine, prefer_largest_piece(target, fine, best, noise))
         check = check_pose(target, best, fine, dense, tolerance / frame.size)
+        mirrored = fit_reflections(target, field, fine, best, noise)
+        if check.agreement < DOUBTFUL_AGREEMENT:
+            flip = np.array([1.0, 1.0, -1.0])
+            other = OrientedPoints(oriented.points * flip, oriented.normals * flip, oriented.signed)
+            rough = propose_poses(other, orient_surface(target.mesh, 20_000, rng), self.trials, rng)
+            pose = search(rough, other, field, rng)[0]
+            found = fit(target, fine * flip, pose, COARSE, noise, 30)
+            mirrored = replace(found, pose=found.pose @ np.diag([*flip, 1.0]))
+        refuse_mirrored(target, fine, dense, best.pose, check, mirrored, tolerance / frame.size)
         if not check.is_acceptable:
             raise check.build_error(
                 "check that the scan shows this part and that both have the right unit; crop away a fixture or table; "
                 "where the pose is known, give it to align: icp or align: none"
             )
         others = np.array([frame.unscale_pose(pose) for pose in choice.others]) if len(choice.others) else None
-        doubts = note_ambiguity(choice, target) + note_free_motion(best.pose, target, fine, best.band)
+        doubts = (
+            check.note_doubts() + note_ambiguity(choice, target) + note_free_motion(best.pose, target, fine, best.band)
+        )
         notes = describe_choice(choice) + doubts
         return Pose(frame.unscale_pose(best.pose), check.rms * frame.size, check.inliers, others, notes, doubts)

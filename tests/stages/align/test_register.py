@@ -86,6 +86,23 @@ def test_another_part_is_refused() -> None:
     assert "shows this part" in caught.value.remedy
 
 
+def test_mirror_image_is_refused() -> None:
+    part, scan = scene("ribbed_plate", seed=1)
+    with pytest.raises(StageError, match="mirror image") as caught:
+        Register().run(Scan(scan.points * [1, 1, -1], noise=scan.noise), part, 4 * scan.noise)
+    assert "left-hand" in caught.value.remedy
+
+
+def test_a_displaced_piece_does_not_shift_the_pose() -> None:
+    part, scan = scene("lever", seed=5, clutter=0.0)
+    assert scan.truth is not None
+    T, tolerance = scan.truth.T_part_scan, 4 * scan.noise
+    points = scan.move(T).points.copy()
+    points[points[:, 0] > np.quantile(points[:, 0], 0.74)] += 4 * tolerance * np.array([0.6, 0.5, 0.62])
+    broken = Scan(points, noise=scan.noise, truth=scan.truth).move(np.linalg.inv(T))
+    assert error(part, Register().run(broken, part, tolerance).T_part_scan, broken) * scan.noise < 0.3 * tolerance
+
+
 def test_inches_read_as_millimetres_are_reported() -> None:
     part, scan = scene("block", seed=2)
     with pytest.raises(StageError, match="unit"):

@@ -1,0 +1,70 @@
+"""Checks a pose that was given and is not to be changed."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from damageest.artefacts import Floats, Part, Scan
+from damageest.errors import StageError
+from damageest.stages.align._check_pose import check_pose
+from damageest.stages.align._fine import Fit, fit, move_points
+from damageest.stages.align._frame import Frame
+from damageest.stages.align._points import draw_evenly, orient_scan, orient_surface
+
+REACH = 0.04
+"""How far off a given pose may be for the pose nearby to be found, in diagonals of the part."""
+
+POINTS = 15_000
+"""Number of scan points that the pose nearby is fitted to."""
+
+SMALL_GAIN = 0.03
+"""Share of the scan that lies on the part only in the pose nearby from which the given one is doubtful."""
+
+MIN_GAIN, MIN_BESIDE, LARGE_GAIN = 0.05, 0.02, 0.4
+"""Shares of the scan that have to lie on the part in the pose nearby and not in the given one, for it to be refused:
+the first, with the second beside the part in the given pose, where no damage explains it; or the third alone."""
+
+
+def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[str, ...]:
+    """What is doubtful about a pose ``T`` (4,4).
+
+    Raises StageError where the scan does not lie on the part, and where a pose nearby, found by the robust fit,
+    explains it much better. Damage and wear are no reason: in the given pose they lie inside the part, and in the pose
+    nearby as well. A correction that moves the part's surface by less than the tolerance is none either.
+    """
+    frame = Frame.build(scan, part)
+    noise, band = scan.noise / frame.size, tolerance / frame.size
+    rng = np.random.default_rng(0)
+    dense, weights, _ = orient_scan(frame.scale_points(scan), scan.normals, noise, 100, rng)
+    points = rng.permutation(dense[draw_evenly(dense, weights, POINTS, rng)])
+    start = frame.scale_pose(T)
+    near = fit(frame.target, points, start, max(REACH, 2 * band), noise, 60)
+    given = check_pose(frame.target, Fit(start, near.band, 0.0), points, dense, band)
+    fitted = check_pose(frame.target, near, points, dense, band)
+
+    D = near.pose @ np.linalg.inv(start)
+    surface = orient_surface(frame.target.mesh, 3000, rng).points
+    moved = float(np.quantile(np.abs(frame.target.closest(move_points(D, surface))[0]), 0.98)) * frame.size
+    gain, beside = fitted.on - given.on, given.beside - fitted.beside
+    differs = fitted.is_acceptable and moved > tolerance
+    if differs and (gain > LARGE_GAIN or (gain > MIN_GAIN and beside > MIN_BESIDE)):
+        shift = float(np.linalg.norm(D[:3, 3])) * frame.size
+        turn = float(np.degrees(Rotation.from_matrix(D[:3, :3]).magnitude()))
+        raise StageError(
+            f"in the given pose {given.on:.0%} of the scan lies on the part; moved by {shift:.3g} {part.unit} and "
+            f"turned by {turn:.2g} degrees, {fitted.on:.0%} would: the given pose is wrong by that much",
+            "use align: icp, which corrects it, or give the right T_part_scan",
+        )
+    if not given.is_acceptable:
+        raise StageError(
+            f"the scan does not lie on the part in the given pose: {given.describe()}",
+            "give the right T_part_scan, or use align: register, which needs none; check unit and part as well",
+        )
+    doubts = [note.replace("in the best pose", "in the given pose") for note in given.note_doubts()]
+    if differs and gain > SMALL_GAIN:
+        doubts.append(
+            f"in a pose that moves the part's surface by {moved:.3g} {part.unit}, {fitted.on:.0%} of the scan lies on "
+            f"the part, in the given one {given.on:.0%}: wear or a wrong pose; if it is the pose, use align: icp"
+        )
+    return tuple(doubts)

@@ -1,0 +1,46 @@
+"""Fit from a rough pose, for the implementations that are given one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import Floats, Part, Pose, Scan
+from damageest.errors import StageError
+from damageest.stages.align._check_pose import check_pose
+from damageest.stages.align._choose import note_free_motion
+from damageest.stages.align._fine import fit
+from damageest.stages.align._frame import Frame
+from damageest.stages.align._largest_piece import prefer_largest_piece
+from damageest.stages.align._points import draw_evenly, orient_scan
+
+
+def fit_from_start(
+    scan: Scan, part: Part, tolerance: float, T: Floats, reach: float, iterations: int, seed: int, remedy: str
+) -> Pose:
+    """The pose that the robust fit finds from ``T`` (4,4), a T_part_scan in the job's unit.
+
+    ``reach``: largest distance of a scan point from the part in the first step, in diagonals of the part. Raises
+    StageError, with the ``remedy``, where its pose does not explain the scan, and where the fit does not converge.
+    """
+    frame = Frame.build(scan, part)
+    noise = scan.noise / frame.size
+    rng = np.random.default_rng(seed)
+    dense, weights, _ = orient_scan(frame.scale_points(scan), scan.normals, noise, 100, rng)
+    points = rng.permutation(dense[draw_evenly(dense, weights, 30_000, rng)])
+    best = fit(frame.target, points, frame.scale_pose(T), reach, noise, iterations)
+    # Only above half the noise: a part that is free to rotate, such as a shaft, may rotate in every step.
+    converged = best.residue <= 0.5 * max(noise, 1e-4)
+    if converged:
+        best = prefer_largest_piece(frame.target, points, best, noise)
+    result = check_pose(frame.target, best, points, dense, tolerance / frame.size)
+    if not result.is_acceptable:
+        raise result.build_error(remedy)
+    if not converged:
+        raise StageError(
+            f"the fit did not converge in {iterations} iterations: the last step still changed the distances "
+            f"of the scan points to the surface by {best.residue * frame.size:.3g} {part.unit} (rms)",
+            "raise iterations, or use align: register",
+        )
+    doubts = result.note_doubts() + note_free_motion(best.pose, frame.target, points, best.band)
+    pose = frame.unscale_pose(best.pose)
+    return Pose(pose, result.rms * frame.size, result.inliers, notes=doubts, doubts=doubts)
