@@ -39,7 +39,11 @@ WITH: dict[str, dict[str, Any]] = {
     "scan simulate": {"options": {"points": 20_000}},
     "align icp": {"pose": NEAR},
     "align none": {"pose": np.eye(4)},
-    "align points": {"options": {"pairs": PAIRS}},
+    "align points": {
+        "options": {"pairs": PAIRS},
+        "lengths": ("pairs",),
+        "exceptions": {"test_moves_along": "the picked points stay where they are, and the part is elsewhere then"},
+    },
     "allowance milling": {"options": {"outer": 0.3}, "lengths": ("outer",)},
     "background build_volume": {
         "options": {"size": (60.0, 60.0, 60.0)},

@@ -25,6 +25,9 @@ LESS, LARGE_GAIN = 0.6, 0.04
 """For the mirrored scan to be the better one: the share of the points off the part that it may keep, or the share of
 the points near the part that lies on it only where the scan is mirrored."""
 
+SUSPECT = 0.82
+"""Share of the points near the part on its surface below which a mirrored scan is searched for from the beginning."""
+
 MIN_GAIN = 0.015
 """Least such share in any case."""
 
@@ -90,6 +93,8 @@ def refuse_mirrored(
         return
     check = check_pose(target, mirrored, points, raw, tolerance)
     gain = check.agreement - best.agreement
+    if not check.is_acceptable:  # another part altogether
+        return
     if gain > LARGE_GAIN or (gain > MIN_GAIN and 1 - check.agreement < LESS * (1 - best.agreement)):
         raise StageError(
             f"the scan is a mirror image of the part: {check.agreement:.0%} of what it shows near the part would lie "

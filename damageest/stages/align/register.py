@@ -31,7 +31,7 @@ class Register(Align):
         """The fitted pose. Raises StageError where no pose explains the scan: it shows another part, has another unit,
         or most of it is not the part."""
         from damageest.errors import StageError
-        from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, check_pose
+        from damageest.stages.align._check_pose import check_pose
         from damageest.stages.align._choose import (
             COARSE,
             choose_pose,
@@ -43,7 +43,7 @@ class Register(Align):
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import MIN_POINTS, Frame
         from damageest.stages.align._largest_piece import prefer_largest_piece
-        from damageest.stages.align._mirror import fit_reflections, refuse_mirrored
+        from damageest.stages.align._mirror import SUSPECT, fit_reflections, refuse_mirrored
         from damageest.stages.align._pairs import propose_poses
         from damageest.stages.align._points import (
             OrientedPoints,
@@ -74,7 +74,7 @@ class Register(Align):
         best = refine_pose(target, fine, prefer_largest_piece(target, fine, best, noise))
         check = check_pose(target, best, fine, dense, tolerance / frame.size)
         mirrored = fit_reflections(target, field, fine, best, noise)
-        if check.agreement < DOUBTFUL_AGREEMENT:
+        if check.agreement < SUSPECT:
             flip = np.array([1.0, 1.0, -1.0])
             other = OrientedPoints(oriented.points * flip, oriented.normals * flip, oriented.signed)
             rough = propose_poses(other, orient_surface(target.mesh, 20_000, rng), self.trials, rng)
