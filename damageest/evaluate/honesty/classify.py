@@ -36,9 +36,11 @@ Outcome = Literal["right", "said", "silent"]
 
 @dataclass(frozen=True, eq=False)
 class TrueState:
-    """The truth of a run. ``pose`` (4,4) T_part_scan, None where no pose is right; ``damage`` in the part's frame. ``names``:
-    patterns that name the trouble. ``tolerance``: the one that the scan allows; a larger one of the job does not make
-    damage tiny or a pose right.
+    """The truth of a run.
+
+    ``pose`` (4,4) T_part_scan, None where no pose is right; ``damage`` in the part's frame. ``names``: patterns that
+    name the trouble. ``tolerance``: the one that the scan allows; a larger one of the job does not make damage tiny or
+    a pose right.
     """
 
     part: Part
