@@ -31,7 +31,7 @@ def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: floa
     if not (aligned.spacing and len(aligned.points) > NEIGHBOURS[0]):
         return turned
     near = deviation.label == INTACT
-    asked = np.flatnonzero(near & (deviation.distance < -max(aligned.noise, 0.1 * tolerance)))
+    asked = np.flatnonzero(near & (deviation.distance < -max(1.5 * aligned.noise, 0.1 * tolerance)))
     cross = part.cross[deviation.face]
     for _ in range(2):  # the second round asks the neighbours of what the first one found
         if not len(asked):

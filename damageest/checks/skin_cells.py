@@ -11,8 +11,10 @@ from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, M
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
 from damageest.geometry.refinement import cut_into_cells
 
-MOST_CELLS = 40_000
-"""Cells that the skin is cut into, apart from those of a part with more triangles than this."""
+MOST_CELLS = 30_000
+"""Cells that the skin is cut into, about; more where the part has more triangles than this."""
+LEAST_AREA = 0.25
+"""Area in squares of a cell's edge below which a triangle is not cut."""
 NEIGHBOURS = 6
 """Scan points that the local spacing is measured from: a disc with six points has 1.25 spacings as radius."""
 AVERAGED = 8
@@ -73,7 +75,7 @@ class SkinCells:
 def cut_skin(part: Part, tolerance: float, spacing: float) -> SkinCells:
     """Cuts the part's skin into cells about as large as three tolerances or three spacings of the scan."""
     edge = max(3 * tolerance, 3 * spacing, 2.2 * float(np.sqrt(part.area / MOST_CELLS)))
-    mesh, parent = cut_into_cells(part, edge)
+    mesh, parent = cut_into_cells(part, edge, LEAST_AREA * edge**2)
     return SkinCells(mesh, parent, edge)
 
 

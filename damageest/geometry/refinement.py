@@ -53,13 +53,20 @@ def halve_edges(mesh: Mesh, edge: float) -> Mesh:
     return cut_into_cells(mesh, edge)[0]
 
 
-def cut_into_cells(mesh: Mesh, edge: float) -> tuple[Mesh, Ints]:
-    """As `halve_edges`, with the face (F,) of ``mesh`` that each new face is a part of."""
+def cut_into_cells(mesh: Mesh, edge: float, area: float = 0.0) -> tuple[Mesh, Ints]:
+    """As `halve_edges`, with the face (F,) of ``mesh`` that each new face is a part of.
+
+    Faces with less than ``area`` stay as they are, except where a neighbour is cut: a part has many long, thin
+    triangles, and cutting all of them to this length would make ten times as many.
+    """
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
     origin = np.arange(len(faces))
     for _ in range(MOST_ROUNDS):
         corners = vertices[faces]
         long = (np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2) > edge).any(axis=1)
+        if area:
+            cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            long &= np.linalg.norm(cross, axis=1) > 2 * area
         if not long.any():
             break
         vertices, faces, parent = _bisect_faces(vertices, faces, np.flatnonzero(long))
