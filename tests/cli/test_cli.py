@@ -26,7 +26,8 @@ def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
     done = call("run", damaged_box.write(tmp_path))
     assert done.returncode == 0, done.stderr
     assert "implicit" in done.stdout
-    assert "passed" in done.stdout
+    assert "proven" in done.stdout
+    assert "the scan shows 100% of the skin" in done.stdout
     assert [line.split(":")[0].strip() for line in done.stderr.splitlines()[1:3]] == ["part", "scan"]
     written = {p.name for p in (tmp_path / "out/job").iterdir()}
     assert {
@@ -37,6 +38,7 @@ def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
         "damage",
         "surface",
         "scan.ply",
+        "skin.ply",
         "stages",
     } == written
     again = call("run", tmp_path / "out/job/job.yaml", "--output", tmp_path / "again", "--quiet")

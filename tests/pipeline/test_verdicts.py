@@ -1,0 +1,133 @@
+"""Doubtful sites stay apart until the job accepts them; sites are dropped, merged and kept as the job says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import damageest
+from damageest.artefacts import Floats, Scan
+from damageest.errors import JobError, StageError
+from damageest.io.meshes import write_points
+from damageest.result import Result
+from damageest.stages.scan.simulate import Simulate
+from tests.cli.test_cli import call
+from tests.damaged_box import JOB, SIZE, box, write
+
+TOP = SIZE[2] / 2
+DENTS = [
+    {"tool": "sphere", "centre": [-12, 0, TOP], "radius": 4},
+    {"tool": "sphere", "centre": [0, 0, TOP], "radius": 3.5},
+    {"tool": "sphere", "centre": [12, 0, TOP], "radius": 3},
+]
+
+
+def scan_with_strays(count: int, dents: int = 0, depth: float = 1.0) -> Floats:
+    """A scan of the box, and stray points under its top, which has its own points above them."""
+    scanner = Simulate.model_validate({"points": 25_000, "noise": 0.04, "damage": DENTS[:dents]})
+    points = scanner.run("mm", box()).points
+    rng = np.random.default_rng(3)
+    place = rng.uniform([3.8, 7.8], [6.2, 10.2], (count, 2))
+    strays = np.column_stack([place, rng.normal(TOP - depth, 0.04, count)])
+    return np.concatenate([points, strays])
+
+
+def run(points: Floats, **job: Any) -> Result:
+    return damageest.run({"version": 1, "tolerance": 0.2, "align": "none", **job}, part=box(), scan=points)
+
+
+def levels(result: Result) -> list[str]:
+    return [site.verdict.level for site in result.sites]
+
+
+@pytest.mark.parametrize("count", [4, 8, 16])
+def test_a_few_stray_points_are_no_failure(count: int) -> None:
+    result = run(scan_with_strays(count))
+    assert result.status == "ok"
+    assert result.damage is None
+    beside = run(scan_with_strays(count, dents=1))
+    assert beside.status == "ok"
+    assert levels(beside)[0] == "proven"
+    assert beside.damage_volume == pytest.approx(2 / 3 * np.pi * 4**3, rel=0.03)
+
+
+def test_stray_points_under_intact_ones_are_doubtful_and_no_damage_unless_accepted(tmp_path: Path) -> None:
+    points = scan_with_strays(60, dents=1)
+    result = run(points)
+    assert levels(result) == ["proven", "doubtful"]
+    doubtful = result.sites[1]
+    assert not doubtful.accepted
+    assert doubtful.deposit is None
+    assert result.damage_volume == pytest.approx(result.sites[0].damage.volume)
+    accepted = run(points, accept=[2])
+    assert levels(accepted) == ["proven", "doubtful"]
+    assert accepted.damage_volume == pytest.approx(sum(site.damage.volume for site in accepted.sites), rel=1e-6)
+    assert run(points, accept="all").damage_volume == accepted.damage_volume
+
+
+def test_files_of_doubtful_sites_lie_apart_and_a_run_with_no_other_ends_with_1(tmp_path: Path) -> None:
+    job = write(tmp_path)
+    x, y, z = scan_with_strays(60).T
+    write_points(tmp_path / "scan.ply", {"x": x, "y": y, "z": z})
+    done = call("run", job)
+    assert done.returncode == 1
+    assert "doubtful" in done.stdout
+    assert "accept" in done.stderr
+    out = tmp_path / "out" / "job"
+    report = json.loads((out / "result.json").read_text())
+    (site,) = report["sites"]
+    assert site["verdict"]["level"] == "doubtful"
+    assert site["verdict"]["reasons"]
+    assert site["files"]["damage"] == "doubtful/site-1.stl"
+    assert (out / "doubtful" / "site-1.stl").is_file()
+    assert not (out / "damage").exists()
+    assert not (out / "damage.stl").exists()
+    assert report["damage_volume"] == report["material"]["deposit_volume"] == 0
+    job.write_text(JOB + "accept: all\n")
+    assert call("run", job).returncode == 0
+    assert (out / "damage" / "site-1.stl").is_file()
+    assert not (out / "doubtful").exists()
+
+
+def test_sites_are_dropped_merged_and_kept_under_the_same_numbers() -> None:
+    scan = Simulate.model_validate({"points": 25_000, "noise": 0.04, "damage": DENTS}).run("mm", box()).points
+    volumes = {site.id: site.damage.volume for site in run(scan).sites}
+    assert list(volumes) == [1, 2, 3]
+    dropped = run(scan, sites={"drop": [2]})
+    assert {site.id: site.damage.volume for site in dropped.sites} == {1: volumes[1], 3: volumes[3]}
+    assert any("site 2 was dropped" in text for text in dropped.warnings)
+    merged = run(scan, sites={"merge": [[3, 2]]})
+    assert [site.id for site in merged.sites] == [1, 2]
+    assert merged.sites[1].damage.volume == pytest.approx(volumes[2] + volumes[3], rel=1e-6)
+    kept = run(scan, sites={"keep": {"min": [-5, -5, 0], "max": [20, 5, 20]}})
+    assert [site.id for site in kept.sites] == [2, 3]
+
+
+@pytest.mark.parametrize("decision", [{"accept": [7]}, {"sites": {"drop": [7]}}, {"sites": {"merge": [[1, 7]]}}])
+def test_an_unknown_number_is_named_with_the_known_ones(decision: dict[str, Any]) -> None:
+    with pytest.raises(StageError, match=r"site 7; there are: 1") as fault:
+        run(scan_with_strays(0, dents=1), **decision)
+    assert fault.value.remedy
+
+
+def test_a_wrong_decision_is_a_fault_of_the_job() -> None:
+    with pytest.raises(JobError, match=r"sites|accept"):
+        run(scan_with_strays(0), sites={"drop": [0]}, accept="some")
+
+
+def test_distances_that_are_no_numbers_are_refused() -> None:
+    from damageest.artefacts import ArtefactError, Deviation
+
+    with pytest.raises(ArtefactError, match="1 of 3 are not finite"):
+        Deviation(np.array([0.0, np.nan, 1.0]), np.zeros(3, np.int64), np.zeros(3, np.uint8))
+
+
+def test_a_scan_keeps_its_views() -> None:
+    scan = Scan(np.eye(3), viewpoints=np.ones((2, 3)), view=np.array([0, 1, -1]))
+    assert scan.take(np.array([2, 0])).view.tolist() == [-1, 0]  # type: ignore[union-attr]
+    turned = scan.move(np.diag([1.0, -1.0, -1.0, 1.0]))
+    assert turned.viewpoints.tolist() == [[1, -1, -1]] * 2  # type: ignore[union-attr]
