@@ -107,19 +107,17 @@ def judge_site(
     """
     found = _Reasons([*pose.doubts, *doubts], list(unknown))
     for reason in evidence.reasons:
+        if proven_by_rays and ("no scan point" in reason or "shallow as it is" in reason):
+            continue  # rays stand for the points, and a thin wall's root is all rim
         unseen = reason.endswith("the damage may extend there")
-        found.add(not (unseen and evidence.skin_unseen <= UNSEEN) and not (proven_by_rays and _is_bare(reason)), reason)
-    _ask_inner_surface(found, evidence, limits)
+        found.add(not (unseen and evidence.skin_unseen <= UNSEEN), reason)
     if not proven_by_rays:
+        _ask_inner_surface(found, evidence, limits)
         _ask_depth(found, depth, area, limits)
         _ask_points(found, evidence, len(depth))
     if found.against:
         return Verdict("doubtful", (*found.against, *found.questions))
     return Verdict("likely" if found.questions else "proven", tuple(found.questions))
-
-
-def _is_bare(reason: str) -> bool:
-    return "no scan point" in reason
 
 
 def _ask_inner_surface(found: _Reasons, evidence: Evidence, limits: ScanLimits) -> None:
