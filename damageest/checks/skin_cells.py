@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Mesh, Part, Scan
-from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.refinement import cut_into_cells
 
 MOST_CELLS = 30_000
@@ -17,7 +17,7 @@ LEAST_AREA = 0.25
 """Area in squares of a cell's edge below which a triangle is not cut."""
 NEIGHBOURS = 6
 """Scan points that the local spacing is measured from: a disc with six points has 1.25 spacings as radius."""
-AVERAGED = 8
+AVERAGED = 6
 """Scan points that the mean distance of a cell is taken of."""
 MOST_REACHES = 20_000
 """Places at which the local spacing is measured."""
@@ -101,12 +101,13 @@ def find_seen(
         reach = np.minimum(reach, 3 * max(usual, tolerance)) + cells.edge / 3
         weight = FACING * usual
         among = np.concatenate([points, weight * facing], axis=1)
-        places = np.concatenate([cells.centres, weight * cells.normals], axis=1)
+        asked = find_nearby(cells.centres, points, float(reach.max()))
+        places = np.concatenate([cells.centres[asked], weight * cells.normals[asked]], axis=1)
         gap, index = find_neighbours(places, AVERAGED, among, float(reach.max()) * 1.001)
-        seen = gap[:, 0] <= reach
+        seen[asked] = gap[:, 0] <= reach[asked]
         near = np.isfinite(gap)
         distance = np.append(deviation.distance[chosen], 0.0)[index]  # the index of a missing neighbour is the last
-        mean = np.where(near, distance, 0.0).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
+        mean[asked] = np.where(near, distance, 0.0).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
         seen = _trim_edges(cells, seen, usual + cells.edge / 3, weight)
     covered = _find_covered(cells, aligned, deviation, max(2 * tolerance, 1.5 * aligned.spacing))
     mean[~seen] = np.nan

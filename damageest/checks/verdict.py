@@ -9,6 +9,7 @@ import numpy as np
 
 from damageest.artefacts import ADDED, Deviation, Evidence, Floats, Pose, Scan
 from damageest.checks.coverage import SkinView
+from damageest.checks.skin_cells import AVERAGED
 from damageest.geometry.voxels import number_cubes
 from damageest.result import Surplus, Verdict
 
@@ -63,7 +64,7 @@ def measure_limits(
         # half the width of the middle 90 %, in standard deviations of a normal distribution
         low, high = np.quantile(distance, [0.05, 0.95])
         spread = float(max(-low, high)) / 1.645
-        systematic = float(np.sqrt(max(spread**2 - aligned.noise**2 / 8, 0.0)))
+        systematic = float(np.sqrt(max(spread**2 - aligned.noise**2 / AVERAGED, 0.0)))
     layer = (deviation.label == ADDED) & (deviation.distance < LAYER * tolerance)
     for one in surplus:
         if one.height > LAYER * tolerance or one.kind == "surroundings":

@@ -26,10 +26,9 @@ MOST_CLOSED = 40
 """Number of surplus clusters, largest first, whose volume is computed."""
 MOST_SKIN = 0.5
 """Share of the part's skin from which surplus is an error of the pose, of the unit or of the tolerance."""
-
-
-EQUAL = 1.35
-"""Largest ratio of the volumes of a displaced piece and of the place that it left."""
+EQUAL, EQUAL_TOUCHING = 1.35, 1.1
+"""Largest ratio of the volumes of a displaced piece and of the place that it left; the second for surplus that touches the
+loss, and may be a weld bead on it."""
 
 
 def find_surplus(engine: Engine, work: Work) -> Work:
@@ -80,7 +79,12 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
         if item.kind == "displaced piece":
             of = " and ".join(f"site {site.number} with a volume of {site.damage.volume:.4g}" for site in beside)
             own = "" if item.volume is None else f" with a volume of {item.volume:.4g}"
-            equal = [site.number for site in beside if _is_equal(item, [other.damage.volume for other in beside], site)]
+            volumes = [other.damage.volume for other in beside]
+            equal = []
+            for site in beside:
+                most = EQUAL_TOUCHING if _is_touching(state, item, site, reach) else EQUAL
+                if _is_equal(item, (site.damage.volume, sum(volumes)), most):
+                    equal.append(site.number)
             doubt = (
                 f"surplus {item.id} beside it{own} is as large: a piece of the part may be displaced, or the part be "
                 "bent, and no metal be lost"
@@ -102,11 +106,9 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
     return replace(work, job=state, sites=tuple(sites), warnings=(*work.warnings, *warnings))
 
 
-def _is_equal(item: Surplus, volumes: list[float], site: FoundSite) -> bool:
-    """Whether a displaced piece is as large as a loss beside it, or as all losses beside it."""
-    if item.volume is None:
-        return False
-    return any(1 / EQUAL < volume / item.volume < EQUAL for volume in (site.damage.volume, sum(volumes)))
+def _is_equal(item: Surplus, volumes: tuple[float, ...], most: float) -> bool:
+    """Whether the volume of a surplus is one of the given volumes, within a factor ``most``."""
+    return item.volume is not None and any(1 / most < volume / item.volume < most for volume in volumes)
 
 
 def _is_touching(state: JobState, item: Surplus, site: FoundSite, reach: float) -> bool:
