@@ -27,8 +27,8 @@ MOST_CLOSED = 40
 MOST_SKIN = 0.5
 """Share of the part's skin from which surplus is an error of the pose, of the unit or of the tolerance."""
 EQUAL, EQUAL_TOUCHING = 1.35, 1.1
-"""Largest ratio of the volumes of a displaced piece and of the place that it left; the second for surplus that touches the
-loss, and may be a weld bead on it."""
+"""Largest ratio of the volumes of a displaced piece and of the place that it left; the second for surplus that touches
+the loss, and may be a weld bead on it."""
 
 
 def find_surplus(engine: Engine, work: Work) -> Work:
