@@ -74,11 +74,12 @@ def judge_error(message: str, names: Sequence[str]) -> Judgement:
 def judge(result: Result, true: TrueState) -> Judgement:
     """The judgement on a run that gave a result."""
     tolerance = min(result.tolerance, true.tolerance)
-    bodies = _split_damage(true, result.pose, tolerance)
+    motion = None if true.pose is None else find_motion(true.part, result.pose, true.pose, tolerance)
+    bodies = _split_damage(true, motion)
     reported = {id(body): _find_report(body, result) for body in bodies}
     unseen = [body for body in bodies if reported[id(body)] == "unseen"]
     seen = _leave_out(bodies, unseen)
-    has_pose = true.pose is not None and is_pose_right(true.part, result.pose, true.pose, tolerance)
+    has_pose = motion is not None
     accepted = [site.damage for site in result.sites if site.accepted]
     faults = [] if has_pose else ["the pose is wrong"]
     faults += find_faults(accepted, seen, unseen, true.part, tolerance)
@@ -175,26 +176,30 @@ def _is_rest_right(
     return not find_faults(accepted, _leave_out(seen, touched), [*unseen, *touched], part, tolerance)
 
 
-def is_pose_right(part: Part, found: Pose, true: Floats, tolerance: float) -> bool:
-    """Whether the pose is right within the tolerance, or another one of a symmetric part, and the result says so."""
+def find_motion(part: Part, found: Pose, true: Floats, tolerance: float) -> Floats | None:
+    """The motion (4,4) of a symmetric part onto itself by which the found pose differs from the true one.
+
+    The identity where the pose is right as it is; None where it is wrong. A pose is right within two tolerances (rms
+    over the part's surface). On a symmetric part the true pose has to be among the alternatives, or, where the symmetry
+    is continuous, a note has to name it.
+    """
     residual, path = measure_pose_error(part, found.T_part_scan, true)
     if path < 2 * tolerance:
-        return True
-    is_symmetric = residual < tolerance
-    listed = found.alternatives is not None and len(found.alternatives) > 0
-    return is_symmetric and (listed or bool(found.notes))
+        return np.eye(4)
+    for other in () if found.alternatives is None else found.alternatives:
+        if measure_pose_error(part, other, true)[1] < 2 * tolerance:
+            return np.asarray(found.T_part_scan @ np.linalg.inv(other))
+    if residual < 2 * tolerance and any("symmetry" in note for note in found.notes):
+        return np.asarray(found.T_part_scan @ np.linalg.inv(true))
+    return None
 
 
-def _split_damage(true: TrueState, pose: Pose, tolerance: float) -> list[Solid]:
+def _split_damage(true: TrueState, motion: Floats | None) -> list[Solid]:
     """The connected bodies of the true damage, where the found pose puts them on a symmetric part."""
     if true.damage is None:
         return []
-    damage = true.damage
-    if true.pose is not None:
-        residual, path = measure_pose_error(true.part, pose.T_part_scan, true.pose)
-        if residual < tolerance and path > max(4 * residual, tolerance / 4):
-            D = pose.T_part_scan @ np.linalg.inv(true.pose)
-            damage = Solid(damage.vertices @ D[:3, :3].T + D[:3, 3], damage.faces)
+    D = np.eye(4) if motion is None else motion
+    damage = Solid(true.damage.vertices @ D[:3, :3].T + D[:3, 3], true.damage.faces)
     origin = damage.bounds.mean(axis=0)
     pieces = [to_solid(piece, origin) for piece in to_manifold(damage, origin).decompose()]
     return [piece for piece in pieces if piece is not None]

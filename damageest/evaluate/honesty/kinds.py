@@ -205,7 +205,11 @@ TROUBLES: dict[str, Trouble] = {
     "mirrored part": Trouble(
         frame.scan_mirrored_part,
         (*FRAME, r"mirror"),
-        (TroubleWay("block", "unknown", 0, False), TroubleWay("lever", "unknown", 8), TroubleWay("block", "known", 8)),
+        (
+            TroubleWay("block", "unknown", 0, False),
+            TroubleWay("ribbed_plate", "unknown", 8),
+            TroubleWay("block", "known", 8),
+        ),
     ),
     "wrong frame": Trouble(
         frame.shift_frame,

@@ -11,8 +11,8 @@ import pytest
 from damageest.artefacts import Deviation, Evidence, Part, Pose, Scan, Solid, Surface
 from damageest.evaluate.honesty.classify import (
     TrueState,
+    find_motion,
     find_name,
-    is_pose_right,
     judge,
     judge_error,
     measure_seen_error,
@@ -155,13 +155,15 @@ def test_a_text_that_names_the_trouble_needs_an_amount() -> None:
 def test_the_pose_has_to_be_right_up_to_listed_symmetries() -> None:
     half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
     half_turn[:2, 3] = 40, 30
-    assert is_pose_right(PART, Pose(EYE), EYE, TOLERANCE)
-    assert not is_pose_right(PART, Pose(half_turn), EYE, TOLERANCE)
+    assert np.array_equal(find_motion(PART, Pose(EYE), EYE, TOLERANCE), EYE)
+    assert find_motion(PART, Pose(half_turn), EYE, TOLERANCE) is None
     listed = Pose(half_turn, alternatives=np.array([EYE]))
-    assert is_pose_right(PART, listed, EYE, TOLERANCE)
+    assert np.allclose(find_motion(PART, listed, EYE, TOLERANCE), half_turn)
+    noted = Pose(half_turn, notes=("the part fits at any angle (continuous symmetry)",))
+    assert np.allclose(find_motion(PART, noted, EYE, TOLERANCE), half_turn)
     shifted = EYE.copy()
     shifted[0, 3] = 1
-    assert not is_pose_right(PART, replace(listed, T_part_scan=shifted), EYE, TOLERANCE)
+    assert find_motion(PART, replace(noted, T_part_scan=shifted), EYE, TOLERANCE) is None
     turned = Solid(DENT.vertices @ half_turn[:3, :3].T + half_turn[:3, 3], DENT.faces)
     assert _judge(_make_result(_make_site(turned), pose=listed), DENT).outcome == "right"
     assert _judge(_make_result(_make_site(DENT), pose=Pose(shifted)), DENT).outcome == "silent"
