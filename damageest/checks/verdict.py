@@ -21,6 +21,13 @@ OUTWARD = 0.3
 """Share of a site's area that skin which lies outside by as much has to have, to be the sign of one error."""
 ALIKE = 2.0
 """How many times deeper than that skin is high a site is to be."""
+AGREE = 0.6
+"""Difference of the views, in tolerances, in four fifths of their overlap, up to which they agree."""
+FEWEST_OF_VIEW = 4
+"""Points of a view in a cube, for its mean to be compared."""
+WIDE, THIN = 0.12, 4.0
+"""A site over a larger share of the skin than the first, and shallower in tolerances than the second, may be an error
+of a fitted pose: worn metal, or a part of another size, moves it."""
 LAYER = 5.0
 """Height in tolerances up to which points outside count as such skin; higher ones are added metal."""
 FEW, TOO_FEW = 100, 12
@@ -43,19 +50,30 @@ class ScanLimits:
 
     ``systematic``: standard deviation of the mean distances of intact cells of the skin that noise does not explain.
     ``outward_area`` and ``outward_height``: skin that lies outside the part by some tolerances, and by how much. No
-    damage does that, so a site of like depth may come from the same error.
+    damage does that, so a site of like depth may come from the same error. ``between_views``: how far the views of the
+    scan differ where they overlap, 0 where they agree or are not known. ``seen_area``: skin that the scan shows;
+    ``is_fitted``: whether the pose was fitted to the scan.
     """
 
     tolerance: float
     spacing: float
     unit: str
+    seen_area: float = 0.0
+    is_fitted: bool = False
     systematic: float = 0.0
     outward_area: float = 0.0
     outward_height: float = 0.0
+    between_views: float = 0.0
 
 
 def measure_limits(
-    skin: SkinView, aligned: Scan, deviation: Deviation, surplus: Iterable[Surplus], tolerance: float, unit: str
+    skin: SkinView,
+    aligned: Scan,
+    deviation: Deviation,
+    surplus: Iterable[Surplus],
+    tolerance: float,
+    unit: str,
+    is_fitted: bool,
 ) -> ScanLimits:
     """Measures how far skin deviates that is not damaged. ``surplus``: higher one is left out, since it is metal."""
     systematic = 0.0
@@ -73,7 +91,33 @@ def measure_limits(
     if layer.any():
         area = measure_area(aligned.points[layer], skin.cells.edge)
         height = float(np.quantile(deviation.distance[layer], 0.9))
-    return ScanLimits(tolerance, aligned.spacing, unit, systematic, area, height)
+    seen = float(skin.cells.areas[skin.seen].sum())
+    apart = _compare_views(aligned, deviation, skin.cells.edge, tolerance)
+    return ScanLimits(tolerance, aligned.spacing, unit, seen, is_fitted, systematic, area, height, apart)
+
+
+def _compare_views(aligned: Scan, deviation: Deviation, edge: float, tolerance: float) -> float:
+    """How far the mean distances of the views differ in cubes that several views show; 0 where they agree."""
+    if aligned.view is None:
+        return 0.0
+    used = np.flatnonzero((aligned.view >= 0) & (np.abs(deviation.distance) < LAYER * tolerance))
+    if not len(used):
+        return 0.0
+    cube = np.unique(number_cubes(aligned.points[used], edge)[1], return_inverse=True)[1]
+    pair, group, count = np.unique(
+        cube * (int(aligned.view.max()) + 1) + aligned.view[used], return_inverse=True, return_counts=True
+    )
+    mean = np.bincount(group, weights=deviation.distance[used]) / count
+    many = count >= FEWEST_OF_VIEW
+    owner, mean = pair[many] // (int(aligned.view.max()) + 1), mean[many]
+    low, high = np.full(int(cube.max()) + 1, np.inf), np.full(int(cube.max()) + 1, -np.inf)
+    np.minimum.at(low, owner, mean)
+    np.maximum.at(high, owner, mean)
+    shared = np.bincount(owner, minlength=len(low)) > 1
+    if shared.sum() < 30:
+        return 0.0
+    apart = (high - low)[shared]
+    return float(np.quantile(apart, 0.98)) if float(np.quantile(apart, 0.8)) > AGREE * tolerance else 0.0
 
 
 def measure_area(points: Floats, edge: float, fewest: int = 3) -> float:
@@ -102,8 +146,7 @@ def judge_site(
     Args:
         depth: (M,) depth of each of its scan points below the skin, in the job's unit.
         area: skin that these points cover.
-        proven_by_rays: whether rays passed through the metal that it removes. Depth and number of points then do not
-            matter.
+        proven_by_rays: whether rays passed through the metal that it removes. Points on it then need not be many.
         unknown: what the scan does not show of it. doubts: what else makes it doubtful, such as a displaced piece.
     """
     found = _Reasons([*pose.doubts, *doubts], list(unknown))
@@ -112,10 +155,11 @@ def judge_site(
             continue  # rays stand for the points, and a thin wall's root is all rim
         unseen = reason.endswith("the damage may extend there")
         found.add(not (unseen and evidence.skin_unseen <= UNSEEN), reason)
+    if len(depth):
+        _ask_depth(found, depth, area, limits)
     if not proven_by_rays:
         _ask_inner_surface(found, evidence, limits)
-        _ask_depth(found, depth, area, limits)
-        _ask_points(found, evidence, len(depth))
+        _ask_points(found, evidence, depth, limits)
     if found.against:
         return Verdict("doubtful", (*found.against, *found.questions))
     return Verdict("likely" if found.questions else "proven", tuple(found.questions))
@@ -132,7 +176,7 @@ def _ask_inner_surface(found: _Reasons, evidence: Evidence, limits: ScanLimits) 
 
 
 def _ask_depth(found: _Reasons, depth: Floats, area: float, limits: ScanLimits) -> None:
-    typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
+    typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95))
     unit = limits.unit
     if limits.systematic > SMALL * limits.tolerance and typical < SYSTEMATIC * limits.systematic:
         found.add(
@@ -147,11 +191,21 @@ def _ask_depth(found: _Reasons, depth: Floats, area: float, limits: ScanLimits) 
             f"{limits.outward_height:.3g} {unit} outside the part: both may come from one error (scale, pose, form of "
             "the part, or scanner)",
         )
-    if deepest < SHALLOW * limits.tolerance:
+    if limits.between_views and typical < 1.5 * limits.between_views:
+        found.add(True, f"the views of the scan differ by up to {limits.between_views:.3g} {unit} where they overlap")
+    if limits.is_fitted and area > WIDE * limits.seen_area and typical < THIN * limits.tolerance:
+        found.add(
+            True,
+            f"it covers {area / limits.seen_area:.0%} of the skin that the scan shows, {typical:.3g} {unit} deep, and "
+            "the pose was fitted to the scan: worn or deviating skin moves the pose, and the loss may lie elsewhere; "
+            "where the pose is known, give it to align: none",
+        )
+
+
+def _ask_points(found: _Reasons, evidence: Evidence, depth: Floats, limits: ScanLimits) -> None:
+    count = len(depth)
+    if not count or float(np.quantile(depth, 0.95)) < SHALLOW * limits.tolerance:
         found.add(False, f"it is less than {SHALLOW:g} tolerances deep: its rim fades out below the tolerance")
-
-
-def _ask_points(found: _Reasons, evidence: Evidence, count: int) -> None:
     if count < FEW:
         found.add(
             count < TOO_FEW,

@@ -18,6 +18,7 @@ from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
 from damageest.pipeline.state import FoundSite, Work
+from damageest.stages.align import Align
 
 BY_RAYS = 0.5
 """Share of a site's unseen skin that rays have to have passed through, for the loss to be proven by them."""
@@ -52,7 +53,10 @@ def judge_sites(engine: Engine, work: Work) -> Work:
     state, accept = work.job, engine.job.accept
     if accept != "all":
         _check_numbers("accept", accept, work.sites)
-    limits = measure_limits(state.skin, state.aligned, state.deviation, state.surplus, state.tolerance, state.unit)
+    limits = measure_limits(
+        state.skin, state.aligned, state.deviation, state.surplus, state.tolerance, state.unit,
+        is_fitted=engine.job.implementations[Align].name != "none",
+    )  # fmt: skip
     done = []
     for site in work.sites:
         area = measure_area(state.aligned.points[site.members], state.skin.cells.edge, 1) if len(site.members) else 0.0

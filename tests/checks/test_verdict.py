@@ -46,6 +46,18 @@ CASES = {
     "within the systematic deviation": ({"limits": replace(LIMITS, systematic=0.3)}, "doubtful"),
     "skin as far outside": ({"limits": replace(LIMITS, outward_area=30.0, outward_height=0.6)}, "doubtful"),
     "little skin outside": ({"limits": replace(LIMITS, outward_area=5.0, outward_height=0.6)}, "proven"),
+    "views disagree": ({"limits": replace(LIMITS, between_views=0.8)}, "doubtful"),
+    "views disagree by less": ({"limits": replace(LIMITS, between_views=0.4)}, "proven"),
+    "wide and shallow, fitted": (
+        {"depth": 0.5 * DEEP, "limits": replace(LIMITS, is_fitted=True, seen_area=200.0)},
+        "doubtful",
+    ),
+    "wide and shallow, known pose": ({"depth": 0.5 * DEEP, "limits": replace(LIMITS, seen_area=200.0)}, "proven"),
+    "a wall of half the depth, by rays": ({"depth": 0.1 * DEEP, "proven_by_rays": True}, "proven"),
+    "by rays, within the deviation": (
+        {"depth": DEEP, "limits": replace(LIMITS, systematic=0.3), "proven_by_rays": True},
+        "doubtful",
+    ),
     "pose not sure": ({"pose": Pose(np.eye(4), doubts=("two poses fit",))}, "doubtful"),
     "displaced piece": ({"doubts": ("surplus 1 is as large",)}, "doubtful"),
     "under surplus": ({"unknown": ("surplus 1 lies on its skin",)}, "likely"),
