@@ -49,6 +49,7 @@ class _ShapeCrop(Crop):
         return self
 
     def describe(self) -> str:
+        """The crop in words: 'keep box'."""
         return super().describe() if self.keep else f"drop {self.drop}"
 
 
@@ -68,6 +69,7 @@ class BoxCrop(_ShapeCrop):
         return self
 
     def contains(self, points: Floats) -> Flags:
+        """Whether each of the points (N,3) is inside the shape."""
         return np.asarray(((points >= self.min) & (points <= self.max)).all(axis=1))
 
 
@@ -87,6 +89,7 @@ class CylinderCrop(_ShapeCrop):
         return self
 
     def contains(self, points: Floats) -> Flags:
+        """Whether each of the points (N,3) is inside the shape."""
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         way = points - np.array(self.point)
         along = way @ axis
@@ -110,6 +113,7 @@ class AboveCrop(_ShapeCrop):
         return self
 
     def contains(self, points: Floats) -> Flags:
+        """Whether each of the points (N,3) is inside the shape."""
         return np.asarray((points - np.array(self.point)) @ np.array(self.normal) >= 0)
 
 
@@ -122,6 +126,7 @@ class PieceCrop(Crop):
     )
 
     def contains(self, points: Floats) -> Flags:
+        """Whether each of the points (N,3) is inside the shape."""
         gap = self.gap or DEFAULT_GAP * measure_noise_and_spacing(points)[1]
         if not gap > 0:
             return np.ones(len(points), dtype=bool)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from math import nan
 from pathlib import Path
 
 import pytest
@@ -54,11 +55,13 @@ def test_every_implementation_of_a_stage_is_run(job: Path, registry: Registry) -
         assert 50 < cell.megabytes < 5000
 
 
-def test_a_refusal_is_shown_with_its_reason(job: Path, registry: Registry) -> None:
-    job.write_text(JOB.replace("radius: 6}", "radius: 6}\n    - {tool: sphere, centre: [-20, 0, 0], radius: 0.9}"))
-    text = make_matrix_table(run_matrix([job], registry, ["repair"]))
-    assert re.search(r"\| repair \| none \| 0\.9\d\d, partly refused \[1\] \|", text)
+def test_a_refusal_is_shown_with_its_reason() -> None:
+    reason = "reconstruct: pyvista (5 points near (1, 2, 3)): at least 16 points are needed"
+    cells = [MatrixCell("repair", "none", "box", iou, refused=text) for iou, text in ((0.981, reason), (nan, reason))]
+    text = make_matrix_table([cells[0]])
+    assert re.search(r"\| repair \| none \| 0\.981, partly refused \[1\] \|", text)
     assert re.search(r"^1\. .*points.* are needed", text, re.MULTILINE)
+    assert re.search(r"\| repair \| none \| refused \[1\] \|", make_matrix_table([cells[1]]))
 
 
 def test_a_job_without_a_truth_is_refused(tmp_path: Path, registry: Registry) -> None:
