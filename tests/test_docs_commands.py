@@ -87,6 +87,7 @@ def test_a_job_is_valid(page: Path, block: str, files: Path, registry: Registry)
     load(files / "job.yaml", registry)
 
 
+@pytest.mark.slow
 def test_the_first_repair_goes_as_its_page_says(tmp_path: Path) -> None:
     """Its commands one after the other, and the table that it shows."""
     page = ROOT / "docs" / "first-repair.md"

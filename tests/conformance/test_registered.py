@@ -56,6 +56,10 @@ WITH: dict[str, dict[str, Any]] = {
 """By implementation: the ``options`` to check it with, and other attributes of its class."""
 
 
+SLOW = {"poisson_subtract"}
+"""Implementations that are checked by -m slow only."""
+
+
 def base(contract: type) -> Any:
     """The class of a contract, which has its name without 'Read'."""
     return getattr(conformance, f"{contract.__name__.removeprefix('Read')}Contract")
@@ -64,6 +68,8 @@ def base(contract: type) -> Any:
 def case(item: Any) -> Any:
     """The class that checks an implementation."""
     told = dict(WITH.get(f"{item.contract.stage} {item.name}", {}))
+    if item.name in SLOW:
+        told["pytestmark"] = pytest.mark.slow
     told["stage"] = item.cls(**told.pop("options", {}))
     return type(f"Test_{item.contract.stage}_{item.name}", (base(item.contract),), told)
 

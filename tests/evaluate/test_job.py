@@ -70,6 +70,7 @@ def test_depths_found_and_not_found_are_told_kept_and_gone_on_from(tmp_path: Pat
     assert timeless(json.loads(again[3])) == timeless(json.loads(lines[lost]))
 
 
+@pytest.mark.slow
 def test_cases_that_fail_or_do_not_fit_stop_nothing(tmp_path: Path) -> None:
     job = damaged_box.write(tmp_path, SIMULATED)
     # a build volume smaller than the part is refused; no damage is deeper than the box is wide

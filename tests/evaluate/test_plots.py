@@ -35,6 +35,7 @@ def test_what_was_varied_is_drawn_and_the_errors(tmp_path: Path) -> None:
     assert {path: path.read_bytes() for path in made} == before
 
 
+@pytest.mark.slow
 def test_ways_to_compare_are_lines_of_their_own(tmp_path: Path) -> None:
     rows = [
         row(varied={"way": way, "points": p}, seconds=t, surface_error=0.1)

@@ -49,6 +49,7 @@ def check(table: list[list[str]], names: set[str]) -> None:
         assert all(re.fullmatch(r"\d+(\.\d+)?(e[+-]\d+)?%?|–", word) for word in line[1:])
 
 
+@pytest.mark.slow
 def test_two_methods_on_a_part_twice_over_and_the_table_in_a_page(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")

@@ -65,6 +65,7 @@ def test_another_outer_runs_allowance_and_export_alone(folder: Path) -> None:
     assert site.deposit.thickness[0] >= 1.5
 
 
+@pytest.mark.slow
 def test_the_written_job_says_the_same(folder: Path) -> None:
     settings = ["allowance.keep_out=[{cylinder: {from: [9, 0, 5], to: [9, 0, 15], radius: 1}}]"]
     first = damageest.run(folder / "job.yaml", output=folder / "again", settings=settings)
@@ -104,6 +105,7 @@ def test_a_refused_site_keeps_its_damage(folder: Path) -> None:
     assert not list((folder / "no").glob("deposit/*"))
 
 
+@pytest.mark.slow
 def test_the_comparison_with_the_truth_is_that_of_the_damage(tmp_path: Path) -> None:
     damaged_box.write(tmp_path)
     ball = {"tool": "sphere", "centre": [0, 0, 10], "radius": 6}

@@ -32,10 +32,7 @@ ROUTE = ["part", "scan", "sample", "align", "segment", "cluster", "enclose", "bo
 
 @pytest.mark.parametrize(
     "stage",
-    [
-        stage if stage in ("scan", "enclose", "export") else pytest.param(stage, marks=pytest.mark.slow)
-        for stage in ROUTE
-    ],
+    [stage if stage in ("enclose",) else pytest.param(stage, marks=pytest.mark.slow) for stage in ROUTE],
 )
 def test_killed_in(stage: str, tmp_path: Path) -> None:
     path = damaged_box.write(tmp_path)

@@ -61,7 +61,7 @@ def first(bar: tuple[Part, Scan, float]) -> Result:
     return run(bar, background="minkowski")
 
 
-@pytest.mark.parametrize("enclose", ["adaptive", "shortest_path"])
+@pytest.mark.parametrize("enclose", ["adaptive", pytest.param("shortest_path", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("background", SMOOTH)
 def test_the_background_does_not_matter_where_it_is_valid(
     bar: tuple[Part, Scan, float], first: Result, background: str, enclose: str
@@ -74,7 +74,9 @@ def test_the_background_does_not_matter_where_it_is_valid(
     assert iou([result.sites[0].damage], [first.sites[0].damage]) > 0.99
 
 
-@pytest.mark.parametrize("background", ["bbox", "cylinder", "capsule"])
+@pytest.mark.parametrize(
+    "background", ["bbox", *(pytest.param(n, marks=pytest.mark.slow) for n in ("cylinder", "capsule"))]
+)
 def test_where_it_is_not_valid_it_says_so(background: str) -> None:
     tool = {"tool": "cylinder", "point": [0, 0, 0], "axis": [1, 0, 0], "length": 50, "radius": 6}
     scene = scanned(PARTS["tube"](), tool)
@@ -91,6 +93,7 @@ def test_a_groove_round_a_shaft(tmp_path: Path) -> None:
     assert len(result.sites) == 1
 
 
+@pytest.mark.slow
 def test_a_piece_broken_out_of_a_ring() -> None:
     """Two damage surfaces, neither of which separates anything alone."""
     scene = scanned(ring(), {"tool": "box", "centre": [30, 0, 0], "size": [30, 25, 30]})

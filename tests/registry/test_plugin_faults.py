@@ -126,7 +126,9 @@ def test_a_module_without_hooks_provides_nothing(site: Site) -> None:
     assert "acme-empty 1.2  MIT  no stages" in CliRunner().invoke(app, ["plugins"]).output
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, -signal.SIGTERM)])
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, -signal.SIGTERM, marks=pytest.mark.slow)]
+)
 def test_a_stage_that_hangs_can_be_stopped(number: int, status: int, site: Site, tmp_path: Path) -> None:
     job = damaged_box.write(tmp_path / "job")
     command = [sys.executable, "-c", "from damageest.cli import main; main()", "run", "-q", str(job)]

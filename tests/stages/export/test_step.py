@@ -22,7 +22,10 @@ cq = import_for("cadquery", "cadquery")
 
 @pytest.mark.parametrize(
     ("detail", "units"),
-    [(None, "mm"), (0.0, "in"), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((None, "in"), (0.0, "mm")))],
+    [
+        (None, "in"),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((None, "mm"), (0.0, "in"), (0.0, "mm"))),
+    ],
 )
 def test_volumes_and_unit(units: str, detail: float | None, tmp_path: Path, registry: Registry) -> None:
     scale = MILLIMETRES[units]

@@ -71,7 +71,8 @@ def test_same_input_same_bytes() -> None:
     assert one.face.tobytes() == two.face.tobytes()
 
 
-@pytest.mark.parametrize("method", ["implicit", pytest.param("surface", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["implicit", "surface"])
 def test_a_job_with_it_finds_the_right_volume(method: str) -> None:
     scan = {
         "use": "simulate",
