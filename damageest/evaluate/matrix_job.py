@@ -88,6 +88,8 @@ def make_settings(item: Implementation, scene: MatrixJob) -> dict[str, Any] | st
     elif use == "build_volume":
         middle, extent = scene.bounds.mean(axis=0), 1.5 * np.ptp(scene.bounds, axis=0) + 10
         options |= {"size": extent.tolist(), "corner": (middle - extent / 2).tolist()}
+    elif use == "points":
+        options["pairs"] = _pick_pairs(scene)
     elif stage == "align" and use != "register":
         moved = _make_small_motion(scene) @ scene.pose if use == "icp" else scene.pose
     missing = [name for name, field in item.cls.model_fields.items() if field.is_required() and name not in options]
@@ -103,6 +105,14 @@ def make_settings(item: Implementation, scene: MatrixJob) -> dict[str, Any] | st
         "own_scan": own_scan,
         "moved": moved.tolist(),
     }
+
+
+def _pick_pairs(scene: MatrixJob) -> list[list[list[float]]]:
+    """Four corners of the part's bounds, in the scan and on the part."""
+    low, high = scene.bounds
+    corners = np.where([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], high, low)
+    back = np.linalg.inv(scene.pose)
+    return [[(back[:3, :3] @ corner + back[:3, 3]).tolist(), corner.tolist()] for corner in corners]
 
 
 def _make_small_motion(scene: MatrixJob) -> Floats:
