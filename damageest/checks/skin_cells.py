@@ -19,6 +19,8 @@ NEIGHBOURS = 6
 """Scan points that the local spacing is measured from: a disc with six points has 1.25 spacings as radius."""
 AVERAGED = 6
 """Scan points that the mean distance of a cell is taken of."""
+MARGIN = 1.05
+"""Width of the margin that is removed at the edge of seen skin, in reaches: it lies beyond the last points."""
 MOST_REACHES = 20_000
 """Places at which the local spacing is measured."""
 FACING = 1.5
@@ -95,10 +97,11 @@ def find_seen(
         chosen = intact[pick_one_per_cube(aligned.points[intact], 0.35 * max(tolerance, aligned.spacing))]
         cross = part.cross[deviation.face[chosen]]
         facing = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
-        points = aligned.points[chosen]
-        reach = np.maximum(_measure_reach(points, cells.centres), tolerance)
+        # the places on the skin below the points: how far they are from it does not matter here
+        points = aligned.points[chosen] - deviation.distance[chosen, None] * facing
+        reach = _measure_reach(points, cells.centres)
         usual = float(np.median(reach))
-        reach = np.minimum(reach, 3 * max(usual, tolerance)) + cells.edge / 3
+        reach = np.minimum(reach, 3 * usual) + cells.edge / 3
         weight = FACING * usual
         among = np.concatenate([points, weight * facing], axis=1)
         asked = find_nearby(cells.centres, points, float(reach.max()))
@@ -133,7 +136,7 @@ def _trim_edges(cells: SkinCells, seen: Flags, reach: float, weight: float) -> F
     if not open_.any():
         return filled
     places = np.concatenate([cells.centres, weight * cells.normals], axis=1)
-    gap = find_neighbours(places[filled], 1, places[open_], 0.7 * reach)[0][:, 0]
+    gap = find_neighbours(places[filled], 1, places[open_], MARGIN * reach)[0][:, 0]
     result = filled.copy()
     result[np.flatnonzero(filled)[np.isfinite(gap)]] = False
     return result
