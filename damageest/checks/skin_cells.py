@@ -19,7 +19,7 @@ NEIGHBOURS = 6
 """Scan points that the local spacing is measured from: a disc with six points has 1.25 spacings as radius."""
 AVERAGED = 6
 """Scan points that the mean distance of a cell is taken of."""
-MARGIN = 1.05
+MARGIN = 0.7
 """Width of the margin that is removed at the edge of seen skin, in reaches: it lies beyond the last points."""
 MOST_REACHES = 20_000
 """Places at which the local spacing is measured."""
@@ -97,11 +97,10 @@ def find_seen(
         chosen = intact[pick_one_per_cube(aligned.points[intact], 0.35 * max(tolerance, aligned.spacing))]
         cross = part.cross[deviation.face[chosen]]
         facing = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
-        # the places on the skin below the points: how far they are from it does not matter here
-        points = aligned.points[chosen] - deviation.distance[chosen, None] * facing
-        reach = _measure_reach(points, cells.centres)
+        points = aligned.points[chosen]
+        reach = np.maximum(_measure_reach(points, cells.centres), tolerance)
         usual = float(np.median(reach))
-        reach = np.minimum(reach, 3 * usual) + cells.edge / 3
+        reach = np.minimum(reach, 3 * max(usual, tolerance)) + cells.edge / 3
         weight = FACING * usual
         among = np.concatenate([points, weight * facing], axis=1)
         asked = find_nearby(cells.centres, points, float(reach.max()))

@@ -38,6 +38,8 @@ BARE = 0.25
 """Share of a site's inner surface without scan points from which its volume is open; from twice that it is doubtful."""
 GAP = 8.0
 """The same for a connected piece of it: its area in squares of the scan's spacing, or of the tolerance."""
+OPEN = 0.08
+"""The same for a site that rays prove: its share of the damage volume's surface. The root of a thin wall is small."""
 SHALLOW = 1.5
 """Depth in tolerances below which a site is shallow: its rim is then as wide as itself."""
 UNSEEN = 0.5
@@ -139,7 +141,7 @@ class _Reasons:
 
 def judge_site(
     evidence: Evidence, depth: Floats, area: float, pose: Pose, limits: ScanLimits, proven_by_rays: bool,
-    unknown: tuple[str, ...] = (), doubts: tuple[str, ...] = (),
+    volume_area: float, unknown: tuple[str, ...] = (), doubts: tuple[str, ...] = (),
 ) -> Verdict:  # fmt: skip
     """Weighs all that speaks for and against a damage volume.
 
@@ -147,6 +149,7 @@ def judge_site(
         depth: (M,) depth of each of its scan points below the skin, in the job's unit.
         area: skin that these points cover.
         proven_by_rays: whether rays passed through the metal that it removes. Points on it then need not be many.
+        volume_area: area of the whole surface of the damage volume.
         unknown: what the scan does not show of it. doubts: what else makes it doubtful, such as a displaced piece.
     """
     found = _Reasons([*pose.doubts, *doubts], list(unknown))
@@ -157,12 +160,24 @@ def judge_site(
         found.add(not (unseen and evidence.skin_unseen <= UNSEEN), reason)
     if len(depth):
         _ask_depth(found, depth, area, limits)
-    if not proven_by_rays:
+    if proven_by_rays:
+        _ask_open_inside(found, evidence.ids_gap / max(volume_area, 1e-300), evidence.ids_gap, limits.unit)
+    else:
         _ask_inner_surface(found, evidence, limits)
         _ask_points(found, evidence, depth, limits)
     if found.against:
         return Verdict("doubtful", (*found.against, *found.questions))
     return Verdict("likely" if found.questions else "proven", tuple(found.questions))
+
+
+def _ask_open_inside(found: _Reasons, share: float, gap: float, unit: str) -> None:
+    """Rays prove that skin is gone, and not how deep the loss reaches behind it."""
+    if share > OPEN / 2:
+        found.add(
+            share > OPEN,
+            f"its inner surface has {gap:.3g} {unit}² without scan points in one piece, {share:.0%} of the surface of "
+            "the damage volume: it may be deeper there",
+        )
 
 
 def _ask_inner_surface(found: _Reasons, evidence: Evidence, limits: ScanLimits) -> None:

@@ -62,7 +62,7 @@ def judge_sites(engine: Engine, work: Work) -> Work:
         area = measure_area(state.aligned.points[site.members], state.skin.cells.edge, 1) if len(site.members) else 0.0
         verdict = judge_site(
             site.evidence, -state.deviation.distance[site.members], area, state.pose, limits,
-            _is_proven_by_rays(state.skin, site), site.questions, site.doubts,
+            _is_proven_by_rays(state.skin, site), site.damage.area, site.questions, site.doubts,
         )  # fmt: skip
         accepted = verdict.level != "doubtful" or accept == "all" or site.number in accept
         done.append(replace(site, verdict=verdict, accepted=accepted))

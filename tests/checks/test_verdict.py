@@ -18,7 +18,7 @@ DEEP = np.full(500, 1.0)
 def judge(
     evidence: Evidence | None = None, depth: np.ndarray = DEEP, limits: ScanLimits = LIMITS, **more: object
 ) -> Verdict:
-    options: dict[str, object] = {"pose": Pose(np.eye(4)), "proven_by_rays": False, **more}
+    options: dict[str, object] = {"pose": Pose(np.eye(4)), "proven_by_rays": False, "volume_area": 100.0, **more}
     return judge_site(evidence or Evidence(), depth, 40.0, limits=limits, **options)  # type: ignore[arg-type]
 
 
@@ -54,6 +54,7 @@ CASES = {
     ),
     "wide and shallow, known pose": ({"depth": 0.5 * DEEP, "limits": replace(LIMITS, seen_area=200.0)}, "proven"),
     "a wall of half the depth, by rays": ({"depth": 0.1 * DEEP, "proven_by_rays": True}, "proven"),
+    "by rays, inner surface open": ({"evidence": Evidence(ids_gap=10.0), "proven_by_rays": True}, "doubtful"),
     "by rays, within the deviation": (
         {"depth": DEEP, "limits": replace(LIMITS, systematic=0.3), "proven_by_rays": True},
         "doubtful",
