@@ -233,6 +233,7 @@ def collect_texts(result: Result) -> list[str]:
         for entry in result.surplus
     ]
     sites = [text for site in result.sites for text in site.warnings]
+    sites += [text for site in result.sites if not site.accepted for text in site.verdict.reasons]
     return [*result.warnings, *result.failures, *surplus, *sites, *result.pose.notes]
 
 
