@@ -79,6 +79,11 @@ class Mesh(_Arrays):
         return np.cross(b - a, c - a)
 
     @cached_property
+    def face_normals(self) -> Floats:
+        """(F,3) unit normals of the faces; 0 where a face has no area."""
+        return np.asarray(self.cross / np.maximum(np.linalg.norm(self.cross, axis=1), 1e-300)[:, None])
+
+    @cached_property
     def vertex_cross(self) -> Floats:
         """(V,3) sum of the faces' `cross` at each vertex: a normal weighted by area, of no unit length."""
         total = np.zeros_like(self.vertices)

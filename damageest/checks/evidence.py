@@ -111,9 +111,7 @@ def _count_intact_over(
         return 0.0
     step = max(1, len(here) // MOST)
     here = here[::step]
-    cross = part.cross[deviation.face[here]]
-    normals = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
-    feet = aligned.points[here] - deviation.distance[here, None] * normals
+    feet = aligned.points[here] - deviation.distance[here, None] * part.face_normals[deviation.face[here]]
     distance, face, _ = closest_on_mesh(feet, damage)
     return float(step * ((distance < 0.02 * tolerance) & ~inner[face]).sum())
 

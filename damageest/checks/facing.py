@@ -32,14 +32,13 @@ def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: floa
         return turned
     near = deviation.label == INTACT
     asked = np.flatnonzero(near & (deviation.distance < -max(1.5 * aligned.noise, 0.1 * tolerance)))
-    cross = part.cross[deviation.face]
     for _ in range(2):  # the second round asks the neighbours of what the first one found
         if not len(asked):
             return turned
         normals, clear = _fit_normals(aligned, asked, tolerance)
         asked, normals = asked[clear], normals[clear]
         if not turned.any():
-            skin = cross[asked] / np.maximum(np.linalg.norm(cross[asked], axis=1), 1e-300)[:, None]
+            skin = part.face_normals[deviation.face[asked]]
             differs = np.abs(np.einsum("ij,ij->i", normals, skin)) < TURNED
             asked, normals = asked[differs], normals[differs]
         turned[asked[_is_buried(aligned.points[asked], normals, part, tolerance)]] = True

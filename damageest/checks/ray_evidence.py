@@ -42,12 +42,12 @@ def trace_rays(part: Part, cells: SkinCells, seen: Flags, aligned: Scan, toleran
     origins, ends = aligned.viewpoints[aligned.view[used]], aligned.points[used]
     hits = caster.find_crossings(origins, ends)
     margin = max(2 * aligned.noise, 0.5 * tolerance)
-    entry, leave, reached = _find_chords(hits, np.linalg.norm(ends - origins, axis=1), margin)
-    way = (ends - origins) / np.maximum(np.linalg.norm(ends - origins, axis=1), 1e-300)[:, None]
+    way, length = _point_at(ends, origins)
+    entry, leave, reached = _find_chords(hits, length, margin)
     ray = hits.ray[entry]
     enter = origins[ray] + hits.distance[entry, None] * way[ray]
     exit_ = origins[ray] + leave[:, None] * way[ray]
-    deep = _is_deep(part, caster, enter, exit_, -part.cross[hits.face[entry]], tolerance)
+    deep = _is_deep(part, caster, enter, exit_, -part.face_normals[hits.face[entry]], tolerance)
     lost = _find_lost(cells, seen, np.concatenate([enter[deep], exit_[deep & ~reached]]), aligned.spacing)
     roots = _find_roots(cells, lost, enter, ray, reached & (leave - hits.distance[entry] > margin))
     hidden, outside = _explain_unseen(
@@ -78,9 +78,8 @@ def _is_deep(part: Part, caster: RayCaster, enter: Floats, leave: Floats, inward
     deep = depth > tolerance
     thin = np.flatnonzero(~deep & (depth > 0.15 * tolerance))
     if len(thin):
-        direction = inward[thin] / np.maximum(np.linalg.norm(inward[thin], axis=1), 1e-300)[:, None]
-        start = enter[thin] + 1e-5 * part.diagonal * direction
-        thickness = caster.find_first(start, direction)[0]
+        start = enter[thin] + 1e-5 * part.diagonal * inward[thin]
+        thickness = caster.find_first(start, inward[thin])[0]
         deep[thin] = depth[thin] > 0.4 * thickness
     return deep
 
@@ -91,8 +90,9 @@ def _find_lost(cells: SkinCells, seen: Flags, places: Floats, spacing: float) ->
     bare = np.flatnonzero(~seen)
     if len(places) < FEWEST or not len(bare):
         return lost
-    gap = find_neighbours(cells.centres[bare], FEWEST, places)[0]
-    lost[bare] = gap[:, -1] < 2.5 * spacing + cells.edge
+    # beyond this distance a place is not found, and its gap is infinite
+    gap = find_neighbours(cells.centres[bare], FEWEST, places, 2.5 * spacing + cells.edge)[0]
+    lost[bare] = np.isfinite(gap[:, -1])
     return lost
 
 
@@ -133,8 +133,8 @@ def _explain_unseen(
     return whole[0], whole[1]
 
 
-def _point_at(places: Floats, viewpoint: Floats) -> tuple[Floats, Floats]:
-    """Unit directions (N,3) from a viewpoint (3,) to places (N,3), and their distances (N,)."""
-    way = places - viewpoint
+def _point_at(places: Floats, origin: Floats) -> tuple[Floats, Floats]:
+    """Unit directions (N,3) from one origin (3,) or from several (N,3) to places (N,3), and their distances (N,)."""
+    way = places - origin
     length = np.linalg.norm(way, axis=1)
     return way / np.maximum(length, 1e-300)[:, None], length

@@ -124,7 +124,7 @@ def check_walls(tolerance: float, part: Part) -> list[str]:
     from damageest.geometry.sampling import sample_by_area
 
     points, face = sample_by_area(part, 2000, np.random.default_rng(0))
-    normals = part.cross[face] / np.maximum(np.linalg.norm(part.cross[face], axis=1), 1e-300)[:, None]
+    normals = part.face_normals[face]
     start = points - 1e-5 * part.diagonal * normals
     thickness = RayCaster(part).find_first(start, -normals)[0]
     thickness = thickness[np.isfinite(thickness)]

@@ -46,10 +46,10 @@ class SkinCells:
         """(F,) the areas of the cells."""
         return np.asarray(np.linalg.norm(self.mesh.cross, axis=1) / 2)
 
-    @cached_property
+    @property
     def normals(self) -> Floats:
         """(F,3) the outward unit normals of the cells."""
-        return np.asarray(self.mesh.cross / np.maximum(2 * self.areas, 1e-300)[:, None])
+        return self.mesh.face_normals
 
     @cached_property
     def neighbours(self) -> Ints:
@@ -95,8 +95,7 @@ def find_seen(
     seen, mean = np.zeros(count, bool), np.full(count, np.nan)
     if len(intact):
         chosen = intact[pick_one_per_cube(aligned.points[intact], 0.35 * max(tolerance, aligned.spacing))]
-        cross = part.cross[deviation.face[chosen]]
-        facing = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+        facing = part.face_normals[deviation.face[chosen]]
         points = aligned.points[chosen]
         reach = np.maximum(_measure_reach(points, cells.centres), tolerance)
         usual = float(np.median(reach))

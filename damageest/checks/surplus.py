@@ -13,6 +13,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.voxels import measure_area
 from damageest.result import Surplus
 
 FAR, FAR_SHARE = 0.15, 0.25
@@ -158,8 +159,7 @@ def _measure_patch(aligned: Scan, part: Part, members: Ints, cell: float) -> _Pa
         kept = kept[pick_one_per_cube(kept, fine)]
     points, cell = kept, 2 * fine
     distance, _, feet = closest_on_mesh(points, part)
-    area, covered = (len(pick_one_per_cube(one, cell)) * cell**2 for one in (points, feet))
-    return _Patch(points, feet, area, covered, float(distance.mean()))
+    return _Patch(points, feet, measure_area(points, cell), measure_area(feet, cell), float(distance.mean()))
 
 
 def _is_plane(points: Floats, tolerance: float) -> bool:

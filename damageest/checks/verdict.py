@@ -10,7 +10,7 @@ import numpy as np
 from damageest.artefacts import ADDED, Deviation, Evidence, Floats, Pose, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.skin_cells import AVERAGED
-from damageest.geometry.voxels import number_cubes
+from damageest.geometry.voxels import measure_area, number_cubes
 from damageest.result import Surplus, Verdict
 
 SYSTEMATIC = 4.0
@@ -23,6 +23,8 @@ ALIKE = 2.0
 """How many times deeper than that skin is high a site is to be."""
 AGREE = 0.6
 """Difference of the views, in tolerances, in four fifths of their overlap, up to which they agree."""
+FEWEST_OUTSIDE = 3
+"""Points in a cube of skin that lies outside; fewer may be noise."""
 FEWEST_OF_VIEW = 4
 """Points of a view in a cube, for its mean to be compared."""
 WIDE, THIN = 0.12, 4.0
@@ -91,7 +93,7 @@ def measure_limits(
             layer[one.points] = False
     area, height = 0.0, 0.0
     if layer.any():
-        area = measure_area(aligned.points[layer], skin.cells.edge)
+        area = measure_area(aligned.points[layer], skin.cells.edge, FEWEST_OUTSIDE)
         height = float(np.quantile(deviation.distance[layer], 0.9))
     seen = float(skin.cells.areas[skin.seen].sum())
     apart = _compare_views(aligned, deviation, skin.cells.edge, tolerance)
@@ -120,12 +122,6 @@ def _compare_views(aligned: Scan, deviation: Deviation, edge: float, tolerance: 
         return 0.0
     apart = (high - low)[shared]
     return float(np.quantile(apart, 0.98)) if float(np.quantile(apart, 0.8)) > AGREE * tolerance else 0.0
-
-
-def measure_area(points: Floats, edge: float, fewest: int = 3) -> float:
-    """Area that points (N,3) on a surface cover: that of the cubes' sides with at least ``fewest`` of them."""
-    count = np.unique(number_cubes(points, edge)[1], return_counts=True)[1]
-    return float((count >= fewest).sum() * edge**2)
 
 
 @dataclass

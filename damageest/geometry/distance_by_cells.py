@@ -115,7 +115,7 @@ def _build_frames(part: Mesh) -> Floats:
     """Four planes per triangle (F,4,4), relative to the centre of the bounds: its own, and the ones through its edges
     perpendicular to it, facing inward."""
     corners = part.triangles - part.bounds.mean(axis=0)
-    normal = part.cross / np.maximum(np.linalg.norm(part.cross, axis=1), 1e-300)[:, None]
+    normal = part.face_normals
     inward = np.cross(normal[:, None], np.roll(corners, -1, axis=1) - corners)
     inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-300)
     result = np.empty((len(corners), 4, 4))

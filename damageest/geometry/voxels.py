@@ -68,6 +68,13 @@ def number_cubes(points: Floats, edge: float, low: Floats | None = None) -> tupl
     return cell, (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
 
 
+def measure_area(points: Floats, edge: float, fewest: int = 1) -> float:
+    """Area that points (N,3) on a surface cover, N at least 1: that of a side of each cube with at least ``fewest`` of
+    them."""
+    count = np.unique(number_cubes(points, edge)[1], return_counts=True)[1]
+    return float((count >= fewest).sum() * edge**2)
+
+
 def number_faced_cubes(points: Floats, normals: Floats, edge: float) -> tuple[Ints, Ints]:
     """As `number_cubes`, but points of one cube have the same number (N,) only if their normals (N,3) are nearest to
     the same one of the six directions along the axes.

@@ -87,18 +87,23 @@ PLY_TYPES = {"f8": "double", "f4": "float", "u1": "uchar", "i4": "int"}
 """numpy's types as PLY names them."""
 
 
+def _describe_columns(columns: Mapping[str, NDArray[Any]]) -> tuple[list[tuple[str, np.dtype[Any]]], str]:
+    """The fields of a record with these columns, little-endian, and the lines of a PLY header for them."""
+    fields = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
+    return fields, "".join(f"property {PLY_TYPES[v.dtype.str[1:]]} {name}\n" for name, v in columns.items())
+
+
 def write_ply(path: Path, mesh: Mesh, columns: Mapping[str, NDArray[Any]] | None = None) -> None:
     """Writes a mesh as binary little-endian PLY with coordinates in double precision.
 
     ``columns``: properties of the faces, each (F,), in the type of the column.
     """
     columns = columns or {}
-    more = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
+    more, listed = _describe_columns(columns)
     table = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3), *more])
     table["count"], table["corners"] = 3, mesh.faces
     for name, values in columns.items():
         table[name] = values
-    listed = "".join(f"property {PLY_TYPES[v.dtype.str[1:]]} {name}\n" for name, v in columns.items())
     head = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\n"
         "property double x\nproperty double y\nproperty double z\n"
@@ -109,13 +114,12 @@ def write_ply(path: Path, mesh: Mesh, columns: Mapping[str, NDArray[Any]] | None
 
 def write_points(path: Path, columns: dict[str, NDArray[Any]]) -> None:
     """Writes points as binary little-endian PLY, with one property per column (N,), in the type of the column."""
-    kind = np.dtype([(name, values.dtype.newbyteorder("<")) for name, values in columns.items()])
-    table = np.empty(len(next(iter(columns.values()))), kind)
+    fields, listed = _describe_columns(columns)
+    table = np.empty(len(next(iter(columns.values()))), fields)
     for name, values in columns.items():
         table[name] = values
-    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(table)}\n"
-    head += "".join(f"property {PLY_TYPES[values.dtype.str[1:]]} {name}\n" for name, values in columns.items())
-    path.write_bytes(head.encode() + b"end_header\n" + table.tobytes())
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(table)}\n{listed}end_header\n"
+    path.write_bytes(head.encode() + table.tobytes())
 
 
 def write_stl(path: Path, mesh: Mesh) -> None:

@@ -25,11 +25,10 @@ def inspect_skin(engine: Engine, work: Work) -> Work:
     cells = cut_skin(part, tolerance, aligned.spacing)
     seen, distance = find_seen(cells, part, aligned, deviation, tolerance)
     rays = trace_rays(part, cells, seen, aligned, tolerance)
-    if rays is not None and len(rays.roots):
-        label = label.copy()
-        roots = rays.roots[label[rays.roots] == INTACT]
-        label[roots] = DAMAGE
-        deviation = replace(deviation, label=label)
+    if rays is not None:
+        rooted = deviation.label.copy()
+        rooted[rays.roots[rooted[rays.roots] == INTACT]] = DAMAGE
+        deviation = replace(deviation, label=rooted)
     sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.tolerance)
     view = SkinView(cells, seen, distance, rays)
     state = state.derive(JobState.skin, view, *sources)

@@ -59,8 +59,8 @@ class Engine:
         named = dict(zip(("stage", "use", "site"), where, strict=True))
         needs = item.cls.needs()
         key = digest(*where[:2], item.provider.fingerprint, stage.model_dump(), [state.key(name) for name in needs])
-        if not self.silent:
-            _tell(hooks.damageest_before_stage, **named)
+        tell = _tell_nobody if self.silent else _tell
+        tell(hooks.damageest_before_stage, **named)
         start = time.perf_counter()
         try:
             cached, value = self.remember(
@@ -72,13 +72,11 @@ class Engine:
         except Exception as error:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
-            if not self.silent:
-                _tell(hooks.damageest_stage_failed, **named, error=error)
+            tell(hooks.damageest_stage_failed, **named, error=error)
             raise _locate(error, item, state) from error
         seconds = time.perf_counter() - start
         self.records.append(StageRecord(*where[:2], str(item.provider), state.number, round(seconds, 3), cached))
-        if not self.silent:
-            _tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
+        tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
         return state.with_named(contract.gives, value, key)
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
@@ -140,6 +138,10 @@ def _tell(hook: Callable[..., Any], **what: Any) -> None:
     except Exception as error:
         text = f"a plugin that observes stage {what['stage']} failed: {type(error).__name__}: {error}"
         warnings.warn(text, RuntimeWarning, stacklevel=2)
+
+
+def _tell_nobody(hook: Callable[..., Any], **what: Any) -> None:
+    """For calls that are not the job's own."""
 
 
 def _check_type(value: Any, contract: Contract) -> Any:

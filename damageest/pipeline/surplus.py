@@ -71,20 +71,23 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
         done.append(item)
         if item.kind == "surroundings":
             continue
-        for site in beside:
-            if _is_touching(state, item, site, reach):
-                note = f"surplus {item.id} lies on its skin: whether more is lost under it cannot be seen"
-                sites[sites.index(site)] = replace(site, questions=(*site.questions, note))
+        touching = {site.number for site in beside if _is_touching(state, item, site, reach)}
+        note = f"surplus {item.id} lies on its skin: whether more is lost under it cannot be seen"
+        sites = [replace(s, questions=(*s.questions, note)) if s.number in touching else s for s in sites]
         warnings += [f"surplus {item.id}: {note}" for note in item.notes if item.solid is None]
         if item.kind == "displaced piece":
             of = " and ".join(f"site {site.number} with a volume of {site.damage.volume:.4g}" for site in beside)
             own = "" if item.volume is None else f" with a volume of {item.volume:.4g}"
             volumes = [other.damage.volume for other in beside]
-            equal = []
-            for site in beside:
-                most = EQUAL_TOUCHING if _is_touching(state, item, site, reach) else EQUAL
-                if _is_equal(item, (site.damage.volume, sum(volumes)), most):
-                    equal.append(site.number)
+            equal = {
+                site.number
+                for site in beside
+                if _is_equal(
+                    item,
+                    (site.damage.volume, sum(volumes)),
+                    EQUAL_TOUCHING if site.number in touching else EQUAL,
+                )
+            }
             doubt = (
                 f"surplus {item.id} beside it{own} is as large: a piece of the part may be displaced, or the part be "
                 "bent, and no metal be lost"

@@ -10,10 +10,11 @@ import numpy as np
 from damageest.artefacts import Flags
 from damageest.checks.coverage import SkinView
 from damageest.checks.evidence import weigh_evidence
-from damageest.checks.verdict import judge_site, measure_area, measure_limits
+from damageest.checks.verdict import judge_site, measure_limits
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import to_solid, unite
+from damageest.geometry.voxels import measure_area
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
@@ -59,7 +60,7 @@ def judge_sites(engine: Engine, work: Work) -> Work:
     )  # fmt: skip
     done = []
     for site in work.sites:
-        area = measure_area(state.aligned.points[site.members], state.skin.cells.edge, 1) if len(site.members) else 0.0
+        area = measure_area(state.aligned.points[site.members], state.skin.cells.edge) if len(site.members) else 0.0
         verdict = judge_site(
             site.evidence, -state.deviation.distance[site.members], area, state.pose, limits,
             _is_proven_by_rays(state.skin, site), site.damage.area, site.questions, site.doubts,

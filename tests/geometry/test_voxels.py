@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from damageest.geometry.voxels import VoxelGrid, number_cubes, number_faced_cubes
+from damageest.geometry.voxels import VoxelGrid, measure_area, number_cubes, number_faced_cubes
 from tests.geometry.shapes import FAR
 
 
@@ -68,3 +68,17 @@ def test_faced_cubes_tell_the_six_directions_apart() -> None:
     assert np.array_equal(cell, number_cubes(points, 1.0)[0])
     assert len(set(number.tolist())) == 12
     assert number[2] == number[6] != number[9] == number[13]
+
+
+@given(st.integers(0, 10_000), st.integers(1, 4))
+@settings(max_examples=30, deadline=None)
+def test_area_is_that_of_cubes_with_enough_points(seed: int, fewest: int) -> None:
+    rng = np.random.default_rng(seed)
+    cubes = rng.permutation(np.stack(np.unravel_index(np.arange(125), (5, 5, 5)), axis=1))[:6]
+    count = rng.integers(1, 6, len(cubes))
+    points = 0.5 * (np.repeat(cubes, count, axis=0) + rng.uniform(0.1, 0.9, (count.sum(), 3)))
+    points = np.vstack([points, np.full(3, 0.001), np.full(3, 2.499)])  # so that cubes begin at the origin
+    count = np.concatenate([count, [1, 1]])
+    every = np.vstack([cubes, [0, 0, 0], [4, 4, 4]])
+    number = np.bincount(np.ravel_multi_index(tuple(every.T), (5, 5, 5)), weights=count)
+    assert np.isclose(measure_area(points, 0.5, fewest), 0.25 * (number >= fewest).sum())

@@ -22,7 +22,7 @@ class Offset(ShapeBackground):
 
     def build_shape(self, part: Part, surface: Surface, gap: float, origin: Floats) -> Any:
         """The part with its vertices moved outward."""
-        normals = part.cross / np.maximum(np.linalg.norm(part.cross, axis=1), 1e-300)[:, None]
+        normals = part.face_normals
         # Each vertex moves so that all planes through it move by the same amount: least squares over distinct planes.
         pairs = np.stack([part.faces.ravel(), np.repeat(np.arange(len(part.faces)), 3)], axis=1)
         key = np.concatenate([pairs[:, :1], np.round(normals[pairs[:, 1]], 3)], axis=1)

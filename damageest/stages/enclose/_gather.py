@@ -58,8 +58,7 @@ def gather_losses(
     points, label, grown, face = _grow_to_rim(aligned, deviation, sites, tolerance)
     skin = sample_skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
     free = cKDTree(points).query(skin.points, workers=2)[0] < np.maximum(band * tolerance, 1.6 * skin.usual)
-    cross = part.cross[face]
-    above = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    above = part.face_normals[face]
     groups, lost_by = _group_losses(points, above, label, skin, free, tolerance, aligned.spacing, aligned.noise)
     areas = measure_local_areas(skin.points)
     kept = np.flatnonzero((lost_by < 0) & ~free)

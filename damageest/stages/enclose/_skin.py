@@ -47,8 +47,7 @@ def sample_skin_near(
     if len(above):
         _, below, places = closest_on_mesh(above[pick_one_per_cube(above, 0.7 * tolerance)], part)
         hit, face = np.concatenate([hit, places]), np.concatenate([face, below])
-    cross = part.cross[face]
-    outward = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    outward = part.face_normals[face]
     clear = np.maximum(1.5 * usual, 2 * tolerance)
     # The normal counts as fourth to sixth coordinate: points on the far side of a thin wall must not count here.
     weight = 1.5 * tolerance

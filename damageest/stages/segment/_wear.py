@@ -65,8 +65,7 @@ def find_wear(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance
     if not (aligned.noise and aligned.spacing) or len(some) < MIN_REGION:
         return Wear(none, tolerance)
     points, depth = aligned.points[some], distance[some]
-    cross = part.cross[face[some]]
-    normals = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    normals = part.face_normals[face[some]]
     # Neighbours are searched along the surface: in a dense scan the nearest points in space have the same noise.
     # Only noise is removed from the positions: points deeper than that stay apart from those beside the rim.
     noise = NOISE * aligned.noise

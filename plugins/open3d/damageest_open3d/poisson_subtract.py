@@ -106,7 +106,7 @@ class PoissonSubtract(EncloseAll):
 
 def _compute_face_normals(part: Part) -> Floats:
     """(F,3) unit normals of the faces."""
-    return np.asarray(part.cross / np.maximum(np.linalg.norm(part.cross, axis=1), 1e-300)[:, None])
+    return part.face_normals
 
 
 def _reconstruct_body(points: Floats, above: Floats, cell: float, depth: int, scale: float) -> tuple[Floats, Ints]:
