@@ -7,9 +7,9 @@ after `align` is in the part's. ``T_part_scan`` takes a point from the scanner's
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -360,6 +360,9 @@ class Enclosures:
     items: tuple[Enclosure, ...]
 
 
+EvidenceCause = Literal["residual", "inside", "contradicted", "bare", "shallow", "unseen"]
+
+
 @dataclass(frozen=True)
 class Evidence:
     """The check of one damage volume (DV) against the scan.
@@ -372,7 +375,8 @@ class Evidence:
     the largest connected piece of that.
     ``intact_share``: share of the skin that the DV removes on which intact points lie as densely as elsewhere, also
     near the rim. Unlike ``skin_contradicted``, it is measured on shallow and small sites too.
-    ``consistent``: whether the scan agrees with the DV. ``reasons`` say why not.
+    ``consistent``: whether the scan agrees with the DV. ``reasons`` say why not, and ``causes`` names the check that
+    gave each reason.
     """
 
     ids_residual: float = 0.0
@@ -383,4 +387,5 @@ class Evidence:
     ids_gap: float = 0.0
     intact_share: float = 0.0
     consistent: bool = True
-    reasons: tuple[str, ...] = field(default=())
+    reasons: tuple[str, ...] = ()
+    causes: tuple[EvidenceCause, ...] = ()

@@ -21,6 +21,7 @@ def job(part: str, **scan: object) -> dict[str, object]:
     return {"version": 1, "tolerance": 0.3, "part": str(DATA / part), "scan": scan}
 
 
+@pytest.mark.slow
 def test_a_corner_lost_from_a_step_part() -> None:
     part = damageest.run({**job("featuretype.STEP", pose="identity"), "align": "none"}).part
     low, high = part.bounds

@@ -27,11 +27,13 @@ Why = Literal["unknown", "hidden", "outside", "no points"]
 
 @dataclass(frozen=True, eq=False)
 class SkinView:
-    """The skin in ``cells``; for each (F,) whether the scan has points on it, ``seen``, and their mean signed
-    ``distance``, NaN without points; ``rays``: None where no scanner position is known."""
+    """The skin in ``cells``; for each (F,) whether the scan has points on it, ``seen``, or has them so near that it
+    perhaps shows it, ``perhaps_seen``, and their mean signed ``distance``, NaN without points; ``rays``: None where no
+    scanner position is known."""
 
     cells: SkinCells
     seen: Flags
+    perhaps_seen: Flags
     distance: Floats
     rays: RayEvidence | None
 

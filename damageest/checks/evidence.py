@@ -8,7 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import ADDED, INTACT, Deviation, Evidence, Flags, Floats, Mesh, Part, Scan, Solid
+from damageest.artefacts import (
+    ADDED,
+    INTACT,
+    Deviation,
+    Evidence,
+    EvidenceCause,
+    Flags,
+    Floats,
+    Mesh,
+    Part,
+    Scan,
+    Solid,
+)
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_in_box, pick_one_per_cube
 from damageest.geometry.point_pieces import number_pieces
@@ -74,21 +86,24 @@ def weigh_evidence(
     expected = min(len(ids_points) + over, skin_area * (1.1 / spacing) ** 2 if spacing else np.inf)
     intact_share = float(min(over / max(expected, 1.0), 1.0))
 
-    reasons = []
+    found: list[tuple[EvidenceCause, str]] = []
     if residual > 1.5 * tolerance + 0.25 * spacing:
-        reasons.append(f"its boundary is off the damaged points (95 % within {residual:.3g})")
+        found.append(("residual", f"its boundary is off the damaged points (95 % within {residual:.3g})"))
     if inside > max(10, 0.02 * len(ids_points)):
-        reasons.append(f"{inside} intact points lie on the skin that it removes")
+        found.append(("inside", f"{inside} intact points lie on the skin that it removes"))
     if contradicted > 0.1:
-        reasons.append(f"intact points lie on {contradicted:.0%} of the skin that it removes")
+        found.append(("contradicted", f"intact points lie on {contradicted:.0%} of the skin that it removes"))
     if bare > 0.1:
-        reasons.append(f"{bare:.0%} of its inner surface has no scan point nearby")
+        found.append(("bare", f"{bare:.0%} of its inner surface has no scan point nearby"))
     if over >= FEWEST_INTACT and intact_share > HALF:
-        reasons.append(f"intact points lie on {intact_share:.0%} of the skin that it removes, shallow as it is")
+        reason = f"intact points lie on {intact_share:.0%} of the skin that it removes, shallow as it is"
+        found.append(("shallow", reason))
     if unseen > UNSEEN:
-        reasons.append(f"{unseen:.0%} of the skin beside it has no scan point: the damage may extend there")
+        reason = f"{unseen:.0%} of the skin beside it has no scan point: the damage may extend there"
+        found.append(("unseen", reason))
+    causes, reasons = zip(*found, strict=True) if found else ((), ())
     return Evidence(
-        residual, inside, contradicted, unseen, ids_unseen, ids_gap, intact_share, not reasons, tuple(reasons)
+        residual, inside, contradicted, unseen, ids_unseen, ids_gap, intact_share, not found, reasons, causes
     )
 
 

@@ -32,8 +32,13 @@ class RayEvidence:
     outside: Flags
 
 
-def trace_rays(part: Part, cells: SkinCells, seen: Flags, aligned: Scan, tolerance: float) -> RayEvidence | None:
-    """Follows the scanner's rays through the part as designed. None where no scanner position is known."""
+def trace_rays(
+    part: Part, cells: SkinCells, seen: Flags, perhaps_seen: Flags, aligned: Scan, tolerance: float
+) -> RayEvidence | None:
+    """Follows the scanner's rays through the part as designed. None where no scanner position is known.
+
+    Cells that are not ``seen`` (F,) are explained; only those that are not ``perhaps_seen`` (F,) can be proven lost.
+    """
     if aligned.viewpoints is None or aligned.view is None or not (aligned.view >= 0).any():
         return None
     used = np.flatnonzero(aligned.view >= 0)
@@ -48,7 +53,7 @@ def trace_rays(part: Part, cells: SkinCells, seen: Flags, aligned: Scan, toleran
     enter = origins[ray] + hits.distance[entry, None] * way[ray]
     exit_ = origins[ray] + leave[:, None] * way[ray]
     deep = _is_deep(part, caster, enter, exit_, -part.face_normals[hits.face[entry]], tolerance)
-    lost = _find_lost(cells, seen, np.concatenate([enter[deep], exit_[deep & ~reached]]), aligned.spacing)
+    lost = _find_lost(cells, perhaps_seen, np.concatenate([enter[deep], exit_[deep & ~reached]]), aligned.spacing)
     roots = _find_roots(cells, lost, enter, ray, reached & (leave - hits.distance[entry] > margin))
     hidden, outside = _explain_unseen(
         caster, cells, seen, aligned.points, aligned.viewpoints, np.asarray(aligned.view, np.int64), tolerance

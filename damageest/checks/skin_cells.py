@@ -19,8 +19,11 @@ NEIGHBOURS = 6
 """Scan points that the local spacing is measured from: a disc with six points has 1.25 spacings as radius."""
 AVERAGED = 6
 """Scan points that the mean distance of a cell is taken of."""
-MARGIN = 0.7
-"""Width of the margin that is removed at the edge of seen skin, in reaches: it lies beyond the last points."""
+MARGIN, NARROW_MARGIN = 1.05, 0.7
+"""Width in reaches of the margin that is removed at the edge of seen skin, since it lies beyond the last points: the
+one that gives the right area, and one that leaves all skin that may be seen, as that beside a lost thin wall."""
+TURNED_AWAY = 0.09
+"""Cosine of the angle between skin and the way to a scanner position below which it does not show the skin."""
 MOST_REACHES = 20_000
 """Places at which the local spacing is measured."""
 FACING = 1.5
@@ -83,8 +86,9 @@ def cut_skin(part: Part, tolerance: float, spacing: float) -> SkinCells:
 
 def find_seen(
     cells: SkinCells, part: Part, aligned: Scan, deviation: Deviation, tolerance: float
-) -> tuple[Flags, Floats]:
-    """Whether the scan shows each cell (F,), and the mean signed distance (F,) of the points on it, NaN without points.
+) -> tuple[Flags, Flags, Floats]:
+    """Whether the scan shows each cell (F,); whether it perhaps does (F,), at the edge of what it shows; and the mean
+    signed distance (F,) of the points on it, NaN without points.
 
     A cell is seen where an intact point lies within the local spacing of the points, or added metal covers it. Points
     count for skin that faces as the skin nearest to them. The area that a point stands for reaches beyond the edge of
@@ -92,14 +96,15 @@ def find_seen(
     """
     count = len(cells.areas)
     intact = np.flatnonzero(deviation.label == INTACT)
-    seen, mean = np.zeros(count, bool), np.full(count, np.nan)
+    seen, perhaps, mean = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
     if len(intact):
         chosen = intact[pick_one_per_cube(aligned.points[intact], 0.35 * max(tolerance, aligned.spacing))]
         facing = part.face_normals[deviation.face[chosen]]
-        points = aligned.points[chosen]
-        reach = np.maximum(_measure_reach(points, cells.centres), tolerance)
+        # the places on the skin below the points: how far they are from it does not matter here
+        points = aligned.points[chosen] - deviation.distance[chosen, None] * facing
+        reach = _measure_reach(points, cells.centres)
         usual = float(np.median(reach))
-        reach = np.minimum(reach, 3 * max(usual, tolerance)) + cells.edge / 3
+        reach = np.minimum(reach, 3 * usual) + cells.edge / 3
         weight = FACING * usual
         among = np.concatenate([points, weight * facing], axis=1)
         asked = find_nearby(cells.centres, points, float(reach.max()))
@@ -109,10 +114,11 @@ def find_seen(
         near = np.isfinite(gap)
         distance = np.append(deviation.distance[chosen], 0.0)[index]  # the index of a missing neighbour is the last
         mean[asked] = np.where(near, distance, 0.0).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
-        seen = _trim_edges(cells, seen, usual + cells.edge / 3, weight)
+        seen, perhaps = _trim_edges(cells, seen, usual + cells.edge / 3, weight)
+        seen &= ~_faces_away(cells, aligned)
     covered = _find_covered(cells, aligned, deviation, max(2 * tolerance, 1.5 * aligned.spacing))
-    mean[~seen] = np.nan
-    return seen | covered, mean
+    mean[~perhaps] = np.nan
+    return seen | covered, perhaps | covered, mean
 
 
 def _measure_reach(points: Floats, places: Floats) -> Floats:
@@ -122,22 +128,34 @@ def _measure_reach(points: Floats, places: Floats) -> Floats:
     return np.asarray(radius[find_neighbours(places, 1, some)[1][:, 0]])
 
 
-def _trim_edges(cells: SkinCells, seen: Flags, reach: float, weight: float) -> Flags:
-    """The seen cells (F,) without small gaps, and without the margin by which they reach beyond the points."""
+def _faces_away(cells: SkinCells, aligned: Scan) -> Flags:
+    """Which cells (F,) face away from all scanner positions; none where a point's position is not known."""
+    away = np.zeros(len(cells.areas), bool)
+    if aligned.viewpoints is None or aligned.view is None or (aligned.view < 0).any():
+        return away
+    away[:] = True
+    for viewpoint in aligned.viewpoints:
+        way = viewpoint - cells.centres
+        away &= np.einsum("ij,ij->i", way, cells.normals) < TURNED_AWAY * np.linalg.norm(way, axis=1)
+    return away
+
+
+def _trim_edges(cells: SkinCells, seen: Flags, reach: float, weight: float) -> tuple[Flags, Flags]:
+    """The seen cells (F,) with small gaps filled, and without the margin by which they reach beyond the points: that of
+    `MARGIN`, and that of `NARROW_MARGIN`."""
     bare = cells.label_connected(~seen)
     if not (bare >= 0).any():
-        return seen
+        return seen, seen
     size = np.bincount(bare[bare >= 0], weights=cells.areas[bare >= 0])
     small = size < 4 * reach**2
     open_ = (bare >= 0) & ~small[np.maximum(bare, 0)]
     filled = ~open_
     if not open_.any():
-        return filled
+        return filled, filled
     places = np.concatenate([cells.centres, weight * cells.normals], axis=1)
-    gap = find_neighbours(places[filled], 1, places[open_], MARGIN * reach)[0][:, 0]
-    result = filled.copy()
-    result[np.flatnonzero(filled)[np.isfinite(gap)]] = False
-    return result
+    gap = np.zeros(len(seen))
+    gap[filled] = find_neighbours(places[filled], 1, places[open_], MARGIN * reach)[0][:, 0]
+    return gap > MARGIN * reach, gap > NARROW_MARGIN * reach
 
 
 def _find_covered(cells: SkinCells, aligned: Scan, deviation: Deviation, reach: float) -> Flags:

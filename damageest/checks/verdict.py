@@ -81,7 +81,7 @@ def measure_limits(
 ) -> ScanLimits:
     """Measures how far skin deviates that is not damaged. ``surplus``: higher one is left out, since it is metal."""
     systematic = 0.0
-    distance = skin.distance[skin.seen & np.isfinite(skin.distance)]
+    distance = skin.distance[skin.perhaps_seen & np.isfinite(skin.distance)]
     if len(distance) >= 30:
         # half the width of the middle 90 %, in standard deviations of a normal distribution
         low, high = np.quantile(distance, [0.05, 0.95])
@@ -149,11 +149,10 @@ def judge_site(
         unknown: what the scan does not show of it. doubts: what else makes it doubtful, such as a displaced piece.
     """
     found = _Reasons([*pose.doubts, *doubts], list(unknown))
-    for reason in evidence.reasons:
-        if proven_by_rays and ("no scan point" in reason or "shallow as it is" in reason):
+    for cause, reason in zip(evidence.causes, evidence.reasons, strict=True):
+        if proven_by_rays and cause in ("bare", "unseen", "shallow"):
             continue  # rays stand for the points, and a thin wall's root is all rim
-        unseen = reason.endswith("the damage may extend there")
-        found.add(not (unseen and evidence.skin_unseen <= UNSEEN), reason)
+        found.add(cause != "unseen" or evidence.skin_unseen > UNSEEN, reason)
     if len(depth):
         _ask_depth(found, depth, area, limits)
     if proven_by_rays:

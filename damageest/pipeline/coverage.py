@@ -23,14 +23,14 @@ def inspect_skin(engine: Engine, work: Work) -> Work:
     label[find_turned(aligned, part, deviation, tolerance)] = DAMAGE
     deviation = replace(deviation, label=label)
     cells = cut_skin(part, tolerance, aligned.spacing)
-    seen, distance = find_seen(cells, part, aligned, deviation, tolerance)
-    rays = trace_rays(part, cells, seen, aligned, tolerance)
+    seen, perhaps_seen, distance = find_seen(cells, part, aligned, deviation, tolerance)
+    rays = trace_rays(part, cells, seen, perhaps_seen, aligned, tolerance)
     if rays is not None:
         rooted = deviation.label.copy()
         rooted[rays.roots[rooted[rays.roots] == INTACT]] = DAMAGE
         deviation = replace(deviation, label=rooted)
     sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.tolerance)
-    view = SkinView(cells, seen, distance, rays)
+    view = SkinView(cells, seen, perhaps_seen, distance, rays)
     state = state.derive(JobState.skin, view, *sources)
     return replace(work, job=state.derive(JobState.deviation, deviation, *sources))
 

@@ -33,7 +33,7 @@ def add_lost_bodies(engine: Engine, work: Work) -> Work:
     cells, owner = skin.cells, piece[skin.cells.parent]
     total, seen, passed = (
         np.bincount(owner, weights=cells.areas * chosen)
-        for chosen in (np.ones(len(owner)), skin.seen, skin.rays.lost & ~skin.seen)
+        for chosen in (np.ones(len(owner)), skin.perhaps_seen, skin.rays.lost & ~skin.perhaps_seen)
     )
     found = []
     for number in np.flatnonzero((seen < SEEN * total) & (passed > PASSED * total)):

@@ -101,7 +101,7 @@ def _is_proven_by_rays(skin: SkinView, site: FoundSite) -> bool:
         return True
     cells, damage = skin.cells, site.damage
     near: Flags = ((cells.centres > damage.bounds[0]) & (cells.centres < damage.bounds[1])).all(axis=1)
-    index = np.flatnonzero(near & ~skin.seen)
+    index = np.flatnonzero(near & ~skin.perhaps_seen)
     index = index[distance_to_mesh(cells.centres[index], damage) < 1e-3 * cells.edge] if len(index) else index
     area = cells.areas[index]
     return bool(len(index)) and float(area[skin.rays.lost[index]].sum()) > BY_RAYS * float(area.sum())

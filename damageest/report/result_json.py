@@ -301,7 +301,7 @@ def _report_site(site: Site, written: ExportedFiles) -> SiteReport:
     spline = written.splines.get(site.id)
 
     low, high = site.damage.bounds.tolist()
-    evidence = {name: value for name, value in vars(site.evidence).items() if name != "reasons"}
+    evidence = {name: value for name, value in vars(site.evidence).items() if name not in ("reasons", "causes")}
     return SiteReport(
         id=site.id,
         points=len(site.points),

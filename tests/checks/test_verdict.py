@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,16 +27,14 @@ def test_nothing_against_a_deep_site_with_many_points() -> None:
     assert judge() == Verdict("proven", ())
 
 
+OPEN: dict[str, Any] = {"consistent": False, "reasons": ("30% of the skin beside it",), "causes": ("unseen",)}
 CASES = {
-    "contradicted": ({"evidence": Evidence(consistent=False, reasons=("8 intact points",))}, "doubtful"),
-    "unseen beside it": (
-        {"evidence": Evidence(skin_unseen=0.3, consistent=False, reasons=("x: the damage may extend there",))},
-        "likely",
-    ),
-    "mostly unseen beside it": (
-        {"evidence": Evidence(skin_unseen=0.6, consistent=False, reasons=("x: the damage may extend there",))},
+    "contradicted": (
+        {"evidence": Evidence(consistent=False, reasons=("8 intact points",), causes=("inside",))},
         "doubtful",
     ),
+    "unseen beside it": ({"evidence": Evidence(skin_unseen=0.3, **OPEN)}, "likely"),
+    "mostly unseen beside it": ({"evidence": Evidence(skin_unseen=0.6, **OPEN)}, "doubtful"),
     "inner surface in part unseen": ({"evidence": Evidence(ids_unseen=0.3)}, "likely"),
     "inner surface mostly unseen": ({"evidence": Evidence(ids_unseen=0.6)}, "doubtful"),
     "a hole in the inner surface": ({"evidence": Evidence(ids_unseen=0.05, ids_gap=3.0)}, "doubtful"),

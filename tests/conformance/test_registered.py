@@ -56,7 +56,7 @@ WITH: dict[str, dict[str, Any]] = {
 """By implementation: the ``options`` to check it with, and other attributes of its class."""
 
 
-SLOW = {"poisson_subtract"}
+SLOW = {"poisson_subtract", "register"}
 """Implementations that are checked by -m slow only."""
 
 

@@ -23,6 +23,7 @@ SIMULATED = damaged_box.JOB.replace(
 )
 
 
+@pytest.mark.slow
 def test_depths_found_and_not_found_are_told_kept_and_gone_on_from(tmp_path: Path) -> None:
     job, out = damaged_box.write(tmp_path, SIMULATED), tmp_path / "out"
     words = ("job", job, "--seeds", 1, "--size", "0,4", "--noise", "0.5,1", "--out", out)

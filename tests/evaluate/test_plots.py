@@ -11,6 +11,7 @@ from damageest.evaluate.plots import draw_plots, require_matplotlib
 from tests.evaluate.rows import MISSED, row
 
 
+@pytest.mark.slow
 def test_what_was_varied_is_drawn_and_the_errors(tmp_path: Path) -> None:
     rows = [
         row(varied={"noise": n, "points": p, "tolerance": t, "size": s}, tolerance=t, size=s, surface_error=0.1 * n)

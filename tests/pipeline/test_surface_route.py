@@ -62,7 +62,9 @@ def first(bar: tuple[Part, Scan, float]) -> Result:
 
 
 @pytest.mark.parametrize("enclose", ["adaptive", pytest.param("shortest_path", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("background", SMOOTH)
+@pytest.mark.parametrize(
+    "background", [n if n in ("minkowski", "bbox") else pytest.param(n, marks=pytest.mark.slow) for n in SMOOTH]
+)
 def test_the_background_does_not_matter_where_it_is_valid(
     bar: tuple[Part, Scan, float], first: Result, background: str, enclose: str
 ) -> None:
@@ -85,6 +87,7 @@ def test_where_it_is_not_valid_it_says_so(background: str) -> None:
     assert right(run(scene), scene[1])  # a wall worn through: both rims reach the background
 
 
+@pytest.mark.slow
 def test_a_groove_round_a_shaft(tmp_path: Path) -> None:
     trimesh.creation.annulus(14, 30, 10, sections=128).export(tmp_path / "groove.stl")
     scene = scanned(PARTS["cylinder"](), {"tool": "mesh", "path": str(tmp_path / "groove.stl")})
@@ -103,6 +106,7 @@ def test_a_piece_broken_out_of_a_ring() -> None:
         assert result.sites[0].clusters == (1, 2)
 
 
+@pytest.mark.slow
 def test_two_pieces_broken_out_of_a_frame_and_a_dent_beside() -> None:
     """Of five damage surfaces four bound two losses in pairs, and one bounds its own."""
     from manifold3d import Manifold

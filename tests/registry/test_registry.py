@@ -96,7 +96,9 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("source", FAULTS)
+@pytest.mark.parametrize(
+    "source", [pytest.param(text, marks=pytest.mark.slow if k % 2 else ()) for k, text in enumerate(FAULTS)]
+)
 def test_a_broken_plugin_stops_nothing(source: str, site: Site, tmp_path: Path) -> None:
     site.add("acme-broken", source)
     registry = Registry.discover()

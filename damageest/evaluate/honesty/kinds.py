@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 from damageest.evaluate.honesty import clutter, frame, lost, scanner, shape
 from damageest.evaluate.honesty.names import (
     BENT,
@@ -22,44 +19,7 @@ from damageest.evaluate.honesty.names import (
     UNSEEN,
     VIEWS,
 )
-from damageest.evaluate.honesty.scene import Scanning, TroubleScene
-
-
-@dataclass(frozen=True)
-class TroubleWay:
-    """One case of a kind. ``pose``: `known` (align: none) or `unknown`. ``views``: scanner positions; 0: all skin at
-    once. ``positions``: whether the job is told the scanner positions. ``amount``: see the kind's function."""
-
-    part: str
-    pose: str = "known"
-    views: int = 8
-    positions: bool = True
-    amount: float = 0.0
-
-
-@dataclass(frozen=True)
-class Trouble:
-    """A kind of trouble. ``names``: patterns of texts that name it. A text with a pattern and a number is enough."""
-
-    make: Callable[[Scanning], TroubleScene]
-    names: tuple[str, ...]
-    ways: tuple[TroubleWay, ...]
-
-
-def _spread(parts: str, pose: str = "known", views: int = 8) -> tuple[TroubleWay, ...]:
-    """A way for each part. ``pose`` `both`: the poses alternate."""
-    poses = {"both": ("known", "unknown")}.get(pose, (pose,))
-    return tuple(TroubleWay(name, poses[k % len(poses)], views) for k, name in enumerate(parts.split()))
-
-
-def _partial(*parts: str) -> tuple[TroubleWay, ...]:
-    """1, 3 and 8 positions, in known and in unknown pose."""
-    return tuple(
-        TroubleWay(name, "known" if (k + views) % 2 else "unknown", views)
-        for k, name in enumerate(parts)
-        for views in (1, 3, 8)
-    )
-
+from damageest.evaluate.honesty.ways import Trouble, TroubleWay, scan_from_few, scan_partly, spread_over
 
 TROUBLES: dict[str, Trouble] = {
     "ordinary damage": Trouble(
@@ -76,7 +36,7 @@ TROUBLES: dict[str, Trouble] = {
         ),
     ),
     "undamaged part, full scan": Trouble(
-        scanner.scan_intact, (), _spread("block half_torus shaft plate", "both", views=0)
+        scanner.scan_intact, (), spread_over("block half_torus shaft plate", "both", views=0)
     ),
     "lost wall": Trouble(
         lost.lose_wall,
@@ -95,10 +55,10 @@ TROUBLES: dict[str, Trouble] = {
     "lost rib": Trouble(
         lost.lose_rib,
         LOST,
-        (*_spread("rib_bracket ribbed_plate", "both"), TroubleWay("rib_bracket", "known", 8, False)),
+        (*spread_over("rib_bracket ribbed_plate", "both"), TroubleWay("rib_bracket", "known", 8, False)),
     ),
     "lost pin": Trouble(
-        lost.lose_pin, LOST, (*_spread("pin_plate grille", "both"), TroubleWay("pin_plate", "unknown", 8, False))
+        lost.lose_pin, LOST, (*spread_over("pin_plate grille", "both"), TroubleWay("pin_plate", "unknown", 8, False))
     ),
     "lost body": Trouble(
         lost.lose_body,
@@ -120,7 +80,7 @@ TROUBLES: dict[str, Trouble] = {
             TroubleWay("lever", "unknown", 3, False),
         ),
     ),
-    "undamaged part, partial scan": Trouble(scanner.scan_intact, (), _partial("block", "gear", "tube", "ribbed_plate")),
+    "undamaged part, partial scan": Trouble(scanner.scan_intact, (), scan_partly()),
     "undamaged part, depth in steps": Trouble(
         scanner.scan_in_steps,
         NOISE,
@@ -313,5 +273,7 @@ TROUBLES: dict[str, Trouble] = {
         COARSE,
         (TroubleWay("plate", "known", 8, amount=0.6), TroubleWay("cuboid", "unknown", 0, False, 0.6)),
     ),
+    "undamaged part, few positions": Trouble(scanner.scan_intact, (), scan_from_few()),
+    "undamaged part, few positions, depth in steps": Trouble(scanner.scan_in_steps, NOISE, scan_from_few(1.0)),
 }
 """Name of a kind: what makes it, what names it, and its cases."""

@@ -19,11 +19,11 @@ _ABOVE = np.array([(1, 0, 0.7), (-0.5, 0.87, 0.7), (-0.5, -0.87, 0.7)])
 
 
 def place_scanners(part: Mesh, count: int, rng: np.random.Generator) -> Floats:
-    """Positions (V,3): one in a random direction, three round a random side, or eight that see all round."""
+    """Positions (V,3): one in a random direction, two or three round a random side, or eight that see all round."""
     from scipy.spatial.transform import Rotation
 
     turn = Rotation.random(random_state=rng).as_matrix()
-    directions = {1: _ABOVE[:1], 3: _ABOVE, 8: _CORNERS}[count] @ turn.T
+    directions = {1: _ABOVE[:1], 2: _ABOVE[:2], 3: _ABOVE, 8: _CORNERS}[count] @ turn.T
     directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     return np.asarray(part.bounds.mean(axis=0) + DISTANCE * part.diagonal * directions)
 

@@ -111,6 +111,7 @@ def test_fewer_faces_within_the_detail(tmp_path: Path) -> None:
     assert back.val().Volume() == pytest.approx(rough.volume, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_the_same_bytes_each_time_and_its_name(tmp_path: Path) -> None:
     made = solid(bitten())
     texts = []

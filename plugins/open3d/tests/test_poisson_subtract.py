@@ -157,6 +157,7 @@ def test_naming_it_fixes_the_route() -> None:
             load({**header, "enclose": "poisson_subtract", **wrong}, registry)
 
 
+@pytest.mark.slow
 def test_a_whole_job_warns_of_what_was_dropped(capfd: pytest.CaptureFixture[str]) -> None:
     tool = {"tool": "sphere", "centre": [0, 0, 6], "radius": 6}
     scan = Simulate.model_validate({"damage": [tool], "points": 20_000, "noise": NOISE}).run("mm", box())

@@ -28,6 +28,7 @@ def test_pose_with_a_third_unseen(name: str) -> None:
     assert error(part, Register().run(scan, part, 4 * scan.noise).T_part_scan, scan) < 0.5
 
 
+@pytest.mark.slow
 def test_keyway_decides() -> None:
     part, scan = scene("keyed_shaft", seed=5, missing=0.05)
     pose = Register().run(scan, part, 4 * scan.noise)
@@ -81,6 +82,7 @@ def test_noise_not_measured_and_no_outliers() -> None:
     assert error(part, Register().run(bare, part, 4 * scan.noise).T_part_scan, scan) < 0.5
 
 
+@pytest.mark.slow
 def test_another_part_is_refused() -> None:
     part, _ = scene("block", seed=0)
     other, scan = scene("half_torus", seed=1)
@@ -97,6 +99,7 @@ def test_mirror_image_is_refused() -> None:
     assert "left-hand" in caught.value.remedy
 
 
+@pytest.mark.slow
 def test_a_displaced_piece_does_not_shift_the_pose() -> None:
     part, scan = scene("lever", seed=5, clutter=0.0)
     assert scan.truth is not None
