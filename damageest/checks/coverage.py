@@ -46,7 +46,8 @@ def measure_coverage(part: Part, skin: SkinView, losses: Sequence[Solid], tolera
     regions, region = _describe_regions(part, cells, label, rays, (LEAST_EDGE * max(tolerance, spacing)) ** 2)
     share = float(cells.areas[seen].sum() / cells.areas.sum())
     lost = rays.lost if rays else np.zeros(len(seen), bool)
-    return Coverage(share, regions, cells.mesh, seen, skin.distance, lost, region)
+    distance = np.where(skin.seen, skin.distance, np.nan)
+    return Coverage(share, regions, cells.mesh, seen, distance, lost, region)
 
 
 def _find_removed(cells: SkinCells, seen: Flags, losses: Sequence[Solid], reach: float) -> Flags:

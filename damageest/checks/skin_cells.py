@@ -19,7 +19,7 @@ NEIGHBOURS = 6
 """Scan points that the local spacing is measured from: a disc with six points has 1.25 spacings as radius."""
 AVERAGED = 6
 """Scan points that the mean distance of a cell is taken of."""
-MARGIN, NARROW_MARGIN = 1.05, 0.7
+MARGIN, NARROW_MARGIN = 1.15, 0.7
 """Width in reaches of the margin that is removed at the edge of seen skin, since it lies beyond the last points: the
 one that gives the right area, and one that leaves all skin that may be seen, as that beside a lost thin wall."""
 TURNED_AWAY = 0.09
@@ -77,9 +77,9 @@ class SkinCells:
         return label
 
 
-def cut_skin(part: Part, tolerance: float, spacing: float) -> SkinCells:
-    """Cuts the part's skin into cells about as large as three tolerances or three spacings of the scan."""
-    edge = max(3 * tolerance, 3 * spacing, 2.2 * float(np.sqrt(part.area / MOST_CELLS)))
+def cut_skin(part: Part, spacing: float) -> SkinCells:
+    """Cuts the part's skin into cells about as large as three spacings of the scan."""
+    edge = max(3 * spacing, 2.2 * float(np.sqrt(part.area / MOST_CELLS)))
     mesh, parent = cut_into_cells(part, edge, LEAST_AREA * edge**2)
     return SkinCells(mesh, parent, edge)
 

@@ -22,7 +22,7 @@ def inspect_skin(engine: Engine, work: Work) -> Work:
     label = deviation.label.copy()
     label[find_turned(aligned, part, deviation, tolerance)] = DAMAGE
     deviation = replace(deviation, label=label)
-    cells = cut_skin(part, tolerance, aligned.spacing)
+    cells = cut_skin(part, aligned.spacing)
     seen, perhaps_seen, distance = find_seen(cells, part, aligned, deviation, tolerance)
     rays = trace_rays(part, cells, seen, perhaps_seen, aligned, tolerance)
     if rays is not None:
