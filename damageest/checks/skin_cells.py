@@ -11,7 +11,7 @@ from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, M
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.refinement import cut_into_cells
 
-MOST_CELLS = 30_000
+MOST_CELLS = 20_000
 """Cells that the skin is cut into, about; more where the part has more triangles than this."""
 LEAST_AREA = 0.25
 """Area in squares of a cell's edge below which a triangle is not cut."""
@@ -24,7 +24,7 @@ MARGIN, NARROW_MARGIN = 1.15, 0.7
 one that gives the right area, and one that leaves all skin that may be seen, as that beside a lost thin wall."""
 TURNED_AWAY = 0.09
 """Cosine of the angle between skin and the way to a scanner position below which it does not show the skin."""
-MOST_REACHES = 20_000
+MOST_REACHES = 5000
 """Places at which the local spacing is measured."""
 FACING = 1.5
 """Weight of a difference of normals, in reaches: points on the far side of a thin wall do not show the near side."""
