@@ -21,8 +21,9 @@ from damageest.errors import Fault, JobError
 from damageest.pipeline.cache import Cache
 
 _OURS = re.compile(
-    r"result\.json|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?(scan\.ply|result\.3mf"
-    r"|(damage|undamaged|(damage|surface|deposit|surplus)/site-\d+)\.(stl|ply|step))"
+    r"result\.json|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?"
+    r"((scan|skin|unseen)\.ply|(doubtful/)?result\.3mf|(damage|undamaged|((doubtful/)?(damage|surface)|doubtful|deposit|"
+    r"surplus)/site-\d+)\.(stl|ply|step))"
 )
 """What a run writes, by its path in the output folder. Other files are the user's and stay, unless the
 old result.json lists them, as those that a plugin wrote in another format."""

@@ -87,6 +87,8 @@ def test_files_of_doubtful_sites_lie_apart_and_a_run_with_no_other_ends_with_1(t
     assert not (out / "damage").exists()
     assert not (out / "damage.stl").exists()
     assert report["damage_volume"] == report["material"]["deposit_volume"] == 0
+    report["export"]["files"] = []  # what is cleared away does not rest on this list
+    (out / "result.json").write_text(json.dumps(report))
     job.write_text(JOB + "accept: all\n")
     assert call("run", job).returncode == 0
     assert (out / "damage" / "site-1.stl").is_file()

@@ -45,7 +45,7 @@ def written(made: Solid, folder: Path, unit: str = "mm") -> Any:
 
 
 @pytest.mark.parametrize(
-    "unit", ["in", *(pytest.param(unit, marks=pytest.mark.slow) for unit in ("um", "mm", "cm", "m", "ft"))]
+    "unit", [pytest.param(unit, marks=pytest.mark.slow) for unit in ("in", "um", "mm", "cm", "m", "ft")]
 )
 def test_volume_and_unit(unit: str, tmp_path: Path) -> None:
     scale = 1 / MILLIMETRES[unit]  # the same block, whatever the unit
