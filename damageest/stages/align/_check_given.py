@@ -53,7 +53,8 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[st
         turn = float(np.degrees(Rotation.from_matrix(D[:3, :3]).magnitude()))
         raise StageError(
             f"in the given pose {given.on:.0%} of the scan lies on the part; moved by {shift:.3g} {part.unit} and "
-            f"turned by {turn:.2g} degrees, {fitted.on:.0%} would: the given pose is wrong by that much",
+            f"turned by {turn:.2g} degrees, {fitted.on:.0%} would: the given pose is wrong by that "
+            "much, or the part is bent or twisted",
             "use align: icp, which corrects it, or give the right T_part_scan",
         )
     if not given.is_acceptable:
