@@ -41,7 +41,8 @@ BARE = 0.25
 GAP = 8.0
 """The same for a connected piece of it: its area in squares of the scan's spacing, or of the tolerance."""
 OPEN = 0.08
-"""The same for a site that rays prove: its share of the damage volume's surface. The root of a thin wall is small."""
+"""Share from which such a piece makes a site doubtful: of the inner surface; for a site that rays prove, of the damage
+volume's whole surface, since the root of a thin wall is small."""
 SHALLOW = 1.5
 """Depth in tolerances below which a site is shallow: its rim is then as wide as itself."""
 UNSEEN = 0.5
@@ -179,7 +180,7 @@ def _ask_inner_surface(found: _Reasons, evidence: Evidence, limits: ScanLimits) 
     gap = evidence.ids_gap / max(limits.tolerance, limits.spacing) ** 2
     if gap > GAP or evidence.ids_unseen > BARE:
         found.add(
-            gap > 2 * GAP or evidence.ids_unseen > 2 * BARE,
+            (gap > 2 * GAP and evidence.ids_unseen > OPEN) or evidence.ids_unseen > 2 * BARE,
             f"{evidence.ids_unseen:.0%} of its inner surface has no scan points near, {evidence.ids_gap:.3g} "
             f"{limits.unit}² in one piece: it may be deeper there",
         )
