@@ -29,7 +29,7 @@ from damageest.geometry.skin import find_inner_faces
 
 MOST = 20_000
 """Points looked at for each figure; more points do not change its second digit."""
-FEWEST_INTACT = 6
+FEWEST_INTACT = 4
 """Intact points over a damage volume below which they do not contradict it."""
 HALF = 0.5
 """Share of intact points over a damage volume from which they contradict it. On the rim of a pit two tolerances deep, a
