@@ -22,7 +22,7 @@ WEDGE = 5929.0
 """Volume in mm3 of the wedge that jobs/make_inputs.py cuts off the block before it scans it."""
 
 
-SLOW = {"block_wedge", "cylinder_two_sides", "four_sites", "half_torus", "stock_uniform", "worn_bore"}
+SLOW = {*SITES, *STOCK} - {"gear_teeth"}
 """Jobs that are run by -m slow only."""
 
 

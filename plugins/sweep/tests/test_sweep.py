@@ -43,10 +43,10 @@ def rod(*point: float, axis: list[float], length: float, radius: float) -> dict[
 @pytest.mark.parametrize(
     ("tools", "least"),
     [
-        ([ball(3, 2, 28, radius=20)], 0.985),
+        pytest.param([ball(3, 2, 28, radius=20)], 0.985, marks=pytest.mark.slow),
         ([rod(0, 0, 70, axis=[0, 1, 0], length=100, radius=61)], 0.97),
-        ([ball(20, 0, 10, radius=8)], 0.99),
-        ([ball(20, 15, 10, radius=8)], 0.99),
+        pytest.param([ball(20, 0, 10, radius=8)], 0.99, marks=pytest.mark.slow),
+        pytest.param([ball(20, 15, 10, radius=8)], 0.99, marks=pytest.mark.slow),
         ([ball(-10, 0, 28, radius=20), ball(10, 5, 28, radius=20)], 0.985),
     ],
     ids=["dent", "wear from edge to edge", "edge", "corner", "two dents"],
@@ -65,8 +65,8 @@ def test_shallow_damage_is_right(tools: list[dict[str, Any]], least: float) -> N
     "tool",
     [
         ball(0, 0, 10, radius=6),
-        ball(0, 0, 7, radius=5),
-        rod(0, 0, 6, axis=[0, 0, 1], length=10, radius=3),
+        pytest.param(ball(0, 0, 7, radius=5), marks=pytest.mark.slow),
+        pytest.param(rod(0, 0, 6, axis=[0, 0, 1], length=10, radius=3), marks=pytest.mark.slow),
         rod(0, 0, 0, axis=[0, 0, 1], length=40, radius=4),
     ],
     ids=["steep sides", "undercut", "deep pit", "worn through"],

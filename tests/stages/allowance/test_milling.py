@@ -65,9 +65,9 @@ def make_case(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit]:
     return part, lost, chosen, deposit
 
 
-# every ninth one by default; the others by -m slow
+# every ninth one of the first fifty by default; the others by -m slow
 @pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=pytest.mark.slow) if seed % 9 else seed for seed in range(CASES)]
+    "seed", [pytest.param(seed, marks=pytest.mark.slow) if seed % 9 or seed > 50 else seed for seed in range(CASES)]
 )
 def test_guarantees(seed: int) -> None:
     part, lost, chosen, deposit = make_case(seed)

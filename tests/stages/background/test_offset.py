@@ -15,7 +15,9 @@ from damageest.stages.background.offset import Offset
 from tests.stages._open import bowl
 
 
-@pytest.mark.parametrize("name", ["gear", "half_torus", "tube", "cuboid"])
+@pytest.mark.parametrize(
+    "name", ["gear", "tube", *(pytest.param(name, marks=pytest.mark.slow) for name in ("half_torus", "cuboid"))]
+)
 def test_runs_beside_the_part_at_the_clearance(name: str) -> None:
     part = PARTS[name]()
     tolerance = 0.002 * part.diagonal

@@ -55,7 +55,7 @@ def test_too_few_points_are_refused() -> None:
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize("density", [0.0, 0.8])
+@pytest.mark.parametrize("density", [pytest.param(0.0, marks=pytest.mark.slow), 0.8])
 @pytest.mark.parametrize(
     "tool",
     [
