@@ -44,8 +44,8 @@ def read_advice(error: StageError, option: str) -> float:
 
 @pytest.mark.parametrize(
     ("name", "least"),
-    [*(pytest.param(*case, marks=pytest.mark.slow) for case in (("edge", 0.94), ("end", 0.99), ("beside the bore", 0.92))),
-     ("pit", 0.92), ("deep hole", 0.82), ("worn through", 0.89), ("two", 0.83)],
+    [*(pytest.param(*one, marks=pytest.mark.slow) for one in (("edge", 0.94), ("end", 0.99), ("two", 0.83))),
+     ("pit", 0.92), ("deep hole", 0.82), ("worn through", 0.89), ("beside the bore", 0.92)],
 )  # fmt: skip
 def test_the_part_inside_it_is_the_damage(name: str, least: float) -> None:
     case = scene(name)
