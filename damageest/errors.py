@@ -20,12 +20,14 @@ class DamageestError(Exception):
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong in a job file; ``line`` and ``column`` count from 1, 0 where there is no file."""
+    """One thing wrong in a job; ``line`` and ``column`` count from 1, 0 where there is no file. ``source``: what it
+    stands in, where that is not the job file, such as an option of the command line."""
 
     message: str
     where: str = ""
     line: int = 0
     column: int = 0
+    source: str = ""
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message
@@ -43,7 +45,7 @@ class JobError(DamageestError):
 
     def lines(self) -> list[str]:
         """One line per fault, as ``file:line:column: what``."""
-        place = [f"{self.source}:{f.line}:{f.column}" if f.line else self.source for f in self.faults]
+        place = [f.source or (f"{self.source}:{f.line}:{f.column}" if f.line else self.source) for f in self.faults]
         return [f"{where}: {fault}" for where, fault in zip(place, self.faults, strict=True)]
 
 

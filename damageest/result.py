@@ -166,6 +166,8 @@ class StageRecord:
 class Result:
     """Everything a run computed. Lengths in ``units``; meshes in the part's frame.
 
+    ``tolerance``: the lambda that was used, in ``units``, also where the job says `auto`. ``pose.T_part_scan`` (4,4)
+    takes a point from the scanner's frame to the part's: x_part = R x_scan + t; ``aligned`` is the scan moved by it.
     ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of the DVs of all
     accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
     sites have no DV or no deposit and why: then ``status`` is ``incomplete``.

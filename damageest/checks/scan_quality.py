@@ -50,7 +50,7 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
     if part.tessellation_error > tolerance / 2:
         warnings.append(
             f"the part's triangles deviate from the CAD surface by up to {part.tessellation_error:.3g}, more than half "
-            f"the tolerance {tolerance:.3g}; ask for a finer chord"
+            f"the tolerance {tolerance:.3g}; ask for a finer part.chord, or for a smaller part.angle if that is no help"
         )
     if scan.spacing > 5 * tolerance:
         warnings.append(

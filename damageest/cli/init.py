@@ -6,16 +6,21 @@ import json
 import os
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from damageest.artefacts import Part, Scan
+
+SCHEMA = "schemas/job.schema.json"
 
 
 def command(
     part: Annotated[Path, typer.Argument(help="CAD file of the part: STL, PLY, OBJ, OFF, 3MF, STEP.")],
     scan: Annotated[Path, typer.Argument(help="The scan of the damaged part.")],
     job: Annotated[
-        Path | None, typer.Option("--job", help="Job file to write. Default: <part>.yaml in this folder.")
+        Path | None, typer.Option("--job", "-o", help="Job file to write. Default: <part>.yaml in this folder.")
     ] = None,
     units: Annotated[str, typer.Option(help="Unit of files without a unit: um, mm, cm, m, in, ft.")] = "mm",
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
@@ -32,31 +37,68 @@ def command(
         raise JobError(
             [Fault("the file exists already; overwrite it with --force, or name another file with --job")], str(target)
         )
-    paths = [os.path.relpath(path.resolve(), target.resolve().parent) for path in (part, scan)]
     source = {"version": 1, "units": units, "part": str(part), "scan": str(scan)}
     registry = Registry.discover()
     solid, cloud, tolerance, cautions = inspect_inputs(load(source, registry), registry)
+    if swapped := _find_swap(part, scan, solid, cloud):
+        cautions = [swapped, *cautions]
+    paths = [os.path.relpath(path.resolve(), target.resolve().parent) for path in (part, scan)]
     lines = [
-        f"# {part.name}: {' x '.join(f'{s:.4g}' for s in solid.bounds[1] - solid.bounds[0])} {units}, "
-        f"{solid.volume:.5g} {units}3, {len(solid.faces)} triangles",
+        *_describe_inputs(part, scan, solid, cloud, units, cautions),
+        *_write_values(paths, units, tolerance),
+        *_write_examples(target.stem, registry.methods(), tolerance),
+    ]
+    target.write_text("\n".join(lines) + "\n")
+    typer.echo(f"written to {target}; next: damageest run {target}")
+    for caution in cautions:
+        typer.echo(f"caution: {caution}", err=True)
+
+
+def _describe_inputs(part: Path, scan: Path, solid: Part, cloud: Scan, units: str, cautions: list[str]) -> list[str]:
+    size = " x ".join(f"{edge:.4g}" for edge in solid.bounds[1] - solid.bounds[0])
+    return [
+        f"# yaml-language-server: $schema={SCHEMA}",
+        f"# The line above gives editors the options; write the schema with  damageest schema job > {SCHEMA}",
+        f"# {part.name}: {size} {units}, {solid.volume:.5g} {units}3, {len(solid.faces)} triangles",
         f"# {scan.name}: {len(cloud.points)} points, noise {cloud.noise:.3g}, spacing {cloud.spacing:.3g} {units}",
         *(f"# note: {note}" for note in (*solid.notes, *cloud.notes)),
         *(f"# CAUTION: {caution}" for caution in cautions),
+    ]
+
+
+def _write_values(paths: list[str], units: str, tolerance: float) -> list[str]:
+    return [
         "version: 1",
         f"units: {units:<20} # of all lengths in this file, and of files without a unit",
         f"tolerance: {tolerance:<16.4g} # lambda: points closer to the nominal surface are intact; or auto",
         f"part: {_quote(paths[0])}",
         f"scan: {_quote(paths[1])}",
         "align: register             # for any start pose; icp or none if the scan is already in the part's frame",
-        "# method: auto              # surface | implicit",
-        "# cluster: {use: dbscan, neighbours: 10}",
-        "# allowance: none",
-        "# output: out/name",
     ]
-    target.write_text("\n".join(lines) + "\n")
-    typer.echo(f"written to {target}; next: damageest run {target}")
-    for caution in cautions:
-        typer.echo(f"caution: {caution}", err=True)
+
+
+def _write_examples(stem: str, methods: tuple[str, ...], tolerance: float) -> list[str]:
+    """Lines that are comments: values that a job often changes."""
+    return [
+        f"# method: auto              # {' | '.join(methods)}",
+        "# cluster: {use: dbscan, neighbours: 10}",
+        f"# allowance: {{use: milling, outer: {2.5 * tolerance:.2g}}}  # stock to be milled off",
+        "# export: {format: [stl, 3mf]}            # also ply, and step with the plugin cadquery",
+        f"# output: {_quote(f'out/{stem}')}",
+    ]
+
+
+def _find_swap(part: Path, scan: Path, solid: Part, cloud: Scan) -> str:
+    """A caution where the file of the scan looks like CAD and that of the part like a scan; empty where not.
+
+    A CAD mesh has few triangles of very different size; a scan is dense and even.
+    """
+    if scan.suffix.lower() not in (".stl", ".obj", ".off", ".ply") or len(cloud.points) * 20 > len(solid.vertices):
+        return ""
+    return (
+        f"the scan {scan.name} has {len(cloud.points)} points, the part {part.name} {len(solid.vertices)} vertices: "
+        "are they swapped? The first file is the CAD model, the second the scan"
+    )
 
 
 def _quote(path: str) -> str:

@@ -10,16 +10,21 @@ The docstring of a class describes its other attributes; `StageContract` describ
 from __future__ import annotations
 
 try:
-    import pytest  # noqa: F401
+    import pytest
 except ImportError as error:
     raise ImportError("damageest.conformance needs pytest: pip install pytest") from error
 
-from damageest.conformance._base import StageContract
-from damageest.conformance._contracts import AllowanceContract, BooleanContract, RepairContract, SampleContract
-from damageest.conformance._enclose import EncloseAllContract, EncloseContract
-from damageest.conformance._files import ExportContract, PartContract, ScanContract
-from damageest.conformance._points import NEAR, AlignContract, ClusterContract, SegmentContract
-from damageest.conformance._surface import BackgroundContract, BoundaryContract, ReconstructContract
+# a check that fails then shows the values that it compared
+pytest.register_assert_rewrite(
+    *(f"{__name__}.{name}" for name in ("_base", "_contracts", "_enclose", "_files", "_points", "_surface"))
+)
+
+from damageest.conformance._base import StageContract  # noqa: E402
+from damageest.conformance._contracts import AllowanceContract, BooleanContract, RepairContract, SampleContract  # noqa: E402
+from damageest.conformance._enclose import EncloseAllContract, EncloseContract  # noqa: E402
+from damageest.conformance._files import ExportContract, PartContract, ScanContract  # noqa: E402
+from damageest.conformance._points import NEAR, AlignContract, ClusterContract, SegmentContract  # noqa: E402
+from damageest.conformance._surface import BackgroundContract, BoundaryContract, ReconstructContract  # noqa: E402
 
 __all__ = [
     "NEAR",

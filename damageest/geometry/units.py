@@ -139,8 +139,8 @@ def diagnose_scale(
             "check that the scan is of this part, and crop the scan to the part"
         )
     return (
-        f"the scan's size is {apart}: one of the two was probably read in the wrong unit, "
-        f"{_format_ratio(best[1])} off; {best[2]}"
+        f"the scan's size is {apart}: one of the two was probably read in the wrong unit, which makes it "
+        f"{_format_ratio(best[1])} the other's; {best[2]}; or part and scan are swapped"
     )
 
 

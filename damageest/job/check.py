@@ -58,9 +58,15 @@ class _Check:
     registry: Registry
     given: Mapping[Contract, Any]
     faults: list[Fault] = field(default_factory=list)
+    overridden: dict[tuple[str | int, ...], str] = field(default_factory=dict)
+    """By their place, the settings that replaced a value of the job."""
 
     def add_fault(self, message: str, *path: str | int) -> None:
         place: tuple[str | int, ...] = path
+        settings = [text for where, text in self.overridden.items() if path[: len(where)] == where]
+        if settings:
+            self.faults.append(Fault(message, ".".join(map(str, path)), source=f"--set {settings[-1]}"))
+            return
         while place and place not in self.positions:
             place = place[:-1]
         line, column = self.positions.get(place, (1, 1) if self.positions else (0, 0))
@@ -113,7 +119,9 @@ class _Check:
         if not equals or not all(keys) or len(keys) > 2:
             self.add_fault(f"--set takes stage.option=value or field=value, not '{setting}'")
             return
-        value, _ = yamlfile.parse(text, f"--set {name}")
+        value, _ = yamlfile.parse(text, f"--set {setting}")
+        if len(keys) == 1 or keys[0] in STAGES:
+            self.overridden[tuple(keys)] = setting
         if len(keys) == 1:
             self.tree[keys[0]] = value
         elif keys[0] not in STAGES:

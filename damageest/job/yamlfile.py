@@ -9,13 +9,27 @@ from typing import Any
 
 from damageest.errors import Fault, JobError
 
+MOST_BYTES = 4 * 1024 * 1024
+"""Largest size of a job file."""
+MOST_VALUES = 100_000
+"""Largest number of values of a job, with each alias counted as often as it is used."""
+
 Positions = dict[tuple[str | int, ...], tuple[int, int]]
 """Path of keys and indices to the (line, column) where the key or item stands, from 1."""
 
 
 def read(path: Path) -> tuple[Any, Positions]:
     """The file's content and the position of each key. Raises JobError for a file that cannot be read or parsed."""
+    if path.is_dir():
+        jobs = sorted(one.name for one in path.iterdir() if one.suffix in (".yaml", ".yml"))
+        listed = ", ".join(jobs[:5]) + (", ..." if len(jobs) > 5 else "")
+        hint = f"name its job files, as {path / '*.yaml'}; it has {listed}" if jobs else "it has no .yaml file"
+        raise JobError([Fault(f"is a folder, not a job file; {hint}")], str(path))
+    if path.exists() and not path.is_file():
+        raise JobError([Fault("is not a regular file; a job is a YAML file on disk")], str(path))
     try:
+        if path.stat().st_size > MOST_BYTES:
+            raise JobError([Fault(f"is larger than {MOST_BYTES // 1024} kB, so it is no job file")], str(path))
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise JobError([Fault("there is no such file")], str(path)) from None
@@ -31,6 +45,12 @@ def parse(text: str, source: str) -> tuple[Any, Positions]:
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     try:
+        root = YAML(typ="rt").compose(text)
+        if root is not None and _count_values(root, {}) > MOST_VALUES:
+            message = (
+                f"its aliases stand for more than {MOST_VALUES} values, or contain themselves; write the values out"
+            )
+            raise JobError([Fault(message)], source)
         tree = YAML(typ="rt").load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -43,6 +63,18 @@ def parse(text: str, source: str) -> tuple[Any, Positions]:
         raise JobError([Fault(f"not valid YAML: {str(error).splitlines()[0]}")], source) from None
     positions: Positions = {}
     return _to_plain(tree, (), positions), positions
+
+
+def _count_values(node: Any, known: dict[int, int]) -> int:
+    """The number of values that a node of the YAML tree stands for. An alias is a node with several parents; one that
+    contains itself stands for more than any number."""
+    key = id(node)
+    if key not in known:
+        known[key] = MOST_VALUES + 1  # until its own count is known: what is met again inside itself has no end
+        items = node.value if isinstance(node.value, list) else []
+        members = [one for item in items for one in (item if isinstance(item, tuple) else (item,))]
+        known[key] = min(1 + sum(_count_values(one, known) for one in members), MOST_VALUES + 1)
+    return known[key]
 
 
 def _to_plain(node: Any, path: tuple[str | int, ...], positions: Positions) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from damageest.errors import StageError
@@ -22,7 +23,8 @@ def fall_back(first: Route, second: Route) -> Step:
         try:
             tried = follow(first, engine, replace(work, failures=()))
         except StageError as error:
-            tried = replace(work, warnings=(*work.warnings, f"fell back to method surface: {error}"))
+            text = str(error).partition("\n")[0]  # its remedy is another method, and that is what follows
+            tried = replace(work, warnings=(*work.warnings, f"fell back to method surface: {text}"))
         agreed = {cluster for site in tried.sites if site.evidence.consistent for cluster in site.clusters}
         wanted = tuple(k for k in range(1, work.job.sites.count + 1) if k not in agreed)
         if not wanted:
@@ -31,10 +33,21 @@ def fall_back(first: Route, second: Route) -> Step:
         again = follow(second, engine, again)
         sites = merge_sites(tried.sites, again.sites)
         done = {cluster for site in sites for cluster in site.clusters}
-        failures = tuple(error for error in again.failures if error.site not in done)
+        failures = tuple(drop_tried(error) for error in again.failures if error.site not in done)
         return replace(work, sites=sites, failures=(*work.failures, *failures), warnings=again.warnings)
 
     return run
+
+
+TRIED = re.compile(r"method: (implicit|surface)|the other method")
+
+
+def drop_tried(error: StageError) -> StageError:
+    """The error without the remedies that were tried already: both methods."""
+    clauses = re.split(r", or |, (?=[a-z]+: )|; ", error.remedy)
+    left = [clause for clause in clauses if clause and not TRIED.search(clause) and not clause.startswith("whose")]
+    error.remedy = ", or ".join(left) or "a smaller tolerance, or a denser scan of this place; both methods were tried"
+    return error
 
 
 def merge_sites(first: tuple[FoundSite, ...], second: tuple[FoundSite, ...]) -> tuple[FoundSite, ...]:

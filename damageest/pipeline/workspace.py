@@ -1,7 +1,7 @@
 """The output folder: written in a hidden sibling, moved into place when it is whole.
 
-A run that fails or is killed leaves the earlier output as it was, and its finished stages where the next run
-finds them.
+A run that is stopped or killed leaves the earlier output as it was, and its finished stages in the hidden folder, where
+the next run finds them. A run that fails leaves no hidden folder: its finished stages go to the earlier output's.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from damageest.errors import Fault, JobError
+from damageest.errors import DamageestError, Fault, JobError
 from damageest.pipeline.cache import Cache
 
 _OURS = re.compile(
@@ -70,10 +70,21 @@ def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
         older = (target / "stages",) if use_cache else ()
         try:
             yield Workspace(target, folder, Cache(stages, older))
+        except DamageestError:
+            _hand_over(stages, target)
+            raise
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             if not stages.is_dir() or not any(stages.iterdir()):
                 shutil.rmtree(hidden, ignore_errors=True)  # where the system keeps an open lock file, it stays
+
+
+def _hand_over(stages: Path, target: Path) -> None:
+    """After a failure, adds the finished stages to those of the earlier output; without one they are dropped."""
+    kept = target / "stages"
+    for path in stages.iterdir() if kept.is_dir() else ():
+        os.replace(path, kept / path.name)
+    shutil.rmtree(stages, ignore_errors=True)
 
 
 def _old_path(target: Path) -> Path:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Vector
 from damageest.report.base import JsonModel
+from damageest.report.deviation_json import DeviationReport, report_deviation
 from damageest.report.site_json import MaterialReport, SiteReport, report_site, sum_material
 from damageest.report.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
 from damageest.result import Result
@@ -78,6 +79,7 @@ class Report(JsonModel):
     part: PartReport
     scan: ScanReport
     alignment: AlignmentReport
+    deviation: DeviationReport
     coverage: CoverageReport | None
     sites: list[SiteReport]
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
@@ -134,6 +136,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             notes=list(pose.notes),
             doubts=list(pose.doubts),
         ),
+        deviation=report_deviation(result.deviation),
         coverage=report_coverage(result.coverage),
         sites=sites,
         surplus=[report_surplus(item, result, written) for item in result.surplus],

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 UNDAMAGED, DAMAGE, DEPOSIT, DOUBTFUL = (150, 155, 165), (215, 50, 40), (40, 130, 205), (225, 165, 40)
 SURPLUS = (150, 90, 190)
+LABELLED = np.array([UNDAMAGED, DAMAGE, SURPLUS, (90, 90, 90)], np.uint8)
+"""Colour of a scan point by its label: intact, damage, added, outlier."""
 
 
 class Files(Export):
@@ -170,6 +172,7 @@ def _write_scan(result: Result, scan: Scan, folder: Path, name: str) -> Exported
         "distance": result.deviation.distance.astype(np.float32),
         "label": result.deviation.label.astype(np.uint8),
         "site": result.site_label.astype(np.int32),
+        **dict(zip(("red", "green", "blue"), LABELLED[result.deviation.label].T, strict=True)),
     }
     write_points(_make_folder(folder, name), columns)
     return ExportedFiles((name,))
