@@ -10,18 +10,19 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Part, Scan
-from damageest.errors import InputError
+from damageest.errors import InputError, StageError
 from damageest.io.files import expand_home
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
-from damageest.pipeline.routes import WRITE, route_of
-from damageest.pipeline.state import JobState
+from damageest.pipeline.routes import SHOW, WRITE, route_of
+from damageest.pipeline.state import JobState, Work
 from damageest.pipeline.workspace import open_workspace
 from damageest.registry import Registry
 from damageest.registry.contracts import Contract
-from damageest.report.files import write_report
+from damageest.report.files import describe_job, describe_result, write_report
 from damageest.result import Result
+from damageest.stages.export import ExportedFiles
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 
@@ -57,10 +58,28 @@ def run(
         state = work.job.with_value(JobState.folder, place.folder, digest(str(target)))
         state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
         written = follow(WRITE, engine, replace(work, job=state)).job.written
-        result = replace(state.result, stages=tuple(engine.records))
+        result, written = _show_result(engine, replace(work, job=state), target, written)
         write_report(result, job, place.folder, target, written)
         place.finish(engine.stems)
     return result
+
+
+def _show_result(engine: Engine, work: Work, target: Path, written: ExportedFiles) -> tuple[Result, ExportedFiles]:
+    """Calls stage `report`. Gives the result with all stages, and the files with those of the report.
+
+    A report that fails is a warning: the result is more than its pictures.
+    """
+    result = replace(work.job.result, stages=tuple(engine.records))
+    content, job_text = describe_result(result, target, written), describe_job(engine.job, target)
+    state = work.job.with_value(JobState.content, content, "follows from the result")
+    state = state.with_value(JobState.job_text, job_text, "follows from the job")
+    try:
+        done = follow(SHOW, engine, replace(work, job=state)).job.reported
+    except StageError as error:
+        warning = f"{error.args[0]} (the run went on without a report)"
+        return replace(result, warnings=(*result.warnings, warning)), written
+    result = replace(result, stages=tuple(engine.records))
+    return result, replace(written, files=(*written.files, *done.files), notes=(*written.notes, *done.notes))
 
 
 def _split(

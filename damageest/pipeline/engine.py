@@ -67,7 +67,7 @@ class Engine:
                 contract.stage + (f"-{state.number}" if state.number else ""),
                 key,
                 lambda: _check_type(stage.run(**{name: state.get(name) for name in needs}), contract),  # type: ignore[attr-defined]
-                keep=contract.stage != "export",
+                keep=contract.stage not in ("export", "report"),
             )
         except Exception as error:
             if is_interrupt(error):

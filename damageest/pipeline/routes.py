@@ -42,6 +42,7 @@ from damageest.stages.export import Export
 from damageest.stages.part import ReadPart
 from damageest.stages.reconstruct import Reconstruct
 from damageest.stages.repair import Repair
+from damageest.stages.report import Report
 from damageest.stages.sample import Sample
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
@@ -61,6 +62,8 @@ CLOSE: Route = (
 
 WRITE: Route = (Export,)
 """After one of the routes, where the result goes to files."""
+SHOW: Route = (Report,)
+"""After that, when the content of result.json is known."""
 
 
 def route_of(method: str) -> Route:

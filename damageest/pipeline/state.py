@@ -34,6 +34,7 @@ from damageest.errors import StageError
 from damageest.pipeline.cache import digest
 from damageest.result import Coverage, Result, Surplus, Verdict
 from damageest.stages.export import ExportedFiles, Writer
+from damageest.stages.report import ReportFiles
 
 T = TypeVar("T")
 
@@ -86,7 +87,8 @@ class State:
 @dataclass(frozen=True, eq=False)
 class JobState(State):
     """The whole job. ``unit`` and ``tolerance`` are the job's; the tolerance is None until it is measured where the job
-    says `auto`. ``aligned``: the scan in the part's frame. ``intact`` (K,3): its points on the nominal surface."""
+    says `auto`. ``aligned``: the scan in the part's frame. ``intact`` (K,3): its points on the nominal surface.
+    ``content``: that of result.json; ``job_text``: that of job.yaml."""
 
     unit = Value[str]()
     tolerance = Value[float]()
@@ -108,6 +110,9 @@ class JobState(State):
     folder = Value[Path]()
     writers = Value[Mapping[str, Writer]]()
     written = Value[ExportedFiles]()
+    content = Value[Mapping[str, Any]]()
+    job_text = Value[str]()
+    reported = Value[ReportFiles]()
 
     number = 0
     """That of a site is 1 or more."""

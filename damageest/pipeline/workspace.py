@@ -21,7 +21,7 @@ from damageest.errors import DamageestError, Fault, JobError
 from damageest.pipeline.cache import Cache
 
 _OURS = re.compile(
-    r"result\.json|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?"
+    r"result\.json|report\.html|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?"
     r"((scan|skin|unseen)\.ply|(doubtful/)?result\.3mf|(damage|undamaged|((doubtful/)?(damage|surface)|doubtful|deposit|"
     r"surplus)/site-\d+)\.(stl|ply|step))"
 )

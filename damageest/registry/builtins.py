@@ -41,6 +41,8 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.reconstruct.pyvista import PyVista
     from damageest.stages.reconstruct.signed_distance import SignedDistance
     from damageest.stages.repair.none import NoRepair as NoRepair
+    from damageest.stages.report.html import Html
+    from damageest.stages.report.none import NoReport as NoReport
     from damageest.stages.sample.edge_aware import EdgeAware
     from damageest.stages.sample.uniform import Uniform
     from damageest.stages.scan.file import ScanFile
@@ -53,6 +55,7 @@ def damageest_stages() -> list[type[Stage]]:
         LargestLoop, AllLoops, Offset, BoundingBox, Capsule, CylinderBackground, Minkowski, BuildVolume, ShortestPath,
         Adaptive, Implicit,
         NoRepair, Manifold, NoAllowance, Milling, Files, Uniform, CloudDistance, SignedDistance, PartFromScan,
+        Html, NoReport,
     ]  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from damageest.stages.export import Export
 from damageest.stages.part import ReadPart
 from damageest.stages.reconstruct import Reconstruct
 from damageest.stages.repair import Repair
+from damageest.stages.report import Report
 from damageest.stages.sample import Sample
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
@@ -36,6 +37,7 @@ DEFAULTS: dict[Contract, str] = {
     Boolean: "manifold",
     Allowance: "none",
     Export: "files",
+    Report: "html",
 }
 """Contract to the name of its default implementation, in the order of the route. Stage `enclose` has two contracts: one
 that goes site by site and one that takes all sites at once."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 from damageest.job import yamlfile
 from damageest.job.model import Job, to_plain
@@ -12,8 +13,18 @@ from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
 
+def describe_result(result: Result, target: Path, written: ExportedFiles) -> dict[str, Any]:
+    """The content of result.json, its paths relative to ``target``, where it will stand."""
+    return build_report(result, written, lambda path: to_plain(Path(path), target))
+
+
+def describe_job(job: Job, target: Path) -> str:
+    """The content of job.yaml, its paths relative to ``target``, where it will stand."""
+    return yamlfile.write(job.to_values(target))
+
+
 def write_report(result: Result, job: Job, folder: Path, target: Path, written: ExportedFiles) -> None:
     """Writes result.json and job.yaml into ``folder``, their paths relative to ``target``, where they will stand."""
-    content = build_report(result, written, lambda path: to_plain(Path(path), target))
+    content = describe_result(result, target, written)
     (folder / "result.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
-    (folder / "job.yaml").write_text(yamlfile.write(job.to_values(target)))
+    (folder / "job.yaml").write_text(describe_job(job, target))

@@ -1,0 +1,168 @@
+"""The page: its template filled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import INTACT
+from damageest.errors import StageError
+from damageest.io.files import file_sha256
+from damageest.result import Result
+from damageest.stages.report import _style as style
+from damageest.stages.report._scene import LAYERS, Scene
+from damageest.stages.report._section import draw_histogram
+from damageest.stages.report._sites import Shown
+from damageest.stages.report._values import list_fit, list_freedom, show_total_interval
+
+FOLDER = Path(__file__).parent / "page"
+WHY = {
+    "hidden": "hidden by the part from every scanner position",
+    "outside": "outside every view",
+    "no points": "in view, but without points",
+    "unknown": "not known",
+}
+
+
+def fill_page(result: Result, content: Mapping[str, Any], job_text: str, scene: Scene, sites: list[Shown]) -> str:
+    """The whole page as text."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"number": style.format_number, "share": style.format_share, "at": _format_point}
+    view = {
+        "objects": scene.objects,
+        "layers": list(_used_layers(scene)),
+        "sites": {site.id: site.view for site in sites},
+        "origin": scene.origin,
+        "size": scene.size,
+        "unit": result.units,
+    }
+    return environment.get_template("report.html").render(
+        title=result.name,
+        unit=result.units,
+        r=content,
+        sites=sites,
+        verdict=describe_run(result),
+        tone=choose_tone(result),
+        total=f"{style.format_number(result.damage_volume)} {result.units}³",
+        interval=show_total_interval(result),
+        scene=scene,
+        layers=[(name, *LAYERS[name]) for name in _used_layers(scene)],
+        view=view,
+        snapshot=scene.snapshot,
+        script=_read_library(),
+        own_script=(FOLDER / "report.js").read_text(encoding="utf-8"),
+        look=(FOLDER / "report.css").read_text(encoding="utf-8"),
+        map_colours=_sample_map(),
+        histogram=draw_histogram(result),
+        labels=count_labels(result),
+        spread=measure_spread(result),
+        fit=list_fit(result),
+        freedom=list_freedom(result),
+        why=WHY,
+        hashes=_hash_scans(result, content),
+        job=job_text,
+        dates=_list_dates(result),
+        seconds=sum(record.seconds for record in result.stages),
+        cached=sum(record.cached for record in result.stages),
+    )
+
+
+def describe_run(result: Result) -> str:
+    """The verdict on the run in one sentence."""
+    coverage = result.coverage
+    seen = coverage.seen if coverage else 1.0
+    on = f" on the {style.format_share(seen)} of the skin that the scan shows" if seen < 0.995 else ""
+    if not result.sites:
+        if result.failures:
+            return f"Incomplete: {_count(len(result.failures), 'site')} without a damage volume, and no other was found."
+        depth = f"{style.format_number(result.tolerance)} {result.units}"
+        return f"No damage deeper than the tolerance of {depth} was found{on}."
+    levels = [site.verdict.level for site in result.sites]
+    parts = [f"{levels.count(level)} {level}" for level in ("proven", "likely", "doubtful") if level in levels]
+    counted = f"all {levels[0]}" if len(parts) == 1 and len(levels) > 1 else ", ".join(parts)
+    counted = levels[0] if len(levels) == 1 else counted
+    out = sum(not site.accepted for site in result.sites)
+    text = f"{_count(len(levels), 'site')}{on}: {counted}"
+    text += f"; {out} of them not part of the damage volume" if out else ""
+    failed = f"; incomplete: {len(result.failures)} failed" if result.failures else ""
+    return f"{text}{failed}."
+
+
+def choose_tone(result: Result) -> str:
+    """The level that the colour of the verdict shows."""
+    levels = {site.verdict.level for site in result.sites}
+    if result.failures or "doubtful" in levels:
+        return "doubtful"
+    return "likely" if "likely" in levels else "proven"
+
+
+def count_labels(result: Result) -> list[tuple[str, int]]:
+    """How many scan points have each label."""
+    count = np.bincount(result.deviation.label, minlength=4).tolist()
+    return list(zip(("on the nominal surface", "damage", "outside the part", "in no site"), count, strict=False))
+
+
+def measure_spread(result: Result) -> list[tuple[str, float]]:
+    """Percentiles of the signed deviation of the intact points, in the job's unit."""
+    distance = result.deviation.distance[result.deviation.label == INTACT]
+    if not len(distance):
+        return []
+    shares = (2.5, 25.0, 50.0, 75.0, 97.5)
+    return [(f"{share:g}", float(value)) for share, value in zip(shares, np.percentile(distance, shares), strict=True)]
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def _format_point(values: Any) -> str:
+    return "(" + ", ".join(style.format_number(value) for value in values) + ")"
+
+
+def _used_layers(scene: Scene) -> list[str]:
+    used = {item["layer"] for item in scene.objects}
+    return [name for name in LAYERS if name in used]
+
+
+def _read_library() -> str:
+    """k3d's script for pages that stand alone, as its wheel carries it."""
+    found = find_spec("k3d")
+    path = Path(found.origin).parent / "static" / "standalone.js" if found and found.origin else None
+    if path is None or not path.is_file():
+        raise StageError("the Python package k3d has no script for the 3D view", "pip install --force-reinstall k3d")
+    # an end tag within the script would end it
+    return path.read_text(encoding="utf-8").replace("</script", "<\\/script")
+
+
+def _sample_map() -> str:
+    """The colour bar as stops of a CSS gradient."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return ", ".join(to_hex(colormaps[style.MAP](x)) for x in np.linspace(0, 1, 9))
+
+
+def _hash_scans(result: Result, content: Mapping[str, Any]) -> dict[str, str]:
+    """The SHA-256 of each scan file, by its path in result.json; empty for one that is gone."""
+    pairs = zip(content["scan"]["paths"], result.scan.paths, strict=True)
+    return {shown: file_sha256(Path(path)) if Path(path).is_file() else "" for shown, path in pairs}
+
+
+def _list_dates(result: Result) -> list[tuple[str, str]]:
+    """When the input files were changed last, and now. The page keeps it apart, since it is not the same twice."""
+    paths = [("part", result.part.path), *(("scan", path) for path in result.scan.paths)]
+    dates = []
+    for kind, name in paths:
+        if name and Path(name).is_file():
+            changed = datetime.fromtimestamp(Path(name).stat().st_mtime, UTC)
+            dates.append((f"{kind} {Path(name).name} of", f"{changed:%Y-%m-%d %H:%M} UTC"))
+    return [*dates, ("report of", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC")]

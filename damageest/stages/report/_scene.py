@@ -1,0 +1,203 @@
+"""The 3D view: what it shows, as a snapshot for k3d's script."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import DAMAGE, INTACT, Floats, Mesh
+from damageest.result import Result, Site
+from damageest.stages.report import _style as style
+from damageest.stages.report._thin import find_sharp_edges, thin_mesh, thin_points
+
+LAYERS = {
+    "part": ("Part", True),
+    "scan": ("Scan, by signed deviation", False),
+    "points": ("Damage points", False),
+    "damage": ("Damage volumes", True),
+    "surface": ("Inner damage surfaces", False),
+    "deposit": ("Deposits", False),
+    "surplus": ("Surplus", True),
+    "unseen": ("Skin that the scan does not show", True),
+}
+"""Name in the page's script, to name on the page and whether it is shown at first."""
+
+
+@dataclass
+class Scene:
+    """``snapshot``: k3d's binary snapshot in base64. ``objects``: for each object of it its number, layer and site (0:
+    none). ``views``: for each site, by number, centre, radius and viewing direction. ``origin`` (3,): what was
+    subtracted from all coordinates. ``size`` (3,): half of the part's extents. ``limit``: the deviation at the ends of
+    the colour bar. ``shown``, ``points``: how many scan points are shown, of how many."""
+
+    snapshot: str
+    objects: list[dict[str, Any]]
+    origin: list[float]
+    size: list[float]
+    limit: float
+    shown: int
+    points: int
+
+
+@dataclass
+class _Stage:
+    """Objects for k3d, in coordinates from ``origin`` that are rounded to ``step``, so that they are compressed well."""
+
+    origin: Floats
+    step: float
+    made: list[Any] = field(default_factory=list)
+    objects: list[dict[str, Any]] = field(default_factory=list)
+
+    def place(self, points: Floats) -> Any:
+        return (np.round((points - self.origin) / self.step) * self.step).astype(np.float32)
+
+    def add(self, item: Any, layer: str, site: int = 0) -> None:
+        item.id = len(self.made) + 1  # k3d's own numbers are addresses in memory, and differ from run to run
+        self.made.append(item)
+        self.objects.append({"id": item.id, "layer": layer, "site": site})
+
+    def add_mesh(self, mesh: Mesh, layer: str, colour: str, site: int = 0, opacity: float = 1.0) -> None:
+        import k3d
+
+        if not len(mesh.faces):
+            return
+        item = k3d.mesh(
+            self.place(mesh.vertices),
+            mesh.faces.astype(np.uint32),
+            color=style.to_number(colour),
+            opacity=opacity,
+            side="double",
+            flat_shading=True,
+            name=layer,
+        )
+        self.add(item, layer, site)
+
+    def add_points(self, points: Floats, layer: str, site: int, size: float, **look: Any) -> None:
+        import k3d
+
+        if len(points):
+            self.add(k3d.points(self.place(points), point_size=size, shader="flat", name=layer, **look), layer, site)
+
+
+def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
+    """The 3D view of a result with at most ``most_points`` scan points and about ``most_triangles`` triangles."""
+    import k3d
+
+    part = result.part
+    step = 2.0 ** np.floor(np.log2(part.diagonal / 2**17))
+    stage = _Stage(np.round(part.bounds.mean(axis=0) / step) * step, step)
+    share = _share_triangles(result, most_triangles)
+    shown = thin_mesh(part, share)
+    stage.add_mesh(shown, "part", style.PART, opacity=0.3)
+    _add_edges(stage, result)
+    limit = choose_limit(result)
+    count = _add_scan(stage, result, most_points, limit)
+    for site in result.sites:
+        _add_site(stage, result, site, share, most_points // 4)
+    for item in result.surplus:
+        if item.solid is not None:
+            stage.add_mesh(thin_mesh(item.solid, share), "surplus", style.SURPLUS)
+        else:
+            places = result.aligned.points[item.points]
+            places = places[thin_points(places, most_points // 8)]
+            stage.add_points(places, "surplus", 0, part.diagonal / 300, color=style.to_number(style.SURPLUS))
+    _add_unseen(stage, result, share)
+    plot = k3d.plot(
+        grid_visible=False, menu_visibility=False, camera_auto_fit=False, camera_mode="trackball", axes_helper=1.0,
+        mode="callback", colorbar_object_id=0, camera_fov=35.0, lighting=1.2, fps=0, antialias=2,
+    )  # fmt: skip
+    for item in stage.made:
+        plot += item
+    snapshot = base64.b64encode(plot.get_binary_snapshot(compression_level=4)).decode()
+    half = (np.ptp(part.bounds, axis=0) / 2).tolist()
+    return Scene(snapshot, stage.objects, stage.origin.tolist(), half, limit, count, len(result.scan.points))
+
+
+def choose_limit(result: Result) -> float:
+    """The deviation at the ends of the colour bar: twice the tolerance at least, and where most damage points lie."""
+    deviation = result.deviation
+    known = np.isin(deviation.label, (INTACT, DAMAGE))
+    far = float(np.quantile(np.abs(deviation.distance[known]), 0.995)) if known.any() else 0.0
+    return style.round_nice(max(2 * result.tolerance, far) * 1.25)
+
+
+def _share_triangles(result: Result, most: int) -> int:
+    """How many triangles each mesh may have: those that have fewer leave the rest to the others."""
+    meshes: list[Mesh] = [result.part, *(item.solid for item in result.surplus if item.solid)]
+    for site in result.sites:
+        meshes += [site.damage, site.surface, *([site.deposit] if site.deposit else [])]
+    counts = np.sort([len(mesh.faces) for mesh in meshes])
+    left = most
+    for k, count in enumerate(counts):
+        share = left // (len(counts) - k)
+        if count > share:
+            return max(share, 500)
+        left -= count
+    return most
+
+
+def _add_edges(stage: _Stage, result: Result) -> None:
+    import k3d
+
+    edges = find_sharp_edges(result.part)
+    if not 0 < len(edges) <= 60_000:
+        return
+    used, number = np.unique(edges, return_inverse=True)
+    lines = k3d.lines(
+        stage.place(result.part.vertices[used]), number.reshape(-1, 2).astype(np.uint32), indices_type="segment",
+        shader="simple", color=style.to_number("#6b767d"), width=0.01, name="edges",
+    )  # fmt: skip
+    stage.add(lines, "part")
+
+
+def _add_scan(stage: _Stage, result: Result, most: int, limit: float) -> int:
+    """Adds the scan, coloured; gives how many points it has there."""
+    import k3d
+
+    surroundings = np.zeros(len(result.scan.points), bool)
+    for item in result.surplus:
+        surroundings[item.points] |= item.kind == "surroundings"
+    own = np.flatnonzero(~surroundings)
+    chosen = own[thin_points(result.aligned.points[own], most)]
+    values = np.clip(result.deviation.distance[chosen], -limit, limit)
+    stage.add_points(
+        result.aligned.points[chosen], "scan", 0, _choose_point_size(result, len(chosen)),
+        attribute=(np.round(values / limit * 127) / 127 * limit).astype(np.float32), color_range=[-limit, limit],
+        color_map=getattr(k3d.matplotlib_color_maps, style.MAP),
+    )  # fmt: skip
+    return len(chosen)
+
+
+def _choose_point_size(result: Result, count: int) -> float:
+    """Points just large enough to cover the part."""
+    return float(1.2 * np.sqrt(result.part.area / max(count, 1)))
+
+
+def _add_site(stage: _Stage, result: Result, site: Site, share: int, most_points: int) -> None:
+    colour = style.colour_site(site.id)
+    points = result.aligned.points[site.points]
+    places = points[thin_points(points, max(most_points // len(result.sites), 500))]
+    size = float(0.7 * np.sqrt(max(site.surface.area, 1e-12 * result.part.area) / max(len(places), 1)))
+    stage.add_points(places, "points", site.id, size, color=style.to_number(colour))
+    stage.add_mesh(thin_mesh(site.damage, share), "damage", colour, site.id)
+    stage.made[-1].click_callback = _tell_nobody  # that there is one makes the script report clicks
+    stage.add_mesh(thin_mesh(site.surface, share), "surface", colour, site.id)
+    if site.deposit is not None:
+        stage.add_mesh(thin_mesh(site.deposit, share), "deposit", style.DEPOSIT, site.id, opacity=0.75)
+
+
+def _add_unseen(stage: _Stage, result: Result, share: int) -> None:
+    coverage = result.coverage
+    if coverage is None or not (coverage.region >= 0).any():
+        return
+    faces = coverage.skin.faces[coverage.region >= 0]
+    used, number = np.unique(faces, return_inverse=True)
+    skin = Mesh(coverage.skin.vertices[used], number.reshape(-1, 3))
+    stage.add_mesh(thin_mesh(skin, share), "unseen", style.UNSEEN)
+
+
+def _tell_nobody(_: Any) -> None:
+    """Clicks are handled by the page."""

@@ -1,0 +1,214 @@
+"""Sections through sites, and the histogram of deviations, as SVG that takes its colours from the page."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import INTACT, Floats, Mesh
+from damageest.geometry.solids import to_manifold
+from damageest.result import Result, Site
+from damageest.stages.report import _style as style
+
+INK, SOFT, GROUND, METAL = "#010203", "#010204", "#010205", "#010206"
+"""Placeholders in the drawings, for which the page's own colours are put."""
+VARIABLES = {INK: "var(--ink)", SOFT: "var(--soft)", GROUND: "var(--ground)", METAL: "var(--metal)"}
+MOST_POINTS = 700
+"""Scan points of a drawing."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane through ``origin`` (3,): ``along`` (3,) goes to the right of the drawing, ``out`` (3,) to its top, away
+    from the metal, and ``across`` (3,) to the viewer. ``depth``: of the origin below the skin."""
+
+    origin: Floats
+    along: Floats
+    out: Floats
+    across: Floats
+    depth: float
+
+    def project(self, points: Floats) -> tuple[Floats, Floats]:
+        """Points (N,3) in the drawing (N,2), and their distance (N,) from the plane."""
+        local = points - self.origin
+        return np.stack([local @ self.along, local @ self.out], axis=1), local @ self.across
+
+
+def choose_plane(result: Result, site: Site) -> Plane:
+    """The plane through the site's deepest point that contains the skin's normal there and, of the directions along the
+    skin that are nearest to the part's axes, the one in which the site is longest."""
+    part, points = result.part, site.points
+    if len(points):
+        deepest = points[int(result.deviation.distance[points].argmin())]
+        place, out = result.aligned.points[deepest], part.face_normals[result.deviation.face[deepest]]
+        depth = float(-result.deviation.distance[deepest])
+    else:
+        place, out, depth = site.centroid, np.zeros(3), 0.0
+    if not np.linalg.norm(out) > 0.5:
+        out = np.array([0.0, 0.0, 1.0])
+    axes = np.eye(3) - np.outer(out, out)
+    length = np.linalg.norm(axes, axis=1)
+    axes = axes[length > 0.5] / length[length > 0.5, None]
+    extent = np.ptp(site.damage.vertices @ axes.T, axis=0)
+    along = axes[int(extent.argmax())]
+    return Plane(place, along, out, np.cross(along, out), depth)
+
+
+def draw_section(result: Result, site: Site, plane: Plane, part: Any) -> tuple[str, float]:
+    """The section as SVG, and the largest distance from the plane of the scan points that it shows.
+
+    ``part``: as `to_manifold` gives it, from the centre of the part's bounds.
+    """
+    figure, axes = _make_figure(6.4, 4.2)
+    flat, _ = plane.project(site.damage.vertices)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    margin = 0.22 * float((high - low).max()) + 4 * result.tolerance
+    low, high = np.minimum(low, 0) - margin, np.maximum(high, 0) + margin
+    low, high = _widen(low, high, 6.4 / 4.2)
+    _fill(axes, _cut(part, plane, result.part.bounds.mean(axis=0)), METAL, INK, 1.1, "part as designed", 1.0)
+    origin = site.damage.bounds.mean(axis=0)
+    colour = style.colour_site(site.id)
+    if site.deposit is not None:
+        loops = _cut(to_manifold(site.deposit, origin), plane, origin)
+        _fill(axes, loops, "none", style.DEPOSIT, 1.2, "deposit", 1.0, dashed=True)
+    _fill(axes, _cut(to_manifold(site.damage, origin), plane, origin), colour, colour, 0.8, "damage volume", 0.35)
+    _draw_surface(axes, site.surface, plane, colour)
+    slab = _draw_points(axes, result, plane, low, high)
+    axes.plot([0], [0], marker="+", color=INK, ms=9, mew=1.2, ls="none", label="deepest point", gid="deepest")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    _draw_ruler(axes, low, high, result.units)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=6, frameon=False, fontsize=7.5, labelcolor=INK,
+                handlelength=1.6, columnspacing=1.2)  # fmt: skip
+    return _to_svg(figure, f"section-{site.id}"), slab
+
+
+def draw_histogram(result: Result) -> str:
+    """How far the intact points are from the skin, with the tolerance and the noise of the scan."""
+    figure, axes = _make_figure(6.4, 2.9)
+    distance = result.deviation.distance[result.deviation.label == INTACT]
+    reach = 1.25 * result.tolerance
+    count, edges = np.histogram(distance, bins=np.linspace(-reach, reach, 81))
+    axes.stairs(count / max(count.sum(), 1) * 100, edges, fill=True, color="#4f86c6", alpha=0.75, gid="counts")
+    for sign in (-1, 1):
+        axes.axvline(sign * result.tolerance, color="#d1495b", lw=1.3, ls="--")
+    noise = result.scan.noise
+    if 0 < noise < reach:
+        axes.axvspan(-noise, noise, color=SOFT, alpha=0.25, lw=0)
+    axes.set(xlim=(-reach, reach))
+    axes.set_xlabel(f"signed distance to the nominal surface, {result.units}", fontsize=8.5)
+    axes.set_ylabel("intact points, %", fontsize=8.5)
+    return _to_svg(figure, "histogram")
+
+
+def _make_figure(width: float, height: float) -> tuple[Any, Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    figure.patch.set_alpha(0)
+    axes = figure.add_subplot()
+    axes.set_facecolor("none")
+    axes.tick_params(colors=SOFT, labelcolor=INK, labelsize=8)
+    axes.xaxis.label.set_color(INK)
+    axes.yaxis.label.set_color(INK)
+    for spine in axes.spines.values():
+        spine.set_color(SOFT)
+        spine.set_linewidth(0.6)
+    return figure, axes
+
+
+def _widen(low: Floats, high: Floats, ratio: float) -> tuple[Floats, Floats]:
+    """Limits of the same centre whose width is ``ratio`` times their height."""
+    centre, half = (low + high) / 2, (high - low) / 2
+    half = np.array([max(half[0], half[1] * ratio), max(half[1], half[0] / ratio)])
+    return centre - half, centre + half
+
+
+def _cut(body: Any, plane: Plane, origin: Floats) -> list[Floats]:
+    """The closed outlines of a body, given from ``origin``, in a plane."""
+    turn = np.stack([plane.along, plane.out, plane.across])
+    shift = turn @ (origin - plane.origin)
+    loops = body.transform(np.column_stack([turn, shift])).slice(0.0).to_polygons()
+    return [np.vstack([loop, loop[:1]]) for loop in loops]
+
+
+def _fill(
+    axes: Any, loops: list[Floats], fill: str, line: str, width: float, label: str, alpha: float, dashed: bool = False
+) -> None:
+    from matplotlib.colors import to_rgba
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    if not loops:
+        return
+    path = Path.make_compound_path(*(Path(loop, closed=True) for loop in loops))
+    face = "none" if fill == "none" else (fill if alpha == 1 else to_rgba(fill, alpha))
+    patch = PathPatch(path, fc=face, ec=line, lw=width, ls="--" if dashed else "-", label=label)
+    patch.set_gid(label.replace(" ", "-"))
+    axes.add_patch(patch)
+
+
+def _draw_surface(axes: Any, surface: Mesh, plane: Plane, colour: str) -> None:
+    """Draws where an open mesh crosses the plane."""
+    from matplotlib.collections import LineCollection
+
+    if not len(surface.faces):
+        return
+    corners = surface.triangles
+    height = (corners - plane.origin) @ plane.across
+    above = height > 0
+    crossed = above.any(axis=1) & ~above.all(axis=1)
+    corners, height, above = corners[crossed], height[crossed], above[crossed]
+    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
+    row = np.arange(len(corners))
+    ends = []
+    for step in (1, 2):
+        other = (lone + step) % 3
+        share = (height[row, lone] / (height[row, lone] - height[row, other]))[:, None]
+        ends.append(plane.project(corners[row, lone] * (1 - share) + corners[row, other] * share)[0])
+    axes.add_collection(
+        LineCollection(np.stack(ends, axis=1), colors=colour, lw=1.8, label="inner damage surface", gid="surface")
+    )
+
+
+def _draw_points(axes: Any, result: Result, plane: Plane, low: Floats, high: Floats) -> float:
+    """Draws the scan points near the plane; gives how near they are."""
+    flat, off = plane.project(result.aligned.points)
+    inside = np.flatnonzero(((flat > low) & (flat < high)).all(axis=1))
+    wanted = max(float(result.scan.spacing), 0.5 * result.tolerance)
+    nearest = np.sort(np.abs(off[inside]))
+    slab = min(wanted, float(nearest[MOST_POINTS - 1])) if len(nearest) >= MOST_POINTS else wanted
+    shown = flat[inside[np.abs(off[inside]) <= slab]]
+    axes.plot(*shown.T, marker="o", ms=1.7, mew=0, color=INK, ls="none", label="scan points", gid="points")
+    return slab
+
+
+def _draw_ruler(axes: Any, low: Floats, high: Floats, unit: str) -> None:
+    """A bar of a round length at the bottom left."""
+    width, height = high - low
+    length = style.round_nice(0.25 * width)
+    x, y = low[0] + 0.03 * width, low[1] + 0.05 * height
+    axes.plot([x, x + length], [y, y], color=INK, lw=2.2, solid_capstyle="butt", gid="ruler")
+    axes.text(x + length / 2, y + 0.02 * height, f"{length:g} {unit}", ha="center", va="bottom", color=INK, fontsize=8.5)
+    axes.set_xlabel(f"{unit} from the deepest point", fontsize=8.5)
+
+
+def _to_svg(figure: Any, name: str) -> str:
+    """The figure as an SVG element, its ids beginning with ``name``, its colours those of the page."""
+    import matplotlib as mpl
+
+    stream = io.StringIO()
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name, "font.family": "sans-serif"}):
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
+    text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", text)
+    text = re.sub(r'<svg [^>]*viewBox="([^"]*)"[^>]*>', r'<svg viewBox="\1" aria-hidden="true">', text, count=1)
+    text = re.sub(r"font: ([0-9.]+px)[^;\"]*", r"font: \1 system-ui, sans-serif", text)
+    for colour, variable in VARIABLES.items():
+        text = text.replace(colour, variable)
+    return text

@@ -1,0 +1,162 @@
+"""What the report says and shows of each site."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Mesh, Part
+from damageest.geometry.distance import closest_on_mesh
+from damageest.geometry.rays import RayCaster
+from damageest.geometry.solids import to_manifold, to_solid
+from damageest.result import Result, Site
+from damageest.stages.report import _style as style
+from damageest.stages.report._section import choose_plane, draw_section
+from damageest.stages.report._values import show_site_interval
+from damageest.stages.report._views import View, choose_view, draw
+
+PICTURE, THUMBNAIL = (400, 300), (140, 105)
+MOST_DRAWN = 30
+"""Sites with pictures and a section; of more, those of the largest volume."""
+
+
+@dataclass
+class Shown:
+    """A site on the page: its values as text, its pictures as data URIs, its section as SVG. Pictures are empty for a
+    site beyond `MOST_DRAWN`."""
+
+    id: int
+    colour: str
+    level: str
+    accepted: bool
+    reasons: list[str]
+    volume: str
+    interval: str
+    depth: str
+    area: str
+    points: str
+    method: str
+    faces: str
+    deposit: list[tuple[str, str]]
+    files: list[tuple[str, str, str]] = field(default_factory=list)
+    picture: str = ""
+    section: str = ""
+    plane: str = ""
+    view: dict[str, Any] = field(default_factory=dict)
+
+
+def describe_sites(result: Result, content: Mapping[str, Any]) -> list[Shown]:
+    """Values, pictures and sections of all sites. ``content``: that of result.json."""
+    if not result.sites:
+        return []
+    part = to_manifold(result.part, result.part.bounds.mean(axis=0))
+    drawn = {s.id for s in sorted(result.sites, key=lambda s: -s.damage.volume)[:MOST_DRAWN]}
+    remains = _Remains(result)
+    shown = []
+    for site, told in zip(result.sites, content["sites"], strict=True):
+        one = _describe(result, site, told)
+        mesh, rays = remains.without(site)
+        view = choose_view(rays, site.surface, site.damage.bounds, result.part.diagonal)
+        one.view = _to_plain(view)
+        if site.id in drawn:
+            _draw_site(result, site, told, one, view, (rays, mesh), part)
+        shown.append(one)
+    return shown
+
+
+class _Remains:
+    """What is left of the part, for rays: without all accepted sites, or without a single one that is not accepted."""
+
+    def __init__(self, result: Result) -> None:
+        self._result = result
+        self._shared: tuple[Mesh, RayCaster] | None = None
+
+    def without(self, site: Site) -> tuple[Mesh, RayCaster]:
+        part = self._result.part
+        if site.accepted and self._result.undamaged is not None:
+            if self._shared is None:
+                self._shared = self._result.undamaged, RayCaster(self._result.undamaged)
+            return self._shared
+        origin = part.bounds.mean(axis=0)
+        left = to_solid(to_manifold(part, origin) - to_manifold(site.damage, origin), origin) or part
+        return left, RayCaster(left)
+
+
+def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
+    unit = result.units
+    deposit = told["deposit"]
+    rows = []
+    if deposit is not None and site.deposit is not None:
+        rows = [("deposit", f"{style.format_number(deposit['volume'])} {unit}³")]
+        rows += [("of it beyond the nominal surface", f"{style.format_number(deposit['stock_volume'])} {unit}³")]
+        if deposit["cut_back_volume"]:
+            rows += [("cut back into intact metal", f"{style.format_number(deposit['cut_back_volume'])} {unit}³")]
+    elif site.refused:
+        rows = [("deposit", "none: the stage allowance refused this site")]
+    return Shown(
+        id=site.id,
+        colour=style.colour_site(site.id),
+        level=site.verdict.level,
+        accepted=site.accepted,
+        reasons=[*site.verdict.reasons, *site.warnings],
+        volume=f"{style.format_number(site.damage.volume)} {unit}³",
+        interval=show_site_interval(site, unit),
+        depth=f"{style.format_number(site.max_depth, 3)} {unit}",
+        area=f"{style.format_number(site.surface.area)} {unit}²",
+        points=style.format_number(len(site.points)),
+        method=site.method,
+        faces=name_faces(result.part, site.damage, result.tolerance),
+        deposit=rows,
+    )
+
+
+def name_faces(part: Part, damage: Mesh, tolerance: float) -> str:
+    """The CAD faces that a damage volume takes skin from, in words; empty where the part has none."""
+    if part.faces_brep is None:
+        return ""
+    near = closest_on_mesh(damage.triangles.mean(axis=1), part)
+    aligned = np.abs(np.einsum("ij,ij->i", damage.face_normals, part.face_normals[near.face])) > 0.99
+    area = np.linalg.norm(damage.cross, axis=1) / 2
+    taken = (near.distance < 0.1 * tolerance) & aligned
+    number = part.faces_brep[near.face[taken]]
+    total = np.bincount(number, weights=area[taken])
+    words = []
+    for face in np.flatnonzero(total > 1e-3 * total.sum()):
+        name = part.face_names[face] if face < len(part.face_names) else ""
+        kind = part.face_kinds[face] if face < len(part.face_kinds) else ""
+        words.append(f"{face}" + (f" “{name}”" if name else "") + (f" ({kind})" if kind else ""))
+    return ", ".join(words)
+
+
+def _draw_site(
+    result: Result, site: Site, told: Mapping[str, Any], one: Shown, view: View, left: tuple[RayCaster, Mesh], part: Any
+) -> None:
+    rays, mesh = left
+    layers = [(rays, mesh, "#c3ccd2")]
+    if len(site.surface.faces):
+        layers.append((RayCaster(site.surface), site.surface, one.colour))
+    one.picture = draw(view._replace(radius=1.7 * view.radius), layers, PICTURE)
+    plane = choose_plane(result, site)
+    one.section, slab = draw_section(result, site, plane, part)
+    at = ", ".join(style.format_number(x) for x in plane.origin)
+    normal = ", ".join(style.format_number(x, 3) for x in np.round(plane.across, 4) + 0.0)
+    one.plane = f"through ({at}), normal ({normal}); scan points within {style.format_number(slab, 2)} {result.units}"
+    meshes = {"damage": site.damage, "surface": site.surface, "deposit": site.deposit or site.damage}
+    colours = {"damage": one.colour, "surface": one.colour, "deposit": style.DEPOSIT}
+    for kind, body in meshes.items():
+        name = told["files"][kind]
+        if name and len(body.faces):
+            image = draw(view._replace(radius=1.05 * view.radius), [(RayCaster(body), body, colours[kind])], THUMBNAIL)
+            one.files.append((kind, name, image))
+
+
+def _to_plain(view: View) -> dict[str, Any]:
+    return {
+        "centre": view.centre.tolist(),
+        "radius": view.radius,
+        "direction": view.direction.tolist(),
+        "up": view.up.tolist(),
+    }

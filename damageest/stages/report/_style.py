@@ -1,0 +1,56 @@
+"""Colours of the report, one for each thing that is shown, and numbers as text."""
+
+from __future__ import annotations
+
+import math
+
+SITES = ("#d1495b", "#edae49", "#00798c", "#66a182", "#8d5b9f", "#d97a34", "#3f7fc1", "#a8577e")
+PART, SURPLUS, UNSEEN, DEPOSIT, POINTS, TRUTH = "#9aa5ad", "#9d6fc4", "#c77f00", "#2f86d6", "#5b6b75", "#444444"
+MAP = "RdBu"
+"""matplotlib's colour map of signed deviations: red below the nominal surface, blue above it."""
+THIN = "\u202f"
+"""Narrow space that does not break, between groups of digits and before a unit."""
+
+
+def colour_site(number: int) -> str:
+    """The colour of a site by its number."""
+    return SITES[(number - 1) % len(SITES)]
+
+
+def to_number(colour: str) -> int:
+    return int(colour.lstrip("#"), 16)
+
+
+def format_number(value: float | None, digits: int = 4) -> str:
+    """A number with ``digits`` significant digits at least, without exponent where it is of common size.
+
+    The decimal mark is a point, and groups of three digits are set apart by a narrow space, as in ISO 80000.
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if not -5 <= size < 12:
+        return f"{value:.{digits - 1}e}".replace("-", "−")
+    text = f"{abs(value):.{max(digits - 1 - size, 0)}f}"
+    whole, _, rest = text.partition(".")
+    groups = []
+    while len(whole) > 4 or (groups and len(whole) > 3):
+        groups.insert(0, whole[-3:])
+        whole = whole[:-3]
+    whole = THIN.join([whole, *groups])
+    return ("−" if value < 0 else "") + whole + (f".{rest}" if rest else "")
+
+
+def format_share(value: float) -> str:
+    """A share in percent; never 100 % for less than all of it."""
+    if value >= 1:
+        return f"100{THIN}%"
+    return f"{min(100 * value, 99.9):.{1 if value > 0.95 or value < 0.1 else 0}f}{THIN}%"
+
+
+def round_nice(value: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is at most a positive value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-9))

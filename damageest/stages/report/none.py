@@ -1,0 +1,17 @@
+"""No report."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from damageest.stages.report import Report, ReportFiles
+
+
+class NoReport(Report):
+    """Writes no report. For many runs whose results are read by programs."""
+
+    use: Literal["none"] = "none"
+
+    def run(self) -> ReportFiles:
+        """No files."""
+        return ReportFiles()
