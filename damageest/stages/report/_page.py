@@ -34,7 +34,11 @@ def fill_page(result: Result, content: Mapping[str, Any], job_text: str, scene: 
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader(FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(FOLDER),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters |= {"number": style.format_number, "share": style.format_share, "at": _format_point}
     view = {
@@ -83,7 +87,9 @@ def describe_run(result: Result) -> str:
     on = f" on the {style.format_share(seen)} of the skin that the scan shows" if seen < 0.995 else ""
     if not result.sites:
         if result.failures:
-            return f"Incomplete: {_count(len(result.failures), 'site')} without a damage volume, and no other was found."
+            return (
+                f"Incomplete: {_count(len(result.failures), 'site')} without a damage volume, and no other was found."
+            )
         depth = f"{style.format_number(result.tolerance)} {result.units}"
         return f"No damage deeper than the tolerance of {depth} was found{on}."
     levels = [site.verdict.level for site in result.sites]

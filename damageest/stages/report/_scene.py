@@ -44,7 +44,7 @@ class Scene:
 
 @dataclass
 class _Stage:
-    """Objects for k3d, in coordinates from ``origin`` that are rounded to ``step``, so that they are compressed well."""
+    """Objects for k3d, in coordinates from ``origin`` that are rounded to ``step``, to be compressed well."""
 
     origin: Floats
     step: float
@@ -91,7 +91,7 @@ def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
     stage = _Stage(np.round(part.bounds.mean(axis=0) / step) * step, step)
     share = _share_triangles(result, most_triangles)
     shown = thin_mesh(part, share)
-    stage.add_mesh(shown, "part", style.PART, opacity=0.3)
+    stage.add_mesh(shown, "part", style.PART, opacity=0.18)
     _add_edges(stage, result)
     limit = choose_limit(result)
     count = _add_scan(stage, result, most_points, limit)
@@ -107,7 +107,7 @@ def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
     _add_unseen(stage, result, share)
     plot = k3d.plot(
         grid_visible=False, menu_visibility=False, camera_auto_fit=False, camera_mode="trackball", axes_helper=1.0,
-        mode="callback", colorbar_object_id=0, camera_fov=35.0, lighting=1.2, fps=0, antialias=2,
+        mode="callback", colorbar_object_id=0, camera_fov=35.0, lighting=1.6, fps=0, antialias=2,
     )  # fmt: skip
     for item in stage.made:
         plot += item

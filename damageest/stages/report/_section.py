@@ -19,18 +19,19 @@ INK, SOFT, GROUND, METAL = "#010203", "#010204", "#010205", "#010206"
 VARIABLES = {INK: "var(--ink)", SOFT: "var(--soft)", GROUND: "var(--ground)", METAL: "var(--metal)"}
 MOST_POINTS = 700
 """Scan points of a drawing."""
+WIDTH, HEIGHT, LEFT, BOTTOM = 6.4, 4.2, 0.55, 0.75
+"""Size of a drawing and its margins, in inches."""
 
 
 @dataclass(frozen=True)
 class Plane:
     """A plane through ``origin`` (3,): ``along`` (3,) goes to the right of the drawing, ``out`` (3,) to its top, away
-    from the metal, and ``across`` (3,) to the viewer. ``depth``: of the origin below the skin."""
+    from the metal, and ``across`` (3,) to the viewer."""
 
     origin: Floats
     along: Floats
     out: Floats
     across: Floats
-    depth: float
 
     def project(self, points: Floats) -> tuple[Floats, Floats]:
         """Points (N,3) in the drawing (N,2), and their distance (N,) from the plane."""
@@ -39,56 +40,76 @@ class Plane:
 
 
 def choose_plane(result: Result, site: Site) -> Plane:
-    """The plane through the site's deepest point that contains the skin's normal there and, of the directions along the
-    skin that are nearest to the part's axes, the one in which the site is longest."""
-    part, points = result.part, site.points
+    """The plane through the site's deepest point in which the damage is seen open to the top.
+
+    It contains the direction that the inner surface faces on average, or where it faces all ways the skin's normal;
+    and of the directions square to that and nearest to the part's axes the one in which the site is longest.
+    """
+    points = site.points
+    place, skin = site.centroid, np.zeros(3)
     if len(points):
         deepest = points[int(result.deviation.distance[points].argmin())]
-        place, out = result.aligned.points[deepest], part.face_normals[result.deviation.face[deepest]]
-        depth = float(-result.deviation.distance[deepest])
-    else:
-        place, out, depth = site.centroid, np.zeros(3), 0.0
-    if not np.linalg.norm(out) > 0.5:
-        out = np.array([0.0, 0.0, 1.0])
+        place, skin = result.aligned.points[deepest], result.part.face_normals[result.deviation.face[deepest]]
+    out = site.surface.cross.sum(axis=0) / 2
+    out = _snap(out / np.linalg.norm(out) if np.linalg.norm(out) > 0.3 * site.surface.area else skin)
     axes = np.eye(3) - np.outer(out, out)
     length = np.linalg.norm(axes, axis=1)
     axes = axes[length > 0.5] / length[length > 0.5, None]
     extent = np.ptp(site.damage.vertices @ axes.T, axis=0)
     along = axes[int(extent.argmax())]
-    return Plane(place, along, out, np.cross(along, out), depth)
+    return Plane(place, along, out, np.cross(along, out))
 
 
-def draw_section(result: Result, site: Site, plane: Plane, part: Any) -> tuple[str, float]:
+def _snap(direction: Floats) -> Floats:
+    """The axis of the part within 20 degrees of a unit vector (3,), else the vector; z for one of no length."""
+    nearest = int(np.abs(direction).argmax())
+    if abs(direction[nearest]) > np.cos(np.radians(20)):
+        return np.asarray(np.eye(3)[nearest] * np.sign(direction[nearest]))
+    return direction if np.linalg.norm(direction) > 0.5 else np.array([0.0, 0.0, 1.0])
+
+
+def draw_section(result: Result, site: Site, plane: Plane, part: Any, paper: Any) -> tuple[str, float]:
     """The section as SVG, and the largest distance from the plane of the scan points that it shows.
 
-    ``part``: as `to_manifold` gives it, from the centre of the part's bounds.
+    ``part``: as `to_manifold` gives it, from the centre of the part's bounds. ``paper``: from `take_paper`.
     """
-    figure, axes = _make_figure(6.4, 4.2)
+    figure, axes = paper
+    for artist in (*axes.patches, *axes.lines, *axes.texts):
+        artist.remove()
     flat, _ = plane.project(site.damage.vertices)
     low, high = flat.min(axis=0), flat.max(axis=0)
     margin = 0.22 * float((high - low).max()) + 4 * result.tolerance
     low, high = np.minimum(low, 0) - margin, np.maximum(high, 0) + margin
-    low, high = _widen(low, high, 6.4 / 4.2)
+    low, high = _widen(low, high, WIDTH / HEIGHT)
     _fill(axes, _cut(part, plane, result.part.bounds.mean(axis=0)), METAL, INK, 1.1, "part as designed", 1.0)
     origin = site.damage.bounds.mean(axis=0)
     colour = style.colour_site(site.id)
     if site.deposit is not None:
         loops = _cut(to_manifold(site.deposit, origin), plane, origin)
         _fill(axes, loops, "none", style.DEPOSIT, 1.2, "deposit", 1.0, dashed=True)
-    _fill(axes, _cut(to_manifold(site.damage, origin), plane, origin), colour, colour, 0.8, "damage volume", 0.35)
+    lost = _cut(to_manifold(site.damage, origin), plane, origin)
+    _fill(axes, lost, GROUND, "none", 0.0, "_", 1.0)
+    _fill(axes, lost, colour, colour, 0.8, "damage volume", 0.35)
     _draw_surface(axes, site.surface, plane, colour)
     slab = _draw_points(axes, result, plane, low, high)
-    axes.plot([0], [0], marker="+", color=INK, ms=9, mew=1.2, ls="none", label="deepest point", gid="deepest")
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    _add_line(axes, np.zeros((1, 2)), marker="+", color=INK, ms=9, mew=1.2, ls="none", gid="deepest-point")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     _draw_ruler(axes, low, high, result.units)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=6, frameon=False, fontsize=7.5, labelcolor=INK,
-                handlelength=1.6, columnspacing=1.2)  # fmt: skip
     return _to_svg(figure, f"section-{site.id}"), slab
+
+
+def take_paper() -> Any:
+    """A figure and its axes for sections, one after the other: to make new ones takes longer than to draw."""
+    figure, axes = _make_figure(WIDTH, HEIGHT)
+    axes.set_position((0, 0, 1, 1))
+    axes.set_axis_off()  # a ruler instead: ticks take longer than all the rest
+    axes.set_aspect("equal")
+    return figure, axes
 
 
 def draw_histogram(result: Result) -> str:
     """How far the intact points are from the skin, with the tolerance and the noise of the scan."""
-    figure, axes = _make_figure(6.4, 2.9)
+    figure, axes = _make_figure(WIDTH, 3.0)
     distance = result.deviation.distance[result.deviation.label == INTACT]
     reach = 1.25 * result.tolerance
     count, edges = np.histogram(distance, bins=np.linspace(-reach, reach, 81))
@@ -107,9 +128,9 @@ def draw_histogram(result: Result) -> str:
 def _make_figure(width: float, height: float) -> tuple[Any, Any]:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height))
     figure.patch.set_alpha(0)
-    axes = figure.add_subplot()
+    axes = figure.add_axes((LEFT / width, BOTTOM / height, 1 - (LEFT + 0.1) / width, 1 - (BOTTOM + 0.08) / height))
     axes.set_facecolor("none")
     axes.tick_params(colors=SOFT, labelcolor=INK, labelsize=8)
     axes.xaxis.label.set_color(INK)
@@ -146,15 +167,13 @@ def _fill(
         return
     path = Path.make_compound_path(*(Path(loop, closed=True) for loop in loops))
     face = "none" if fill == "none" else (fill if alpha == 1 else to_rgba(fill, alpha))
-    patch = PathPatch(path, fc=face, ec=line, lw=width, ls="--" if dashed else "-", label=label)
+    patch = PathPatch(path, fc=face, ec=line, lw=width, ls="--" if dashed else "-")
     patch.set_gid(label.replace(" ", "-"))
-    axes.add_patch(patch)
+    axes.add_artist(patch)
 
 
 def _draw_surface(axes: Any, surface: Mesh, plane: Plane, colour: str) -> None:
     """Draws where an open mesh crosses the plane."""
-    from matplotlib.collections import LineCollection
-
     if not len(surface.faces):
         return
     corners = surface.triangles
@@ -169,31 +188,44 @@ def _draw_surface(axes: Any, surface: Mesh, plane: Plane, colour: str) -> None:
         other = (lone + step) % 3
         share = (height[row, lone] / (height[row, lone] - height[row, other]))[:, None]
         ends.append(plane.project(corners[row, lone] * (1 - share) + corners[row, other] * share)[0])
-    axes.add_collection(
-        LineCollection(np.stack(ends, axis=1), colors=colour, lw=1.8, label="inner damage surface", gid="surface")
-    )
+    gap = np.full((len(corners), 1, 2), np.nan)  # so that all pieces are one line
+    line = np.concatenate([np.stack(ends, axis=1), gap], axis=1).reshape(-1, 2)
+    _add_line(axes, line, color=colour, lw=1.8, gid="inner-damage-surface")
 
 
 def _draw_points(axes: Any, result: Result, plane: Plane, low: Floats, high: Floats) -> float:
     """Draws the scan points near the plane; gives how near they are."""
-    flat, off = plane.project(result.aligned.points)
-    inside = np.flatnonzero(((flat > low) & (flat < high)).all(axis=1))
-    wanted = max(float(result.scan.spacing), 0.5 * result.tolerance)
-    nearest = np.sort(np.abs(off[inside]))
-    slab = min(wanted, float(nearest[MOST_POINTS - 1])) if len(nearest) >= MOST_POINTS else wanted
-    shown = flat[inside[np.abs(off[inside]) <= slab]]
-    axes.plot(*shown.T, marker="o", ms=1.7, mew=0, color=INK, ls="none", label="scan points", gid="points")
+    slab = max(float(result.scan.spacing), 0.5 * result.tolerance)
+    off = np.abs(result.aligned.points @ plane.across - plane.origin @ plane.across)
+    near = np.flatnonzero(off <= slab)
+    flat, _ = plane.project(result.aligned.points[near])
+    inside = ((flat > low) & (flat < high)).all(axis=1)
+    flat, off = flat[inside], off[near[inside]]
+    if len(off) > MOST_POINTS:
+        slab = float(np.partition(off, MOST_POINTS - 1)[MOST_POINTS - 1])
+    shown = flat[off <= slab]
+    _add_line(axes, shown, marker="o", ms=1.7, mew=0, color=INK, ls="none", gid="scan-points")
     return slab
 
 
 def _draw_ruler(axes: Any, low: Floats, high: Floats, unit: str) -> None:
-    """A bar of a round length at the bottom left."""
+    """A ruler of a round length at the bottom left, with a mark at each tenth of it."""
     width, height = high - low
-    length = style.round_nice(0.25 * width)
-    x, y = low[0] + 0.03 * width, low[1] + 0.05 * height
-    axes.plot([x, x + length], [y, y], color=INK, lw=2.2, solid_capstyle="butt", gid="ruler")
-    axes.text(x + length / 2, y + 0.02 * height, f"{length:g} {unit}", ha="center", va="bottom", color=INK, fontsize=8.5)
-    axes.set_xlabel(f"{unit} from the deepest point", fontsize=8.5)
+    length = style.round_nice(0.3 * width)
+    x, y, tick = low[0] + 0.03 * width, low[1] + 0.04 * height, 0.012 * height
+    line = [(x, y + 2 * tick), (x, y), (x + length, y), (x + length, y + 2 * tick)]
+    for k in range(1, 10):
+        line += [(np.nan, np.nan), (x + k * length / 10, y), (x + k * length / 10, y + (1.6 if k == 5 else 1) * tick)]
+    _add_line(axes, np.array(line), color=INK, lw=1.2, gid="ruler")
+    axes.text(x + length, y + 3 * tick, f"{length:g} {unit}", ha="center", va="bottom", color=INK, fontsize=9)
+    axes.text(x, y + 3 * tick, "0", ha="center", va="bottom", color=INK, fontsize=9)
+
+
+def _add_line(axes: Any, points: Floats, **look: Any) -> None:
+    """As matplotlib's ``plot``, for points (N,2), but without looking for new limits."""
+    from matplotlib.lines import Line2D
+
+    axes.add_artist(Line2D(*points.T, **look))
 
 
 def _to_svg(figure: Any, name: str) -> str:

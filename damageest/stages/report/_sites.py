@@ -14,11 +14,13 @@ from damageest.geometry.rays import RayCaster
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
-from damageest.stages.report._section import choose_plane, draw_section
+from damageest.stages.report._section import choose_plane, draw_section, take_paper
 from damageest.stages.report._values import show_site_interval
 from damageest.stages.report._views import View, choose_view, draw
 
-PICTURE, THUMBNAIL = (400, 300), (140, 105)
+PICTURE, THUMBNAIL = (320, 240), (104, 78)
+FEW = 6
+"""Up to so many sites, pictures are drawn with smooth edges."""
 MOST_DRAWN = 30
 """Sites with pictures and a section; of more, those of the largest volume."""
 
@@ -54,7 +56,7 @@ def describe_sites(result: Result, content: Mapping[str, Any]) -> list[Shown]:
         return []
     part = to_manifold(result.part, result.part.bounds.mean(axis=0))
     drawn = {s.id for s in sorted(result.sites, key=lambda s: -s.damage.volume)[:MOST_DRAWN]}
-    remains = _Remains(result)
+    remains, paper = _Remains(result), take_paper()
     shown = []
     for site, told in zip(result.sites, content["sites"], strict=True):
         one = _describe(result, site, told)
@@ -62,7 +64,7 @@ def describe_sites(result: Result, content: Mapping[str, Any]) -> list[Shown]:
         view = choose_view(rays, site.surface, site.damage.bounds, result.part.diagonal)
         one.view = _to_plain(view)
         if site.id in drawn:
-            _draw_site(result, site, told, one, view, (rays, mesh), part)
+            _draw_site(result, site, told, one, view, (rays, mesh), part, paper)
         shown.append(one)
     return shown
 
@@ -132,25 +134,34 @@ def name_faces(part: Part, damage: Mesh, tolerance: float) -> str:
 
 
 def _draw_site(
-    result: Result, site: Site, told: Mapping[str, Any], one: Shown, view: View, left: tuple[RayCaster, Mesh], part: Any
+    result: Result,
+    site: Site,
+    told: Mapping[str, Any],
+    one: Shown,
+    view: View,
+    left: tuple[RayCaster, Mesh],
+    part: Any,
+    paper: Any,
 ) -> None:
     rays, mesh = left
+    smooth, near = len(result.sites) <= FEW, view._replace(radius=1.05 * view.radius)
     layers = [(rays, mesh, "#c3ccd2")]
-    if len(site.surface.faces):
-        layers.append((RayCaster(site.surface), site.surface, one.colour))
-    one.picture = draw(view._replace(radius=1.7 * view.radius), layers, PICTURE)
+    surface = RayCaster(site.surface) if len(site.surface.faces) else None
+    if surface:
+        layers.append((surface, site.surface, one.colour))
+    one.picture = draw(view._replace(radius=1.7 * view.radius), layers, PICTURE, smooth)
     plane = choose_plane(result, site)
-    one.section, slab = draw_section(result, site, plane, part)
+    one.section, slab = draw_section(result, site, plane, part, paper)
     at = ", ".join(style.format_number(x) for x in plane.origin)
     normal = ", ".join(style.format_number(x, 3) for x in np.round(plane.across, 4) + 0.0)
     one.plane = f"through ({at}), normal ({normal}); scan points within {style.format_number(slab, 2)} {result.units}"
-    meshes = {"damage": site.damage, "surface": site.surface, "deposit": site.deposit or site.damage}
-    colours = {"damage": one.colour, "surface": one.colour, "deposit": style.DEPOSIT}
-    for kind, body in meshes.items():
-        name = told["files"][kind]
-        if name and len(body.faces):
-            image = draw(view._replace(radius=1.05 * view.radius), [(RayCaster(body), body, colours[kind])], THUMBNAIL)
-            one.files.append((kind, name, image))
+    damage = RayCaster(site.damage)
+    deposit = RayCaster(site.deposit) if site.deposit else damage
+    shapes = [("damage", damage, site.damage, one.colour), ("surface", surface, site.surface, one.colour)]
+    for kind, body, shape, colour in [*shapes, ("deposit", deposit, site.deposit or site.damage, style.DEPOSIT)]:
+        if body and told["files"][kind]:
+            image = draw(near, [(body, shape, colour)], THUMBNAIL, smooth)
+            one.files.append((kind, told["files"][kind], image))
 
 
 def _to_plain(view: View) -> dict[str, Any]:

@@ -21,11 +21,14 @@ def to_number(colour: str) -> int:
     return int(colour.lstrip("#"), 16)
 
 
-def format_number(value: float | None, digits: int = 4) -> str:
-    """A number with ``digits`` significant digits at least, without exponent where it is of common size.
+def format_number(value: float | int | None, digits: int = 4) -> str:
+    """A number with ``digits`` significant digits at least, without exponent where it is of common size; integers in
+    full.
 
     The decimal mark is a point, and groups of three digits are set apart by a narrow space, as in ISO 80000.
     """
+    if isinstance(value, int):
+        digits = max(len(str(abs(value))), 1)
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0:
@@ -35,7 +38,7 @@ def format_number(value: float | None, digits: int = 4) -> str:
         return f"{value:.{digits - 1}e}".replace("-", "−")
     text = f"{abs(value):.{max(digits - 1 - size, 0)}f}"
     whole, _, rest = text.partition(".")
-    groups = []
+    groups: list[str] = []
     while len(whole) > 4 or (groups and len(whole) > 3):
         groups.insert(0, whole[-3:])
         whole = whole[:-3]

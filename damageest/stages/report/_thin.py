@@ -51,4 +51,4 @@ def find_sharp_edges(mesh: Mesh, degrees: float = 30.0) -> Ints:
     same = np.flatnonzero(number[order][1:] == number[order][:-1])
     left, right = face[order[same]], face[order[same + 1]]
     cosine = np.einsum("ij,ij->i", mesh.face_normals[left], mesh.face_normals[right])
-    return edges[order[same[cosine < np.cos(np.radians(degrees))]]]
+    return np.asarray(edges[order[same[cosine < np.cos(np.radians(degrees))]]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,58 +50,57 @@ def choose_view(left: RayCaster, surface: Mesh, bounds: Floats, scale: float) ->
     return View(centre, max(radius, 1e-3 * scale), direction, up)
 
 
-def draw(view: View, layers: list[tuple[RayCaster, Mesh, str]], size: tuple[int, int], zoom: float = 1.0) -> str:
+def draw(view: View, layers: list[tuple[RayCaster, Mesh, str]], size: tuple[int, int], smooth: bool) -> str:
     """A shaded picture without perspective, as a data URI of a PNG with a transparent background.
 
     ``layers``: meshes with their rays and colours; of two that lie on each other the later one is seen. ``size``: width
-    and height in pixels; the view's radius fills the height at ``zoom`` 1.
+    and height in pixels; the view's radius fills the height. ``smooth``: drawn at twice the size and made smaller.
     """
-    from matplotlib.colors import to_rgb
     from PIL import Image
 
-    width, height = 2 * size[0], 2 * size[1]  # drawn at twice the size, and made smaller, for smooth edges
+    times = 2 if smooth else 1
+    width, height = times * size[0], times * size[1]
     right = np.cross(view.up, view.direction)
     right /= np.linalg.norm(right)
-    up = np.cross(view.direction, right)
-    across, along = np.meshgrid(np.arange(width) - width / 2 + 0.5, height / 2 - 0.5 - np.arange(height))
-    pixel = 2 * view.radius / zoom / height
-    far = 4 * max(mesh.diagonal for _, mesh, _ in layers) + view.radius
-    flat = across.ravel()[:, None] * right + along.ravel()[:, None] * up
-    origins = view.centre + far * view.direction + pixel * flat
-    ways = np.broadcast_to(-view.direction, origins.shape)
-    depth, colour, normal = np.full(len(origins), np.inf), np.zeros((len(origins), 3)), np.zeros((len(origins), 3))
-    for rays, mesh, name in layers:
-        distance, face = rays.find_first(origins, ways)
-        nearer = distance < depth + 1e-4 * view.radius
-        depth[nearer], colour[nearer], normal[nearer] = distance[nearer], to_rgb(name), mesh.face_normals[face[nearer]]
-    light = view.direction + 0.5 * up - 0.4 * right
+    frame = np.stack([right, np.cross(view.direction, right)])
+    pixel = 2 * view.radius / height
+    across, along = pixel * (np.arange(width) - width / 2 + 0.5), pixel * (height / 2 - 0.5 - np.arange(height))
+    start = view.centre + (4 * max(mesh.diagonal for _, mesh, _ in layers) + view.radius) * view.direction
+    light = view.direction + 0.5 * frame[1] - 0.4 * right
     light /= np.linalg.norm(light)
-    bright = 0.42 + 0.58 * np.abs(normal @ light)
-    seen = np.isfinite(depth).reshape(height, width)
-    edge = _find_edges(depth.reshape(height, width), normal.reshape(height, width, 3), pixel)
-    image = np.zeros((height, width, 4))
-    image[..., :3] = (colour * bright[:, None]).reshape(height, width, 3) * np.where(edge, 0.55, 1.0)[..., None]
-    image[..., 3] = seen
-    image[..., :3] *= image[..., 3:]
-    small = image.reshape(size[1], 2, size[0], 2, 4).mean(axis=(1, 3))
+    depth = np.full((height, width), np.inf)
+    image, shade = np.zeros((height, width, 4), np.float32), np.zeros((height, width), np.float32)
+    for rays, mesh, name in layers:
+        corners = (mesh.vertices - view.centre) @ frame.T
+        columns = np.flatnonzero((across >= corners[:, 0].min()) & (across <= corners[:, 0].max()))
+        rows = np.flatnonzero((along >= corners[:, 1].min()) & (along <= corners[:, 1].max()))
+        if not len(columns) or not len(rows):
+            continue
+        box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        places = start + along[box[0], None, None] * frame[1] + across[box[1], None] * right
+        ways = np.broadcast_to(-view.direction, places.shape).reshape(-1, 3)
+        distance, face = (value.reshape(places.shape[:2]) for value in rays.find_first(places.reshape(-1, 3), ways))
+        nearer = distance < depth[box] + 1e-4 * view.radius
+        bright = (0.42 + 0.58 * np.abs(mesh.face_normals @ light)).astype(np.float32)[face[nearer]]
+        depth[box][nearer], shade[box][nearer] = distance[nearer], bright
+        image[box][nearer] = np.append(_read_colour(name), 1)
+    image[..., :3] *= (shade * np.where(_find_edges(depth, shade, pixel), 0.55, 1.0))[..., None]
+    small = image.reshape(size[1], times, size[0], times, 4).mean(axis=(1, 3))
     small[..., :3] /= np.maximum(small[..., 3:], 1e-9)
     stream = io.BytesIO()
-    Image.fromarray((np.clip(small, 0, 1) * 255).round().astype(np.uint8), "RGBA").quantize(128, method=2).save(
-        stream, "png", optimize=False
-    )
+    Image.fromarray((np.clip(small, 0, 1) * 255).round().astype(np.uint8), "RGBA").save(stream, "png", compress_level=6)
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
-def _find_edges(depth: Floats, normal: Floats, pixel: float) -> np.ndarray:
-    """Whether a pixel is at an edge: the next one to the right or below is much deeper, or turned by more than 40°."""
+def _read_colour(name: str) -> Floats:
+    """Red, green and blue, 0 to 1, of a colour as #rrggbb."""
+    return np.frombuffer(bytes.fromhex(name[1:]), np.uint8) / 255.0
+
+
+def _find_edges(depth: Floats, shade: Any, pixel: float) -> Any:
+    """Whether a pixel is at an edge: the next one to the right or below is much deeper, or of another shade."""
     edge = np.zeros(depth.shape, bool)
-    known = np.where(np.isfinite(depth), depth, depth[np.isfinite(depth)].max(initial=0.0) + 1e6 * pixel)
-    for axis in (0, 1):
-        ahead = [slice(None)] * 2
-        ahead[axis] = slice(1, None)
-        back = [slice(None)] * 2
-        back[axis] = slice(None, -1)
-        step = np.abs(known[tuple(ahead)] - known[tuple(back)]) > 12 * pixel
-        turn = np.einsum("ijk,ijk->ij", normal[tuple(ahead)], normal[tuple(back)]) < 0.75
-        edge[tuple(back)] |= step | turn
+    known = np.where(np.isfinite(depth), depth, -1e6 * pixel)
+    for ahead, back in ((np.s_[1:, :], np.s_[:-1, :]), (np.s_[:, 1:], np.s_[:, :-1])):
+        edge[back] |= (np.abs(known[ahead] - known[back]) > 12 * pixel) | (np.abs(shade[ahead] - shade[back]) > 0.12)
     return edge & np.isfinite(depth)

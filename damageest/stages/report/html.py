@@ -19,7 +19,10 @@ class Html(Report):
 
     use: Literal["html"] = "html"
     points: int = Field(
-        120_000, ge=1000, le=1_000_000, description="most scan points that the 3D view shows; the others are thinned out"
+        120_000,
+        ge=1000,
+        le=1_000_000,
+        description="most scan points that the 3D view shows; the others are thinned out",
     )
     triangles: int = Field(
         120_000, ge=1000, le=1_000_000, description="about how many triangles the 3D view shows; meshes are simplified"
