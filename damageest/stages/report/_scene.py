@@ -166,14 +166,14 @@ def _add_scan(stage: _Stage, result: Result, most: int, limit: float) -> int:
     stage.add_points(
         result.aligned.points[chosen], "scan", 0, _choose_point_size(result, len(chosen)),
         attribute=(np.round(values / limit * 127) / 127 * limit).astype(np.float32), color_range=[-limit, limit],
-        color_map=getattr(k3d.matplotlib_color_maps, style.MAP),
+        color_map=getattr(k3d.matplotlib_color_maps, style.MAP.capitalize()),
     )  # fmt: skip
     return len(chosen)
 
 
 def _choose_point_size(result: Result, count: int) -> float:
     """Points just large enough to cover the part."""
-    return float(1.2 * np.sqrt(result.part.area / max(count, 1)))
+    return float(1.6 * np.sqrt(result.part.area / max(count, 1)))
 
 
 def _add_site(stage: _Stage, result: Result, site: Site, share: int, most_points: int) -> None:

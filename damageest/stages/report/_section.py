@@ -40,18 +40,22 @@ class Plane:
 
 
 def choose_plane(result: Result, site: Site) -> Plane:
-    """The plane through the site's deepest point in which the damage is seen open to the top.
+    """The plane through the site's deepest point that cuts the inner surface there squarely.
 
-    It contains the direction that the inner surface faces on average, or where it faces all ways the skin's normal;
-    and of the directions square to that and nearest to the part's axes the one in which the site is longest.
+    It contains the direction that the inner surface faces there, or where there is none the skin's normal; and of the
+    directions square to that and nearest to the part's axes the one in which the site is longest.
     """
     points = site.points
     place, skin = site.centroid, np.zeros(3)
     if len(points):
         deepest = points[int(result.deviation.distance[points].argmin())]
         place, skin = result.aligned.points[deepest], result.part.face_normals[result.deviation.face[deepest]]
-    out = site.surface.cross.sum(axis=0) / 2
-    out = _snap(out / np.linalg.norm(out) if np.linalg.norm(out) > 0.3 * site.surface.area else skin)
+    if len(site.surface.faces):  # averaged, because it is as rough as the scan
+        far = np.linalg.norm(site.surface.triangles.mean(axis=1) - place, axis=1)
+        reach = far.min() + 0.2 * site.damage.diagonal
+        out = (np.exp(-((far / reach) ** 2))[:, None] * site.surface.cross).sum(axis=0)
+        skin = out / np.linalg.norm(out) if np.linalg.norm(out) > 0 else skin
+    out = _snap(skin)
     axes = np.eye(3) - np.outer(out, out)
     length = np.linalg.norm(axes, axis=1)
     axes = axes[length > 0.5] / length[length > 0.5, None]

@@ -6,8 +6,9 @@ import math
 
 SITES = ("#d1495b", "#edae49", "#00798c", "#66a182", "#8d5b9f", "#d97a34", "#3f7fc1", "#a8577e")
 PART, SURPLUS, UNSEEN, DEPOSIT, POINTS, TRUTH = "#9aa5ad", "#9d6fc4", "#c77f00", "#2f86d6", "#5b6b75", "#444444"
-MAP = "RdBu"
-"""matplotlib's colour map of signed deviations: red below the nominal surface, blue above it."""
+MAP = "coolwarm"
+"""matplotlib's colour map of signed deviations: blue below the nominal surface, red above it, as inspection has it; grey
+between, so that it is seen on a light and on a dark ground."""
 THIN = "\u202f"
 """Narrow space that does not break, between groups of digits and before a unit."""
 

@@ -25,14 +25,15 @@
   const whole = length(scene.size);
 
   function placeCamera(target, radius, direction, up) {
-    const eye = add(target, direction, radius / Math.sin(FOV * Math.PI / 360));
+    const narrow = Math.max(holder.clientHeight / holder.clientWidth, 1);
+    const eye = add(target, direction, narrow * radius / Math.sin(FOV * Math.PI / 360));
     return [...eye, ...target, ...up];
   }
 
   function viewFrom(axis) {
     const ways = { iso: [-1, -1, 0.8], x: [1, 0, 0], y: [0, -1, 0], z: [0, 0, 1] };
     const way = ways[axis], size = length(way);
-    return placeCamera([0, 0, 0], whole * 0.95, way.map((x) => x / size), axis === "z" ? [0, 1, 0] : [0, 0, 1]);
+    return placeCamera([0, 0, 0], whole * 0.9, way.map((x) => x / size), axis === "z" ? [0, 1, 0] : [0, 0, 1]);
   }
 
   let flight = 0;

@@ -1,0 +1,53 @@
+"""Reports of small results, written once for all tests of a process."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import numpy as np
+
+from damageest.artefacts import DAMAGE, Deviation, Scan
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.sampling import sample_by_area
+from damageest.report.files import describe_result
+from damageest.result import Result, Verdict
+from damageest.stages.export import ExportedFiles
+from damageest.stages.report.html import Html
+from tests.stages.export.results import make
+
+NASTY = '<img src=x onerror="document.title=1">&"\'</script><script>document.title=2</script>'
+"""Would run where it is not escaped."""
+
+
+@cache
+def two_sites() -> Result:
+    """The box with two bites, with a scan of it: 12,000 points."""
+    plain = make()
+    assert plain.undamaged is not None
+    points = sample_by_area(plain.undamaged, 12_000, np.random.default_rng(0))[0]
+    points += np.random.default_rng(1).normal(0, 0.02, points.shape)
+    distance, face = signed_distance(points, plain.part)
+    label = np.where(distance < -3 * plain.tolerance, DAMAGE, 0).astype(np.uint8)
+    near = [np.linalg.norm(points - site.centroid, axis=1) for site in plain.sites]
+    number = np.where(label == DAMAGE, 1 + np.argmin(near, axis=0), 0).astype(np.int32)
+    scan = Scan(points, noise=0.02, spacing=0.5)
+    sites = tuple(replace(site, points=np.flatnonzero(number == site.id)) for site in plain.sites)
+    sites = (sites[0], replace(sites[1], verdict=Verdict("likely", ("a part of its rim was not seen",))))
+    return replace(
+        plain, scan=scan, aligned=scan, deviation=Deviation(distance, face, label), site_label=number, sites=sites
+    )
+
+
+def write(
+    result: Result, folder: Path | None = None, job_text: str = "version: 1\n", stage: Html | None = None
+) -> Path:
+    """Writes the report of a result; gives its path."""
+    folder = folder or Path(mkdtemp(prefix="damageest-report-"))
+    folder.mkdir(parents=True, exist_ok=True)
+    names = tuple(f"{kind}/site-{site.id}.stl" for site in result.sites for kind in ("damage", "surface", "deposit"))
+    content = describe_result(result, folder, ExportedFiles(names))
+    (stage or Html()).run(result, folder, content, job_text)
+    return folder / "report.html"

@@ -1,0 +1,141 @@
+"""The page as text: what it holds, that it needs nothing else, and that it is the same twice."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import damageest
+from damageest.artefacts import Pose
+from damageest.result import Verdict
+from damageest.stages.report.html import Html
+from tests import damaged_box
+from tests.stages.report import pages
+
+DATES = re.compile("<!-- dates and times: begin -->.*?<!-- dates and times: end -->", re.DOTALL)
+
+
+class Page(HTMLParser):
+    """The tags of a page with their attributes, and its text outside of scripts and styles."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str]]] = []
+        self.words: list[str] = []
+        self.inside = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, {name: value or "" for name, value in attrs}))
+        self.inside = tag
+
+    def handle_data(self, data: str) -> None:
+        if self.inside not in ("script", "style"):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+
+@pytest.fixture(scope="module")
+def page() -> Page:
+    return Page(pages.write(pages.two_sites()).read_text())
+
+
+def test_it_needs_no_other_file(page: Page) -> None:
+    for tag, attributes in page.tags:
+        for name in ("src", "href", "xlink:href", "action", "data"):
+            assert attributes.get(name, "#").startswith(("#", "data:")), (tag, attributes)
+    style = pages.write(pages.two_sites()).read_text().split("<style>")[1].split("</style>")[0]
+    assert "@import" not in style
+    assert "url(" not in style
+
+
+def test_it_shows_the_values_of_each_site(page: Page) -> None:
+    result = pages.two_sites()
+    for site in result.sites:
+        assert f"{site.damage.volume:#.4g} mm³" in page.text
+        assert f"damage/site-{site.id}.stl" in page.text
+    assert "a part of its rim was not seen" in page.text
+    assert "2 sites: 1 proven, 1 likely." in page.text
+
+
+def test_every_picture_has_a_text(page: Page) -> None:
+    pictures = [attributes for tag, attributes in page.tags if tag == "img"]
+    assert len(pictures) >= 2 * 4
+    assert all(attributes.get("alt") for attributes in pictures)
+    sections = [a for tag, a in page.tags if tag == "figure" and a.get("class") == "section"]
+    assert len(sections) == 2
+    assert all(a["role"] == "img" and a["aria-label"] for a in sections)
+
+
+def test_ids_are_given_once(page: Page) -> None:
+    ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+
+
+def test_same_bytes_twice_but_for_dates() -> None:
+    first, second = (pages.write(pages.two_sites()).read_text() for _ in range(2))
+    assert DATES.sub("", first) == DATES.sub("", second)
+    assert len(DATES.findall(first)) == 1
+
+
+def test_markup_in_names_and_messages_does_no_harm(tmp_path: Path) -> None:
+    nasty, result = pages.NASTY, pages.two_sites()
+    sites = tuple(replace(s, verdict=Verdict("doubtful", (nasty,)), warnings=(nasty,)) for s in result.sites)
+    part = replace(result.part, path=str(tmp_path / nasty.replace("/", "")), notes=(nasty,))
+    told = replace(result, name=nasty, sites=sites, part=part, warnings=(nasty,), failures=(nasty,))
+    text = pages.write(replace(told, pose=Pose(np.eye(4), notes=(nasty,))), job_text=nasty).read_text()
+    plain = Page(pages.write(result).read_text())
+    count = {tag: sum(t == tag for t, _ in plain.tags) for tag in ("script", "img")}
+    found = Page(text)
+    assert {tag: sum(t == tag for t, _ in found.tags) for tag in count} == count
+    assert not [a for _, a in found.tags if any(name.startswith("on") for name in a)]
+    assert found.text.count("onerror") >= 9
+
+
+@pytest.mark.parametrize("kind", ["none", "incomplete"])
+def test_runs_without_sites(kind: str) -> None:
+    result = pages.two_sites()
+    none = replace(result, sites=(), damage=None, undamaged=result.part, site_label=np.zeros_like(result.site_label))
+    if kind == "incomplete":
+        none = replace(none, failures=("boolean: manifold (site 1): it failed",))
+    text = Page(pages.write(none).read_text()).text
+    assert ("No damage deeper than the tolerance" in text) == (kind == "none")
+    assert ("it failed" in text) == (kind == "incomplete")
+
+
+def test_many_points_and_triangles_stay_small() -> None:
+    result, limit = pages.two_sites(), Html(points=2000, triangles=2000)
+    small, usual = pages.write(result, stage=limit), pages.write(result)
+    assert small.stat().st_size < usual.stat().st_size < 15e6
+    shown = re.search(r"(\d+) of 12.000 points", Page(small.read_text()).text)
+    assert shown
+    assert 1000 < int(shown[1]) <= 2000
+
+
+def test_the_run_writes_it_and_names_it(tmp_path: Path) -> None:
+    path = damaged_box.write(tmp_path)
+    result = damageest.run(path, output=tmp_path / "out")
+    assert (tmp_path / "out/report.html").stat().st_size > 1e6
+    assert '"report.html"' in (tmp_path / "out/result.json").read_text()
+    assert [record.use for record in result.stages][-1] == "html"
+    damageest.run(path, output=tmp_path / "out", settings=["report=none"])
+    assert not (tmp_path / "out/report.html").exists()
+
+
+def test_a_report_that_fails_is_a_warning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("no such colour")
+
+    monkeypatch.setattr("damageest.stages.report._scene.build_scene", fail)
+    result = damageest.run(damaged_box.write(tmp_path), output=tmp_path / "out")
+    assert [text for text in result.warnings if "no such colour" in text and "without a report" in text]
+    assert (tmp_path / "out/result.json").is_file()
+    assert "no such colour" in (tmp_path / "out/result.json").read_text()

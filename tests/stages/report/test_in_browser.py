@@ -1,0 +1,168 @@
+"""The page in a browser: it draws, its layers switch, rows and sites find each other, and it prints on A4."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import damageest
+from damageest.result import Surplus
+from tests.stages.report import browser, pages
+
+pytestmark = pytest.mark.xdist_group("browser")
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser.open_browser() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def shown(chromium: Any) -> browser.Shown:
+    result = pages.two_sites()
+    some = np.arange(200)
+    weld = Surplus(1, some, 0.01, result.sites[0].damage, 0.4, 3.0)
+    return browser.Shown(chromium, pages.write(replace(result, surplus=(weld,))))
+
+
+def count_changed(before: np.ndarray, after: np.ndarray) -> int:
+    return int((np.abs(before - after).sum(axis=2) > 30).sum())
+
+
+def test_no_fault_and_no_request(shown: browser.Shown) -> None:
+    assert not shown.faults
+
+
+@pytest.mark.parametrize("layer", ["part", "scan", "points", "damage", "surface", "deposit", "surplus"])
+def test_each_layer_draws_and_switches(shown: browser.Shown, layer: str) -> None:
+    boxes = shown.page.locator("input.layer")
+    for k in range(boxes.count()):
+        boxes.nth(k).uncheck()
+    shown.settle()
+    empty = shown.picture()
+    shown.switch(layer, True)
+    assert count_changed(empty, shown.picture()) > 100
+    shown.switch(layer, False)
+    assert count_changed(empty, shown.picture()) < 20
+    shown.switch("part", True)
+    shown.switch("damage", True)
+
+
+def test_the_colour_bar_comes_with_the_scan(shown: browser.Shown) -> None:
+    for on in (True, False):
+        shown.switch("scan", on)
+        assert shown.page.is_visible("#scale") == on
+
+
+def test_a_site_can_be_hidden(shown: browser.Shown) -> None:
+    before = shown.picture()
+    shown.page.uncheck("input.site[data-site='1']")
+    shown.settle()
+    assert count_changed(before, shown.picture()) > 50
+    shown.page.check("input.site[data-site='1']")
+
+
+def test_a_click_on_a_row_flies_to_the_site(shown: browser.Shown) -> None:
+    result = pages.two_sites()
+    for site in result.sites:
+        before = shown.camera()
+        shown.page.click(f"#row-{site.id} td:nth-child(3)")
+        shown.settle()
+        after = shown.camera()
+        assert np.linalg.norm(after[:3] - before[:3]) > 1
+        centre = site.damage.bounds.mean(axis=0) - result.part.bounds.mean(axis=0)
+        assert after[3:] == pytest.approx(centre, abs=0.05)
+        assert "chosen" in shown.page.get_attribute(f"#row-{site.id}", "class")
+    shown.page.click("#fit")
+    shown.settle()
+    assert shown.camera()[3:] == pytest.approx(np.zeros(3), abs=1e-6)
+
+
+def test_a_click_on_a_site_shows_its_row(shown: browser.Shown) -> None:
+    shown.page.click("#row-1 td:nth-child(3)")  # the site is now in the middle of the picture
+    shown.settle()
+    shown.page.evaluate("for (const row of document.querySelectorAll('#sites tr')) row.classList.remove('chosen')")
+    box = shown.page.locator("#canvas").bounding_box()
+    shown.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    shown.settle()
+    shown.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    shown.page.wait_for_selector("#row-1.chosen", timeout=5000)
+    shown.page.click("#fit")
+
+
+def test_the_plane_clips(shown: browser.Shown) -> None:
+    shown.page.select_option("#clip-axis", "2")
+    shown.settle()
+    half = shown.picture()
+    assert re.fullmatch(r"z = -?[\d.e-]+ mm", shown.page.inner_text("#clip-text"))
+    shown.page.select_option("#clip-axis", "")
+    shown.settle()
+    assert count_changed(half, shown.picture()) > 200
+
+
+def test_a_section_has_outline_and_points(shown: browser.Shown) -> None:
+    for site in (1, 2):
+        for name in (
+            "part-as-designed",
+            "damage-volume",
+            "inner-damage-surface",
+            "scan-points",
+            "ruler",
+            "deepest-point",
+        ):
+            box = shown.page.locator(f"#section-{site}-{name}").bounding_box()
+            assert box, name
+            assert box["width"] + box["height"] > 2, name
+        assert shown.page.locator(f"#section-{site}-scan-points use").count() > 20
+
+
+def test_in_the_dark_on_a_tablet_and_on_paper(chromium: Any) -> None:
+    report = browser.Shown(chromium, pages.write(pages.two_sites()), "#site-2", color_scheme="dark")
+    assert "chosen" in report.page.get_attribute("#row-2", "class")
+    assert report.picture()[:5, :5].mean() < 60
+    ink = report.page.evaluate("getComputedStyle(document.querySelector('#section-1-part-as-designed path')).stroke")
+    assert min(int(x) for x in re.findall(r"\d+", ink)[:3]) > 200
+    for width in (1100, 768, 420):
+        report.page.set_viewport_size({"width": width, "height": 900})
+        assert report.page.evaluate("document.documentElement.scrollWidth") <= width
+    report.page.emulate_media(media="print")
+    report.page.set_viewport_size({"width": 688, "height": 1000})  # A4 less its margins, at 96 pixels an inch
+    assert report.page.evaluate("document.documentElement.scrollWidth") <= 688
+    assert not report.page.is_visible("#tools")
+    data = report.page.pdf(prefer_css_page_size=True).decode("latin-1")
+    for found in re.findall(r"/MediaBox ?\[([^\]]*)\]", data):
+        assert [float(x) for x in found.split()] == pytest.approx([0, 0, 595, 842], abs=1.5)
+    assert not report.faults
+    report.page.close()
+
+
+def test_without_sites_and_with_markup_in_every_name(chromium: Any) -> None:
+    nasty, result = pages.NASTY, pages.two_sites()
+    none = replace(result, sites=(), damage=None, undamaged=result.part, site_label=np.zeros_like(result.site_label))
+    told = replace(none, name=nasty, warnings=(nasty,), failures=(nasty,))
+    report = browser.Shown(chromium, pages.write(told, job_text=nasty))
+    assert report.page.title() == f"{nasty} – damage report"
+    assert not report.faults
+    assert report.page.locator("#sites").count() == 0
+    report.page.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("job", sorted((Path(__file__).parents[3] / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
+def test_the_report_of_each_job(job: Path, chromium: Any, tmp_path: Path) -> None:
+    damageest.run(job, output=tmp_path / "out")
+    path = tmp_path / "out/report.html"
+    assert path.stat().st_size < 15e6
+    report = browser.Shown(chromium, path)
+    assert not report.faults
+    before = report.picture()
+    report.switch("damage", False)
+    assert count_changed(before, report.picture()) > 20
+    report.page.close()
