@@ -14,7 +14,7 @@ from damageest.stages.scan.simulate import Simulate
 SIZE = (40.0, 30.0, 20.0)
 TRUE_VOLUME = np.pi * 6**3 * 2 / 3
 """mm3 of the half ball of radius 6 removed from the top."""
-JOB = "version: 1\ntolerance: 0.2\nalign: none\npart: box.stl\nscan: scan.ply\n"
+JOB = "version: 1\ntolerance: 0.2\nalign: none\npart: box.stl\nscan: scan.ply\nreport: none\n"
 
 
 def box() -> Part:

@@ -104,7 +104,8 @@ def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
         given["scan"] = Scan(data["points"], unit=str(data["unit"])).move(move)
         pose = pose @ np.linalg.inv(move)
     try:
-        result = damageest.run(case["job"], output=folder / "out" if case["stage"] == "export" else False, **given)
+        writes = case["stage"] in ("export", "report")
+        result = damageest.run(case["job"], output=folder / "out" if writes else False, **given)
     except DamageestError as error:
         row["refused"] = _shorten_reason(str(error))
         return row | {"seconds": time.perf_counter() - start}

@@ -58,7 +58,7 @@ def test_the_report_has_the_figures(folder: Path) -> None:
 
 def test_another_outer_runs_allowance_and_export_alone(folder: Path) -> None:
     result = damageest.run(folder / "job.yaml", output=True, settings=["allowance.outer=1.5"])
-    assert [record.stage for record in result.stages if not record.cached] == ["allowance", "export"]
+    assert [record.stage for record in result.stages if not record.cached] == ["allowance", "export", "report"]
     (site,) = result.sites
     assert isinstance(site.deposit, Deposit)
     assert site.deposit.thickness is not None
