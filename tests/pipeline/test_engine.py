@@ -154,7 +154,9 @@ def test_only_what_changed_runs_again(tmp_path: Path) -> None:
     """Another scan under the same name leaves what came from the part alone, and nothing that came from the scan."""
     path = damaged_box.write(tmp_path)
     damageest.run(path, output=True)
-    assert not [r for r in damageest.run(path, output=True).stages if not r.cached and r.stage not in ("export", "report")]
+    assert not [
+        r for r in damageest.run(path, output=True).stages if not r.cached and r.stage not in ("export", "report")
+    ]
     x, y, z = damaged_box.scan(15_000).T
     write_points(tmp_path / "scan.ply", {"x": x, "y": y, "z": z})
     again = damageest.run(path, output=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from damageest.artefacts import INTACT
 from damageest.errors import StageError
+from damageest.io import colours
 from damageest.io.files import file_sha256
 from damageest.result import Result
 from damageest.stages.report import _style as style
@@ -154,7 +155,7 @@ def _sample_map() -> str:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    return ", ".join(to_hex(colormaps[style.MAP](x)) for x in np.linspace(0, 1, 9))
+    return ", ".join(to_hex(colormaps[colours.DEVIATION](x)) for x in np.linspace(0, 1, 9))
 
 
 def _hash_scans(result: Result, content: Mapping[str, Any]) -> dict[str, str]:

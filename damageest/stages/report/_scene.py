@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import DAMAGE, INTACT, Floats, Mesh
+from damageest.io import colours
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._thin import find_sharp_edges, thin_mesh, thin_points
@@ -91,7 +92,7 @@ def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
     stage = _Stage(np.round(part.bounds.mean(axis=0) / step) * step, step)
     share = _share_triangles(result, most_triangles)
     shown = thin_mesh(part, share)
-    stage.add_mesh(shown, "part", style.PART, opacity=0.18)
+    stage.add_mesh(shown, "part", colours.PART, opacity=0.18)
     _add_edges(stage, result)
     limit = choose_limit(result)
     count = _add_scan(stage, result, most_points, limit)
@@ -99,11 +100,11 @@ def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
         _add_site(stage, result, site, share, most_points // 4)
     for item in result.surplus:
         if item.solid is not None:
-            stage.add_mesh(thin_mesh(item.solid, share), "surplus", style.SURPLUS)
+            stage.add_mesh(thin_mesh(item.solid, share), "surplus", colours.SURPLUS)
         else:
             places = result.aligned.points[item.points]
             places = places[thin_points(places, most_points // 8)]
-            stage.add_points(places, "surplus", 0, part.diagonal / 300, color=style.to_number(style.SURPLUS))
+            stage.add_points(places, "surplus", 0, part.diagonal / 300, color=style.to_number(colours.SURPLUS))
     _add_unseen(stage, result, share)
     plot = k3d.plot(
         grid_visible=False, menu_visibility=False, camera_auto_fit=False, camera_mode="trackball", axes_helper=1.0,
@@ -166,7 +167,7 @@ def _add_scan(stage: _Stage, result: Result, most: int, limit: float) -> int:
     stage.add_points(
         result.aligned.points[chosen], "scan", 0, _choose_point_size(result, len(chosen)),
         attribute=(np.round(values / limit * 127) / 127 * limit).astype(np.float32), color_range=[-limit, limit],
-        color_map=getattr(k3d.matplotlib_color_maps, style.MAP.capitalize()),
+        color_map=getattr(k3d.matplotlib_color_maps, colours.DEVIATION.capitalize()),
     )  # fmt: skip
     return len(chosen)
 
@@ -177,7 +178,7 @@ def _choose_point_size(result: Result, count: int) -> float:
 
 
 def _add_site(stage: _Stage, result: Result, site: Site, share: int, most_points: int) -> None:
-    colour = style.colour_site(site.id)
+    colour = colours.colour_site(site.id)
     points = result.aligned.points[site.points]
     places = points[thin_points(points, max(most_points // len(result.sites), 500))]
     size = float(0.7 * np.sqrt(max(site.surface.area, 1e-12 * result.part.area) / max(len(places), 1)))
@@ -186,7 +187,7 @@ def _add_site(stage: _Stage, result: Result, site: Site, share: int, most_points
     stage.made[-1].click_callback = _tell_nobody  # that there is one makes the script report clicks
     stage.add_mesh(thin_mesh(site.surface, share), "surface", colour, site.id)
     if site.deposit is not None:
-        stage.add_mesh(thin_mesh(site.deposit, share), "deposit", style.DEPOSIT, site.id, opacity=0.75)
+        stage.add_mesh(thin_mesh(site.deposit, share), "deposit", colours.DEPOSIT, site.id, opacity=0.75)
 
 
 def _add_unseen(stage: _Stage, result: Result, share: int) -> None:
@@ -196,7 +197,7 @@ def _add_unseen(stage: _Stage, result: Result, share: int) -> None:
     faces = coverage.skin.faces[coverage.region >= 0]
     used, number = np.unique(faces, return_inverse=True)
     skin = Mesh(coverage.skin.vertices[used], number.reshape(-1, 3))
-    stage.add_mesh(thin_mesh(skin, share), "unseen", style.UNSEEN)
+    stage.add_mesh(thin_mesh(skin, share), "unseen", colours.UNSEEN)
 
 
 def _tell_nobody(_: Any) -> None:

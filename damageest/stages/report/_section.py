@@ -11,6 +11,7 @@ import numpy as np
 
 from damageest.artefacts import INTACT, Floats, Mesh
 from damageest.geometry.solids import to_manifold
+from damageest.io import colours
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 
@@ -87,10 +88,10 @@ def draw_section(result: Result, site: Site, plane: Plane, part: Any, paper: Any
     low, high = _widen(low, high, WIDTH / HEIGHT)
     _fill(axes, _cut(part, plane, result.part.bounds.mean(axis=0)), METAL, INK, 1.1, "part as designed", 1.0)
     origin = site.damage.bounds.mean(axis=0)
-    colour = style.colour_site(site.id)
+    colour = colours.colour_site(site.id)
     if site.deposit is not None:
         loops = _cut(to_manifold(site.deposit, origin), plane, origin)
-        _fill(axes, loops, "none", style.DEPOSIT, 1.2, "deposit", 1.0, dashed=True)
+        _fill(axes, loops, "none", colours.DEPOSIT, 1.2, "deposit", 1.0, dashed=True)
     lost = _cut(to_manifold(site.damage, origin), plane, origin)
     _fill(axes, lost, GROUND, "none", 0.0, "_", 1.0)
     _fill(axes, lost, colour, colour, 0.8, "damage volume", 0.35)

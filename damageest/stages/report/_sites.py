@@ -12,11 +12,13 @@ from damageest.artefacts import Mesh, Part
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.geometry.views import View, choose_view
+from damageest.io import colours
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
+from damageest.stages.report._drawing import draw
 from damageest.stages.report._section import choose_plane, draw_section, take_paper
 from damageest.stages.report._values import show_site_interval
-from damageest.stages.report._views import View, choose_view, draw
 
 PICTURE, THUMBNAIL = (320, 240), (104, 78)
 FEW = 6
@@ -100,7 +102,7 @@ def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
         rows = [("deposit", "none: the stage allowance refused this site")]
     return Shown(
         id=site.id,
-        colour=style.colour_site(site.id),
+        colour=colours.colour_site(site.id),
         level=site.verdict.level,
         accepted=site.accepted,
         reasons=[*site.verdict.reasons, *site.warnings],
@@ -158,7 +160,7 @@ def _draw_site(
     damage = RayCaster(site.damage)
     deposit = RayCaster(site.deposit) if site.deposit else damage
     shapes = [("damage", damage, site.damage, one.colour), ("surface", surface, site.surface, one.colour)]
-    for kind, body, shape, colour in [*shapes, ("deposit", deposit, site.deposit or site.damage, style.DEPOSIT)]:
+    for kind, body, shape, colour in [*shapes, ("deposit", deposit, site.deposit or site.damage, colours.DEPOSIT)]:
         if body and told["files"][kind]:
             image = draw(near, [(body, shape, colour)], THUMBNAIL, smooth)
             one.files.append((kind, told["files"][kind], image))

@@ -1,21 +1,11 @@
-"""Colours of the report, one for each thing that is shown, and numbers as text."""
+"""Numbers as the report shows them."""
 
 from __future__ import annotations
 
 import math
 
-SITES = ("#d1495b", "#edae49", "#00798c", "#66a182", "#8d5b9f", "#d97a34", "#3f7fc1", "#a8577e")
-PART, SURPLUS, UNSEEN, DEPOSIT, POINTS, TRUTH = "#9aa5ad", "#9d6fc4", "#c77f00", "#2f86d6", "#5b6b75", "#444444"
-MAP = "coolwarm"
-"""matplotlib's colour map of signed deviations: blue below the nominal surface, red above it, as inspection has it; grey
-between, so that it is seen on a light and on a dark ground."""
 THIN = "\u202f"
 """Narrow space that does not break, between groups of digits and before a unit."""
-
-
-def colour_site(number: int) -> str:
-    """The colour of a site by its number."""
-    return SITES[(number - 1) % len(SITES)]
 
 
 def to_number(colour: str) -> int:

@@ -1,0 +1,125 @@
+"""An output folder, read again to be shown."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import Floats, Mesh
+from damageest.errors import InputError
+from damageest.io.meshes import read_mesh
+
+PLY_TYPES = {"double": "<f8", "float": "<f4", "uchar": "u1", "int": "<i4"}
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledScan:
+    """The aligned scan: ``points`` (N,3), ``distance`` (N,) signed to the skin, ``site`` (N,), 0 for none."""
+
+    points: Floats
+    distance: Floats
+    site: NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class OutputFolder:
+    """What a run wrote into ``folder``; ``content`` is that of result.json."""
+
+    folder: Path
+    content: dict[str, Any]
+
+    @property
+    def unit(self) -> str:
+        return str(self.content["units"])
+
+    @property
+    def site_numbers(self) -> list[int]:
+        return [site["id"] for site in self.content["sites"]]
+
+    @cached_property
+    def place(self) -> Path:
+        """Where the files in the part's frame are; where there are none, those in the scan's."""
+        other = self.folder / "scan_frame"
+        return other if other.is_dir() and not (self.folder / "scan.ply").is_file() else self.folder
+
+    @cached_property
+    def _in_one_file(self) -> dict[str, Any]:
+        """Solids of 3MF files, by their names there."""
+        import trimesh
+
+        found: dict[str, Any] = {}
+        for name in ("result.3mf", "doubtful/result.3mf"):
+            if (self.place / name).is_file():
+                found |= trimesh.load_scene(self.place / name, process=False).geometry
+        return found
+
+    def read_solid(self, kind: str, site: int = 0) -> Mesh | None:
+        """A solid: ``kind`` undamaged, damage, deposit or surplus; None where no file holds it that can be read."""
+        stems = [kind] if not site else [f"{kind}/site-{site}"]
+        if kind == "damage" and site:
+            stems.append(f"doubtful/site-{site}")
+        for stem in stems:
+            for suffix in (".ply", ".stl"):
+                if (path := self.place / f"{stem}{suffix}").is_file():
+                    return _read(path)
+        words = {"undamaged": ["undamaged part"], "damage": [f"damage site-{site}", f"doubtful site-{site}"]}
+        for name in words.get(kind, [f"{kind} site-{site}"]):
+            if name in self._in_one_file:
+                body = self._in_one_file[name]
+                return Mesh(body.vertices, body.faces)
+        return None
+
+    def read_mesh(self, name: str) -> Mesh | None:
+        """An open mesh by the path of its file in the folder, as ``skin.ply``; None where there is none."""
+        path = self.place / name
+        return _read(path) if path.is_file() else None
+
+    def read_surface(self, site: int) -> Mesh | None:
+        """The inner damage surface of a site."""
+        found = self.read_mesh(f"surface/site-{site}.ply")
+        return found if found is not None else self.read_mesh(f"doubtful/surface/site-{site}.ply")
+
+    @cached_property
+    def scan(self) -> LabelledScan | None:
+        """The aligned scan; None where the folder has none."""
+        path = self.place / "scan.ply"
+        if not path.is_file():
+            return None
+        head, body = path.read_bytes().split(b"end_header\n", 1)
+        words = [line.split() for line in head.decode().splitlines()]
+        dtype = [(line[2], PLY_TYPES[line[1]]) for line in words if line[0] == "property"]
+        table = np.frombuffer(body, dtype)
+        points = np.stack([table["x"], table["y"], table["z"]], axis=1)
+        return LabelledScan(points, table["distance"].astype(np.float64), table["site"])
+
+    def check_site(self, site: int) -> None:
+        """Raises InputError where the result has no site of that number."""
+        if site and site not in self.site_numbers:
+            known = ", ".join(map(str, self.site_numbers)) or "none"
+            raise InputError(f"{self.folder}: there is no site {site}; there are: {known}")
+
+
+def open_output(folder: Path) -> OutputFolder:
+    """Reads result.json of an output folder. Raises InputError where there is none that can be read."""
+    path = folder / "result.json"
+    if not path.is_file():
+        raise InputError(
+            f"{folder}: there is no result.json, so this is no output folder; name the folder that `damageest run` "
+            "wrote, as out/<name>"
+        )
+    try:
+        content = json.loads(path.read_text())
+        return OutputFolder(folder, {**content, "sites": list(content["sites"]), "units": content["units"]})
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: cannot be read as a result: {error}; run the job again") from None
+
+
+def _read(path: Path) -> Mesh:
+    vertices, faces, _ = read_mesh(path)
+    return Mesh(vertices, faces)
