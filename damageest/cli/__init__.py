@@ -75,7 +75,9 @@ def main() -> None:
 
 
 def _stop_interrupted() -> NoReturn:
-    typer.echo("interrupted; finished stages are kept, and the same command continues after them", err=True)
+    from damageest.cli import _interrupt
+
+    typer.echo(_interrupt.text, err=True)
     sys.exit(INTERRUPTED)
 
 

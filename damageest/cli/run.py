@@ -40,6 +40,7 @@ def command(
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Run jobs: compute the damage volumes from part and scan."""
+    from damageest.cli import _interrupt
     from damageest.cli._progress import Progress
     from damageest.errors import DamageestError, Fault, JobError
     from damageest.job import load
@@ -69,6 +70,9 @@ def command(
         except DamageestError as error:
             status = max(status, _report_failure(error, job.source, as_json, debug))
             continue
+        except KeyboardInterrupt:
+            _interrupt.text = progress.describe_kept(output or job.output)
+            raise
         target = (output or job.output).resolve()
         if as_json:
             typer.echo(json.dumps(json.loads((target / "result.json").read_text())))

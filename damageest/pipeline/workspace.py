@@ -1,7 +1,8 @@
 """The output folder: written in a hidden sibling, moved into place when it is whole.
 
-A run that is stopped or killed leaves the earlier output as it was, and its finished stages in the hidden folder, where
-the next run finds them. A run that fails leaves no hidden folder: its finished stages go to the earlier output's.
+No run that stops early touches the earlier output. One that is interrupted, or that fails where there is an earlier
+output, puts its finished stages into `stages/` of the output folder, where the next run finds them. One that is killed
+leaves them in the hidden sibling, which the next run takes over.
 """
 
 from __future__ import annotations
@@ -71,19 +72,28 @@ def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
         try:
             yield Workspace(target, folder, Cache(stages, older))
         except DamageestError:
-            _hand_over(stages, target)
+            if not (target / "stages").is_dir():
+                shutil.rmtree(stages)
             raise
         finally:
             shutil.rmtree(folder, ignore_errors=True)
+            _keep_stages(stages, target / "stages")
             if not stages.is_dir() or not any(stages.iterdir()):
                 shutil.rmtree(hidden, ignore_errors=True)  # where the system keeps an open lock file, it stays
 
 
-def _hand_over(stages: Path, target: Path) -> None:
-    """After a failure, adds the finished stages to those of the earlier output; without one they are dropped."""
-    kept = target / "stages"
-    for path in stages.iterdir() if kept.is_dir() else ():
-        os.replace(path, kept / path.name)
+def _keep_stages(stages: Path, kept: Path) -> None:
+    """Moves the stages of a run that did not finish to the output folder. Half an entry is dropped."""
+    whole = [path for path in stages.glob("*") if not path.name.startswith(".")] if stages.is_dir() else []
+    if not whole:
+        shutil.rmtree(stages, ignore_errors=True)
+        return
+    try:
+        kept.mkdir(parents=True, exist_ok=True)
+        for path in whole:
+            os.replace(path, kept / path.name)
+    except OSError:  # they stay in the hidden folder then
+        return
     shutil.rmtree(stages, ignore_errors=True)
 
 
@@ -118,7 +128,8 @@ def _refuse_other_folder(target: Path) -> None:
     """Raises JobError for a folder that damageest did not write: it is never replaced."""
     if target.is_file():
         raise JobError([Fault(f"{target} is a file; name a folder", "output")])
-    if target.is_dir() and any(target.iterdir()) and not (target / "result.json").is_file():
+    held = {path.name for path in target.iterdir()} if target.is_dir() else set()
+    if held - {"stages"} and "result.json" not in held:
         message = f"{target} holds files but no result.json, so it is not an earlier output; choose another folder"
         raise JobError([Fault(message, "output")])
 

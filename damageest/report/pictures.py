@@ -19,15 +19,15 @@ from damageest.report.output_folder import OutputFolder
 Look = Literal["damage", "points", "deviation", "deposit", "stock"]
 LOOKS: tuple[Look, ...] = ("damage", "points", "deviation", "deposit", "stock")
 """damage: damage volumes in what is left; points: the scan, each site in its colour; deviation: the scan by signed
-distance; deposit: deposits on what is left; stock: the same, coloured by their height over the nominal surface."""
+distance; deposit: deposits on what is left; stock: those, coloured by their height over the nominal surface."""
 Side = Literal["iso", "x", "y", "z"]
 SIDES = {"iso": (-1.0, -1.0, 0.8), "x": (1.0, 0.0, 0.0), "y": (0.0, -1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-LEFT, GROUND = "#c9d1d6", "white"
+LEFT, EDGE, GROUND = "#c9d1d6", "#8a959c", "white"
 MOST_POINTS = 300_000
 NO_GRAPHICS = (
     "the picture could not be drawn: this machine has no OpenGL, or its graphics driver failed",
-    "apt-get install libegl1 libgl1 libgl1-mesa-dri (OpenGL without a graphics card), or open report.html in a browser, "
-    "whose pictures need none",
+    "apt-get install libegl1 libgl1 libgl1-mesa-dri (OpenGL without a graphics card); or open report.html in a "
+    "browser: its pictures need none",
 )
 
 
@@ -104,19 +104,23 @@ def _draw(picture: Picture, path: str) -> None:
     for row, look in enumerate(picture.looks):
         for column, (folder, site) in enumerate(zip(picture.folders, picture.sites, strict=True)):
             plotter.subplot(row, column)
-            _add_look(plotter, folder, look, " " * (row * columns + column))
+            _add_look(plotter, folder, site, look, " " * (row * columns + column))
             _place_camera(plotter, folder, site, picture.side)
     plotter.screenshot(path)
 
 
-def _add_look(plotter: Any, folder: OutputFolder, look: Look, unique: str) -> None:
+def _add_look(plotter: Any, folder: OutputFolder, site: int, look: Look, unique: str) -> None:
     if look in ("points", "deviation"):
-        _add_scan(plotter, folder, look, unique)
+        _add_scan(plotter, folder, look, unique, 8.0 if site else 4.0)
         return
     left = folder.read_solid("undamaged") or folder.read_mesh("skin.ply")
     if left is not None:
         opacity = 0.55 if look == "damage" else 1.0
-        plotter.add_mesh(_wrap(left), color=LEFT, opacity=opacity, smooth_shading=True, split_sharp_edges=True)
+        body = _wrap(left)
+        plotter.add_mesh(body, color=LEFT, opacity=opacity)
+        edges = body.extract_feature_edges(30, boundary_edges=False, non_manifold_edges=False, manifold_edges=False)
+        if edges.n_cells:
+            plotter.add_mesh(edges, color=EDGE, line_width=1.5)
     for number in folder.site_numbers:
         body = folder.read_solid("damage" if look == "damage" else "deposit", number)
         if body is None:
@@ -141,7 +145,7 @@ def _add_stock(plotter: Any, folder: OutputFolder, deposit: Mesh, unique: str) -
     plotter.add_mesh(fine, scalars=title, cmap="YlOrRd", scalar_bar_args={**bar, "title": title})
 
 
-def _add_scan(plotter: Any, folder: OutputFolder, look: Look, unique: str) -> Any:
+def _add_scan(plotter: Any, folder: OutputFolder, look: Look, unique: str, size: float) -> Any:
     import pyvista as pv
 
     scan = folder.scan
@@ -155,12 +159,12 @@ def _add_scan(plotter: Any, folder: OutputFolder, look: Look, unique: str) -> An
         cloud[title] = distance
         bar = {"color": "black", "title": title, "width": 0.5, "position_x": 0.25, "position_y": 0.02, "n_labels": 3}
         return plotter.add_mesh(
-            cloud, scalars=title, cmap=colours.DEVIATION, clim=(-limit, limit), point_size=2.5, scalar_bar_args=bar
+            cloud, scalars=title, cmap=colours.DEVIATION, clim=(-limit, limit), point_size=size, scalar_bar_args=bar
         )
     for number in np.unique(site):
         colour = colours.PART if number == 0 else colours.colour_site(int(number))
         own = pv.PolyData(points[site == number])
-        plotter.add_mesh(own, color=colour, point_size=2.0 if number == 0 else 3.5)
+        plotter.add_mesh(own, color=colour, point_size=size if number == 0 else 1.5 * size)
     return None
 
 
@@ -186,7 +190,7 @@ def _add_layers(plotter: Any, folder: OutputFolder) -> dict[str, list[Any]]:
     for site in folder.site_numbers:
         add("inner damage surfaces", folder.read_surface(site), color=colours.colour_site(site))
         add("deposits", folder.read_solid("deposit", site), color=colours.DEPOSIT, opacity=0.75)
-    if folder.scan is not None and (actor := _add_scan(plotter, folder, "deviation", "")) is not None:
+    if folder.scan is not None and (actor := _add_scan(plotter, folder, "deviation", "", 3.0)) is not None:
         found["scan"] = [actor]
         for site in folder.site_numbers:
             own = folder.scan.points[folder.scan.site == site]

@@ -1,0 +1,6 @@
+"""What is said after Ctrl-C."""
+
+from __future__ import annotations
+
+text = "interrupted; finished stages are kept, and the same command continues after them"
+"""A command that knows more says so here before it ends."""

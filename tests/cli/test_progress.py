@@ -1,0 +1,77 @@
+"""Progress on a terminal and in a pipe, and what is said and kept after an interrupt."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from damageest.artefacts import Sites
+from damageest.cli._progress import Progress
+from tests import damaged_box
+
+MAIN = [sys.executable, "-c", "from damageest.cli import main; main()"]
+
+
+def read_until(stream: object, word: str) -> str:
+    """What a process writes until a word has come."""
+    text = ""
+    while word not in text and (more := os.read(stream.fileno(), 1)):  # type: ignore[attr-defined]
+        text += more.decode()
+    return text
+
+
+def test_an_interrupt_says_what_is_kept_and_leaves_nothing_hidden(tmp_path: Path) -> None:
+    job = damaged_box.write(tmp_path)
+    process = subprocess.Popen([*MAIN, "run", str(job)], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL)
+    assert process.stderr
+    text = read_until(process.stderr, "enclose: ")  # a stage is named when it begins
+    process.send_signal(signal.SIGINT)
+    text += process.stderr.read().decode()
+    assert process.wait() == 130
+    kept = tmp_path / "out/job/stages"
+    assert f"interrupted in enclose: implicit; kept in {kept}: part, scan, sample, align, segment, cluster;" in text
+    assert text.splitlines()[-1].startswith("interrupted")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["job"]
+    again = subprocess.run([*MAIN, "run", str(job)], capture_output=True, text=True)
+    assert again.returncode == 0, again.stderr
+    assert again.stderr.count("from an earlier run") >= 6
+
+
+def test_on_a_terminal_sites_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    master, slave = pty.openpty()
+    monkeypatch.setattr(sys, "stderr", os.fdopen(slave, "w"))
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    progress = Progress(quiet=False)
+    assert progress.console.is_terminal
+    with progress.show_job("part [1/2]"):
+        progress.damageest_before_stage("cluster", "dbscan", 0)
+        progress.damageest_after_stage("cluster", 0, Sites([1, 2, 0], 2), 1.5, False)
+        for site in (1, 2):
+            progress.damageest_before_stage("boolean", "manifold", site)
+            assert progress.live
+            assert progress.live.tasks[0].description == f"boolean: manifold, site {site} of 2"
+            progress.damageest_after_stage("boolean", site, None, 0.25, False)
+        progress.damageest_before_stage("export", "files", 0)
+        progress.damageest_after_stage("export", 0, None, 0.1, True)
+    sys.stderr.flush()
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", os.read(master, 1 << 16).decode())
+    assert "part [1/2]" in text
+    assert re.search(r"cluster: dbscan +1\.50 s", text)
+    assert re.search(r"boolean: manifold, 2 sites +0\.50 s", text)
+    assert re.search(r"export: files +from an earlier run", text)
+
+
+def test_quiet_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    progress = Progress(quiet=True)
+    with progress.show_job("part"):
+        progress.damageest_before_stage("cluster", "dbscan", 0)
+        progress.damageest_stage_failed("cluster", "dbscan", 0)
+    assert capsys.readouterr() == ("", "")
