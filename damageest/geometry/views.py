@@ -15,6 +15,9 @@ from damageest.geometry.rays import RayCaster
 
 DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
+OVERVIEWS = np.array([(x, y, 0.8) for x, y in ((-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0))])
+OVERVIEWS /= np.linalg.norm(OVERVIEWS, axis=1)[:, None]
+"""Directions that all of a part is looked at from: askew and from above."""
 PROBES = 150
 """Points of a damage surface that are asked for from where they are seen."""
 
@@ -29,23 +32,24 @@ class View(NamedTuple):
     up: Floats
 
 
-def choose_view(left: RayCaster, surface: Mesh, bounds: Floats, scale: float) -> View:
+def choose_view(left: RayCaster, surface: Mesh, bounds: Floats, scale: float, directions: Floats = DIRECTIONS) -> View:
     """From where most of a damage ``surface`` is seen past what is ``left`` of the part, rather from above and askew.
 
     ``bounds`` (2,3) of the damage; ``scale``: a length of which a thousandth is small.
+    ``directions`` (K,3): unit vectors to the eye, to choose from.
     """
     centre, radius = bounds.mean(axis=0), float(np.linalg.norm(np.ptp(bounds, axis=0)) / 2)
-    slope = -DIRECTIONS @ np.array([1.0, 1.0, -1.0]) / np.sqrt(3)  # highest from the front, the left and above
+    slope = -directions @ np.array([1.0, 1.0, -1.0]) / np.sqrt(3)  # highest from the front, the left and above
     score = 0.1 * slope
     if len(surface.faces):
         every = max(len(surface.faces) // PROBES, 1)
         normals = surface.face_normals[::every]
         places = surface.triangles[::every].mean(axis=1) + 1e-3 * scale * normals
-        starts = np.repeat(places, len(DIRECTIONS), axis=0)
-        ways = np.tile(DIRECTIONS, (len(places), 1))
+        starts = np.repeat(places, len(directions), axis=0)
+        ways = np.tile(directions, (len(places), 1))
         free = np.isinf(left.find_first(starts, ways)[0]).reshape(len(places), -1)
-        facing = np.clip(normals @ DIRECTIONS.T, 0, None)
+        facing = np.clip(normals @ directions.T, 0, None)
         score = score + (free * (0.4 + 0.6 * facing)).mean(axis=0)
-    direction = DIRECTIONS[int(score.argmax())]
+    direction = directions[int(score.argmax())]
     up = np.array([0.0, 1.0, 0.0]) if abs(direction[2]) > 0.99 else np.array([0.0, 0.0, 1.0])
     return View(centre, max(radius, 1e-3 * scale), direction, up)

@@ -12,7 +12,8 @@ import numpy as np
 from damageest.artefacts import Mesh
 from damageest.errors import StageError
 from damageest.geometry.rays import RayCaster
-from damageest.geometry.views import choose_view
+from damageest.geometry.solids import concatenate_meshes
+from damageest.geometry.views import DIRECTIONS, OVERVIEWS, choose_view
 from damageest.io import colours
 from damageest.report.output_folder import OutputFolder
 
@@ -104,6 +105,7 @@ def _draw(picture: Picture, path: str) -> None:
     for row, look in enumerate(picture.looks):
         for column, (folder, site) in enumerate(zip(picture.folders, picture.sites, strict=True)):
             plotter.subplot(row, column)
+            plotter.enable_depth_peeling(8)
             _add_look(plotter, folder, site, look, " " * (row * columns + column))
             _place_camera(plotter, folder, site, picture.side)
     plotter.screenshot(path)
@@ -111,7 +113,7 @@ def _draw(picture: Picture, path: str) -> None:
 
 def _add_look(plotter: Any, folder: OutputFolder, site: int, look: Look, unique: str) -> None:
     if look in ("points", "deviation"):
-        _add_scan(plotter, folder, look, unique, 8.0 if site else 4.0)
+        _add_scan(plotter, folder, look, unique, 7.0 if site else 3.0)
         return
     left = folder.read_solid("undamaged") or folder.read_mesh("skin.ply")
     if left is not None:
@@ -122,7 +124,8 @@ def _add_look(plotter: Any, folder: OutputFolder, site: int, look: Look, unique:
         if edges.n_cells:
             plotter.add_mesh(edges, color=EDGE, line_width=1.5)
     for number in folder.site_numbers:
-        body = folder.read_solid("damage" if look == "damage" else "deposit", number)
+        body = None if look == "damage" else folder.read_solid("deposit", number)
+        body = body or folder.read_solid("damage", number)  # which is what to deposit where there is no allowance
         if body is None:
             continue
         if look == "stock":
@@ -137,10 +140,10 @@ def _add_stock(plotter: Any, folder: OutputFolder, deposit: Mesh, unique: str) -
     if skin is None:
         plotter.add_mesh(fine, color=colours.DEPOSIT)
         return
-    from damageest.geometry.distance import distance_to_mesh
+    from damageest.geometry.distance import signed_distance
 
     title = f"stock, {folder.unit}{unique}"  # bars of one title would be one bar
-    fine[title] = distance_to_mesh(np.asarray(fine.points, np.float64), skin)
+    fine[title] = np.maximum(signed_distance(np.asarray(fine.points, np.float64), skin)[0], 0)
     bar = {"color": "black", "fmt": "%.1f", "n_labels": 3, "width": 0.5, "position_x": 0.25, "position_y": 0.02}
     plotter.add_mesh(fine, scalars=title, cmap="YlOrRd", scalar_bar_args={**bar, "title": title})
 
@@ -213,22 +216,26 @@ def _add_switch(plotter: Any, name: str, actors: Sequence[Any], height: int) -> 
 
 
 def _place_camera(plotter: Any, folder: OutputFolder, site: int, side: Side | None) -> None:
-    """The camera from a side onto the part; or onto a site, without a side from where it is seen best."""
+    """The camera onto the part or onto a site: from a side, or without one from where most of the damage is seen."""
     way, up = np.array(SIDES[side or "iso"]), (0.0, 1.0, 0.0) if side == "z" else (0.0, 0.0, 1.0)
-    if site:
-        told = next(item for item in folder.content["sites"] if item["id"] == site)
-        bounds = np.array(told["bounds"])
-        surface, left = folder.read_surface(site), folder.read_solid("undamaged")
-        if side is None and surface is not None and left is not None:
-            view = choose_view(RayCaster(left), surface, bounds, left.diagonal)
-            way, up = view.direction, tuple(view.up)
-        half = 0.8 * np.ptp(bounds, axis=0)
-        box = np.array([bounds.mean(axis=0) - half, bounds.mean(axis=0) + half])
-        plotter.view_vector(way, up, bounds=box.T.ravel().tolist())
+    left = folder.read_solid("undamaged")
+    numbers = [site] if site else folder.site_numbers
+    surfaces = [mesh for number in numbers if (mesh := folder.read_surface(number)) is not None]
+    bounds = next((np.array(told["bounds"]) for told in folder.content["sites"] if told["id"] == site), None)
+    if side is None and left is not None and surfaces:
+        vertices, faces, _ = concatenate_meshes(surfaces)
+        box = left.bounds if bounds is None else bounds
+        choice = OVERVIEWS if bounds is None else DIRECTIONS
+        view = choose_view(RayCaster(left), Mesh(vertices, faces), box, left.diagonal, choice)
+        way, up = view.direction, tuple(view.up)
+    if bounds is None:
+        plotter.view_vector(way, up)
+        plotter.reset_camera()
+        plotter.camera.zoom(1.05)
         return
-    plotter.view_vector(way, up)
-    plotter.reset_camera()
-    plotter.camera.zoom(1.2)
+    half = 0.8 * np.ptp(bounds, axis=0)
+    near = np.array([bounds.mean(axis=0) - half, bounds.mean(axis=0) + half])
+    plotter.view_vector(way, up, bounds=near.T.ravel().tolist())
 
 
 def _wrap(mesh: Mesh) -> Any:

@@ -1,0 +1,135 @@
+"""`damageest view` and `damageest picture` on the output of a run."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import webbrowser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import damageest
+from damageest.errors import InputError, JobError, StageError
+from damageest.report import pictures
+from damageest.report.output_folder import OutputFolder, open_output
+from tests import damaged_box
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    home = tmp_path_factory.mktemp("box")
+    job = damaged_box.write(home, damaged_box.JOB + "export: {format: [stl, 3mf], frame: both}\n")
+    damageest.run(job, output=home / "out")
+    return home / "out"
+
+
+def test_what_was_written_is_read_again(folder: Path) -> None:
+    output = open_output(folder)
+    assert output.site_numbers == [1]
+    damage, left, skin = output.read_solid("damage", 1), output.read_solid("undamaged"), output.read_mesh("skin.ply")
+    assert damage
+    assert left
+    assert skin
+    assert damage.bounds[0, 2] > 3
+    assert np.ptp(left.bounds, axis=0) == pytest.approx(damaged_box.SIZE, abs=1e-3)
+    assert output.scan
+    assert len(output.scan.points) == 20_000
+    assert (output.scan.site == 1).sum() == output.content["sites"][0]["points"]
+    assert output.scan.distance[output.scan.site == 1].min() == pytest.approx(-output.content["sites"][0]["max_depth"])
+
+
+def test_solids_of_a_3mf_file_are_found_by_name(folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(folder / "scan_frame", tmp_path / "scan_frame", ignore=shutil.ignore_patterns("*.stl"))
+    shutil.copy(folder / "result.json", tmp_path)
+    output, usual = open_output(tmp_path), open_output(folder)
+    assert output.place == tmp_path / "scan_frame"
+    for kind, site in (("damage", 1), ("undamaged", 0)):
+        found, expected = output.read_solid(kind, site), usual.read_solid(kind, site)
+        assert found
+        assert expected
+        assert found.area == pytest.approx(expected.area, rel=1e-4)
+
+
+def test_view_opens_the_report_at_the_site(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: object) -> None:
+    from damageest.cli.view import command
+
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", lambda address: opened.append(address) or True)
+    with pytest.raises(InputError, match=r"no report\.html"):
+        command(folder, 0, False)
+    (folder / "report.html").write_text("")
+    command(folder, 1, False)
+    assert opened == [f"{(folder / 'report.html').as_uri()}#site-1"]
+    with pytest.raises(InputError, match=r"no site 7; there are: 1"):
+        command(folder, 7, False)
+    with pytest.raises(InputError, match=r"no result\.json"):
+        command(folder.parent, 0, False)
+
+
+def test_a_window_needs_a_display(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(StageError, match="no display"):
+        pictures.open_window(open_output(folder), 0)
+
+
+def test_a_picture_shows_the_damage(folder: Path, tmp_path: Path) -> None:
+    from PIL import Image
+
+    output = open_output(folder)
+    looks = ("damage", "deviation", "stock")
+    picture = pictures.Picture((output, output), (0, 1), looks, None, (160, 120))
+    try:
+        pictures.draw_picture(picture, tmp_path / "new/picture.png")
+    except StageError as error:
+        pytest.skip(str(error))
+    image = np.asarray(Image.open(tmp_path / "new/picture.png").convert("RGB")).astype(int)
+    assert image.shape == (3 * 120, 2 * 160, 3)
+    red = (image[..., 0] > image[..., 1] + 40) & (image[..., 0] > image[..., 2] + 20)
+    for column in (0, 1):
+        own = image[:, 160 * column : 160 * (column + 1)]
+        for row in range(3):
+            assert (own[120 * row : 120 * (row + 1)].min(axis=2) < 240).mean() > 0.05, (row, column)
+        assert red[:120, 160 * column : 160 * (column + 1)].sum() > 20
+    assert red[:120, 160:].sum() > 3 * red[:120, :160].sum(), "the site is seen from near"
+
+
+def die(*_: object) -> None:
+    os.abort()
+
+
+def test_a_machine_without_opengl_says_what_to_install(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pictures, "_draw_quietly", die)
+    with pytest.raises(StageError, match="no OpenGL") as caught:
+        pictures.draw_picture(pictures.Picture((open_output(folder),), (0,)), tmp_path / "picture.png")
+    assert "libegl1" in str(caught.value)
+    assert not (tmp_path / "picture.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"side": "left"}, "there are: iso, x, y, z"),
+        ({"show": ["damages"]}, "did you mean 'damage'"),
+        ({"size": "9x"}, "'9x' is no size"),
+        ({"site": [1, 1]}, "given 2 times for 1 folders"),
+        ({"output": Path("picture.jpg")}, "name it with .png"),
+    ],
+)
+def test_wrong_options_are_named(given: dict[str, object], said: str, folder: Path) -> None:
+    from damageest.cli.picture import command
+
+    options = {"output": Path("p.png"), "site": None, "side": None, "show": None, "size": "90x70", "debug": False}
+    with pytest.raises(JobError, match=said):
+        command([folder], **{**options, **given})  # type: ignore[arg-type]
+
+
+def test_a_folder_with_half_a_result_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text('{"sites": 1}')
+    with pytest.raises(InputError, match="cannot be read as a result"):
+        open_output(tmp_path)
+    assert OutputFolder(tmp_path, {}).read_solid("damage", 1) is None
