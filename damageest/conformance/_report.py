@@ -99,6 +99,7 @@ def describe(result: Any) -> dict[str, Any]:
             "transform": pose.T_part_scan.tolist(), "rms": pose.rms, "inliers": pose.inliers, "alternatives": [],
             "notes": [], "doubts": [],
         },
+        "deviation": {"labels": dict.fromkeys(("intact", "damage", "added", "outlier"), 0), "intact_percentiles": {}},
         "coverage": None,
         "sites": sites,
         "surplus": [],

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import INTACT
 from damageest.errors import StageError
 from damageest.io import colours
 from damageest.io.files import file_sha256
@@ -22,6 +21,13 @@ from damageest.stages.report._sites import Shown
 from damageest.stages.report._values import list_fit, list_freedom, show_total_interval
 
 FOLDER = Path(__file__).parent / "page"
+LABELS = {
+    "intact": "on the nominal surface",
+    "damage": "in a site",
+    "added": "on surplus",
+    "outlier": "in neither",
+}
+"""Label of result.json to what the page says of its points."""
 WHY = {
     "hidden": "hidden by the part from every scanner position",
     "outside": "outside every view",
@@ -68,8 +74,7 @@ def fill_page(result: Result, content: Mapping[str, Any], job_text: str, scene: 
         look=(FOLDER / "report.css").read_text(encoding="utf-8"),
         map_colours=_sample_map(),
         histogram=draw_histogram(result),
-        labels=count_labels(result),
-        spread=measure_spread(result),
+        labels=LABELS,
         fit=list_fit(result),
         freedom=list_freedom(result),
         why=WHY,
@@ -110,21 +115,6 @@ def choose_tone(result: Result) -> str:
     if result.failures or "doubtful" in levels:
         return "doubtful"
     return "likely" if "likely" in levels else "proven"
-
-
-def count_labels(result: Result) -> list[tuple[str, int]]:
-    """How many scan points have each label."""
-    count = np.bincount(result.deviation.label, minlength=4).tolist()
-    return list(zip(("on the nominal surface", "damage", "outside the part", "in no site"), count, strict=False))
-
-
-def measure_spread(result: Result) -> list[tuple[str, float]]:
-    """Percentiles of the signed deviation of the intact points, in the job's unit."""
-    distance = result.deviation.distance[result.deviation.label == INTACT]
-    if not len(distance):
-        return []
-    shares = (2.5, 25.0, 50.0, 75.0, 97.5)
-    return [(f"{share:g}", float(value)) for share, value in zip(shares, np.percentile(distance, shares), strict=True)]
 
 
 def _count(number: int, word: str) -> str:
