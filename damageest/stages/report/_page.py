@@ -17,7 +17,7 @@ from damageest.result import Result
 from damageest.stages.report import _style as style
 from damageest.stages.report._scene import LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
-from damageest.stages.report._sites import Shown
+from damageest.stages.report._sites import MOST_DRAWN, Shown, choose_overview
 from damageest.stages.report._values import list_fit, list_freedom, show_total_interval
 
 FOLDER = Path(__file__).parent / "page"
@@ -48,10 +48,12 @@ def fill_page(result: Result, content: Mapping[str, Any], job_text: str, scene: 
         lstrip_blocks=True,
     )
     environment.filters |= {"number": style.format_number, "share": style.format_share, "at": _format_point}
+    environment.filters["name"] = lambda path: Path(path).name
     view = {
         "objects": scene.objects,
         "layers": list(_used_layers(scene)),
         "sites": {site.id: site.view for site in sites},
+        "start": choose_overview(result).tolist(),
         "origin": scene.origin,
         "size": scene.size,
         "unit": result.units,
@@ -61,6 +63,7 @@ def fill_page(result: Result, content: Mapping[str, Any], job_text: str, scene: 
         unit=result.units,
         r=content,
         sites=sites,
+        drawn=MOST_DRAWN,
         verdict=describe_run(result),
         tone=choose_tone(result),
         total=f"{style.format_number(result.damage_volume)} {result.units}³",
@@ -104,7 +107,8 @@ def describe_run(result: Result) -> str:
     counted = levels[0] if len(levels) == 1 else counted
     out = sum(not site.accepted for site in result.sites)
     text = f"{_count(len(levels), 'site')}{on}: {counted}"
-    text += f"; {out} of them not part of the damage volume" if out else ""
+    named = "none" if out == len(levels) else f"{len(levels) - out}"
+    text += f"; {named} of them part of the damage volume" if out else ""
     failed = f"; incomplete: {len(result.failures)} failed" if result.failures else ""
     return f"{text}{failed}."
 

@@ -197,7 +197,7 @@ def _add_unseen(stage: _Stage, result: Result, share: int) -> None:
     faces = coverage.skin.faces[coverage.region >= 0]
     used, number = np.unique(faces, return_inverse=True)
     skin = Mesh(coverage.skin.vertices[used], number.reshape(-1, 3))
-    stage.add_mesh(thin_mesh(skin, share), "unseen", colours.UNSEEN)
+    stage.add_mesh(thin_mesh(skin, share), "unseen", colours.UNSEEN, opacity=0.45)
 
 
 def _tell_nobody(_: Any) -> None:

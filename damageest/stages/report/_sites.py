@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Mesh, Part
+from damageest.artefacts import Floats, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.rays import RayCaster
-from damageest.geometry.solids import to_manifold, to_solid
-from damageest.geometry.views import View, choose_view
+from damageest.geometry.solids import concatenate_meshes, to_manifold, to_solid
+from damageest.geometry.views import OVERVIEWS, View, choose_view
 from damageest.io import colours
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
@@ -23,8 +23,8 @@ from damageest.stages.report._values import show_site_interval
 PICTURE, THUMBNAIL = (320, 240), (104, 78)
 FEW = 6
 """Up to so many sites, pictures are drawn with smooth edges."""
-MOST_DRAWN = 30
-"""Sites with pictures and a section; of more, those of the largest volume."""
+MOST_DRAWN = 12
+"""Sites with pictures and a section, so that a report takes few seconds; of more, those of the largest volume."""
 
 
 @dataclass
@@ -71,6 +71,15 @@ def describe_sites(result: Result, content: Mapping[str, Any]) -> list[Shown]:
     return shown
 
 
+def choose_overview(result: Result) -> Floats:
+    """The direction (3,) from where most of the damage is seen, of those that all of the part is looked at from."""
+    left = result.undamaged
+    if not result.sites or left is None:
+        return np.asarray(OVERVIEWS[0])
+    vertices, faces, _ = concatenate_meshes([site.surface for site in result.sites])
+    return choose_view(RayCaster(left), Mesh(vertices, faces), left.bounds, left.diagonal, OVERVIEWS).direction
+
+
 class _Remains:
     """What is left of the part, for rays: without all accepted sites, or without a single one that is not accepted."""
 
@@ -95,9 +104,9 @@ def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
     rows = []
     if deposit is not None and site.deposit is not None:
         rows = [("deposit", f"{style.format_number(deposit['volume'])} {unit}³")]
-        rows += [("of it beyond the nominal surface", f"{style.format_number(deposit['stock_volume'])} {unit}³")]
+        rows += [("stock of it", f"{style.format_number(deposit['stock_volume'])} {unit}³")]
         if deposit["cut_back_volume"]:
-            rows += [("cut back into intact metal", f"{style.format_number(deposit['cut_back_volume'])} {unit}³")]
+            rows += [("cut back", f"{style.format_number(deposit['cut_back_volume'])} {unit}³")]
     elif site.refused:
         rows = [("deposit", "none: the stage allowance refused this site")]
     return Shown(

@@ -31,7 +31,7 @@
   }
 
   function viewFrom(axis) {
-    const ways = { iso: [-1, -1, 0.8], x: [1, 0, 0], y: [0, -1, 0], z: [0, 0, 1] };
+    const ways = { iso: scene.start, x: [1, 0, 0], y: [0, -1, 0], z: [0, 0, 1] };
     const way = ways[axis], size = length(way);
     return placeCamera([0, 0, 0], whole * 0.9, way.map((x) => x / size), axis === "z" ? [0, 1, 0] : [0, 0, 1]);
   }
