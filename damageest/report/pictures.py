@@ -81,7 +81,7 @@ def open_window(folder: OutputFolder, site: int) -> None:
     for k, (name, group) in enumerate(actors.items()):
         _add_switch(plotter, name, group, 10 + 34 * k)
     _place_camera(plotter, folder, site, None)
-    plotter.add_axes()
+    plotter.add_axes(viewport=(0.85, 0.0, 1.0, 0.15))
     plotter.show()
 
 
@@ -188,13 +188,13 @@ def _add_layers(plotter: Any, folder: OutputFolder) -> dict[str, list[Any]]:
         add("damage volumes", folder.read_solid("damage", site), color=colours.colour_site(site))
     for item in folder.content["surplus"]:
         add("surplus", folder.read_solid("surplus", item["id"]), color=colours.SURPLUS)
-    add("unseen skin", folder.read_mesh("unseen.ply"), color=colours.UNSEEN)
+    add("unseen skin", folder.read_mesh("unseen.ply"), color=colours.UNSEEN, opacity=0.45)
     shown = set(found)
     for site in folder.site_numbers:
         add("inner damage surfaces", folder.read_surface(site), color=colours.colour_site(site))
         add("deposits", folder.read_solid("deposit", site), color=colours.DEPOSIT, opacity=0.75)
     if folder.scan is not None and (actor := _add_scan(plotter, folder, "deviation", "", 3.0)) is not None:
-        found["scan"] = [actor]
+        found["scan"] = [actor, *plotter.scalar_bars.values()]
         for site in folder.site_numbers:
             own = folder.scan.points[folder.scan.site == site]
             if len(own):
