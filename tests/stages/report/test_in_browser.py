@@ -136,6 +136,8 @@ def test_in_the_dark_on_a_tablet_and_on_paper(chromium: Any) -> None:
     report.page.set_viewport_size({"width": 688, "height": 1000})  # A4 less its margins, at 96 pixels an inch
     assert report.page.evaluate("document.documentElement.scrollWidth") <= 688
     assert not report.page.is_visible("#tools")
+    report.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert report.page.is_visible("#run pre"), "the job is printed"
     data = report.page.pdf(prefer_css_page_size=True).decode("latin-1")
     for found in re.findall(r"/MediaBox ?\[([^\]]*)\]", data):
         assert [float(x) for x in found.split()] == pytest.approx([0, 0, 595, 842], abs=1.5)

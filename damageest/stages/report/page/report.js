@@ -130,11 +130,13 @@
     document.body.dataset.ready = "yes";
   }
 
-  // what is printed: the drawing buffer is empty by then, so a picture of it takes its place
+  // paper has no summary to click on
+  let closed = [];
   addEventListener("beforeprint", () => {
-    if (!view3d) return;
-    view3d.getWorld().renderer.render(view3d.getWorld().scene, view3d.getWorld().camera);
+    closed = find("details:not([open])");
+    for (const block of closed) block.open = true;
   });
+  addEventListener("afterprint", () => { for (const block of closed) block.open = false; });
 
   listenToRows();
   start().catch((error) => {
