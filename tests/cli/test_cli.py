@@ -72,7 +72,7 @@ def test_every_job_is_checked_before_the_first_runs(tmp_path: Path) -> None:
     bad.write_text(damaged_box.JOB + "clutser: x\n")
     done = call("run", good, bad)
     assert done.returncode == 2
-    assert f"{bad}:6:1" in done.stderr
+    assert f"{bad}:7:1" in done.stderr
     assert not (tmp_path / "out").exists()
 
 
@@ -82,7 +82,7 @@ def test_validate(tmp_path: Path) -> None:
     good.write_text(damaged_box.JOB + "clutser: x\nsegment: y\n")
     done = call("validate", good)
     assert done.returncode == 2
-    assert [line.split(":")[1] for line in done.stderr.splitlines()] == ["6", "7"]
+    assert [line.split(":")[1] for line in done.stderr.splitlines()] == ["7", "8"]
     assert done.stdout == ""
 
 
