@@ -45,7 +45,7 @@ class Shown:
     """A report that a browser shows. ``faults``: errors and warnings of its console, requests for other files."""
 
     def __init__(self, browser: Any, path: Path, hash: str = "", **options: Any) -> None:
-        options = {"viewport": {"width": 800, "height": 560}, "reduced_motion": "reduce", **options}
+        options = {"viewport": {"width": 720, "height": 560}, "reduced_motion": "reduce", **options}
         self.page = browser.new_page(**options)
         self.faults: list[str] = []
         self.page.on("console", lambda m: self.faults.append(m.text) if m.type in ("error", "warning") else None)

@@ -40,16 +40,16 @@ def test_no_fault_and_no_request(shown: browser.Shown) -> None:
     assert not shown.faults
 
 
-@pytest.mark.parametrize("layer", ["part", "scan", "points", "damage", "surface", "deposit", "surplus"])
-def test_each_layer_draws_and_switches(shown: browser.Shown, layer: str) -> None:
-    boxes = shown.page.locator("input.layer")
-    for k in range(boxes.count()):
-        boxes.nth(k).uncheck()
+def test_each_layer_draws_and_switches(shown: browser.Shown) -> None:
+    for box in shown.page.locator("input.layer").all():
+        box.uncheck()
     shown.settle()
     empty = shown.picture()
-    shown.switch(layer, True)
-    assert count_changed(empty, shown.picture()) > 100
-    shown.switch(layer, False)
+    for layer in ("part", "scan", "points", "damage", "surface", "deposit", "surplus"):
+        shown.switch(layer, True)
+        assert count_changed(empty, shown.picture()) > 60, layer
+        shown.page.uncheck(f"input[data-layer={layer}]")
+    shown.settle()
     assert count_changed(empty, shown.picture()) < 20
     shown.switch("part", True)
     shown.switch("damage", True)
@@ -89,9 +89,9 @@ def test_a_click_on_a_site_shows_its_row(shown: browser.Shown) -> None:
     shown.page.click("#row-1 td:nth-child(3)")  # the site is now in the middle of the picture
     shown.settle()
     shown.page.evaluate("for (const row of document.querySelectorAll('#sites tr')) row.classList.remove('chosen')")
-    box = shown.page.locator("#canvas").bounding_box()
-    shown.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    shown.settle()
+    canvas = shown.page.locator("#canvas")
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
     shown.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     shown.page.wait_for_selector("#row-1.chosen", timeout=5000)
     shown.page.click("#fit")
@@ -145,6 +145,7 @@ def test_in_the_dark_on_a_tablet_and_on_paper(chromium: Any) -> None:
     report.page.close()
 
 
+@pytest.mark.slow
 def test_without_sites_and_with_markup_in_every_name(chromium: Any) -> None:
     nasty, result = pages.NASTY, pages.two_sites()
     none = replace(result, sites=(), damage=None, undamaged=result.part, site_label=np.zeros_like(result.site_label))
