@@ -101,6 +101,61 @@ class Surplus:
         return self.solid.volume if self.solid else None
 
 
+@dataclass(frozen=True)
+class PatchDeviation:
+    """Mean deviations of patches of skin of width ``size``: their standard deviation ``deviation``, what the noise of
+    their points explains (``noise``), and what is left after the form that the fit names (``left``)."""
+
+    size: float
+    deviation: float
+    noise: float
+    left: float
+
+
+@dataclass(frozen=True, eq=False)
+class ViewFit:
+    """How one view lies against the part: ``shift`` (3,) of the part's centre and ``turn`` in degrees that would put it
+    right, in the part's frame; ``apart``: how far it lies from the other views where they overlap. ``is_determined``:
+    whether it fixes its pose by itself. ``is_corrected``: whether it was put right."""
+
+    number: int
+    shift: Floats
+    turn: float
+    apart: float
+    is_determined: bool
+    is_corrected: bool
+
+
+Deformed = Literal["bend", "twist", "shear", "stretch", "scale"]
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFit:
+    """How well the part as designed, in one rigid pose, explains the intact skin.
+
+    ``scale``: length in the scan over length in the CAD, with its standard error; ``scale_by_axis`` (3,) along
+    ``axes`` (3,3, as rows); those of a model that is `ok` are within their errors and the scanner's. ``deformation``:
+    kinds and amounts: the largest displacement of the seen skin beyond the rigid motion nearest to it, with
+    ``amount`` for all together and ``amount_error``. ``waviness``: standard deviation of what no form explains.
+    ``corrected_scale``: the scale that was taken out of the scan, 1 where none was. ``words`` say it all.
+    """
+
+    model: Literal["ok", "scaled", "deformed", "views disagree", "wavy"]
+    words: str
+    deviations: tuple[PatchDeviation, ...]
+    scale: float
+    scale_error: float
+    axes: Floats
+    scale_by_axis: Floats
+    scale_by_axis_error: Floats
+    deformation: tuple[tuple[Deformed, float], ...]
+    amount: float
+    amount_error: float
+    views: tuple[ViewFit, ...]
+    waviness: float
+    corrected_scale: float = 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Site:
     """One damage: ``damage`` (DV) and ``surface`` (IDS) in the part's frame; ``deposit`` None where it is the DV.
@@ -191,6 +246,7 @@ class Result:
     stages: tuple[StageRecord, ...] = ()
     coverage: Coverage | None = None
     surplus: tuple[Surplus, ...] = ()
+    fit: ModelFit | None = None
 
     @property
     def status(self) -> Literal["ok", "incomplete"]:

@@ -56,6 +56,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
         stages=tuple(engine.records),
         coverage=state.coverage,
         surplus=state.surplus,
+        fit=None if state.fitted is None else state.fitted.fit,
     )
     key = digest(
         engine.job.name, [state.keys[name] for name in sorted(state.keys)], [s.key("deposit") for s in work.sites]

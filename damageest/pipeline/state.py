@@ -30,6 +30,8 @@ from damageest.artefacts import (
     Surface,
 )
 from damageest.checks.coverage import SkinView
+from damageest.checks.model_fit import FittedModel
+from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
 from damageest.pipeline.cache import digest
 from damageest.result import Coverage, Result, Surplus, Verdict
@@ -101,6 +103,9 @@ class JobState(State):
     sites = Value[Sites]()
     intact = Value[Floats]()
     skin = Value[SkinView]()
+    views = Value[ViewFits | None]()
+    corrected_scale = Value[float]()
+    fitted = Value[FittedModel | None]()
     coverage = Value[Coverage]()
     surplus = Value[tuple[Surplus, ...]]()
     enclosures = Value[Enclosures]()

@@ -26,6 +26,11 @@ class Register(Align):
         60_000, ge=1000, le=2_000_000, description="number of candidate poses tried; the best are refined"
     )
     points: int = Option(30_000, ge=1000, le=120_000, description="number of scan points used by the final fit")
+    fit_views: bool = Option(
+        True,
+        description="whether each view of a scan with known views is fitted to the part where the views disagree: a "
+        "misplaced one is put right, if it fixes its pose by itself",
+    )
 
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The fitted pose. Raises StageError where no pose explains the scan: it shows another part, has another unit,

@@ -1,0 +1,167 @@
+"""Whether the views of a scan agree, and where each of them lies on the part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Ints, Part, Scan
+from damageest.checks.form_fields import choose_frame
+from damageest.checks.form_fit import Form, Skin, find_feet, improve
+from damageest.geometry.neighbourhoods import pick_one_per_cube
+from damageest.geometry.voxels import number_faced_cubes
+from damageest.result import ViewFit
+
+COMPARED, FITTED = 30_000, 4_000
+"""Points that views are compared with, in all, and points of a view that it is fitted with."""
+REACH = 12.0
+"""Distance from the skin, in tolerances, up to which points are used."""
+WIDTHS = (8.0, 5.0, 3.0, 1.5, 0.7, 0.0)
+"""Widths of the kernel, in tolerances, one after the other."""
+NARROWEST, BY_NOISE = 0.3, 1.25
+"""The last width: the larger of these, in tolerances and in standard deviations of the noise."""
+APART = 0.4
+"""Difference of a view from the others, in tolerances, in a fifth of their overlap, from which they disagree."""
+FEWEST_OF_VIEW, FEWEST_SHARED = 4, 25
+"""Points of a view in a cell, for its mean to be compared, and cells that it has to share with other views."""
+FEWEST_POINTS = 300
+"""Points near the part below which a view does not fix its pose."""
+CERTAIN = 0.12
+"""Standard error of a view's pose, in tolerances at its worst point, up to which it is determined."""
+HEALED = 0.6
+"""Share of the disagreement that may be left after the views are fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class ViewFits:
+    """The views, each with ``moves`` (V,4,4): the motion that puts it right, in the part's frame. ``disagree``: whether
+    they differ by more than noise explains. ``before``: by how much."""
+
+    views: tuple[ViewFit, ...]
+    moves: Floats
+    disagree: bool
+    before: float
+
+    def apply(self, aligned: Scan) -> Scan:
+        """The scan with the views put right that were corrected."""
+        assert aligned.view is not None
+        assert aligned.viewpoints is not None
+        points, scanners = aligned.points.copy(), aligned.viewpoints.copy()
+        for one in self.views:
+            if one.is_corrected:
+                move = self.moves[one.number]
+                own = aligned.view == one.number
+                points[own] = points[own] @ move[:3, :3].T + move[:3, 3]
+                scanners[one.number] = move[:3, :3] @ scanners[one.number] + move[:3, 3]
+        return replace(aligned, points=points, viewpoints=scanners)
+
+
+def fit_views(part: Part, aligned: Scan, tolerance: float, is_correcting: bool) -> ViewFits | None:
+    """Compares the views where they overlap, and where they disagree, fits each of them to the part by itself.
+
+    ``aligned``: the scan in the part's frame. ``is_correcting``: views that are determined by themselves and lie
+    elsewhere are put right. None for a scan without views, or of a single one. A part that is bent or of another size
+    shows as such: its views agree where they overlap.
+    """
+    if aligned.view is None or aligned.viewpoints is None or len(aligned.viewpoints) < 2:
+        return None
+    skin, count = Skin.build(part), len(aligned.viewpoints)
+    gap = float(np.sqrt(part.area / COMPARED))
+    index = [_draw(aligned, number, gap) for number in range(count)]
+    where = np.concatenate(index)
+    if len(where) < FEWEST_POINTS:
+        return None
+    points, view = aligned.points[where], np.asarray(aligned.view[where], np.int64)
+    before = _compare(skin, points, view, count, gap, tolerance)
+    moves = np.tile(np.eye(4), (count, 1, 1))
+    known = np.nan_to_num(before)
+    if not (known > APART * tolerance).any():
+        return ViewFits((), moves, False, float(known.max(initial=0.0)))
+    frame = choose_frame(part, points)
+    determined = np.zeros(count, bool)
+    width = max(NARROWEST * tolerance, BY_NOISE * aligned.noise)
+    for number in range(count):
+        own = points[view == number]
+        form, determined[number] = _fit_one(skin, Form.rigid(frame), own, gap, width, tolerance)
+        moves[number] = form.T if determined[number] else np.eye(4)
+    moved = points.copy()
+    for number in range(count):
+        own = view == number
+        moved[own] = points[own] @ moves[number, :3, :3].T + moves[number, :3, 3]
+    after = np.nan_to_num(_compare(skin, moved, view, count, gap, tolerance))
+    healed = float(after.max()) < max(HEALED * float(known.max()), APART * tolerance)
+    views = []
+    for number in range(count):
+        own = view == number
+        far = float(np.quantile(np.linalg.norm(moved[own] - points[own], axis=1), 0.9)) if own.any() else 0.0
+        elsewhere = bool(healed and determined[number] and far > APART / 2 * tolerance)
+        views.append(_describe(number, moves[number], frame.centre, known[number], bool(determined[number]),
+                               elsewhere and is_correcting))  # fmt: skip
+    return ViewFits(tuple(views), moves, True, float(known.max()))
+
+
+def _draw(aligned: Scan, number: int, gap: float) -> Ints:
+    """Points of one view, spread evenly over what it shows."""
+    own = np.flatnonzero(aligned.view == number)
+    return own[pick_one_per_cube(aligned.points[own], gap)] if len(own) else own
+
+
+def _compare(skin: Skin, points: Floats, view: Ints, count: int, gap: float, tolerance: float) -> Floats:
+    """How far each view (V,) lies from the others where they overlap, in a fifth of it; NaN where it does not."""
+    distance, places, normals = skin.find_feet(points)
+    offset = np.einsum("ij,ij->i", normals, points - places)
+    used = (distance < REACH * tolerance) & (np.abs(np.abs(offset) - distance) < 0.1 * tolerance)
+    cell = np.unique(number_faced_cubes(places[used], normals[used], 5 * gap)[1], return_inverse=True)[1]
+    cells = int(cell.max(initial=-1)) + 1
+    total = np.bincount(cell * count + view[used], minlength=cells * count).reshape(-1, count).astype(np.float64)
+    sums = np.bincount(cell * count + view[used], offset[used], cells * count).reshape(-1, count)
+    mean = np.where(total >= FEWEST_OF_VIEW, sums / np.maximum(total, 1), np.nan)
+    apart = np.full(count, np.nan)
+    for number in range(count):
+        others = np.delete(mean, number, axis=1)
+        shared = np.isfinite(mean[:, number]) & np.isfinite(others).any(axis=1)
+        if shared.sum() >= FEWEST_SHARED:
+            difference = np.abs(mean[shared, number] - np.nanmedian(others[shared], axis=1))
+            apart[number] = float(np.quantile(difference, 0.8))
+    return apart
+
+
+def _fit_one(skin: Skin, form: Form, points: Floats, gap: float, width: float, tolerance: float) -> tuple[Form, bool]:
+    """The rigid motion of one view, and whether its points determine it."""
+    points = points[:: max(1, len(points) // FITTED)]
+    edge = 4 * gap * max(1.0, float(np.sqrt(len(points) / max(len(points), 1))))
+    for wide in WIDTHS:
+        feet = find_feet(skin, form, points, edge, REACH * tolerance, tolerance)
+        if len(feet.points) < FEWEST_POINTS:
+            return form, False
+        for _ in range(2):
+            cells = feet.summarise(form)
+            if len(cells.count) < 12:
+                return form, False
+            form = improve(form, cells, max(wide * tolerance, width), tolerance)
+    worst = float(np.sqrt(np.linalg.eigvalsh(form.covariance)[-1]))
+    return form, worst < CERTAIN * tolerance
+
+
+def _describe(
+    number: int, move: Floats, centre: Floats, apart: float, is_determined: bool, is_corrected: bool
+) -> ViewFit:
+    from scipy.spatial.transform import Rotation
+
+    shift = move[:3, :3] @ centre + move[:3, 3] - centre
+    turn = float(np.degrees(Rotation.from_matrix(move[:3, :3]).magnitude()))
+    return ViewFit(number, shift, turn, float(apart), is_determined, is_corrected)
+
+
+def find_misplaced(fits: ViewFits, tolerance: float) -> Flags:
+    """Which of the views (V,) lie elsewhere than the part says, or apart from the others without being determined."""
+    return np.array(
+        [
+            one.is_corrected
+            or (not one.is_determined and one.apart > APART * tolerance)
+            or (one.is_determined and float(np.linalg.norm(one.shift)) > APART / 2 * tolerance)
+            for one in fits.views
+        ],
+        dtype=bool,
+    )
