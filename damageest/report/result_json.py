@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from damageest.artefacts import Deposit, Floats, Vector
+from damageest.report.uncertainty_json import UncertaintyReport, report_interval, report_uncertainty
 from damageest.result import Coverage, Result, Site, Surplus
 from damageest.stages.export import ExportedFiles
 
@@ -129,6 +130,9 @@ class SiteReport(_Model):
     id: int
     points: int
     volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
+    volume_95: tuple[float, float] | None = Field(description="95 % interval of `volume`; null where there is none")
+    depth_95: tuple[float, float] | None = Field(description="95 % interval of the largest depth, before a cut-back")
+    uncertainty: UncertaintyReport | None
     surface_area: float = Field(description="of the inner damage surface")
     max_depth: float = Field(description="of the scan below the nominal surface")
     centroid: Vector
@@ -198,6 +202,7 @@ class Report(_Model):
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
     export: ExportReport
     damage_volume: float
+    volume_95: tuple[float, float] | None = Field(description="95 % interval of `damage_volume`; null: there is none")
     undamaged_volume: float
     material: MaterialReport = Field(description="what the whole repair takes")
     truth: TruthReport | None
@@ -254,6 +259,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
         surplus=[_report_surplus(item, result, written) for item in result.surplus],
         export=ExportReport(files=list(written.files), notes=list(written.notes)),
         damage_volume=result.damage_volume,
+        volume_95=report_interval(result.volume_95),
         undamaged_volume=result.undamaged_volume,
         material=_sum_material([site.deposit for site in sites if site.deposit]),
         truth=_report_truth(result),
@@ -306,6 +312,9 @@ def _report_site(site: Site, written: ExportedFiles) -> SiteReport:
         id=site.id,
         points=len(site.points),
         volume=site.damage.volume,
+        volume_95=report_interval(site.volume_95),
+        depth_95=report_interval(site.depth_95),
+        uncertainty=report_uncertainty(site),
         surface_area=site.surface.area,
         max_depth=site.max_depth,
         centroid=tuple(site.centroid.tolist()),
