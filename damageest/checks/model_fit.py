@@ -160,9 +160,7 @@ def _measure_patches(
             continue
         means = [(np.bincount(patch, values) / count)[many] for values in (offset, left)]
         by_noise = float(noise / np.sqrt(np.median(count[many])))
-        found.append(
-            PatchDeviation(size * tolerance, _measure_spread(means[0]), by_noise, _measure_spread(means[1]))
-        )
+        found.append(PatchDeviation(size * tolerance, _measure_spread(means[0]), by_noise, _measure_spread(means[1])))
         waviness = max(waviness, _measure_waviness(means[1], by_noise))
     return tuple(found), waviness
 
