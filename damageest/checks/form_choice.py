@@ -163,7 +163,9 @@ def _select(fields: tuple[Field, ...]) -> Floats:
     return chosen
 
 
-def _solve(task: _Task, rich: Form, cells: Cells, fields: tuple[Field, ...], used: Flags) -> tuple[Floats, Floats, Floats]:
+def _solve(
+    task: _Task, rich: Form, cells: Cells, fields: tuple[Field, ...], used: Flags
+) -> tuple[Floats, Floats, Floats]:
     """The motion and coefficients (6+K,) of some fields, their covariance, and what they leave in all cells (C,)."""
     J = cells.jacobian @ _select(fields)
     known = np.concatenate([np.zeros(6), rich.coefficients])

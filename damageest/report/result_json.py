@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from damageest.artefacts import Deposit, Floats, Vector
+from damageest.report.fit_json import FitReport, report_fit
 from damageest.result import Coverage, Result, Site, Surplus
 from damageest.stages.export import ExportedFiles
 
@@ -194,6 +195,7 @@ class Report(_Model):
     scan: ScanReport
     alignment: AlignmentReport
     coverage: CoverageReport | None
+    fit: FitReport | None = Field(description="null where too few points lie near the skin")
     sites: list[SiteReport]
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
     export: ExportReport
@@ -250,6 +252,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             doubts=list(pose.doubts),
         ),
         coverage=_report_coverage(result.coverage),
+        fit=report_fit(result.fit),
         sites=sites,
         surplus=[_report_surplus(item, result, written) for item in result.surplus],
         export=ExportReport(files=list(written.files), notes=list(written.notes)),
