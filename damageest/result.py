@@ -122,6 +122,7 @@ class ViewFit:
     shift: Floats
     turn: float
     apart: float
+    left: float
     is_determined: bool
     is_corrected: bool
 

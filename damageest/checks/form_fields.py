@@ -81,17 +81,3 @@ def choose_frame(part: Mesh, corners: Floats) -> FieldFrame:
     size = [float(np.prod(np.ptp((corners - centre) @ axes.T, axis=0))) for axes in (np.eye(3), principal)]
     axes = principal if size[1] < COMPACT * size[0] else np.eye(3)
     return FieldFrame(centre, np.asarray(axes), part.diagonal / 2)
-
-
-def remove_rigid(points: Floats, displacement: Floats, weights: Floats) -> Floats:
-    """The displacement (N,3) of points (N,3) without the rigid motion that is nearest to it, by weighted least squares.
-
-    To first order in the angle, which is small."""
-    at = points - points.mean(axis=0)
-    size = max(float(np.abs(at).max()), 1e-300)
-    zero, (x, y, z) = np.zeros(len(at)), at.T / size
-    turns = np.stack([np.stack(row, axis=1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], axis=2)
-    basis = np.concatenate([turns, np.broadcast_to(np.eye(3), (len(at), 3, 3))], axis=2)
-    root = np.sqrt(weights)[:, None]
-    found = np.linalg.lstsq((basis * root[..., None]).reshape(-1, 6), (displacement * root).ravel(), rcond=1e-9)[0]
-    return np.asarray(displacement - basis @ found)

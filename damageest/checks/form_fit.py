@@ -155,7 +155,8 @@ def solve_cells(
     hessian += np.diag(np.full(len(hessian), prior))
     total = max(float(weight.sum()), 1e-300)
     spread, per_cell = float((weight * offset**2).sum()) / total, float((weight * count).sum()) / total
-    return -np.linalg.solve(hessian, J.T @ (weight * offset)), np.linalg.inv(hessian) * spread * per_cell
+    step = -np.linalg.solve(hessian, J.T @ (weight * offset))
+    return np.asarray(step), np.asarray(np.linalg.inv(hessian) * spread * per_cell)
 
 
 def improve(form: Form, cells: Cells, width: float, tolerance: float) -> Form:

@@ -28,10 +28,19 @@ def describe_fit(fit: ModelFit, unit: str, tolerance: float) -> ModelFit:
     return replace(fit, words=words)
 
 
+def name_model(fit: ModelFit) -> str:
+    """The model in a few words, for a sentence about a site."""
+    return {
+        "ok": "the part as designed",
+        "scaled": f"the scale is wrong by {100 * (fit.scale - 1):+.3g} %",
+        "deformed": "the part is " + " and ".join(DONE[kind] for kind, _ in fit.deformation),
+        "views disagree": "the views of the scan disagree",
+        "wavy": "the skin is wavy",
+    }[fit.model]
+
+
 def _describe_scale(fit: ModelFit, unit: str) -> str:
     percent = 100 * (fit.scale - 1)
-    if np.ptp(fit.scale_by_axis) > 0.5 * abs(fit.scale - 1) and fit.deformation:
-        percent = 0.0
     larger = "larger" if percent > 0 else "smaller"
     return (
         f"the scale is wrong: the scan is {abs(percent):.3g} % {larger} than the part (standard error "
@@ -51,24 +60,20 @@ def _describe_deformation(fit: ModelFit, unit: str) -> str:
 def _describe_views(fit: ModelFit, unit: str) -> str:
     apart = max((view.apart for view in fit.views), default=0.0)
     moved = [_describe_view(view, unit) for view in fit.views if view.is_corrected]
-    left = [
-        _describe_view(view, unit)
-        for view in fit.views
-        if not view.is_corrected and view.is_determined and _is_elsewhere(view, apart)
-    ]
-    open_ = [str(view.number + 1) for view in fit.views if not view.is_determined]
+    left = [_describe_view(view, unit) for view in fit.views if not view.is_corrected and _is_elsewhere(view, apart)]
+    open_ = [str(view.number + 1) for view in fit.views if not view.is_determined and view.left > 0.5 * apart]
     words = f"the views of the scan disagree by {apart:.3g} {unit} where they overlap"
     if moved:
         words += "; put right: " + ", ".join(moved)
     if left:
         words += "; misplaced, and not put right: " + ", ".join(left)
     if open_:
-        words += f"; view {', '.join(open_)} does not fix its pose by itself and was not moved"
+        words += f"; by themselves, these do not fix their pose, and were not moved: view {', '.join(open_)}"
     return words
 
 
 def _is_elsewhere(view: ViewFit, apart: float) -> bool:
-    return bool(np.linalg.norm(view.shift) > 0.25 * apart or view.turn > 0.05)
+    return view.is_determined and float(np.linalg.norm(view.shift)) > 0.25 * apart
 
 
 def _describe_view(view: ViewFit, unit: str) -> str:

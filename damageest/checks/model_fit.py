@@ -8,10 +8,11 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part
 from damageest.checks.form_choice import FormChoice, choose_form
-from damageest.checks.form_fields import Field, remove_rigid
+from damageest.checks.form_fields import Field
 from damageest.checks.form_fit import Form
 from damageest.checks.form_words import describe_fit
 from damageest.checks.view_fit import ViewFits
+from damageest.geometry.transforms import remove_rigid
 from damageest.geometry.voxels import number_faced_cubes
 from damageest.result import Deformed, ModelFit, PatchDeviation
 
@@ -21,6 +22,9 @@ FEWEST_PATCHES, FEWEST_POINTS = 12, 6
 """Patches of a width, for it to be told, and points in a patch."""
 LEAST_AMOUNT = 0.15
 """Displacement of the skin, in tolerances, below which a form does not matter."""
+LARGEST_AMOUNT, LARGEST_SCALE = 15.0, 0.04
+"""Displacement of the skin in tolerances, and relative change of length, beyond which a form is none: a face of a
+fracture was taken for skin."""
 CERTAIN = 5.0
 """How many standard errors a form has to be away from none."""
 OUTSIDE = 0.2
@@ -30,6 +34,8 @@ ALIKE = 0.3
 """Relative difference of the scales by axis up to which they are one scale."""
 OWN_SHARE = 0.3
 """Share of the amount from which a kind of deformation is named beside others."""
+INTACT = 1.5
+"""Distance from the skin, in tolerances, up to which points count as intact after the form is undone."""
 WAVY = 0.3
 """Waviness, in tolerances, from which the skin is wavy."""
 _GROUPS: dict[str, Deformed] = {
@@ -99,10 +105,18 @@ def _decide(choice: FormChoice, amount: float, error: float, tolerance: float) -
     """The model, and the form that it stands for."""
     if choice.name == "rigid" or amount < max(LEAST_AMOUNT * tolerance, CERTAIN * error):
         return "ok", None
+    by_length = [
+        abs(float(value)) / choice.form.frame.half
+        for field, value in zip(choice.form.fields, choice.form.coefficients, strict=True)
+        if field.kind in ("scale", "stretch")
+    ]
+    if amount > LARGEST_AMOUNT * tolerance or max(by_length, default=0.0) > LARGEST_SCALE:
+        return "ok", None
     if choice.name == "scale":
         return ("scaled", choice.form) if _is_one_scale(choice) else ("ok", None)
     before, after = choice.rigid_cells, choice.cells
-    explained = (np.abs(before.offset) > choice.width / 2) & (np.abs(before.offset) > 2 * np.abs(after.offset))
+    size, left = np.abs(before.offset), np.abs(after.offset)
+    explained = (size > choice.width / 2) & (size > 2 * left) & (left < choice.width)
     outside = float(before.count[explained & (before.offset > 0)].sum())
     inside = float(before.count[explained & (before.offset < 0)].sum())
     if outside < OUTSIDE * inside:
@@ -151,8 +165,10 @@ def _measure_patches(
     offset = np.einsum("ij,ij->i", feet.normals, feet.points - feet.places)
     left = np.einsum("ij,ij->i", feet.normals, form.undo(feet.points) - feet.places)
     found, waviness = [], 0.0
+    intact = np.abs(left) < INTACT * tolerance
+    places, normals, offset, left = feet.places[intact], feet.normals[intact], offset[intact], left[intact]
     for size in SIZES:
-        number = number_faced_cubes(feet.places, feet.normals, size * tolerance)[1]
+        number = number_faced_cubes(places, normals, size * tolerance)[1]
         patch = np.unique(number, return_inverse=True)[1]
         count = np.bincount(patch).astype(np.float64)
         many = count >= FEWEST_POINTS

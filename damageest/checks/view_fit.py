@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Part, Scan
+from damageest.artefacts import Floats, Ints, Part, Scan
 from damageest.checks.form_fields import choose_frame
 from damageest.checks.form_fit import Form, Skin, find_feet, improve
 from damageest.geometry.neighbourhoods import pick_one_per_cube
 from damageest.geometry.voxels import number_faced_cubes
 from damageest.result import ViewFit
 
-COMPARED, FITTED = 30_000, 4_000
+COMPARED, FITTED = 30_000, 6_000
 """Points that views are compared with, in all, and points of a view that it is fitted with."""
 REACH = 12.0
 """Distance from the skin, in tolerances, up to which points are used."""
@@ -27,7 +27,9 @@ FEWEST_OF_VIEW, FEWEST_SHARED = 4, 25
 """Points of a view in a cell, for its mean to be compared, and cells that it has to share with other views."""
 FEWEST_POINTS = 300
 """Points near the part below which a view does not fix its pose."""
-CERTAIN = 0.12
+SHOWN = 2e-3
+"""Mean square of the displacement along the normal, by a motion of size 1, from which the part shows the motion."""
+CERTAIN = 0.15
 """Standard error of a view's pose, in tolerances at its worst point, up to which it is determined."""
 HEALED = 0.6
 """Share of the disagreement that may be left after the views are fitted."""
@@ -81,9 +83,10 @@ def fit_views(part: Part, aligned: Scan, tolerance: float, is_correcting: bool) 
     frame = choose_frame(part, points)
     determined = np.zeros(count, bool)
     width = max(NARROWEST * tolerance, BY_NOISE * aligned.noise)
+    shown = _find_shown(skin, Form.rigid(frame), points, gap, tolerance)
     for number in range(count):
         own = points[view == number]
-        form, determined[number] = _fit_one(skin, Form.rigid(frame), own, gap, width, tolerance)
+        form, determined[number] = _fit_one(skin, Form.rigid(frame), own, shown, gap, width, tolerance)
         moves[number] = form.T if determined[number] else np.eye(4)
     moved = points.copy()
     for number in range(count):
@@ -96,8 +99,13 @@ def fit_views(part: Part, aligned: Scan, tolerance: float, is_correcting: bool) 
         own = view == number
         far = float(np.quantile(np.linalg.norm(moved[own] - points[own], axis=1), 0.9)) if own.any() else 0.0
         elsewhere = bool(healed and determined[number] and far > APART / 2 * tolerance)
-        views.append(_describe(number, moves[number], frame.centre, known[number], bool(determined[number]),
-                               elsewhere and is_correcting))  # fmt: skip
+        shift, turn = _describe_motion(moves[number], frame.centre)
+        views.append(
+            ViewFit(
+                number, shift, turn, float(known[number]), float(after[number]), bool(determined[number]),
+                elsewhere and is_correcting,
+            )
+        )  # fmt: skip
     return ViewFits(tuple(views), moves, True, float(known.max()))
 
 
@@ -127,10 +135,12 @@ def _compare(skin: Skin, points: Floats, view: Ints, count: int, gap: float, tol
     return apart
 
 
-def _fit_one(skin: Skin, form: Form, points: Floats, gap: float, width: float, tolerance: float) -> tuple[Form, bool]:
+def _fit_one(
+    skin: Skin, form: Form, points: Floats, shown: Floats, gap: float, width: float, tolerance: float
+) -> tuple[Form, bool]:
     """The rigid motion of one view, and whether its points determine it."""
     points = points[:: max(1, len(points) // FITTED)]
-    edge = 4 * gap * max(1.0, float(np.sqrt(len(points) / max(len(points), 1))))
+    edge = 4 * gap
     for wide in WIDTHS:
         feet = find_feet(skin, form, points, edge, REACH * tolerance, tolerance)
         if len(feet.points) < FEWEST_POINTS:
@@ -140,28 +150,22 @@ def _fit_one(skin: Skin, form: Form, points: Floats, gap: float, width: float, t
             if len(cells.count) < 12:
                 return form, False
             form = improve(form, cells, max(wide * tolerance, width), tolerance)
-    worst = float(np.sqrt(np.linalg.eigvalsh(form.covariance)[-1]))
+    worst = float(np.sqrt(np.linalg.eigvalsh(shown.T @ form.covariance @ shown)[-1]))
     return form, worst < CERTAIN * tolerance
 
 
-def _describe(
-    number: int, move: Floats, centre: Floats, apart: float, is_determined: bool, is_corrected: bool
-) -> ViewFit:
+def _find_shown(skin: Skin, form: Form, points: Floats, gap: float, tolerance: float) -> Floats:
+    """(6,S) the motions that the whole scan shows: a turn of a shaft about its axis is none of them."""
+    cells = find_feet(skin, form, points, 4 * gap, REACH * tolerance, tolerance).summarise(form)
+    weight = cells.count / cells.count.sum()
+    size, motions = np.linalg.eigh(cells.jacobian.T @ (cells.jacobian * weight[:, None]))
+    return np.asarray(motions[:, size > SHOWN])
+
+
+def _describe_motion(move: Floats, centre: Floats) -> tuple[Floats, float]:
+    """The shift (3,) of the part's centre by a motion (4,4), and its turn in degrees."""
     from scipy.spatial.transform import Rotation
 
-    shift = move[:3, :3] @ centre + move[:3, 3] - centre
-    turn = float(np.degrees(Rotation.from_matrix(move[:3, :3]).magnitude()))
-    return ViewFit(number, shift, turn, float(apart), is_determined, is_corrected)
-
-
-def find_misplaced(fits: ViewFits, tolerance: float) -> Flags:
-    """Which of the views (V,) lie elsewhere than the part says, or apart from the others without being determined."""
-    return np.array(
-        [
-            one.is_corrected
-            or (not one.is_determined and one.apart > APART * tolerance)
-            or (one.is_determined and float(np.linalg.norm(one.shift)) > APART / 2 * tolerance)
-            for one in fits.views
-        ],
-        dtype=bool,
+    return move[:3, :3] @ centre + move[:3, 3] - centre, float(
+        np.degrees(Rotation.from_matrix(move[:3, :3]).magnitude())
     )

@@ -184,6 +184,8 @@ def _print_table(result: Result, target: Path) -> None:
         depth = f"{result.tolerance:.4g} {unit}"
         console.print(f"no damage deeper than the tolerance of {depth} was found{_on_seen(result)}")
     _print_coverage(result, console)
+    if result.fit is not None and result.fit.model == "ok":  # otherwise it is among the notes
+        console.print(f"fit: {result.fit.words}")
     for item in result.surplus:
         console.print(_describe_surplus(item, unit))
     for text in result.failures:

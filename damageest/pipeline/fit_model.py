@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats, Scan
+from damageest.checks.form_words import name_model
 from damageest.checks.model_fit import FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import fit_views
@@ -126,7 +127,7 @@ def question_sites(engine: Engine, work: Work) -> Work:
         depth = float(np.quantile(-distance, 0.95))
         text = (
             f"it is {depth:.3g} {state.unit} deep, and intact skin deviates by about {local:.3g} {state.unit} there: "
-            f"{state.fitted.fit.words}"
+            f"{name_model(state.fitted.fit)}"
         )
         if depth < NEAR * local:
             site = replace(site, doubts=(*site.doubts, text))

@@ -9,6 +9,7 @@ from pydantic import Field
 from damageest.artefacts import Floats, Vector
 from damageest.report.base import JsonModel
 from damageest.report.deviation_json import DeviationReport, report_deviation
+from damageest.report.fit_json import FitReport, report_fit
 from damageest.report.site_json import MaterialReport, SiteReport, report_site, sum_material
 from damageest.report.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
 from damageest.report.uncertainty_json import report_interval
@@ -82,6 +83,7 @@ class Report(JsonModel):
     alignment: AlignmentReport
     deviation: DeviationReport
     coverage: CoverageReport | None
+    fit: FitReport | None = Field(description="null where too few points lie near the skin")
     sites: list[SiteReport]
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
     export: ExportReport
@@ -140,6 +142,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
         ),
         deviation=report_deviation(result.deviation),
         coverage=report_coverage(result.coverage),
+        fit=report_fit(result.fit),
         sites=sites,
         surplus=[report_surplus(item, result, written) for item in result.surplus],
         export=ExportReport(files=list(written.files), notes=list(written.notes)),
