@@ -81,6 +81,7 @@ def _describe_site(found: FoundSite) -> Site:
         refused=found.refused,
         verdict=found.verdict,
         accepted=found.accepted,
+        volume_rates=found.volume_rates,
         method=found.method,
         evidence=evidence,
         max_depth=max(float(-found.job.deviation.distance[members].min(initial=0.0)), 0.0),

@@ -153,7 +153,7 @@ class Candidate(_SiteState):
 class FoundSite(_SiteState):
     """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
     ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
-    ``questions``: what the scan leaves open about it."""
+    ``questions``: what the scan leaves open about it; ``volume_rates``: as in `Site`."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -165,6 +165,7 @@ class FoundSite(_SiteState):
     accepted: bool = True
     doubts: tuple[str, ...] = ()
     questions: tuple[str, ...] = ()
+    volume_rates: tuple[float, ...] = ()
 
     damage = Value[Solid]()
     others = Value[Solid | None]()

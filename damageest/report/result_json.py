@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from damageest.artefacts import Deposit, Floats, Vector
+from damageest.report.free_json import FreeMotionReport, report_free_motion
 from damageest.result import Coverage, Result, Site, Surplus
 from damageest.stages.export import ExportedFiles
 
@@ -45,6 +46,10 @@ class AlignmentReport(_Model):
     alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
     notes: list[str]
     doubts: list[str] = Field(description="those of the notes that make every site doubtful")
+    free: list[FreeMotionReport] = Field(
+        description="motions after which the scan fits as well, since no unworn skin holds it"
+    )
+    held: bool = Field(description="whether unworn skin holds the pose, but for these motions")
 
 
 class EvidenceReport(_Model):
@@ -131,6 +136,7 @@ class SiteReport(_Model):
     volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
     surface_area: float = Field(description="of the inner damage surface")
     max_depth: float = Field(description="of the scan below the nominal surface")
+    volume_rates: list[float] = Field(description="change of the volume for each unit of each motion of alignment.free")
     centroid: Vector
     bounds: tuple[Vector, Vector]
     method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
@@ -248,6 +254,8 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
             notes=list(pose.notes),
             doubts=list(pose.doubts),
+            free=[report_free_motion(motion) for motion in pose.free],
+            held=pose.is_held,
         ),
         coverage=_report_coverage(result.coverage),
         sites=sites,
@@ -308,6 +316,7 @@ def _report_site(site: Site, written: ExportedFiles) -> SiteReport:
         volume=site.damage.volume,
         surface_area=site.surface.area,
         max_depth=site.max_depth,
+        volume_rates=list(site.volume_rates),
         centroid=tuple(site.centroid.tolist()),
         bounds=(tuple(low), tuple(high)),
         method=site.method,
