@@ -9,7 +9,9 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.evaluate.honesty.lost import make_box
+from damageest.evaluate.honesty.names import SHALLOW
 from damageest.evaluate.honesty.scene import Scanning, TroubleScene
+from damageest.evaluate.honesty.ways import Trouble, TroubleWay
 from damageest.geometry.solids import to_manifold
 
 FAR = 1000.0
@@ -20,7 +22,6 @@ BORES: dict[str, tuple[float, float, float]] = {
     "tube": (0.0, 0.0, 19.0),
     "coupling": (0.0, 0.0, 13.5),
     "lever": (0.0, 0.0, 10.0),
-    "block": (0.0, 0.0, 0.0),
     "plate": (28.0, -15.0, 5.0),
     "ribbed_plate": (28.0, -6.0, 8.0),
 }
@@ -98,3 +99,90 @@ def _turn_about_z(count: int) -> list[Floats]:
     """Unit vectors (3,) across z, evenly spread."""
     angle = np.arange(count) * 2 * np.pi / count
     return list(np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)]))
+
+
+WORN = (r"\bwear\b", r"\bworn\b", *SHALLOW)
+"""Patterns of the texts that name wear, or a pose that wear leaves free."""
+
+
+def _list_ways(*cases: tuple[str, float, str, int]) -> tuple[TroubleWay, ...]:
+    """Ways of part, depth in tolerances, `known` or `unknown` pose, and number of scanner positions."""
+    return tuple(TroubleWay(part, pose, views, views > 0, amount) for part, amount, pose, views in cases)
+
+
+WEAR_TROUBLES: dict[str, Trouble] = {
+    "wear: one face": Trouble(
+        wear_one_face,
+        WORN,
+        _list_ways(
+            ("block", 2, "unknown", 0),
+            ("block", 4, "unknown", 8),
+            ("gear", 2, "unknown", 0),
+            ("lever", 4, "unknown", 0),
+            ("ribbed_plate", 1, "unknown", 0),
+            ("coupling", 3, "unknown", 8),
+            ("plate", 2, "unknown", 0),
+            ("cuboid", 3, "unknown", 0),
+            ("gear", 1, "known", 8),
+        ),
+    ),
+    "wear: both faces": Trouble(
+        wear_both_faces,
+        WORN,
+        _list_ways(
+            ("plate", 2, "unknown", 0),
+            ("gear", 2, "unknown", 0),
+            ("block", 3, "unknown", 0),
+            ("plate", 4, "known", 8),
+        ),
+    ),
+    "wear: wedge": Trouble(
+        wear_wedge,
+        WORN,
+        _list_ways(
+            ("block", 2, "unknown", 0),
+            ("lever", 4, "unknown", 0),
+            ("plate", 3, "unknown", 0),
+            ("cuboid", 4, "known", 8),
+        ),
+    ),
+    "wear: half a shaft": Trouble(
+        wear_half_shaft,
+        WORN,
+        _list_ways(
+            ("keyed_shaft", 2, "unknown", 0),
+            ("shaft", 3, "unknown", 0),
+            ("cylinder", 2, "unknown", 0),
+            ("keyed_shaft", 4, "known", 8),
+        ),
+    ),
+    "wear: one side of a journal": Trouble(
+        wear_journal,
+        WORN,
+        _list_ways(("keyed_shaft", 1, "unknown", 0), ("shaft", 4, "unknown", 0), ("cylinder", 3, "known", 8)),
+    ),
+    "wear: bore": Trouble(
+        wear_bore,
+        WORN,
+        _list_ways(
+            ("gear", 2, "unknown", 0),
+            ("tube", 4, "unknown", 0),
+            ("coupling", 3, "unknown", 0),
+            ("lever", 1, "unknown", 0),
+            ("tube", 2, "known", 8),
+        ),
+    ),
+    "wear: all over": Trouble(
+        wear_all_over,
+        WORN,
+        _list_ways(
+            ("cuboid", 2, "unknown", 0),
+            ("gear", 2, "unknown", 0),
+            ("block", 3, "unknown", 0),
+            ("tube", 4, "unknown", 0),
+            ("cylinder", 1, "unknown", 0),
+            ("plate", 2, "known", 8),
+        ),
+    ),
+}
+"""Kinds of wear: what makes each, what names it, and its cases."""

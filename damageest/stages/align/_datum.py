@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from pydantic import Field as Option
 
-from damageest.artefacts import Flags, Part
-from damageest.errors import StageError
+from damageest.artefacts import Flags, Floats, Ints, Part
 from damageest.geometry.selectors import Selector
 
 Datum = tuple[int | str | Selector, ...]
@@ -20,18 +21,24 @@ NO_DATUM: Datum = Option(
 )
 
 
-def find_datum(part: Part, datum: Datum) -> Flags | None:
-    """Which triangles (F,) of the part belong to the datum; None where there is none.
+@dataclass(frozen=True)
+class DatumSkin:
+    """The skin of ``part`` that the ``selectors`` choose."""
 
-    Raises StageError where the part has no such face, and where nothing is selected.
-    """
-    if not datum:
-        return None
-    centres = part.triangles.mean(axis=1)
-    chosen = np.zeros(len(part.faces), bool)
-    for item in datum:
-        selector = item if isinstance(item, Selector) else Selector(faces=(item,))
-        chosen |= selector.matches(centres, part.face_normals, np.arange(len(part.faces)), part)
-    if not chosen.any():
-        raise StageError("align.datum selects no skin of the part", "change its conditions, or name CAD faces")
-    return chosen
+    part: Part
+    selectors: tuple[Selector, ...]
+
+    @classmethod
+    def find(cls, part: Part, datum: Datum) -> DatumSkin | None:
+        """The datum of a part, None where the job names none. Raises StageError where the part has no such face."""
+        if not datum:
+            return None
+        found = cls(part, tuple(one if isinstance(one, Selector) else Selector(faces=(one,)) for one in datum))
+        found.choose(np.zeros((1, 3)), np.zeros(1, np.int64))
+        return found
+
+    def choose(self, points: Floats, face: Ints) -> Flags:
+        """Whether points (N,3) on the triangles ``face`` (N,), in the part's frame, belong to it (N,)."""
+        normals = self.part.face_normals[face]
+        chosen = [one.matches(points, normals, face, self.part) for one in self.selectors]
+        return np.asarray(np.any(chosen, axis=0))

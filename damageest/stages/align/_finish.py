@@ -9,6 +9,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, FreeMotion
 from damageest.errors import StageError
 from damageest.stages.align._check_pose import PoseCheck, check_pose
+from damageest.stages.align._datum import DatumSkin
 from damageest.stages.align._field import PartSurface
 from damageest.stages.align._fine import Fit
 from damageest.stages.align._frame import Frame
@@ -28,6 +29,8 @@ LOW = 1.5
 """Distance outside, in tolerances, up to which points are skin; added metal is higher."""
 MIN_MOVED = 0.1
 """Movement of the skin, in tolerances, below which the pose stays as the robust fit found it."""
+MIN_STEP = 0.02
+"""The same for a pose that a datum fixes."""
 MIN_GAIN = 0.01
 """Share of the skin that has to come into contact for the pose to be changed."""
 MIN_CONTACT = 0.1
@@ -70,14 +73,14 @@ class _Found:
 
 
 def finish_pose(
-    frame: Frame, points: Floats, best: Fit, noise: float, tolerance: float, unit: str, datum: Flags | None = None
+    frame: Frame, points: Floats, best: Fit, noise: float, tolerance: float, unit: str, datum: DatumSkin | None = None
 ) -> Finish:
     """Fits the pose of ``best`` once more, so that the largest area is in contact with the skin and none outside it.
 
     Args:
         points: (N,3) spread evenly over the scanned area. noise, tolerance: in diagonals of the part.
         unit: the job's.
-        datum: (F,) faces of the part that fix the pose; what they do not fix the others fix. None: all faces.
+        datum: the skin that fixes the pose; what it does not fix the rest fixes. None: all of the skin.
 
     Raises:
         StageError: where the scan does not show the datum.
@@ -87,26 +90,28 @@ def finish_pose(
         patches = measure_patches(target, points, fitted.pose, noise, tolerance)
         if len(patches.weight) < MIN_PATCHES or not patches.basis.shape[1]:
             return Finish(best)
-        on_datum = None if datum is None else _find_datum(datum[patches.face], patches)
+        on_datum = None if datum is None else _find_datum(frame, datum, patches)
         found = _search(patches, on_datum, noise, tolerance, rng)
         motion = found.motions[0]
         moved = float(measure_movement(patches, motion[None])[0])
         wanted = found.gain > MIN_GAIN and found.explains and moved > MIN_MOVED * tolerance
-        if number == ROUNDS or not (wanted or on_datum is not None):
+        by_datum = on_datum is not None and moved > MIN_STEP * tolerance
+        if number == ROUNDS or not (wanted or by_datum):
             break
         fitted = replace(fitted, pose=make_motion((patches.basis @ motion)[None])[0] @ fitted.pose)
     finish = _describe(frame, fitted, found, tolerance, unit, on_datum)
     return replace(finish, is_changed=fitted is not best)
 
 
-def _find_datum(is_datum: Flags, patches: Patches) -> Flags:
-    """The patches (P,) of the datum. Raises StageError where there are too few of them."""
+def _find_datum(frame: Frame, datum: DatumSkin, patches: Patches) -> Flags:
+    """Which patches (P,) belong to the datum. Raises StageError where there are too few of them."""
+    is_datum = datum.choose(patches.place * frame.size + frame.centre, patches.face)
     share = float(patches.weight[is_datum].sum() / patches.weight.sum())
     if share < MIN_DATUM:
         raise StageError(
             f"the scan does not show the datum: {share:.1%} of its points near the part lie there, and "
             f"{MIN_DATUM:.1%} are needed",
-            "name faces in align.datum that were scanned; `damageest faces` lists them",
+            "name skin in align.datum that was scanned; `damageest faces` lists the CAD faces",
         )
     return is_datum
 

@@ -7,7 +7,7 @@ import numpy as np
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.stages.align._choose import note_free_motion
-from damageest.stages.align._datum import Datum, find_datum
+from damageest.stages.align._datum import Datum, DatumSkin
 from damageest.stages.align._fine import fit
 from damageest.stages.align._finish import Finish, check_finish, finish_pose
 from damageest.stages.align._frame import Frame
@@ -25,7 +25,7 @@ def fit_from_start(
     what fixes the pose in the last fit. Raises StageError, with the ``remedy``, where its pose does not explain the
     scan, and where the fit does not converge.
     """
-    on_datum = find_datum(part, datum)
+    on_datum = DatumSkin.find(part, datum)
     frame = Frame.build(scan, part)
     noise = scan.noise / frame.size
     rng = np.random.default_rng(seed)

@@ -58,6 +58,11 @@ def measure_patches(target: PartSurface, points: Floats, pose: Floats, noise: fl
     at = move_points(pose, points)
     distance, foot, face = target.closest(at)
     near = np.abs(distance) < REACH * tolerance
+    if not near.any():
+        none = np.zeros(0)
+        return Patches(
+            none, np.zeros((0, 6)), none, none > 0, np.zeros((6, 0)), np.zeros((0, 3)), np.zeros(0, np.int64)
+        )
     distance, foot, face = distance[near], foot[near], face[near]
     normals = target.normals[face]
     edge = EDGE * float(np.sqrt(target.mesh.area / len(points)))

@@ -12,6 +12,8 @@ ARM = 0.3
 """Distance from the axis of a turn, in diagonals, of skin that it moves."""
 MOSTLY = 0.15
 """Movement by the turn, as a share of that by the shift, below which a motion is called a shift."""
+NEGLIGIBLE = 0.05
+"""Component of a motion, as a share of its largest one, that is taken as 0."""
 MIN_HELD = 0.01
 """Information about a motion that the datum has to give, as a share of what all of the skin seen gives."""
 
@@ -41,11 +43,30 @@ def describe_open(frame: Frame, patches: Patches, datum: Flags, unit: str) -> tu
     slopes = patches.slopes
     values, vectors = np.linalg.eigh((slopes[datum] * patches.weight[datum, None]).T @ slopes[datum])
     left = vectors.T[values < MIN_HELD * patches.weight.sum()]
-    motions = [to_free_motion(frame, patches.basis @ one, 0.0, 0.0, unit) for one in left]
-    if not motions:
+    if not len(left):
         return ()
-    named = "; ".join(_name(one) for one in motions)
+    named = "; ".join(_name(to_free_motion(frame, one, 0.0, 0.0, unit)) for one in _simplify(left @ patches.basis.T))
     return (f"the datum does not fix {named}: the rest of the skin fixes it",)
+
+
+def _simplify(twists: Floats) -> Floats:
+    """Twists (M,6) that span the same motions as the given ones, with shifts apart from turns, and each along an axis
+    where that is possible (reduced row echelon form)."""
+    rows = twists / np.abs(twists).max(axis=1, keepdims=True)
+    done = 0
+    for column in range(6):
+        pivot = done + int(np.argmax(np.abs(rows[done:, column])))
+        if abs(rows[pivot, column]) < NEGLIGIBLE:
+            rows[done:, column] = 0.0
+            continue
+        rows[[done, pivot]] = rows[[pivot, done]]
+        rows[done] /= rows[done, column]
+        others = np.arange(len(rows)) != done
+        rows[others] -= rows[others, column][:, None] * rows[done]
+        done += 1
+        if done == len(rows):
+            break
+    return np.asarray(rows)
 
 
 def _orient(vector: Floats, low: float, high: float) -> tuple[Vector, float, float]:

@@ -40,7 +40,7 @@ class Register(Align):
             note_ambiguity,
             note_free_motion,
         )
-        from damageest.stages.align._datum import find_datum
+        from damageest.stages.align._datum import DatumSkin
         from damageest.stages.align._field import PlaneGrid
         from damageest.stages.align._fine import fit
         from damageest.stages.align._finish import check_finish, finish_pose
@@ -58,7 +58,7 @@ class Register(Align):
         from damageest.stages.align._refine_pose import refine_pose
         from damageest.stages.align._search import search
 
-        datum = find_datum(part, self.datum)
+        datum = DatumSkin.find(part, self.datum)
         frame = Frame.build(scan, part)
         target, noise = frame.target, scan.noise / frame.size
         rng = np.random.default_rng(self.seed)
