@@ -205,7 +205,8 @@ class Site:
     After a cut-back, DV and IDS are those of the enlarged cavity. ``refused``: the stage `allowance` failed, and what
     to deposit is not known. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into
     the scan; ``max_depth``: the farthest of them below the nominal surface. ``accepted``: whether the site is part of
-    `Result.damage`; a doubtful one is where the job accepts it.
+    `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
+    unit of each motion of `Pose.free`.
     """
 
     id: int
@@ -221,6 +222,7 @@ class Site:
     refused: bool = False
     verdict: Verdict = Verdict()
     accepted: bool = True
+    volume_rates: tuple[float, ...] = ()
     uncertainty: Uncertainty | None = None
 
     @property

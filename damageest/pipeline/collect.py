@@ -86,6 +86,7 @@ def _describe_site(found: FoundSite) -> Site:
         verdict=found.verdict,
         accepted=found.accepted,
         uncertainty=shift_uncertainty(found.uncertainty, damage.volume - found.damage.volume),
+        volume_rates=found.volume_rates,
         method=found.method,
         evidence=evidence,
         max_depth=max(float(-found.job.deviation.distance[members].min(initial=0.0)), 0.0),

@@ -10,6 +10,7 @@ import numpy as np
 from damageest.artefacts import Flags
 from damageest.checks.coverage import SkinView
 from damageest.checks.evidence import weigh_evidence
+from damageest.checks.free_pose import ask_free_pose, measure_dependence
 from damageest.checks.verdict import judge_site, measure_limits
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
@@ -56,17 +57,21 @@ def judge_sites(engine: Engine, work: Work) -> Work:
         _check_numbers("accept", accept, work.sites)
     limits = measure_limits(
         state.skin, state.aligned, state.deviation, state.surplus, state.tolerance, state.unit,
-        is_fitted=engine.job.implementations[Align].name != "none",
+        is_fitted=engine.job.implementations[Align].name != "none" and not state.pose.is_held,
     )  # fmt: skip
     done = []
     for site in work.sites:
         area = measure_area(state.aligned.points[site.members], state.skin.cells.edge) if len(site.members) else 0.0
+        dependences = measure_dependence(site.damage, state.part, state.pose)
+        against, questions = ask_free_pose(dependences, site.damage.volume, state.unit)
         verdict = judge_site(
             site.evidence, -state.deviation.distance[site.members], area, state.pose, limits,
-            _is_proven_by_rays(state.skin, site), site.damage.area, site.questions, site.doubts,
+            _is_proven_by_rays(state.skin, site), site.damage.area, (*site.questions, *questions),
+            (*site.doubts, *against),
         )  # fmt: skip
         accepted = verdict.level != "doubtful" or accept == "all" or site.number in accept
-        done.append(replace(site, verdict=verdict, accepted=accepted))
+        rates = tuple(one.rate for one in dependences)
+        done.append(replace(site, verdict=verdict, accepted=accepted, volume_rates=rates))
     return replace(work, sites=tuple(done))
 
 

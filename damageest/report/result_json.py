@@ -10,6 +10,7 @@ from damageest.artefacts import Floats, Vector
 from damageest.report.base import JsonModel
 from damageest.report.deviation_json import DeviationReport, report_deviation
 from damageest.report.fit_json import FitReport, report_fit
+from damageest.report.free_json import FreeMotionReport, report_free_motion
 from damageest.report.site_json import MaterialReport, SiteReport, report_site, sum_material
 from damageest.report.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
 from damageest.report.uncertainty_json import report_interval
@@ -46,6 +47,10 @@ class AlignmentReport(JsonModel):
     alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
     notes: list[str]
     doubts: list[str] = Field(description="those of the notes that make every site doubtful")
+    free: list[FreeMotionReport] = Field(
+        description="motions after which the scan fits as well, since no unworn skin holds it"
+    )
+    held: bool = Field(description="whether unworn skin holds the pose, but for these motions")
 
 
 class ExportReport(JsonModel):
@@ -139,6 +144,8 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
             notes=list(pose.notes),
             doubts=list(pose.doubts),
+            free=[report_free_motion(motion) for motion in pose.free],
+            held=pose.is_held,
         ),
         deviation=report_deviation(result.deviation),
         coverage=report_coverage(result.coverage),

@@ -78,6 +78,7 @@ class SiteReport(JsonModel):
     uncertainty: UncertaintyReport | None
     surface_area: float = Field(description="of the inner damage surface")
     max_depth: float = Field(description="of the scan below the nominal surface")
+    volume_rates: list[float] = Field(description="change of the volume for each unit of each motion of alignment.free")
     centroid: Vector
     bounds: tuple[Vector, Vector]
     method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
@@ -112,6 +113,7 @@ def report_site(site: Site, written: ExportedFiles) -> SiteReport:
         uncertainty=report_uncertainty(site),
         surface_area=site.surface.area,
         max_depth=site.max_depth,
+        volume_rates=list(site.volume_rates),
         centroid=tuple(site.centroid.tolist()),
         bounds=(tuple(low), tuple(high)),
         method=site.method,
