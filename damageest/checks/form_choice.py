@@ -61,8 +61,8 @@ CANDIDATES = dict(_SETS)
 
 @dataclass(frozen=True, eq=False)
 class FormChoice:
-    """The ``form`` that explains the scan, and the ``rigid`` one. ``cells``: what is left in the cells of the skin after
-    the form, ``rigid_cells``: after the rigid motion.
+    """The ``form`` that explains the scan, and the ``rigid`` one. ``cells``: what is left in the cells of the skin
+    after the form, ``rigid_cells``: after the rigid motion.
 
     ``scale``: the form with the one scale that fits best, ``stretch``: with one for each axis, whether they are needed
     or not. ``name``: of `CANDIDATES`. ``gain``: the cost that the form explains beyond the rigid motion, and ``kept``,
