@@ -7,8 +7,9 @@ from pathlib import Path
 import cadquery as cq
 import numpy as np
 
-from damageest.artefacts import Part
+from damageest.artefacts import Part, Solid
 from damageest.evaluate.parts import PARTS
+from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.io.meshes import write_points, write_stl
 from damageest.stages.scan.simulate import Simulate
 
@@ -49,6 +50,8 @@ def main() -> None:
     half_torus_step()
     for name in ("block", "ribbed_plate", "cylinder"):
         write_stl(HERE / "parts" / f"{name}.stl", PARTS[name]())
+    blade = to_manifold(PARTS["blade"]()).simplify(0.02)  # mm, and a quarter of the triangles
+    write_stl(HERE / "parts" / "blade.stl", Solid(*to_arrays(blade)))
     wedge = {"tool": "plane", "point": [31.0, 0.0, 9.0], "normal": [0.75, 0.15, 0.65]}
     scan_of(PARTS["block"](), "block_wedge.ply", [wedge], 110_000, 5)
 

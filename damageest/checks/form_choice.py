@@ -33,6 +33,9 @@ WIDTHS = (8.0, 5.0, 3.0, 2.0, 1.2, 0.7)
 """Widths of the kernel, in tolerances, one after the other; then the last one."""
 NARROWEST, BY_NOISE = 0.3, 1.25
 """The last width: the larger of these, in tolerances and in standard deviations of the noise."""
+MOST_OUTSIDE, LEAST_OUTSIDE = 0.02, 0.5
+"""Share of the skin that lies outside the rigid part by more than the second, in tolerances, from which all fields are
+also fitted from wide kernels on."""
 BLOCKS, FOLDS = 6, 4
 """Blocks along the part's diagonal that cells are left out by, and the folds that these are dealt to."""
 LEAST_GAIN = 0.015
@@ -61,13 +64,13 @@ CANDIDATES = dict(_SETS)
 
 @dataclass(frozen=True, eq=False)
 class FormChoice:
-    """The ``form`` that explains the scan, and the ``rigid`` one. ``cells``: what is left in the cells of the skin after
-    the form, ``rigid_cells``: after the rigid motion.
+    """The ``form`` that explains the scan, and the ``rigid`` one. ``cells``: what is left in the cells of the skin
+    after the form, ``rigid_cells``: after the rigid motion.
 
     ``scale``: the form with the one scale that fits best, ``stretch``: with one for each axis, whether they are needed
     or not. ``name``: of `CANDIDATES`. ``gain``: the cost that the form explains beyond the rigid motion, and ``kept``,
-    where it was not fitted. ``costs``: of all candidates. ``width``: of the kernel. ``feet``: the points
-    that the form was fitted to.
+    where it was not fitted. ``costs``: of the candidates that were tried. ``width``: of the
+    kernel. ``feet``: the points that the form was fitted to.
     """
 
     name: str
@@ -122,31 +125,46 @@ def choose_form(part: Part, points: Floats, distance: Floats, noise: float, tole
     task = _Task(Skin.build(part), tolerance, max(NARROWEST * tolerance, BY_NOISE * noise), PER_CELL * gap)
     start = Form.rigid(choose_frame(part, every))
     rigid = task.fit(start, WIDTHS[3:], few)
-    fits = [task.fit(start.with_fields(EVERY), WIDTHS, few), task.fit(rigid.with_fields(EVERY), WIDTHS[4:], few)]
-    feet = [task.find_feet(one, few) for one in fits]
-    cost = [_measure(at.summarise(one), task.width) for one, at in zip(fits, feet, strict=True)]
-    rich = task.fit(fits[int(np.argmin(cost))], (0.0,), every)
+    starts = [task.fit(rigid.with_fields(EVERY), WIDTHS[4:], few)]
+    if _measure_outside(task.find_feet(rigid, few).summarise(rigid), tolerance) > MOST_OUTSIDE:
+        starts.append(task.fit(start.with_fields(EVERY), WIDTHS, few))
+    found = [_measure(task.find_feet(one, few).summarise(one), task.width) for one in starts]
+    rich = task.fit(starts[int(np.argmin(found))], (0.0,), every)
     at = task.find_feet(rich, every)
     cells = at.summarise(rich)
     if len(cells.count) < 30:
         return None
     forms, costs = {}, {}
-    for name, fields in CANDIDATES.items():
-        forms[name], costs[name] = _reduce(task, rich, cells, fields)
+    names = ("rigid", "every", "scale", "stretch", *CANDIDATES)
+    for name in names:
+        if name not in costs and (len(costs) < 4 or costs["rigid"] - costs["every"] > LEAST_GAIN):
+            forms[name], costs[name] = _reduce(task, rich, cells, CANDIDATES[name])
     full = costs["rigid"] - costs["every"]
-    name = next(name for name in CANDIDATES if costs[name] <= costs["every"] + max(NEARLY * full, LEAST_GAIN / 2))
+    name = next(
+        name
+        for name in CANDIDATES
+        if name in costs and costs[name] <= costs["every"] + max(NEARLY * full, LEAST_GAIN / 2)
+    )
     gain, kept = costs["rigid"] - costs[name], 0.0
     if name != "rigid":
         kept = _cross_validate(task, rich, cells, CANDIDATES[name])
     if gain < LEAST_GAIN or kept < LEAST_SHARE * gain:
         name = "rigid"
-    form = task.fit(forms[name], (0.0,), every)
+    form = forms[name]
+    if name != "rigid":
+        form = task.fit(form, (0.0,), every)
+        at = task.find_feet(form, every)
     scale = form if name == "scale" else forms["scale"]
-    at = task.find_feet(form, every)
     return FormChoice(
         name, form, forms["rigid"], scale, forms["stretch"], at.summarise(form), at.summarise(forms["rigid"]),
         gain, kept, costs, task.width, at,
     )  # fmt: skip
+
+
+def _measure_outside(cells: Cells, tolerance: float) -> float:
+    """Share of the skin that lies outside the part by more than noise, where no loss puts it."""
+    outside = cells.offset > LEAST_OUTSIDE * tolerance
+    return float(cells.count[outside].sum() / max(float(cells.count.sum()), 1.0))
 
 
 def _measure(cells: Cells, width: float) -> float:

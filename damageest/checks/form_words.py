@@ -52,8 +52,8 @@ def _describe_scale(fit: ModelFit, unit: str) -> str:
 def _describe_deformation(fit: ModelFit, unit: str) -> str:
     kinds = " and ".join(f"{DONE[kind]} by {amount:.3g} {unit}" for kind, amount in fit.deformation)
     return (
-        f"the part is {kinds}: the seen skin lies up to {fit.amount:.3g} {unit} (standard error {fit.amount_error:.2g}) "
-        "away from where the nearest rigid part has it"
+        f"the part is {kinds}: the seen skin lies up to {fit.amount:.3g} {unit} (standard error "
+        f"{fit.amount_error:.2g}) away from where the nearest rigid part has it"
     )
 
 

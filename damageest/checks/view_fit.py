@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Part, Scan
+from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.checks.form_fields import choose_frame
 from damageest.checks.form_fit import Form, Skin, find_feet, improve
 from damageest.geometry.neighbourhoods import pick_one_per_cube
@@ -38,24 +38,26 @@ HEALED = 0.6
 @dataclass(frozen=True, eq=False)
 class ViewFits:
     """The views, each with ``moves`` (V,4,4): the motion that puts it right, in the part's frame. ``disagree``: whether
-    they differ by more than noise explains. ``before``: by how much."""
+    they differ by more than noise explains. ``common`` (4,4): the motion of the view that most others lie with, which
+    is an error of the pose and not of views; shifts and turns of ``views`` are beyond it."""
 
     views: tuple[ViewFit, ...]
     moves: Floats
     disagree: bool
-    before: float
+    common: Floats
 
     def apply(self, aligned: Scan) -> Scan:
-        """The scan with the views put right that were corrected."""
+        """The scan with the views put right: the corrected ones by their own motion, the others by the common one."""
         assert aligned.view is not None
         assert aligned.viewpoints is not None
         points, scanners = aligned.points.copy(), aligned.viewpoints.copy()
         for one in self.views:
-            if one.is_corrected:
-                move = self.moves[one.number]
-                own = aligned.view == one.number
-                points[own] = points[own] @ move[:3, :3].T + move[:3, 3]
-                scanners[one.number] = move[:3, :3] @ scanners[one.number] + move[:3, 3]
+            move = self.moves[one.number] if one.is_corrected else self.common
+            own = aligned.view == one.number
+            points[own] = points[own] @ move[:3, :3].T + move[:3, 3]
+            scanners[one.number] = move[:3, :3] @ scanners[one.number] + move[:3, 3]
+        other = aligned.view < 0
+        points[other] = points[other] @ self.common[:3, :3].T + self.common[:3, 3]
         return replace(aligned, points=points, viewpoints=scanners)
 
 
@@ -79,7 +81,7 @@ def fit_views(part: Part, aligned: Scan, tolerance: float, is_correcting: bool) 
     moves = np.tile(np.eye(4), (count, 1, 1))
     known = np.nan_to_num(before)
     if not (known > APART * tolerance).any():
-        return ViewFits((), moves, False, float(known.max(initial=0.0)))
+        return ViewFits((), moves, False, np.eye(4))
     frame = choose_frame(part, points)
     determined = np.zeros(count, bool)
     width = max(NARROWEST * tolerance, BY_NOISE * aligned.noise)
@@ -94,19 +96,25 @@ def fit_views(part: Part, aligned: Scan, tolerance: float, is_correcting: bool) 
         moved[own] = points[own] @ moves[number, :3, :3].T + moves[number, :3, 3]
     after = np.nan_to_num(_compare(skin, moved, view, count, gap, tolerance))
     healed = float(after.max()) < max(HEALED * float(known.max()), APART * tolerance)
+    common = _choose_common(moves, determined, np.bincount(view, minlength=count), part.bounds) if healed else np.eye(4)
+    normals = skin.find_feet(moved)[2]
     views = []
     for number in range(count):
         own = view == number
-        far = float(np.quantile(np.linalg.norm(moved[own] - points[own], axis=1), 0.9)) if own.any() else 0.0
+        at = points[own] @ common[:3, :3].T + common[:3, 3]
+        along = np.einsum("ij,ij->i", moved[own] - at, normals[own])
+        far = float(np.quantile(np.abs(along), 0.9)) if own.any() else 0.0
         elsewhere = bool(healed and determined[number] and far > APART / 2 * tolerance)
-        shift, turn = _describe_motion(moves[number], frame.centre)
+        shift, turn = _describe_motion(
+            moves[number] @ np.linalg.inv(common) if determined[number] else np.eye(4), frame.centre
+        )
         views.append(
             ViewFit(
                 number, shift, turn, float(known[number]), float(after[number]), bool(determined[number]),
                 elsewhere and is_correcting,
             )
         )  # fmt: skip
-    return ViewFits(tuple(views), moves, True, float(known.max()))
+    return ViewFits(tuple(views), moves, True, common)
 
 
 def _draw(aligned: Scan, number: int, gap: float) -> Ints:
@@ -160,6 +168,17 @@ def _find_shown(skin: Skin, form: Form, points: Floats, gap: float, tolerance: f
     weight = cells.count / cells.count.sum()
     size, motions = np.linalg.eigh(cells.jacobian.T @ (cells.jacobian * weight[:, None]))
     return np.asarray(motions[:, size > SHOWN])
+
+
+def _choose_common(moves: Floats, determined: Flags, count: Ints, bounds: Floats) -> Floats:
+    """The motion (4,4) of the view that lies nearest to the others: the median of the motions of determined views."""
+    if not determined.any():
+        return np.eye(4)
+    corner = np.array([[x, y, z] for x in bounds[:, 0] for y in bounds[:, 1] for z in bounds[:, 2]])
+    chosen = np.flatnonzero(determined)
+    ends = corner @ np.swapaxes(moves[chosen, :3, :3], 1, 2) + moves[chosen, None, :3, 3]
+    apart = np.linalg.norm(ends[:, None] - ends[None], axis=3).mean(axis=2)
+    return np.asarray(moves[chosen[int(np.argmin((apart * count[chosen]).sum(axis=1) - 1e-9 * count[chosen]))]])
 
 
 def _describe_motion(move: Floats, centre: Floats) -> tuple[Floats, float]:

@@ -36,6 +36,8 @@ def correct_scan(engine: Engine, work: Work) -> Work:
     key = digest("views", state.key("aligned"), state.key("part"), state.key("tolerance"))
     state = state.with_value(JobState.views, views, key)
     if views is not None and any(view.is_corrected for view in views.views):
+        pose = replace(state.pose, T_part_scan=_make_rigid(views.common @ state.pose.T_part_scan))
+        state = state.derive(JobState.pose, pose, JobState.pose, JobState.views)
         state = _take_corrected(engine, state, views.apply(state.aligned))
     scale = 1.0
     if getattr(engine.job.stages.get(ReadScan), "scale", None) == "auto":
