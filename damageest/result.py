@@ -101,6 +101,47 @@ class Surplus:
         return self.solid.volume if self.solid else None
 
 
+Interval = tuple[float, float]
+"""Low and high end."""
+
+
+@dataclass(frozen=True)
+class Fading:
+    """A shallow loss whose edge fades out: its volume where it is deeper than ``half`` the tolerance, than the
+    tolerance, ``at``, and than ``twice`` the tolerance; ``beyond``: what is lost beyond the rim of the site."""
+
+    half: float
+    at: float
+    twice: float
+    beyond: float
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How exactly a site's volume and its largest depth are known.
+
+    ``volume_95``, ``depth_95``: the 95 % intervals; None where the scan does not support one, and ``reasons`` say why.
+    The causes, each as one standard deviation of the volume: ``noise`` of the points; ``spacing`` of the points,
+    between which the inner surface is interpolated; ``rim``: where it meets the skin; ``pose``; ``tessellation`` of the
+    part; ``form`` of skin that deviates over whole areas. ``inside``, ``beside``: by how much the loss may be larger at
+    most where no points show the inner surface, and the skin beside it. ``fading``: None for a loss that is not
+    shallow.
+    """
+
+    volume_95: Interval | None
+    depth_95: Interval | None
+    noise: float = 0.0
+    spacing: float = 0.0
+    rim: float = 0.0
+    pose: float = 0.0
+    tessellation: float = 0.0
+    form: float = 0.0
+    inside: float = 0.0
+    beside: float = 0.0
+    fading: Fading | None = None
+    reasons: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Site:
     """One damage: ``damage`` (DV) and ``surface`` (IDS) in the part's frame; ``deposit`` None where it is the DV.
@@ -124,6 +165,23 @@ class Site:
     refused: bool = False
     verdict: Verdict = Verdict()
     accepted: bool = True
+    uncertainty: Uncertainty | None = None
+
+    @property
+    def volume_95(self) -> Interval | None:
+        """The 95 % interval of the volume of ``damage``; None where the scan does not support one."""
+        return self.uncertainty.volume_95 if self.uncertainty else None
+
+    @property
+    def depth_95(self) -> Interval | None:
+        """The 95 % interval of the largest depth of the loss, which ``max_depth``, of single points, exceeds by noise;
+        None where the scan does not support one."""
+        return self.uncertainty.depth_95 if self.uncertainty else None
+
+    @property
+    def fading(self) -> Fading | None:
+        """How a shallow loss fades out; None for a loss with a sharp rim."""
+        return self.uncertainty.fading if self.uncertainty else None
 
     @cached_property
     def centroid(self) -> Floats:
@@ -170,7 +228,8 @@ class Result:
     takes a point from the scanner's frame to the part's: x_part = R x_scan + t; ``aligned`` is the scan moved by it.
     ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of the DVs of all
     accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
-    sites have no DV or no deposit and why: then ``status`` is ``incomplete``.
+    sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
+    volume of ``damage``; None where one of its sites has none.
     """
 
     name: str
@@ -191,6 +250,7 @@ class Result:
     stages: tuple[StageRecord, ...] = ()
     coverage: Coverage | None = None
     surplus: tuple[Surplus, ...] = ()
+    volume_95: Interval | None = None
 
     @property
     def status(self) -> Literal["ok", "incomplete"]:

@@ -13,6 +13,7 @@ from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid,
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.pipeline.uncertainty import shift_interval, shift_uncertainty
 from damageest.result import Result, Site
 
 
@@ -56,6 +57,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
         stages=tuple(engine.records),
         coverage=state.coverage,
         surplus=state.surplus,
+        volume_95=shift_interval(state.volume_95, damage, found),
     )
     key = digest(
         engine.job.name, [state.keys[name] for name in sorted(state.keys)], [s.key("deposit") for s in work.sites]
@@ -81,6 +83,7 @@ def _describe_site(found: FoundSite) -> Site:
         refused=found.refused,
         verdict=found.verdict,
         accepted=found.accepted,
+        uncertainty=shift_uncertainty(found.uncertainty, damage, found.damage),
         method=found.method,
         evidence=evidence,
         max_depth=max(float(-found.job.deviation.distance[members].min(initial=0.0)), 0.0),

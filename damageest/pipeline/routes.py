@@ -30,6 +30,7 @@ from damageest.pipeline.sites import (
     where_damaged,
 )
 from damageest.pipeline.surplus import find_surplus, relate_surplus
+from damageest.pipeline.uncertainty import measure_uncertainty
 from damageest.pipeline.verdicts import choose_sites, judge_sites
 from damageest.stages.align import Align
 from damageest.stages.allowance import Allowance
@@ -56,7 +57,7 @@ BY_SITE: Route = (
 AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
 CLOSE: Route = (
     add_lost_bodies, set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus,
-    judge_sites, make_deposits(Allowance), separate_deposits, collect_result,
+    judge_sites, make_deposits(Allowance), separate_deposits, measure_uncertainty, collect_result,
 )  # fmt: skip
 
 WRITE: Route = (Export,)

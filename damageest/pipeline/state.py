@@ -32,7 +32,7 @@ from damageest.artefacts import (
 from damageest.checks.coverage import SkinView
 from damageest.errors import StageError
 from damageest.pipeline.cache import digest
-from damageest.result import Coverage, Result, Surplus, Verdict
+from damageest.result import Coverage, Interval, Result, Surplus, Uncertainty, Verdict
 from damageest.stages.export import ExportedFiles, Writer
 
 T = TypeVar("T")
@@ -103,6 +103,7 @@ class JobState(State):
     skin = Value[SkinView]()
     coverage = Value[Coverage]()
     surplus = Value[tuple[Surplus, ...]]()
+    volume_95 = Value[Interval | None]()
     enclosures = Value[Enclosures]()
     result = Value[Result]()
     folder = Value[Path]()
@@ -153,7 +154,7 @@ class Candidate(_SiteState):
 class FoundSite(_SiteState):
     """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
     ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
-    ``questions``: what the scan leaves open about it."""
+    ``questions``: what the scan leaves open about it; ``uncertainty``: of the volume of ``damage``."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -165,6 +166,7 @@ class FoundSite(_SiteState):
     accepted: bool = True
     doubts: tuple[str, ...] = ()
     questions: tuple[str, ...] = ()
+    uncertainty: Uncertainty | None = None
 
     damage = Value[Solid]()
     others = Value[Solid | None]()

@@ -11,6 +11,7 @@ from damageest.report.base import JsonModel
 from damageest.report.deviation_json import DeviationReport, report_deviation
 from damageest.report.site_json import MaterialReport, SiteReport, report_site, sum_material
 from damageest.report.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
+from damageest.report.uncertainty_json import report_interval
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
@@ -85,6 +86,7 @@ class Report(JsonModel):
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
     export: ExportReport
     damage_volume: float
+    volume_95: tuple[float, float] | None = Field(description="95 % interval of `damage_volume`; null: there is none")
     undamaged_volume: float
     material: MaterialReport = Field(description="what the whole repair takes")
     truth: TruthReport | None
@@ -142,6 +144,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
         surplus=[report_surplus(item, result, written) for item in result.surplus],
         export=ExportReport(files=list(written.files), notes=list(written.notes)),
         damage_volume=result.damage_volume,
+        volume_95=report_interval(result.volume_95),
         undamaged_volume=result.undamaged_volume,
         material=sum_material([site.deposit for site in sites if site.deposit]),
         truth=_report_truth(result),

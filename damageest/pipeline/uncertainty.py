@@ -1,0 +1,131 @@
+"""The step that measures how exactly the volumes are known, of each site and in total."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import Flags, Solid
+from damageest.checks.fading import find_removed, measure_fading
+from damageest.checks.pose_error import PoseError, measure_pose_error
+from damageest.checks.uncertainty import (
+    SiteError,
+    combine_site,
+    combine_total,
+    describe_fading,
+    limit_beside,
+    measure_site_error,
+)
+from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.solids import unite
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.result import Fading, Interval, Uncertainty
+from damageest.stages.allowance import Allowance
+
+BESIDE = 2.0
+"""Distance from a damage volume, in reaches, within which unseen skin may be part of the same loss."""
+
+
+def measure_uncertainty(engine: Engine, work: Work) -> Work:
+    """Gives each site the 95 % intervals of its volume and depth, and the job that of the total.
+
+    A site that is doubtful has none: what contradicts it is not an error that has a size. The total has one where each
+    accepted site has one, and no damage was left without a volume.
+    """
+    state = work.job
+    if not work.sites:
+        total = None if work.failures else (0.0, 0.0)
+        return replace(work, job=state.with_value(JobState.volume_95, total, digest("no sites", bool(work.failures))))
+    pose = measure_pose_error(state.part, state.aligned, state.deviation, state.tolerance)
+    sites, errors = [], []
+    for site in work.sites:
+        uncertainty, error = _measure_site(state, site, work.sites, pose)
+        sites.append(replace(site, uncertainty=uncertainty))
+        if site.accepted:
+            errors.append(error)
+    known = [error for error in errors if error is not None]
+    lost = [error for error in work.failures if error.stage != Allowance.stage]
+    total = None
+    if len(known) == len(errors) and not lost:
+        origin = state.part.bounds.mean(axis=0)
+        total = combine_total(float(unite((s.damage for s in sites if s.accepted), origin).volume()), known)
+    key = digest("interval", total, [site.key("damage") for site in sites])
+    return replace(work, sites=tuple(sites), job=state.with_value(JobState.volume_95, total, key))
+
+
+def _measure_site(
+    state: JobState, site: FoundSite, every: tuple[FoundSite, ...], pose: PoseError
+) -> tuple[Uncertainty, SiteError | None]:
+    """A site's uncertainty, and its errors, None where there is no interval."""
+    if site.verdict.level == "doubtful":
+        return Uncertainty(None, None, reasons=("no interval, since the site is doubtful",)), None
+    points = state.aligned.points[site.members]
+    inner = find_inner_faces(site.damage, state.part)
+    error = measure_site_error(
+        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.tolerance
+    )
+    if error is None:
+        return Uncertainty(None, None, reasons=("no interval, since no scan points lie on its inner surface",)), None
+    reach = BESIDE * max(2 * state.tolerance, 1.5 * state.aligned.spacing)
+    fading = _measure_fading(state, site, inner, every, pose)
+    error = replace(
+        error,
+        beside=limit_beside(state.coverage, site.damage, reach, error.depth),
+        fading=fading.beyond if fading else 0.0,
+    )
+    volume, depth = combine_site(error)
+    reasons = []
+    if error.beside > 0:
+        reasons.append(
+            f"skin beside it is not seen: the loss may be larger there by up to {error.beside:.3g} {state.unit}³"
+        )
+    if error.inside > 0:
+        reasons.append(
+            f"its inner surface has no scan points in one piece of {site.evidence.ids_gap:.3g} {state.unit}²: the loss "
+            f"may be larger there by up to {error.inside:.3g} {state.unit}³"
+        )
+    if fading:
+        reasons.append(describe_fading(fading, error.volume, state.unit, state.tolerance))
+    uncertainty = Uncertainty(
+        volume_95=volume,
+        depth_95=depth,
+        noise=error.noise,
+        spacing=error.spacing,
+        rim=error.rim,
+        pose=float(np.linalg.norm(error.pose)),
+        tessellation=error.tessellation,
+        form=error.form,
+        inside=error.inside,
+        beside=error.beside,
+        fading=fading,
+        reasons=tuple(reasons),
+    )
+    return uncertainty, error
+
+
+def _measure_fading(
+    state: JobState, site: FoundSite, inner: Flags, every: tuple[FoundSite, ...], pose: PoseError
+) -> Fading | None:
+    others = np.zeros(len(state.skin.cells.areas), bool)
+    for other in every:
+        if other is not site:
+            others |= find_removed(other.damage, state.skin)
+    return measure_fading(site.damage, inner, state.skin, state.aligned.noise, pose.systematic, state.tolerance, others)
+
+
+def shift_interval(interval: Interval | None, after: Solid | None, before: Solid | None) -> Interval | None:
+    """The interval of a volume ``before`` a cut-back, for the volume ``after`` it: both have the same errors."""
+    if interval is None or after is None or before is None or after is before:
+        return interval
+    more = after.volume - before.volume
+    return interval[0] + more, interval[1] + more
+
+
+def shift_uncertainty(uncertainty: Uncertainty | None, after: Solid, before: Solid) -> Uncertainty | None:
+    """As `shift_interval`, for the interval of a site's volume. The depth is that before the cut-back."""
+    if uncertainty is None:
+        return None
+    return replace(uncertainty, volume_95=shift_interval(uncertainty.volume_95, after, before))
