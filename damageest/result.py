@@ -229,7 +229,8 @@ class Result:
     ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of the DVs of all
     accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
     sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
-    volume of ``damage``; None where one of its sites has none.
+    volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
+    high end.
     """
 
     name: str

@@ -23,7 +23,7 @@ WIDTH = 2.0
 GAP = 8.0
 """Area of a hole in the scan of an inner surface, in squares of the spacing or the tolerance, from which it may hide
 more than interpolation shows; as in `checks.verdict`."""
-HOLE = 0.25
+HOLE = 0.5
 """Depth that a hole in the scan of an inner surface may hide, in square roots of its area."""
 SMOOTH = 30.0
 """Angle in degrees between triangles up to which they stand for one curved face, whose chords they are."""
@@ -101,10 +101,13 @@ def combine_site(error: SiteError) -> tuple[Interval, Interval]:
     return combine_total(error.volume, [error]), (max(depth_low, 0.0), depth_high)
 
 
-def combine_total(volume: float, errors: Sequence[SiteError]) -> Interval:
-    """The 95 % interval of the sites' ``volume`` together, which is in the unit's third power, and at least 0."""
+def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 0.0) -> Interval:
+    """The 95 % interval of the sites' ``volume`` together, which is in the unit's third power, and at least 0.
+
+    ``doubtful``: volume of sites that are not part of the damage, and may be.
+    """
     if not errors:
-        return volume, volume
+        return volume, volume + doubtful
     alone = np.array([[one.noise, one.spacing, one.rim] for one in errors])
     shared = np.array([[one.form, one.tessellation] for one in errors]).sum(axis=0)
     moved = np.sum([one.pose for one in errors], axis=0)
@@ -113,7 +116,7 @@ def combine_total(volume: float, errors: Sequence[SiteError]) -> Interval:
     middle = volume - sum(one.excess for one in errors)
     low = min(middle - WIDTH * deviation, volume)
     high = max(middle + WIDTH * deviation, volume) + more
-    return max(low, 0.0), high
+    return max(low, 0.0), high + doubtful
 
 
 def limit_beside(coverage: Coverage, damage: Solid, reach: float, depth: float) -> float:

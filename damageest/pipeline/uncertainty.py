@@ -33,7 +33,8 @@ def measure_uncertainty(engine: Engine, work: Work) -> Work:
     """Gives each site the 95 % intervals of its volume and depth, and the job that of the total.
 
     A site that is doubtful has none: what contradicts it is not an error that has a size. The total has one where each
-    accepted site has one, and no damage was left without a volume.
+    accepted site has one, and no damage was left without a volume. Doubtful sites that are not accepted make it wide:
+    they may be damage, too.
     """
     state = work.job
     if not work.sites:
@@ -51,7 +52,8 @@ def measure_uncertainty(engine: Engine, work: Work) -> Work:
     total = None
     if len(known) == len(errors) and not lost:
         origin = state.part.bounds.mean(axis=0)
-        total = combine_total(float(unite((s.damage for s in sites if s.accepted), origin).volume()), known)
+        volume = float(unite((site.damage for site in sites if site.accepted), origin).volume())
+        total = combine_total(volume, known, sum(site.damage.volume for site in sites if not site.accepted))
     key = digest("interval", total, [site.key("damage") for site in sites])
     return replace(work, sites=tuple(sites), job=state.with_value(JobState.volume_95, total, key))
 
