@@ -70,7 +70,8 @@ def find_removed(damage: Solid, skin: SkinView) -> Flags:
     """Which cells (C,) of the skin a damage volume removes."""
     cells = skin.cells
     removed = np.zeros(len(cells.areas), bool)
-    near = ((cells.centres > damage.bounds[0]) & (cells.centres < damage.bounds[1])).all(axis=1)
+    low, high = damage.bounds[0] - cells.edge, damage.bounds[1] + cells.edge
+    near = ((cells.centres > low) & (cells.centres < high)).all(axis=1)
     index = np.flatnonzero(near)
     if len(index):
         removed[index] = distance_to_mesh(cells.centres[index], damage) < 1e-3 * cells.edge

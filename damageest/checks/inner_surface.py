@@ -18,7 +18,7 @@ from damageest.geometry.voxels import number_cubes
 CUBE = 5.0
 """Edge in spacings of the cubes in which the area for each point is measured: about 25 points."""
 FEWEST = 4
-"""Points in a cube from which its own density counts; with fewer, that of the whole surface."""
+"""Points in a cube from which its own density counts; with fewer, at most that of the whole surface."""
 MOST_POINTS = 20_000
 """Points that are assigned to the surface; more do not change the second digit."""
 NOISE = 1.0
@@ -87,7 +87,8 @@ def _measure_shares(damage: Solid, inner: Flags, area: Floats, points: Floats, e
     _, cube = np.unique(number_cubes(damage.triangles.mean(axis=1), edge)[1], return_inverse=True)
     count = step * np.bincount(cube[face], minlength=int(cube.max()) + 1)
     own = np.bincount(cube, weights=area * inner, minlength=len(count))
-    shares = np.where(count >= FEWEST * step, own / np.maximum(count, 1), share)
+    own_share = own / np.maximum(count, 1)
+    shares = np.where(count >= FEWEST * step, own_share, np.maximum(own_share, share))
     return share, float((own * shares).sum())
 
 

@@ -154,7 +154,8 @@ def suite_command(
             raise InputError(
                 "--intervals: varies noise and density itself; leave out --vary, --against, --set, --noise and --points"
             )
-        return run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, _format_command())
+        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, _format_command())
+        return
     _prepare(out, plots)
     if write:
         replace_between_marks(write, None, marks)  # fails before the runs start if the marks are missing

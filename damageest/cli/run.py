@@ -157,24 +157,19 @@ def _print_table(result: Result, target: Path) -> None:
     unit = result.units
     if result.sites:
         table = Table(title=None, box=None, pad_edge=False, header_style="bold")
-        heads = ["site", f"volume {unit}³", "95 %", f"area {unit}²", f"depth {unit}"]
+        heads = ["site", f"volume {unit}³", f"area {unit}²", f"depth {unit}"]
         if any(site.deposit for site in result.sites):
             heads += [f"deposit {unit}³", f"stock {unit}³"]
-        for name in (*heads, "method", "verdict"):
+        for name in (*heads, "95 %", "method", "verdict"):
             table.add_column(name, justify="left" if name in ("method", "verdict") else "right")
         for site in result.sites:
             verdict = site.verdict.level + ("" if site.accepted == (site.verdict.level != "doubtful") else ", accepted")
-            numbers = [
-                f"{site.damage.volume:.6g}",
-                _format_interval(site.volume_95),
-                f"{site.surface.area:.6g}",
-                f"{site.max_depth:.4g}",
-            ]
-            if len(heads) > 5:
+            numbers = [f"{site.damage.volume:.6g}", f"{site.surface.area:.6g}", f"{site.max_depth:.4g}"]
+            if len(heads) > 4:
                 stock = getattr(site.deposit, "stock_volume", None)
                 numbers += [f"{site.deposit.volume:.6g}" if site.deposit else "–"]
                 numbers += ["–" if stock is None else f"{stock:.6g}"]
-            table.add_row(str(site.id), *numbers, site.method, verdict)
+            table.add_row(str(site.id), *numbers, _format_interval(site.volume_95), site.method, verdict)
         console.print(table)
         known = "" if result.volume_95 is None else f" (95 %: {_format_interval(result.volume_95)})"
         console.print(
