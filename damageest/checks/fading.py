@@ -7,6 +7,8 @@ leaves out.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh, Solid
@@ -19,8 +21,10 @@ from damageest.result import Fading
 
 SHALLOW = 4.0
 """Depth in tolerances of half the skin of a site up to which it is shallow."""
-SAMPLES = 4000
+SAMPLES = 2000
 """Places on the skin at which the depth is measured."""
+FIRST = 10
+"""Every so many of these places tell whether the site is shallow at all."""
 PATCH = 3.0
 """Edge of a patch in edges of a skin cell."""
 SIGNIFICANT = 3.0
@@ -34,24 +38,30 @@ AVERAGED = 6
 
 
 def measure_fading(
-    damage: Solid, inner: Flags, skin: SkinView, noise: float, systematic: float, tolerance: float, others: Flags
-) -> Fading | None:
+    damage: Solid, inner: Flags, skin: SkinView, noise: float, systematic: float, tolerance: float,
+    others: Iterable[Solid],
+) -> Fading | None:  # fmt: skip
     """The volumes of a shallow loss; None for a deeper one.
 
     Args:
         inner: (F,) which faces of ``damage`` are on its inner surface.
         systematic: how far intact skin deviates over whole areas: less is no loss.
-        others: (C,) skin cells that other sites remove.
+        others: damage volumes of other sites, whose skin is theirs.
     """
     on_skin = np.flatnonzero(~inner & (np.linalg.norm(damage.cross, axis=1) > 0))
     if not len(on_skin) or not inner.any():
         return None
     places, _ = sample_by_area(damage, SAMPLES, np.random.default_rng(0), on_skin)
     bottom = Mesh(damage.vertices, damage.faces[inner])
-    depth = distance_to_mesh(places, bottom)
-    if float(np.median(depth)) > SHALLOW * tolerance or not depth.any():
+    if float(np.median(distance_to_mesh(places[::FIRST], bottom))) > SHALLOW * tolerance:
         return None
-    beyond_depth, beyond_area = _find_beyond(damage, skin, noise, systematic, tolerance, others)
+    depth = distance_to_mesh(places, bottom)
+    if not depth.any():
+        return None
+    taken = np.zeros(len(skin.cells.areas), bool)
+    for other in others:
+        taken |= find_removed(other, skin)
+    beyond_depth, beyond_area = _find_beyond(damage, skin, noise, systematic, tolerance, taken)
     inside = damage.volume / float(depth.sum())
 
     def count_from(least: float) -> float:

@@ -12,15 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Solid
-from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.voxels import number_cubes
 
 CUBE = 5.0
 """Edge in spacings of the cubes in which the area for each point is measured: about 25 points."""
 FEWEST = 4
 """Points in a cube from which its own density counts; with fewer, at most that of the whole surface."""
-MOST_POINTS = 20_000
-"""Points that are assigned to the surface; more do not change the second digit."""
 NOISE = 1.0
 """Standard deviation of the volume by the noise, as a share of what theory gives."""
 BESIDE_RIM, AT_EDGES, RIM = 0.066, 0.073, 0.13
@@ -30,7 +27,7 @@ ones, on random damages: so large that the truth lies within two of them in 95 o
 FLARE, ROUNDING = 0.052, 0.14
 """By how much volumes are too large for each unit of length of the rim, in areas that a scan point stands for; and too
 small for each unit of turning of the inner surface, in squares of the tolerance, because its edges are rounded."""
-DEPTH_GAP, DEPTH_NOISE, DEPTH_HIGH = 0.15, 0.5, 0.12
+DEPTH_GAP, DEPTH_NOISE, DEPTH_HIGH = 0.19, 0.8, 0.12
 """Standard deviations of the largest depth, in gaps between the points of the inner surface and in noises; and by how
 many gaps the depth of the damage volume is too large."""
 
@@ -80,22 +77,21 @@ def measure_inner_surface(
 def _measure_shares(damage: Solid, inner: Flags, area: Floats, points: Floats, edge: float) -> tuple[float, float]:
     """The area that one point of the inner surface stands for, on average; and the sum of its square over the points,
     with the density of each cube of ``edge``."""
-    step = max(1, -(-len(points) // MOST_POINTS))
     total = float(area[inner].sum())
     share = total / len(points)
-    face = closest_on_mesh(points[::step], damage).face
-    _, cube = np.unique(number_cubes(damage.triangles.mean(axis=1), edge)[1], return_inverse=True)
-    count = step * np.bincount(cube[face], minlength=int(cube.max()) + 1)
-    own = np.bincount(cube, weights=area * inner, minlength=len(count))
+    places = np.concatenate([damage.triangles.mean(axis=1), points])
+    _, cube = np.unique(number_cubes(places, edge)[1], return_inverse=True)
+    own = np.bincount(cube[: len(area)], weights=area * inner, minlength=int(cube.max()) + 1)
+    count = np.bincount(cube[len(area) :], minlength=len(own))
     own_share = own / np.maximum(count, 1)
-    shares = np.where(count >= FEWEST * step, own_share, np.maximum(own_share, share))
+    shares = np.where(count >= FEWEST, own_share, np.maximum(own_share, share))
     return share, float((own * shares).sum())
 
 
 def _measure_edges(damage: Solid, inner: Flags) -> tuple[float, float]:
     """Length of the rim; and the turning of the inner surface: the sum over its edges of length times turning angle,
     positive where the damage volume is convex. Noise turns to both sides, so that it adds nothing."""
-    starts, ends, first, second = _pair_faces(damage.faces)
+    starts, ends, first, second = pair_faces(damage.faces)
     along = damage.vertices[ends] - damage.vertices[starts]
     length = np.linalg.norm(along, axis=1)
     rim = inner[first] != inner[second]
@@ -107,7 +103,7 @@ def _measure_edges(damage: Solid, inner: Flags) -> tuple[float, float]:
     return float(length[rim].sum()), float(length[within] @ angle)
 
 
-def _pair_faces(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+def pair_faces(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
     """For each edge (E,) of a closed mesh: its ends, and the two faces at it; it runs from the first to the second end
     in the first face."""
     edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from damageest.artefacts import Evidence, Flags, Floats, Part, Scan, Solid
-from damageest.checks.inner_surface import measure_inner_surface
+from damageest.checks.inner_surface import measure_inner_surface, pair_faces
 from damageest.checks.pose_error import PoseError
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
+from damageest.geometry.neighbourhoods import find_nearby
 from damageest.result import Coverage, Fading, Interval
 
 WIDTH = 2.0
@@ -25,8 +27,18 @@ GAP = 8.0
 more than interpolation shows; as in `checks.verdict`."""
 HOLE = 0.5
 """Depth that a hole in the scan of an inner surface may hide, in square roots of its area."""
-SMOOTH = 30.0
-"""Angle in degrees between triangles up to which they stand for one curved face, whose chords they are."""
+FLAT, SMOOTH = 0.05, 30.0
+"""Angles in degrees between triangles that are chords of one curved face."""
+ASKED = 2000
+"""Scan points among which the deepest ones of a site are looked for."""
+
+
+class _Place(NamedTuple):
+    """``depth`` below the skin of a place ``at`` (3,), and the outward ``normal`` (3,) of the skin nearest to it."""
+
+    depth: float
+    at: Floats
+    normal: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +86,10 @@ def measure_site_error(
     skin_area = float(area[skin].sum())
     patches = max(1.0, skin_area / max(pose.patch_area, 1e-300))
     systematic = max(form, pose.systematic)
+    chord = part.tessellation_error * _measure_curved(damage, skin, area) if part.tessellation_error else 0.0
     hole = evidence.ids_gap if evidence.ids_gap > GAP * max(tolerance, aligned.spacing) ** 2 else 0.0
-    depth, place, normal = _find_deepest(damage, inner, part)
-    by_pose = pose.of_distance(place, normal)
+    deepest = _find_deepest(damage, inner, part, members, 3 * max(surface.gap, tolerance))
+    by_pose = pose.of_distance(deepest.at, deepest.normal)
     return SiteError(
         volume=damage.volume,
         noise=surface.noise,
@@ -84,11 +97,11 @@ def measure_site_error(
         rim=surface.rim,
         excess=surface.excess,
         pose=pose.of_volume(damage.triangles[skin].mean(axis=1), damage.face_normals[skin], area[skin]),
-        tessellation=part.tessellation_error * _measure_curved(damage, skin, area) / np.sqrt(3),
+        tessellation=chord / np.sqrt(3),
         # a form that a fit gives is common to the whole site; that of patches is different in each
         form=float(max(form * skin_area, pose.systematic * skin_area / np.sqrt(patches))),
         inside=HOLE * hole**1.5,
-        depth=depth - surface.depth_excess,
+        depth=deepest.depth - surface.depth_excess,
         depth_error=float(np.sqrt(surface.depth**2 + by_pose**2 + systematic**2 + part.tessellation_error**2 / 3)),
         deeper=HOLE * float(np.sqrt(hole)),
     )
@@ -143,22 +156,27 @@ def describe_fading(fading: Fading, volume: float, unit: str, tolerance: float) 
     )
 
 
-def _find_deepest(damage: Solid, inner: Flags, part: Part) -> tuple[float, Floats, Floats]:
-    """The largest depth of a damage volume, its place (3,), and the outward normal (3,) of the skin nearest to it."""
-    chosen = np.unique(damage.faces[inner])
-    distance, face, _ = closest_on_mesh(damage.vertices[chosen], part)
+def _find_deepest(damage: Solid, inner: Flags, part: Part, members: Floats, reach: float) -> _Place:
+    """The deepest place of a damage volume. It is near the deepest scan points, so that the other vertices are not
+    asked; ``reach``: how near."""
+    vertices = damage.vertices[np.unique(damage.faces[inner])]
+    step = max(1, len(members) // ASKED)
+    depth = distance_to_mesh(members[::step], part)
+    deep = members[::step][depth > depth.max() - reach]
+    near = vertices[find_nearby(vertices, deep, reach)]
+    distance, face, _ = closest_on_mesh(near if len(near) else vertices, part)
     at = int(distance.argmax())
-    return float(distance[at]), damage.vertices[chosen[at]], part.face_normals[face[at]]
+    return _Place(float(distance[at]), (near if len(near) else vertices)[at], part.face_normals[face[at]])
 
 
 def _measure_curved(damage: Solid, skin: Flags, area: Floats) -> float:
     """Area of the removed skin that is curved: triangles beside others that turn by a small angle. Chords err there."""
-    import trimesh
-
-    mesh = trimesh.Trimesh(damage.vertices, damage.faces, process=False)
-    angle = np.degrees(mesh.face_adjacency_angles)
-    pairs = mesh.face_adjacency[(angle > 0.05) & (angle < SMOOTH)]
-    pairs = pairs[skin[pairs].all(axis=1)]
+    _, _, first, second = pair_faces(damage.faces)
+    between = skin[first] & skin[second]
+    first, second = first[between], second[between]
+    cosine = np.einsum("ij,ij->i", damage.face_normals[first], damage.face_normals[second])
+    turns = (cosine < np.cos(np.radians(FLAT))) & (cosine > np.cos(np.radians(SMOOTH)))
     curved = np.zeros(len(area), bool)
-    curved[pairs] = True
+    curved[first[turns]] = True
+    curved[second[turns]] = True
     return float(area[curved].sum())

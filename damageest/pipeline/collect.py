@@ -38,6 +38,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
     cut_back = any(site.damage is not found.damage for site, found in zip(sites, work.sites, strict=True))
     taken = (site.damage for site in work.sites if site.accepted)
     found = to_solid(unite(taken, origin), origin) if cut_back else damage
+    alone = sum(site.damage.volume for site in work.sites if site.accepted)
     result = Result(
         name=engine.job.name,
         units=engine.job.units,
@@ -57,7 +58,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
         stages=tuple(engine.records),
         coverage=state.coverage,
         surplus=state.surplus,
-        volume_95=shift_interval(state.volume_95, damage, found),
+        volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
     key = digest(
         engine.job.name, [state.keys[name] for name in sorted(state.keys)], [s.key("deposit") for s in work.sites]
@@ -83,7 +84,7 @@ def _describe_site(found: FoundSite) -> Site:
         refused=found.refused,
         verdict=found.verdict,
         accepted=found.accepted,
-        uncertainty=shift_uncertainty(found.uncertainty, damage, found.damage),
+        uncertainty=shift_uncertainty(found.uncertainty, damage.volume - found.damage.volume),
         method=found.method,
         evidence=evidence,
         max_depth=max(float(-found.job.deviation.distance[members].min(initial=0.0)), 0.0),

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Flags, Solid
-from damageest.checks.fading import find_removed, measure_fading
+from damageest.artefacts import Flags
+from damageest.checks.fading import measure_fading
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.uncertainty import (
     SiteError,
@@ -18,7 +18,6 @@ from damageest.checks.uncertainty import (
     measure_site_error,
 )
 from damageest.geometry.skin import find_inner_faces
-from damageest.geometry.solids import unite
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
@@ -51,8 +50,8 @@ def measure_uncertainty(engine: Engine, work: Work) -> Work:
     lost = [error for error in work.failures if error.stage != Allowance.stage]
     total = None
     if len(known) == len(errors) and not lost:
-        origin = state.part.bounds.mean(axis=0)
-        volume = float(unite((site.damage for site in sites if site.accepted), origin).volume())
+        # collect_result moves it to the volume of the union, which is the same but for overlaps
+        volume = sum(site.damage.volume for site in sites if site.accepted)
         total = combine_total(volume, known, sum(site.damage.volume for site in sites if not site.accepted))
     key = digest("interval", total, [site.key("damage") for site in sites])
     return replace(work, sites=tuple(sites), job=state.with_value(JobState.volume_95, total, key))
@@ -111,23 +110,18 @@ def _measure_site(
 def _measure_fading(
     state: JobState, site: FoundSite, inner: Flags, every: tuple[FoundSite, ...], pose: PoseError
 ) -> Fading | None:
-    others = np.zeros(len(state.skin.cells.areas), bool)
-    for other in every:
-        if other is not site:
-            others |= find_removed(other.damage, state.skin)
-    return measure_fading(site.damage, inner, state.skin, state.aligned.noise, pose.systematic, state.tolerance, others)
+    others = [other.damage for other in every if other is not site]
+    noise, tolerance = state.aligned.noise, state.tolerance
+    return measure_fading(site.damage, inner, state.skin, noise, pose.systematic, tolerance, others)
 
 
-def shift_interval(interval: Interval | None, after: Solid | None, before: Solid | None) -> Interval | None:
-    """The interval of a volume ``before`` a cut-back, for the volume ``after`` it: both have the same errors."""
-    if interval is None or after is None or before is None or after is before:
-        return interval
-    more = after.volume - before.volume
-    return interval[0] + more, interval[1] + more
+def shift_interval(interval: Interval | None, more: float) -> Interval | None:
+    """The interval of a volume that is larger by ``more``, as by a cut-back, which is exact."""
+    return None if interval is None else (max(interval[0] + more, 0.0), interval[1] + more)
 
 
-def shift_uncertainty(uncertainty: Uncertainty | None, after: Solid, before: Solid) -> Uncertainty | None:
-    """As `shift_interval`, for the interval of a site's volume. The depth is that before the cut-back."""
-    if uncertainty is None:
-        return None
-    return replace(uncertainty, volume_95=shift_interval(uncertainty.volume_95, after, before))
+def shift_uncertainty(uncertainty: Uncertainty | None, more: float) -> Uncertainty | None:
+    """As `shift_interval`, for the interval of a site's volume. The depth is that before a cut-back."""
+    if uncertainty is None or not more:
+        return uncertainty
+    return replace(uncertainty, volume_95=shift_interval(uncertainty.volume_95, more))
