@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from damageest.report.base import JsonModel
 from damageest.result import Interval, Site
 
 
-class FadingReport(BaseModel):
+class FadingReport(JsonModel):
     """Volumes of a shallow loss, counted only where it is deep enough."""
 
-    model_config = ConfigDict(extra="forbid")
     half: float = Field(description="where it is deeper than half the tolerance")
     at: float = Field(description="where it is deeper than the tolerance")
     twice: float = Field(description="where it is deeper than twice the tolerance")
     beyond: float = Field(description="lost beyond the rim of the site, shallower still; not part of `volume`")
 
 
-class UncertaintyReport(BaseModel):
+class UncertaintyReport(JsonModel):
     """The causes. The first six are standard deviations of the volume; the next two, how much larger it may be."""
 
-    model_config = ConfigDict(extra="forbid")
     noise: float = Field(description="noise of the points on the inner surface")
     spacing: float = Field(description="the surface between the points, above all beside the rim")
     rim: float = Field(description="where the inner surface meets the skin")
