@@ -13,7 +13,7 @@ from damageest.job import yamlfile
 from tests.needs import needs_plugin
 
 JOBS = Path(__file__).parents[1] / "jobs"
-SITES = {"block_wedge": 1, "gear_teeth": 4, "cylinder_two_sides": 2, "half_torus": 1, "four_sites": 4}
+SITES = {"block_wedge": 1, "gear_teeth": 4, "cylinder_two_sides": 2, "half_torus": 1, "four_sites": 4, "worn_shaft": 1}
 STOCK = {"stock_uniform": 0.8, "stock_flanks": 0.3, "worn_bore": 0.5}
 """Millimetres of stock that the jobs ask for; each has as many sites as `DEPOSITS` says."""
 DEPOSITS = {"stock_uniform": 1, "stock_flanks": 2, "worn_bore": 2}
@@ -22,7 +22,7 @@ WEDGE = 5929.0
 """Volume in mm3 of the wedge that jobs/make_inputs.py cuts off the block before it scans it."""
 
 
-SLOW = {"block_wedge", "cylinder_two_sides", "four_sites", "half_torus", "stock_uniform", "worn_bore"}
+SLOW = {"block_wedge", "cylinder_two_sides", "four_sites", "half_torus", "stock_uniform", "worn_bore", "worn_shaft"}
 """Jobs that are run by -m slow only."""
 
 
