@@ -8,9 +8,8 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, FreeMotion
 from damageest.errors import StageError
-from damageest.stages.align._check_pose import PoseCheck, check_pose
+from damageest.stages.align._check_worn import MOST_OUTSIDE, measure_outside, measure_wear
 from damageest.stages.align._datum import DatumSkin
-from damageest.stages.align._field import PartSurface
 from damageest.stages.align._fine import Fit
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._free import MIN_MOVED as APART
@@ -23,10 +22,6 @@ from damageest.stages.align._words import describe_open, to_free_motion
 FORM_ERRORS = (0.03, 0.06, 0.12, 0.25)
 """Standard deviations, in tolerances, that errors of form and scanner give the mean of a patch; the first one that
 explains the scan is taken."""
-MOST_OUTSIDE = 0.04
-"""Share of the skin that may lie outside by less than `LOW`, in a pose that explains the scan."""
-LOW = 1.5
-"""Distance outside, in tolerances, up to which points are skin; added metal is higher."""
 MIN_MOVED = 0.1
 """Movement of the skin, in tolerances, below which the pose stays as the robust fit found it."""
 MIN_STEP = 0.02
@@ -126,8 +121,7 @@ def _describe(frame: Frame, fitted: Fit, found: _Found, tolerance: float, unit: 
         return Finish(fitted, notes=notes)
     freedoms = find_freedoms(patches, found.motions, found.band, tolerance, datum)
     free = tuple(to_free_motion(frame, patches.basis @ one.motion, one.low, one.high, unit) for one in freedoms)
-    inside = patches.offset[patches.is_flat]
-    depth = max(-float(np.quantile(inside, 0.1)), 0.0) if len(inside) else 0.0
+    depth = measure_wear(patches, found.band, tolerance)
     return Finish(fitted, free, (*notes, *(one.text for one in free)), depth, is_held=True)
 
 
@@ -140,19 +134,9 @@ def _search(patches: Patches, datum: Flags | None, noise: float, tolerance: floa
         band = measure_bands(patches, noise, error * tolerance)
         found = search_motions(weighted, band, APART * tolerance, rng)
         offset = patches.move(found.motions[:1])[0]
-        low = (offset > band) & (offset < LOW * tolerance)
-        outside = float(patches.weight[low].sum() / patches.weight.sum())
+        outside = measure_outside(patches, offset, band, tolerance)
         contact = float(patches.weight[np.abs(offset) < band].sum() / patches.weight.sum())
         explains = outside < MOST_OUTSIDE and contact > MIN_CONTACT
         if explains or datum is not None:
             break
     return _Found(patches, band, found.motions, float(found.score[0]) - found.start, explains)
-
-
-def check_finish(target: PartSurface, finish: Finish, even: Floats, raw: Floats, tolerance: float) -> PoseCheck:
-    """As `check_pose`. Skin that is worn, with nothing outside, explains a scan as intact skin does."""
-    check = check_pose(target, finish.fit, even, raw, tolerance)
-    if (check.is_acceptable and not check.note_doubts()) or finish.worn_depth <= tolerance:
-        return check
-    worn = check_pose(target, finish.fit, even, raw, finish.worn_depth)
-    return replace(worn, rms=check.rms, inliers=check.inliers) if worn.is_acceptable else check

@@ -6,10 +6,11 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
+from damageest.stages.align._check_worn import check_with_wear
 from damageest.stages.align._choose import note_free_motion
 from damageest.stages.align._datum import Datum, DatumSkin
 from damageest.stages.align._fine import fit
-from damageest.stages.align._finish import Finish, check_finish, finish_pose
+from damageest.stages.align._finish import Finish, finish_pose
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._largest_piece import prefer_largest_piece
 from damageest.stages.align._points import draw_evenly, orient_scan
@@ -40,7 +41,7 @@ def fit_from_start(
     if converged:
         finish = finish_pose(frame, points, best, noise, tolerance / frame.size, part.unit, on_datum)
         best = finish.fit
-    result = check_finish(frame.target, finish, points, dense, tolerance / frame.size)
+    result = check_with_wear(frame.target, best, points, dense, tolerance / frame.size, finish.worn_depth)
     if not result.is_acceptable:
         raise result.build_error(remedy)
     if not converged:

@@ -38,6 +38,7 @@ class Register(Align):
         """The fitted pose. Raises StageError where no pose explains the scan: it shows another part, has another unit,
         or most of it is not the part."""
         from damageest.errors import StageError
+        from damageest.stages.align._check_worn import check_with_wear
         from damageest.stages.align._choose import (
             COARSE,
             choose_pose,
@@ -48,7 +49,7 @@ class Register(Align):
         from damageest.stages.align._datum import DatumSkin
         from damageest.stages.align._field import PlaneGrid
         from damageest.stages.align._fine import fit
-        from damageest.stages.align._finish import check_finish, finish_pose
+        from damageest.stages.align._finish import finish_pose
         from damageest.stages.align._frame import MIN_POINTS, Frame
         from damageest.stages.align._largest_piece import prefer_largest_piece
         from damageest.stages.align._mirror import SUSPECT, fit_reflections, refuse_mirrored
@@ -83,7 +84,7 @@ class Register(Align):
         best = refine_pose(target, fine, prefer_largest_piece(target, fine, best, noise))
         finish = finish_pose(frame, fine, best, noise, tolerance / frame.size, part.unit, datum)
         best = finish.fit
-        check = check_finish(target, finish, fine, dense, tolerance / frame.size)
+        check = check_with_wear(target, best, fine, dense, tolerance / frame.size, finish.worn_depth)
         mirrored = fit_reflections(target, field, fine, best, noise)
         if check.agreement < SUSPECT:
             flip = np.array([1.0, 1.0, -1.0])

@@ -54,7 +54,12 @@ def measure_error(part: Part, pose: Pose, tolerance: float) -> float:
 
 @pytest.mark.parametrize(
     ("kind", "part", "amount"),
-    [("one face", "block", 2.0), ("half", "keyed_shaft", 3.0), ("wedge", "block", 4.0), ("one face", "gear", 1.0)],
+    [
+        ("one face", "block", 2.0),
+        pytest.param("half", "keyed_shaft", 3.0, marks=pytest.mark.slow),
+        pytest.param("wedge", "block", 4.0, marks=pytest.mark.slow),
+        pytest.param("one face", "gear", 1.0, marks=pytest.mark.slow),
+    ],
 )
 def test_unworn_skin_fixes_the_pose(kind: str, part: str, amount: float) -> None:
     body, scan, tolerance = scan_worn(kind, part, amount)
@@ -91,6 +96,7 @@ def test_a_plate_worn_to_a_wedge_is_free_to_turn() -> None:
     assert abs(moved[2]) == pytest.approx(3 * tolerance, abs=0.8 * tolerance)
 
 
+@pytest.mark.slow
 def test_wear_all_over_frees_every_shift_of_a_block() -> None:
     part, scan, tolerance = scan_worn("all over", "cuboid", 2.0)
     pose = align(part, scan, tolerance)
@@ -106,6 +112,7 @@ def test_a_datum_fixes_what_wear_leaves_free() -> None:
     assert any("does not fix" in note and "(1.000, 0.000, 0.000)" in note for note in pose.notes)
 
 
+@pytest.mark.slow
 def test_a_worn_datum_moves_the_pose_to_itself() -> None:
     part, scan, tolerance = scan_worn("one face", "block", 2.0)
     top = {"box": [[-99.0, -99.0, 14.9], [99.0, 99.0, 15.1]]}
@@ -144,7 +151,10 @@ def test_an_unknown_condition_is_refused_with_the_valid_ones() -> None:
         Icp.model_validate({"datum": [{"plane": 3}]})
 
 
-@pytest.mark.parametrize(("kind", "part"), [("clean", "shaft"), ("clean", "plate"), ("bead", "cuboid")])
+@pytest.mark.parametrize(
+    ("kind", "part"),
+    [("clean", "plate"), ("bead", "cuboid"), pytest.param("clean", "shaft", marks=pytest.mark.slow)],
+)
 def test_the_pose_of_a_scan_without_wear_stays(kind: str, part: str) -> None:
     body, scan, tolerance = scan_worn(kind, part, 0.0)
     frame = Frame.build(scan, body)
