@@ -68,9 +68,9 @@ class FormChoice:
     after the form, ``rigid_cells``: after the rigid motion.
 
     ``scale``: the form with the one scale that fits best, ``stretch``: with one for each axis, whether they are needed
-    or not, and ``every``: of all fields. ``name``: of `CANDIDATES`. ``gain``: the cost that the form explains beyond the rigid motion, and ``kept``,
-    where it was not fitted. ``costs``: of the candidates that were tried. ``width``: of the
-    kernel. ``feet``: the points that the form was fitted to.
+    or not, and ``every``: of all fields. ``name``: of `CANDIDATES`. ``gain``: the cost that the form explains beyond
+    the rigid motion, and ``kept``, where it was not fitted. ``costs``: of the candidates that were tried. ``width``: of
+    the kernel. ``feet``: the points that the form was fitted to.
     """
 
     name: str

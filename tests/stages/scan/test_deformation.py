@@ -19,7 +19,9 @@ def measure(moved: np.ndarray) -> float:
     return float(np.linalg.norm(remove_rigid(POINTS, moved - POINTS, np.ones(len(POINTS))), axis=1).max())
 
 
-@pytest.mark.parametrize("how", [{"bend": 0.4}, {"twist": 0.4}, {"bend": -0.4, "along": [0, 1, 0], "toward": [1, 0, 0]}])
+@pytest.mark.parametrize(
+    "how", [{"bend": 0.4}, {"twist": 0.4}, {"bend": -0.4, "along": [0, 1, 0], "toward": [1, 0, 0]}]
+)
 def test_the_amount_is_the_largest_displacement_beyond_a_rigid_motion(how: dict[str, object]) -> None:
     assert measure(deform(POINTS, Deformation.model_validate(how), PART)) == pytest.approx(0.4, rel=0.05)
 
