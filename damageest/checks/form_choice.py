@@ -68,9 +68,9 @@ class FormChoice:
     after the form, ``rigid_cells``: after the rigid motion.
 
     ``scale``: the form with the one scale that fits best, ``stretch``: with one for each axis, whether they are needed
-    or not. ``name``: of `CANDIDATES`. ``gain``: the cost that the form explains beyond the rigid motion, and ``kept``,
-    where it was not fitted. ``costs``: of the candidates that were tried. ``width``: of the
-    kernel. ``feet``: the points that the form was fitted to.
+    or not, and ``every``: of all fields. ``name``: of `CANDIDATES`. ``gain``: the cost that the form explains beyond
+    the rigid motion, and ``kept``, where it was not fitted. ``costs``: of the candidates that were tried. ``width``: of
+    the kernel. ``feet``: the points that the form was fitted to.
     """
 
     name: str
@@ -78,6 +78,7 @@ class FormChoice:
     rigid: Form
     scale: Form
     stretch: Form
+    every: Form
     cells: Cells
     rigid_cells: Cells
     gain: float
@@ -157,7 +158,7 @@ def choose_form(part: Part, points: Floats, distance: Floats, noise: float, tole
         at = task.find_feet(form, every)
     scale = form if name == "scale" else forms["scale"]
     return FormChoice(
-        name, form, forms["rigid"], scale, forms["stretch"], at.summarise(form), at.summarise(forms["rigid"]),
+        name, form, forms["rigid"], scale, forms["stretch"], rich, at.summarise(form), at.summarise(forms["rigid"]),
         gain, kept, costs, task.width, at,
     )  # fmt: skip
 

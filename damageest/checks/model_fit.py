@@ -78,6 +78,8 @@ def measure_fit(
     elif model == "ok":
         amount = 0.0
     deviations, waviness = _measure_patches(choice, choice.form if form else choice.rigid, noise, tolerance)
+    if waviness > WAVY * tolerance:  # what fields of low order explain is none
+        waviness = min(waviness, _measure_patches(choice, choice.every, noise, tolerance)[1])
     if model == "ok" and waviness > WAVY * tolerance:
         model = "wavy"
     if views is not None and views.disagree:
@@ -87,7 +89,7 @@ def measure_fit(
         words="",
         deviations=deviations,
         scale=1 + float(scale.coefficients[0]) / half,
-        scale_error=float(np.sqrt(scale.covariance[6, 6])) / half,
+        scale_error=_measure_scale_error(choice) / half,
         axes=choice.form.frame.axes,
         scale_by_axis=1 + stretch.coefficients / half,
         scale_by_axis_error=np.sqrt(np.diag(stretch.covariance)[6:]) / half,
@@ -131,6 +133,14 @@ def _is_one_scale(choice: FormChoice) -> bool:
     shown = error < 0.2 * abs(one)
     agree = np.abs(by_axis - one) < 3 * error + ALIKE * abs(one)
     return bool(shown.sum() >= 2 and agree[shown].all())
+
+
+def _measure_scale_error(choice: FormChoice) -> float:
+    """The standard error of the scale: from the noise, and from how the scales of the axes that show it differ."""
+    error = np.sqrt(np.diag(choice.stretch.covariance)[6:])
+    shown = error < max(0.2 * abs(float(choice.scale.coefficients[0])), 2 * float(error.min()))
+    apart = float(np.std(choice.stretch.coefficients[shown], ddof=1)) if shown.sum() > 1 else 0.0
+    return float(np.hypot(np.sqrt(choice.scale.covariance[6, 6]), apart / np.sqrt(max(int(shown.sum()), 1))))
 
 
 def _measure_amount(choice: FormChoice, fields: tuple[Field, ...]) -> tuple[float, float]:

@@ -105,8 +105,9 @@ def _is_proven_by_rays(skin: SkinView, site: FoundSite) -> bool:
     if site.method == BY_RAYS_ALONE:
         return True
     cells, damage = skin.cells, site.damage
-    near: Flags = ((cells.centres > damage.bounds[0]) & (cells.centres < damage.bounds[1])).all(axis=1)
+    close = 1e-3 * cells.edge  # cells of a flat face lie on the bounds
+    near: Flags = ((cells.centres > damage.bounds[0] - close) & (cells.centres < damage.bounds[1] + close)).all(axis=1)
     index = np.flatnonzero(near & ~skin.perhaps_seen)
-    index = index[distance_to_mesh(cells.centres[index], damage) < 1e-3 * cells.edge] if len(index) else index
+    index = index[distance_to_mesh(cells.centres[index], damage) < close] if len(index) else index
     area = cells.areas[index]
     return bool(len(index)) and float(area[skin.rays.lost[index]].sum()) > BY_RAYS * float(area.sum())
