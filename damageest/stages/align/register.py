@@ -95,10 +95,7 @@ class Register(Align):
             mirrored = replace(found, pose=found.pose @ np.diag([*flip, 1.0]))
         refuse_mirrored(target, fine, dense, best.pose, check, mirrored, tolerance / frame.size)
         if not check.is_acceptable:
-            raise check.build_error(
-                "check that the scan shows this part and that both have the right unit; crop away a fixture or table; "
-                "where the pose is known, give it to align: icp or align: none"
-            )
+            raise check.build_error(_advise(scan))
         others = None
         if len(choice.others):
             # a symmetry of the part takes the pose found to each of the others
@@ -112,3 +109,13 @@ class Register(Align):
         pose = frame.unscale_pose(best.pose)
         rms = check.rms * frame.size
         return Pose(pose, rms, check.inliers, others, notes, doubts, finish.free, finish.is_held)
+
+
+def _advise(scan: Scan) -> str:
+    """What to do where no pose explains the scan."""
+    views = 0 if scan.view is None else len(np.unique(scan.view[scan.view >= 0]))
+    apart = f"check that the {views} views of the scan are not misplaced against each other; " if views > 1 else ""
+    return (
+        f"check that the scan shows this part and that both have the right unit; {apart}crop away a fixture or table; "
+        "where the pose is known, give it to align: icp or align: none"
+    )
