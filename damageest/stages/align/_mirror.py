@@ -99,7 +99,7 @@ def refuse_mirrored(
         if check.agreement < DOUBTFUL_AGREEMENT:
             raise StageError(
                 f"in the best pose only {best.agreement:.0%} of what the scan shows near the part lies on its surface, "
-                f"and {check.agreement:.0%} of it if it were mirrored: it shows a mirrored part, one of another size, a "
+                f"and {check.agreement:.0%} of it if it were mirrored: it shows a mirrored part, another size, a "
                 "bent one, or another part",
                 "scan: {scale: auto} if the scale may be wrong; otherwise check which part was scanned",
             )
