@@ -11,6 +11,7 @@ from damageest.artefacts import Flags
 from damageest.checks.coverage import SkinView
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import ask_free_pose, measure_dependence
+from damageest.checks.unseen_rim import ask_unseen_rim
 from damageest.checks.verdict import judge_site, measure_limits
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
@@ -60,14 +61,17 @@ def judge_sites(engine: Engine, work: Work) -> Work:
         is_fitted=engine.job.implementations[Align].name != "none" and not state.pose.is_held,
     )  # fmt: skip
     done = []
+    reach = 2 * max(state.tolerance, state.aligned.spacing)
     for site in work.sites:
         area = measure_area(state.aligned.points[site.members], state.skin.cells.edge) if len(site.members) else 0.0
         dependences = measure_dependence(site.damage, state.part, state.pose)
         against, questions = ask_free_pose(dependences, site.damage.volume, state.unit)
+        by_rays = _is_proven_by_rays(state.skin, site)
+        at_rim = ask_unseen_rim(site.damage, state.part, state.coverage, reach)
+        against, questions = (*against, *at_rim[0]), (*questions, *at_rim[1])
         verdict = judge_site(
             site.evidence, -state.deviation.distance[site.members], area, state.pose, limits,
-            _is_proven_by_rays(state.skin, site), site.damage.area, (*site.questions, *questions),
-            (*site.doubts, *against),
+            by_rays, site.damage.area, (*site.questions, *questions), (*site.doubts, *against),
         )  # fmt: skip
         accepted = verdict.level != "doubtful" or accept == "all" or site.number in accept
         rates = tuple(one.rate for one in dependences)
