@@ -135,7 +135,8 @@ def choose_form(part: Part, points: Floats, distance: Floats, noise: float, tole
     cells = at.summarise(rich)
     if len(cells.count) < 30:
         return None
-    forms, costs = {}, {}
+    forms: dict[str, Form] = {}
+    costs: dict[str, float] = {}
     names = ("rigid", "every", "scale", "stretch", *CANDIDATES)
     for name in names:
         if name not in costs and (len(costs) < 4 or costs["rigid"] - costs["every"] > LEAST_GAIN):
