@@ -56,7 +56,7 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[st
         raise StageError(
             f"in the given pose {given.on:.0%} of the scan lies on the part; moved by {shift:.3g} {part.unit} and "
             f"turned by {turn:.2g} degrees, {fitted.on:.0%} would: the given pose is wrong by that "
-            "much, or the part is bent or twisted, or the scan has another scale",
+            "much, or the part is bent or twisted, or the scale of the scan is wrong",
             "use align: icp, which corrects it, or give the right T_part_scan",
         )
     if not given.is_acceptable:
