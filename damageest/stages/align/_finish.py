@@ -14,7 +14,7 @@ from damageest.stages.align._fine import Fit
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._free import MIN_MOVED as APART
 from damageest.stages.align._free import find_freedoms
-from damageest.stages.align._one_sided import measure_bands, measure_movement, search_motions
+from damageest.stages.align._one_sided import measure_bands, search_motions
 from damageest.stages.align._patches import Patches, measure_patches
 from damageest.stages.align._search import make_motion
 from damageest.stages.align._words import describe_open, to_free_motion
@@ -24,6 +24,8 @@ FORM_ERRORS = (0.03, 0.06, 0.12, 0.25)
 explains the scan is taken."""
 MIN_MOVED = 0.1
 """Movement of the skin, in tolerances, below which the pose stays as the robust fit found it."""
+MOST_MOVED = 0.98
+"""Quantile of the patches' movements that is compared: of a turn of a shaft only the flanks of its key tell."""
 MIN_STEP = 0.02
 """The same for a pose that a datum fixes."""
 MIN_GAIN = 0.01
@@ -88,7 +90,7 @@ def finish_pose(
         on_datum = None if datum is None else _find_datum(frame, datum, patches)
         found = _search(patches, on_datum, noise, tolerance, rng)
         motion = found.motions[0]
-        moved = float(measure_movement(patches, motion[None])[0])
+        moved = float(np.quantile(np.abs(motion @ patches.slopes.T), MOST_MOVED))
         wanted = found.gain > MIN_GAIN and found.explains and moved > MIN_MOVED * tolerance
         by_datum = on_datum is not None and moved > MIN_STEP * tolerance
         if number == ROUNDS or not (wanted or by_datum):
