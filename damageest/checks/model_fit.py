@@ -36,6 +36,8 @@ OWN_SHARE = 0.3
 """Share of the amount from which a kind of deformation is named beside others."""
 INTACT = 1.5
 """Distance from the skin, in tolerances, up to which points count as intact after the form is undone."""
+PLAIN = 5.0
+"""How many times larger than the waviness that it leaves a form has to be, to be named before the waviness."""
 WAVY = 0.3
 """Waviness, in tolerances, from which the skin is wavy."""
 _GROUPS: dict[str, Deformed] = {
@@ -80,8 +82,8 @@ def measure_fit(
     deviations, waviness = _measure_patches(choice, choice.form if form else choice.rigid, noise, tolerance)
     if waviness > WAVY * tolerance:  # what fields of low order explain is none
         waviness = min(waviness, _measure_patches(choice, choice.every, noise, tolerance)[1])
-    if model == "ok" and waviness > WAVY * tolerance:
-        model = "wavy"
+    if waviness > WAVY * tolerance and amount < PLAIN * waviness:
+        model, form, deformation, amount = "wavy", None, (), 0.0
     if views is not None and views.disagree:
         model = "views disagree"
     fit = ModelFit(
