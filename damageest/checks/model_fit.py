@@ -30,6 +30,11 @@ CERTAIN = 5.0
 OUTSIDE = 0.2
 """How much skin that lies outside a form has to explain, compared with skin inside that it explains: wear and loss put
 none outside."""
+OUTSIDE_IF_SURE, SURE = 0.03, 30.0
+"""The same for a form of one bend or twist that is this many standard errors away from none: of a twisted shaft, only
+the flanks of its key come to lie outside."""
+LEAST_EXPLAINED = 0.3
+"""Share of the skin that deviates by up to 1.5 times the amount which a form has to explain; the rest is wear."""
 ALIKE = 0.3
 """Relative difference of the scales by axis up to which they are one scale."""
 OWN_SHARE = 0.3
@@ -123,7 +128,11 @@ def _decide(choice: FormChoice, amount: float, error: float, tolerance: float) -
     explained = (size > choice.width / 2) & (size > 2 * left) & (left < choice.width)
     outside = float(before.count[explained & (before.offset > 0)].sum())
     inside = float(before.count[explained & (before.offset < 0)].sum())
-    if outside < OUTSIDE * inside:
+    alike = (size > choice.width / 2) & (size < 1.5 * amount)
+    if outside + inside < LEAST_EXPLAINED * float(before.count[alike].sum()):
+        return "ok", None
+    is_sure = len(choice.form.fields) == 1 and amount > SURE * error
+    if outside < (OUTSIDE_IF_SURE if is_sure else OUTSIDE) * inside:
         return "ok", None
     return ("scaled" if choice.name == "stretch" else "deformed"), choice.form
 
