@@ -16,7 +16,7 @@ from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import JobState, Work
+from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.stages.align import Align
 from damageest.stages.scan import ReadScan
 
@@ -118,15 +118,11 @@ def question_sites(engine: Engine, work: Work) -> Work:
         return work
     sites = []
     for site in work.sites:
-        members = site.members
-        if not len(members):
+        if not len(site.members):
             sites.append(site)
             continue
-        normals = state.part.face_normals[state.deviation.face[members]]
-        distance = state.deviation.distance[members]
-        places = state.aligned.points[members] - distance[:, None] * normals
-        local = measure_local(state.fitted, places, normals)
-        depth = float(np.quantile(-distance, 0.95))
+        local = measure_at_site(state, site)
+        depth = float(np.quantile(-state.deviation.distance[site.members], 0.95))
         text = (
             f"it is {depth:.3g} {state.unit} deep, and intact skin deviates by about {local:.3g} {state.unit} there: "
             f"{name_model(state.fitted.fit)}"
@@ -137,6 +133,16 @@ def question_sites(engine: Engine, work: Work) -> Work:
             site = replace(site, questions=(*site.questions, text))
         sites.append(site)
     return replace(work, sites=tuple(sites))
+
+
+def measure_at_site(state: JobState, site: FoundSite) -> float:
+    """How far intact skin deviates at a site by the model that the fit names; 0 where the part is as designed."""
+    members = site.members
+    if state.fitted is None or state.fitted.fit.model == "ok" or not len(members):
+        return 0.0
+    normals = state.part.face_normals[state.deviation.face[members]]
+    places = state.aligned.points[members] - state.deviation.distance[members, None] * normals
+    return measure_local(state.fitted, places, normals)
 
 
 def measure_local(fitted: FittedModel, places: Floats, normals: Floats) -> float:

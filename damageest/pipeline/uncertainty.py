@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Flags
+from damageest.artefacts import Flags, Floats
 from damageest.checks.fading import measure_fading
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.uncertainty import (
+    WIDTH,
     SiteError,
     combine_site,
     combine_total,
@@ -20,6 +21,7 @@ from damageest.checks.uncertainty import (
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.fit_model import measure_at_site
 from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.result import Fading, Interval, Uncertainty
 from damageest.stages.allowance import Allowance
@@ -39,7 +41,8 @@ def measure_uncertainty(engine: Engine, work: Work) -> Work:
     if not work.sites:
         total = None if work.failures else (0.0, 0.0)
         return replace(work, job=state.with_value(JobState.volume_95, total, digest("no sites", bool(work.failures))))
-    pose = measure_pose_error(state.part, state.aligned, state.deviation, state.tolerance)
+    free = _list_free_motions(state)
+    pose = measure_pose_error(state.part, state.aligned, state.deviation, state.tolerance, free)
     sites, errors = [], []
     for site in work.sites:
         uncertainty, error = _measure_site(state, site, work.sites, pose)
@@ -65,9 +68,11 @@ def _measure_site(
         return Uncertainty(None, None, reasons=("no interval, since the site is doubtful",)), None
     points = state.aligned.points[site.members]
     inner = find_inner_faces(site.damage, state.part)
+    # what the model fit gives is the 95 % bound of a deviation
     error = measure_site_error(
-        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.tolerance
-    )
+        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.tolerance,
+        form=measure_at_site(state, site) / WIDTH,
+    )  # fmt: skip
     if error is None:
         return Uncertainty(None, None, reasons=("no interval, since no scan points lie on its inner surface",)), None
     reach = BESIDE * max(2 * state.tolerance, 1.5 * state.aligned.spacing)
@@ -105,6 +110,19 @@ def _measure_site(
         reasons=tuple(reasons),
     )
     return uncertainty, error
+
+
+def _list_free_motions(state: JobState) -> Floats | None:
+    """The motions that the scan does not fix: (6,F), a turn and a shift about the centre of the part's bounds, each as
+    far as it may go; None where there is none."""
+    centre = state.part.bounds.mean(axis=0)
+    columns = []
+    for one in state.pose.free:
+        far, direction = max(-one.low, one.high), np.array(one.direction)
+        turn = np.zeros(3) if one.point is None else one.turn * direction
+        shift = direction if one.point is None else np.cross(turn, centre - np.array(one.point))
+        columns.append(far / WIDTH * np.concatenate([turn, shift]))
+    return np.column_stack(columns) if columns else None
 
 
 def _measure_fading(
