@@ -13,11 +13,11 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh, Solid
 from damageest.checks.coverage import SkinView
+from damageest.findings import Fading
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.voxels import number_faced_cubes
-from damageest.result import Fading
 
 SHALLOW = 4.0
 """Depth in tolerances of half the skin of a site up to which it is shallow."""

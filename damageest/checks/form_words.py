@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.result import ModelFit, ViewFit
+from damageest.findings import ModelFit, ViewFit
 
 DONE = {"bend": "bent", "twist": "twisted", "shear": "sheared", "stretch": "stretched", "scale": "scaled"}
 

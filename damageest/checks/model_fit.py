@@ -12,9 +12,9 @@ from damageest.checks.form_fields import Field
 from damageest.checks.form_fit import Form
 from damageest.checks.form_words import describe_fit
 from damageest.checks.view_fit import ViewFits
+from damageest.findings import Deformed, ModelFit, PatchDeviation
 from damageest.geometry.transforms import remove_rigid
 from damageest.geometry.voxels import number_faced_cubes
-from damageest.result import Deformed, ModelFit, PatchDeviation
 
 SIZES = (20.0, 50.0, 100.0)
 """Widths of patches of skin, in tolerances."""

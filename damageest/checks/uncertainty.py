@@ -16,9 +16,9 @@ import numpy as np
 from damageest.artefacts import Evidence, Flags, Floats, Part, Scan, Solid
 from damageest.checks.inner_surface import measure_inner_surface, pair_faces
 from damageest.checks.pose_error import PoseError
+from damageest.findings import Coverage, Fading, Interval
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby
-from damageest.result import Coverage, Fading, Interval
 
 WIDTH = 2.0
 """Half the width of a 95 % interval in standard deviations."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Part, Solid
+from damageest.findings import Coverage
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.skin import find_inner_faces
-from damageest.result import Coverage
 
 ASKED, AGAINST = 0.08, 0.3
 """Share of the rim beside unseen skin from which it is open where the damage ends there; from the second one on the

@@ -10,8 +10,8 @@ import numpy as np
 from damageest.artefacts import ADDED, Deviation, Evidence, Floats, Pose, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.skin_cells import AVERAGED
+from damageest.findings import Surplus, Verdict
 from damageest.geometry.voxels import measure_area, number_cubes
-from damageest.result import Surplus, Verdict
 
 SYSTEMATIC = 4.0
 """How many times deeper than the systematic deviation of intact skin a site is to be."""

@@ -9,9 +9,9 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.checks.form_fields import choose_frame
 from damageest.checks.form_fit import Form, Skin, find_feet, improve
+from damageest.findings import ViewFit
 from damageest.geometry.neighbourhoods import pick_one_per_cube
 from damageest.geometry.voxels import number_faced_cubes
-from damageest.result import ViewFit
 
 COMPARED, FITTED = 30_000, 6_000
 """Points that views are compared with, in all, and points of a view that it is fitted with."""

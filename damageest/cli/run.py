@@ -13,7 +13,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from damageest.result import Result, Surplus
+    from damageest.findings import Surplus
+    from damageest.result import Result
 
 
 MOST_UNSEEN = 5

@@ -21,10 +21,10 @@ from damageest.evaluate.honesty.parts import NOISE, TOLERANCE, make_named_part
 from damageest.evaluate.parts import PARTS
 from damageest.evaluate.suite import make_cases
 from damageest.evaluate.variants import VariationRequest
+from damageest.findings import ModelFit
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.registry import Registry
-from damageest.result import ModelFit
 from damageest.stages.align.register import Register
 from damageest.stages.scan.simulate import Simulate
 

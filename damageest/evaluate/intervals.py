@@ -23,9 +23,10 @@ from damageest.evaluate.parts import PARTS
 from damageest.evaluate.processes import MARK, Row
 from damageest.evaluate.readme import describe_measurement, format_markdown
 from damageest.evaluate.scores import measure_depth
+from damageest.findings import Interval
 from damageest.pipeline.cache import digest
 from damageest.registry import Registry
-from damageest.result import Interval, Result
+from damageest.result import Result
 
 NOISES = (0.00025, 0.0005, 0.001)
 """Noise of the scan, as shares of the part's diagonal. The tolerance is four times the noise."""

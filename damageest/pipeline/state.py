@@ -33,8 +33,9 @@ from damageest.checks.coverage import SkinView
 from damageest.checks.model_fit import FittedModel
 from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
+from damageest.findings import Coverage, Interval, Surplus, Uncertainty, Verdict
 from damageest.pipeline.cache import digest
-from damageest.result import Coverage, Interval, Result, Surplus, Uncertainty, Verdict
+from damageest.result import Result
 from damageest.stages.export import ExportedFiles, Writer
 
 T = TypeVar("T")

@@ -18,12 +18,12 @@ from damageest.checks.uncertainty import (
     limit_beside,
     measure_site_error,
 )
+from damageest.findings import Fading, Interval, Uncertainty
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.fit_model import measure_at_site
 from damageest.pipeline.state import FoundSite, JobState, Work
-from damageest.result import Fading, Interval, Uncertainty
 from damageest.stages.allowance import Allowance
 
 BESIDE = 2.0

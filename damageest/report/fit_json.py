@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from damageest.artefacts import Vector
-from damageest.result import ModelFit
+from damageest.findings import ModelFit
 
 
 class _Model(BaseModel):

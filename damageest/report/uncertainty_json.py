@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from damageest.findings import Interval
 from damageest.report.base import JsonModel
-from damageest.result import Interval, Site
+from damageest.result import Site
 
 
 class FadingReport(JsonModel):
