@@ -287,6 +287,30 @@ class Samples(_Arrays):
     }
 
 
+@dataclass(frozen=True)
+class FreeMotion:
+    """A motion that unworn skin does not exclude: after it the scan fits the part as well.
+
+    ``direction``: unit vector of a shift, or of the axis of a turn through ``point`` (None: a shift), in the part's
+    frame. ``low``, ``high``: how far the scan can be moved, 0 being the pose found, in the job's unit; of a turn, the
+    movement of the skin that moves most. ``turn``: angle in radians for each unit of it, 0 for a shift. ``text``: the
+    same in words.
+    """
+
+    direction: Vector
+    low: float
+    high: float
+    point: Vector | None = None
+    turn: float = 0.0
+    text: str = ""
+
+    def move(self, points: Floats) -> Floats:
+        """How points (N,3) of the scan, in the part's frame, move for each unit of the motion (N,3)."""
+        if self.point is None:
+            return np.tile(np.array(self.direction), (len(points), 1))
+        return np.cross(self.turn * np.array(self.direction), points - np.array(self.point))
+
+
 @dataclass(frozen=True, eq=False)
 class Pose(_Arrays):
     """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
@@ -294,6 +318,8 @@ class Pose(_Arrays):
     ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is
     one of several right ones. ``notes`` say so in words. ``doubts``: those of the notes that make the verdict on every
     site doubtful, such as a small share of the scan on the part, or other poses that fit and are no symmetries.
+    ``free``: motions that unworn skin does not exclude. ``is_held``: whether skin without wear holds the pose but for
+    those; False where that was not tested.
     """
 
     T_part_scan: Floats
@@ -302,6 +328,8 @@ class Pose(_Arrays):
     alternatives: Floats | None = None
     notes: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    free: tuple[FreeMotion, ...] = ()
+    is_held: bool = False
     _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import (
     Deviation,
     Evidence,
-    Flags,
     Floats,
-    Ints,
     Mesh,
     Part,
     Pose,
@@ -23,82 +21,9 @@ from damageest.artefacts import (
     Solid,
     Surface,
 )
+from damageest.findings import Coverage, Fading, Interval, ModelFit, Surplus, Uncertainty, Verdict
 from damageest.geometry.transforms import invert_pose
 from damageest.io.conversions import as_manifold, as_trimesh
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What a damage volume is worth: ``level``, and ``reasons`` that speak against it, in words.
-
-    `proven`: all that could contradict it was asked, and agrees. `likely`: nothing contradicts it, but not all could be
-    asked. `doubtful`: something contradicts it, or what it rests on cannot be told from errors of the scan.
-    """
-
-    level: Literal["proven", "likely", "doubtful"] = "proven"
-    reasons: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class UnseenRegion:
-    """Connected skin without scan points.
-
-    ``centre`` (3,) and ``bounds`` (2,3) of its cells; ``faces``: numbers of its CAD faces, empty where the part has
-    none; ``volume``: the most that can be lost behind it without a trace in the scan. ``why``: `hidden`: the part
-    itself is between it and every scanner position; `outside`: no view reached there; `no points`: a view reached there
-    and gave no points; `unknown`: no scanner position is known.
-    """
-
-    area: float
-    centre: Floats
-    bounds: Floats
-    faces: tuple[int, ...]
-    volume: float
-    why: Literal["unknown", "hidden", "outside", "no points"] = "unknown"
-
-
-@dataclass(frozen=True, eq=False)
-class Coverage:
-    """What the scan shows of the part's skin.
-
-    ``seen``: its share of the skin's area. ``skin``: the skin cut into cells, triangles of similar size, F of them.
-    ``is_seen`` (F,): whether the scan has points on a cell; ``distance`` (F,): their mean signed distance, NaN where
-    there are none; ``is_lost`` (F,): whether rays of the scanner passed through the metal behind it; ``region`` (F,):
-    the cell's place in ``unseen``, -1 for a cell in none. ``unseen``: largest first.
-    """
-
-    seen: float
-    unseen: tuple[UnseenRegion, ...]
-    skin: Mesh
-    is_seen: Flags
-    distance: Floats
-    is_lost: Flags
-    region: Ints
-
-
-@dataclass(frozen=True, eq=False)
-class Surplus:
-    """Metal or other matter outside the nominal surface.
-
-    ``points`` (M,) indices into the scan, ``share`` of it; ``solid``: its volume as a closed mesh, None where it cannot
-    be closed; ``height``: its largest distance from the skin; ``area``: skin that it covers. ``kind``: `surplus`, as a
-    weld bead or dirt; `displaced piece`, with losses of like size beside it; `surroundings`, as a fixture, a table or a
-    second specimen. ``clusters``: the point clusters of the losses beside it. ``notes`` say what was recognised.
-    """
-
-    id: int
-    points: NDArray[np.int64]
-    share: float
-    solid: Solid | None
-    height: float
-    area: float
-    kind: Literal["surplus", "displaced piece", "surroundings"] = "surplus"
-    clusters: tuple[int, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def volume(self) -> float | None:
-        return self.solid.volume if self.solid else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +33,8 @@ class Site:
     After a cut-back, DV and IDS are those of the enlarged cavity. ``refused``: the stage `allowance` failed, and what
     to deposit is not known. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into
     the scan; ``max_depth``: the farthest of them below the nominal surface. ``accepted``: whether the site is part of
-    `Result.damage`; a doubtful one is where the job accepts it.
+    `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
+    unit of each motion of `Pose.free`.
     """
 
     id: int
@@ -122,8 +48,26 @@ class Site:
     max_depth: float
     warnings: tuple[str, ...] = ()
     refused: bool = False
-    verdict: Verdict = Verdict()
+    verdict: Verdict = field(default_factory=Verdict)
     accepted: bool = True
+    volume_rates: tuple[float, ...] = ()
+    uncertainty: Uncertainty | None = None
+
+    @property
+    def volume_95(self) -> Interval | None:
+        """The 95 % interval of the volume of ``damage``; None where the scan does not support one."""
+        return self.uncertainty.volume_95 if self.uncertainty else None
+
+    @property
+    def depth_95(self) -> Interval | None:
+        """The 95 % interval of the largest depth of the loss, which ``max_depth``, of single points, exceeds by noise;
+        None where the scan does not support one."""
+        return self.uncertainty.depth_95 if self.uncertainty else None
+
+    @property
+    def fading(self) -> Fading | None:
+        """How a shallow loss fades out; None for a loss with a sharp rim."""
+        return self.uncertainty.fading if self.uncertainty else None
 
     @cached_property
     def centroid(self) -> Floats:
@@ -170,7 +114,9 @@ class Result:
     takes a point from the scanner's frame to the part's: x_part = R x_scan + t; ``aligned`` is the scan moved by it.
     ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of the DVs of all
     accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
-    sites have no DV or no deposit and why: then ``status`` is ``incomplete``.
+    sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
+    volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
+    high end.
     """
 
     name: str
@@ -191,6 +137,8 @@ class Result:
     stages: tuple[StageRecord, ...] = ()
     coverage: Coverage | None = None
     surplus: tuple[Surplus, ...] = ()
+    fit: ModelFit | None = None
+    volume_95: Interval | None = None
 
     @property
     def status(self) -> Literal["ok", "incomplete"]:

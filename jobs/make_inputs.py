@@ -7,8 +7,9 @@ from pathlib import Path
 import cadquery as cq
 import numpy as np
 
-from damageest.artefacts import Part
+from damageest.artefacts import Part, Solid
 from damageest.evaluate.parts import PARTS
+from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.io.meshes import write_points, write_stl
 from damageest.stages.scan.simulate import Simulate
 
@@ -44,11 +45,26 @@ def scan_of(part: Part, name: str, damage: list[dict[str, object]], points: int,
     write_points(HERE / "scans" / name, {"x": x, "y": y, "z": z})
 
 
+def worn_shaft() -> None:
+    """A keyed shaft, and what its seat in the middle has lost by eccentric wear: 1 mm at the side of positive x, and
+    nothing at the opposite side. The mesh is larger than the loss: the shaft bounds it outside."""
+    from manifold3d import Manifold
+
+    low, length, radius, depth = -19.0, 28.0, 18.0, 1.0
+    seat = Manifold.cylinder(length, radius, radius, 256).translate((-depth, 0, low))
+    ring = Manifold.cylinder(length, radius + 1, radius + 1, 256).translate((0, 0, low))
+    write_stl(HERE / "parts" / "shaft_loss.stl", Part(*to_arrays(ring - seat)))
+    write_stl(HERE / "parts" / "keyed_shaft.stl", PARTS["keyed_shaft"]())
+
+
 def main() -> None:
     gear_step()
     half_torus_step()
+    worn_shaft()
     for name in ("block", "ribbed_plate", "cylinder"):
         write_stl(HERE / "parts" / f"{name}.stl", PARTS[name]())
+    blade = to_manifold(PARTS["blade"]()).simplify(0.02)  # mm, and a quarter of the triangles
+    write_stl(HERE / "parts" / "blade.stl", Solid(*to_arrays(blade)))
     wedge = {"tool": "plane", "point": [31.0, 0.0, 9.0], "normal": [0.75, 0.15, 0.65]}
     scan_of(PARTS["block"](), "block_wedge.ply", [wedge], 110_000, 5)
 

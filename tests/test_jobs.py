@@ -13,7 +13,7 @@ from damageest.job import yamlfile
 from tests.needs import needs_plugin
 
 JOBS = Path(__file__).parents[1] / "jobs"
-SITES = {"block_wedge": 1, "gear_teeth": 4, "cylinder_two_sides": 2, "half_torus": 1, "four_sites": 4}
+SITES = {"block_wedge": 1, "gear_teeth": 4, "cylinder_two_sides": 2, "half_torus": 1, "four_sites": 4, "worn_shaft": 1}
 STOCK = {"stock_uniform": 0.8, "stock_flanks": 0.3, "worn_bore": 0.5}
 """Millimetres of stock that the jobs ask for; each has as many sites as `DEPOSITS` says."""
 DEPOSITS = {"stock_uniform": 1, "stock_flanks": 2, "worn_bore": 2}
@@ -35,7 +35,7 @@ def mark_job(name: str) -> Any:
 
 
 def test_every_job_is_listed() -> None:
-    assert {path.stem for path in JOBS.glob("*.yaml")} == {*SITES, *STOCK}
+    assert {path.stem for path in JOBS.glob("*.yaml")} == {*SITES, *STOCK, "bent_blade"}
 
 
 @pytest.mark.parametrize("name", map(mark_job, SITES))
@@ -69,3 +69,15 @@ def test_example_with_stock(name: str) -> None:
     assert result.undamaged_volume + result.damage_volume == pytest.approx(result.part.volume, rel=1e-6)
     if result.truth is not None:
         assert result.truth[1] >= 0.97
+
+
+@pytest.mark.slow
+def test_a_bent_blade_is_named_and_its_chip_is_found() -> None:
+    result = damageest.run(JOBS / "bent_blade.yaml")
+    assert result.fit is not None
+    assert result.fit.model == "deformed"
+    assert result.fit.deformation[0][0] == "bend"
+    assert result.fit.amount == pytest.approx(0.16, rel=0.2)
+    assert [site.verdict.level for site in result.sites if site.accepted] == ["proven"]
+    assert result.truth is not None
+    assert result.truth[1] >= 0.93

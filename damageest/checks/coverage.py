@@ -11,10 +11,10 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Part, Solid
 from damageest.checks.ray_evidence import RayEvidence
 from damageest.checks.skin_cells import SkinCells
+from damageest.findings import Coverage, UnseenRegion
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.rays import RayCaster
-from damageest.result import Coverage, UnseenRegion
 
 LEAST_EDGE = 4.0
 """Edge of a square, in tolerances, whose area an unseen region has at least; smaller ones count in the share only."""

@@ -22,6 +22,9 @@ NEAR_PART = 0.03
 MIN_INTACT = 0.25
 """Least share of the points near the part that must be intact."""
 
+MOST_OUTSIDE = 0.02
+"""Share of these points that may lie outside the part where wear explains that few are intact."""
+
 
 def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float = 0.0) -> tuple[float, list[str]]:
     """Lambda in the job's unit, and what is doubtful about it, in words.
@@ -110,10 +113,16 @@ def require_intact(distance: Floats, tolerance: float, part: Part) -> None:
     if share >= MIN_INTACT:
         return
     better = float(np.quantile(near, 0.75))
+    worn = ""
+    if float((distance[size <= near[-1]] > tolerance).mean()) < MOST_OUTSIDE:
+        worn = (
+            f"; nothing lies outside, so that the part may be worn by about {float(np.median(near)):.2g} {part.unit} "
+            "over most of its skin, or be smaller than its model"
+        )
     raise StageError(
         f"only {share:.0%} of the scan points near the part are intact, which means within the tolerance of "
         f"{tolerance:.3g} {part.unit}; at least {MIN_INTACT:.0%} have to be: damage cannot be told from errors of scan "
-        "or pose",
+        f"or pose{worn}",
         f"check the pose first; then a larger tolerance: 75 % of these points lie within {better:.2g} {part.unit}",
     )
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from damageest.artefacts import Deviation, Floats, Ints, Part, Scan, Sites, Solid
+from damageest.findings import Surplus
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.voxels import measure_area
-from damageest.result import Surplus
 
 FAR, FAR_SHARE = 0.15, 0.25
 """Distance from the skin, as a share of the part's diagonal, that added metal hardly has; the share of a cluster's

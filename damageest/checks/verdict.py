@@ -10,8 +10,8 @@ import numpy as np
 from damageest.artefacts import ADDED, Deviation, Evidence, Floats, Pose, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.skin_cells import AVERAGED
+from damageest.findings import Surplus, Verdict
 from damageest.geometry.voxels import measure_area, number_cubes
-from damageest.result import Surplus, Verdict
 
 SYSTEMATIC = 4.0
 """How many times deeper than the systematic deviation of intact skin a site is to be."""
@@ -29,7 +29,7 @@ FEWEST_OF_VIEW = 4
 """Points of a view in a cube, for its mean to be compared."""
 WIDE, THIN = 0.12, 4.0
 """A site over a larger share of the skin than the first, and shallower in tolerances than the second, may be an error
-of a fitted pose: worn metal, or a part of another size, moves it."""
+of a fitted pose that no unworn skin is known to hold: worn metal, or a part of another size, moves it."""
 LAYER = 5.0
 """Height in tolerances up to which points outside count as such skin; higher ones are added metal."""
 FEW, TOO_FEW = 100, 12
@@ -57,7 +57,7 @@ class ScanLimits:
     ``outward_area`` and ``outward_height``: skin that lies outside the part by some tolerances, and by how much. No
     damage does that, so a site of like depth may come from the same error. ``between_views``: how far the views of the
     scan differ where they overlap, 0 where they agree or are not known. ``seen_area``: skin that the scan shows;
-    ``is_fitted``: whether the pose was fitted to the scan.
+    ``is_fitted``: whether the pose was fitted to the scan, and no unworn skin is known to hold it.
     """
 
     tolerance: float

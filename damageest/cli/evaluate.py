@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from damageest.cli import honesty
+from damageest.cli.intervals import run_intervals
 
 if TYPE_CHECKING:
     from damageest.evaluate.case import DamageCase
@@ -119,6 +120,13 @@ def suite_command(
         str, typer.Option(metavar="A,B", help="Multiples of the noise, lengths, as 1mm, or auto.")
     ] = "4",
     settings: Settings = None,
+    intervals: Annotated[
+        bool,
+        typer.Option(
+            "--intervals",
+            help="Count how often the truth lies in the 95 % intervals, at three noises and three densities.",
+        ),
+    ] = False,
     jobs: Jobs = 2,
     timeout: Timeout = 300,
     out: Out = None,
@@ -140,6 +148,14 @@ def suite_command(
     from damageest.evaluate.variants import VariationRequest
     from damageest.registry import Registry
 
+    chosen = [name.strip() for name in parts.split(",")] if parts else list(PARTS)
+    if intervals:
+        if vary or against or settings or noise or points:
+            raise InputError(
+                "--intervals: varies noise and density itself; leave out --vary, --against, --set, --noise and --points"
+            )
+        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, _format_command())
+        return
     _prepare(out, plots)
     if write:
         replace_between_marks(write, None, marks)  # fails before the runs start if the marks are missing
@@ -148,7 +164,6 @@ def suite_command(
     base = [f"method={method}", *(["align=none"] if pose == "identity" else [])]
     varied = [text for text in base if text.partition("=")[0] not in {name.partition("=")[0] for name in vary or ()}]
     request = VariationRequest(size, noise, points, tolerance, vary or (), [*varied, *(settings or ())], against or ())
-    chosen = [name.strip() for name in parts.split(",")] if parts else list(PARTS)
     rows = _run_cases(suite.make_cases(cases, seed, chosen, pose, request, Registry.discover()), jobs, timeout, out)
     first = ["part"] if len(chosen) > 1 or not collect_axes(rows) else []
     _write_report(rows, first, "mm", out, plots)

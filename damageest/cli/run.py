@@ -13,7 +13,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from damageest.result import Result, Surplus
+    from damageest.findings import Surplus
+    from damageest.result import Result
 
 
 MOST_UNSEEN = 5
@@ -98,6 +99,20 @@ def _list_reasons(result: Result) -> list[str]:
     ]
 
 
+def _list_uncertainties(result: Result) -> list[str]:
+    return [
+        f"site {site.id}: {reason}"
+        for site in result.sites
+        if site.uncertainty and site.accepted
+        for reason in site.uncertainty.reasons
+    ]
+
+
+def _format_interval(interval: tuple[float, float] | None) -> str:
+    """As "98.2 to 101", or a dash where there is none."""
+    return "–" if interval is None else f"{interval[0]:.4g} to {interval[1]:.4g}"
+
+
 def _list_warnings(result: Result) -> list[str]:
     return [f"site {site.id}: {note}" for site in result.sites for note in site.warnings]
 
@@ -150,7 +165,7 @@ def _print_table(result: Result, target: Path) -> None:
         heads = ["site", f"volume {unit}³", f"area {unit}²", f"depth {unit}"]
         if any(site.deposit for site in result.sites):
             heads += [f"deposit {unit}³", f"stock {unit}³"]
-        for name in (*heads, "method", "verdict"):
+        for name in (*heads, "95 %", "method", "verdict"):
             table.add_column(name, justify="left" if name in ("method", "verdict") else "right")
         for site in result.sites:
             verdict = site.verdict.level + ("" if site.accepted == (site.verdict.level != "doubtful") else ", accepted")
@@ -159,20 +174,23 @@ def _print_table(result: Result, target: Path) -> None:
                 stock = getattr(site.deposit, "stock_volume", None)
                 numbers += [f"{site.deposit.volume:.6g}" if site.deposit else "–"]
                 numbers += ["–" if stock is None else f"{stock:.6g}"]
-            table.add_row(str(site.id), *numbers, site.method, verdict)
+            table.add_row(str(site.id), *numbers, _format_interval(site.volume_95), site.method, verdict)
         console.print(table)
+        known = "" if result.volume_95 is None else f" (95 %: {_format_interval(result.volume_95)})"
         console.print(
-            f"damage volume: {result.damage_volume:.6g} {unit}³; part volume: {result.part.volume:.6g} {unit}³"
+            f"damage volume: {result.damage_volume:.6g} {unit}³{known}; part volume: {result.part.volume:.6g} {unit}³"
         )
     elif not result.failures:
         depth = f"{result.tolerance:.4g} {unit}"
         console.print(f"no damage deeper than the tolerance of {depth} was found{_on_seen(result)}")
     _print_coverage(result, console)
+    if result.fit is not None and result.fit.model == "ok":  # otherwise it is among the notes
+        console.print(f"fit: {result.fit.words}")
     for item in result.surplus:
         console.print(_describe_surplus(item, unit))
     for text in result.failures:
         console.print(f"[red]failed:[/red] {text}")
-    for text in (*result.warnings, *_list_reasons(result), *_list_warnings(result)):
+    for text in (*result.warnings, *_list_reasons(result), *_list_warnings(result), *_list_uncertainties(result)):
         console.print(f"[yellow]note:[/yellow] {text}")
     console.print(f"written to {target}")
 

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+from weakref import ReferenceType, WeakKeyDictionary, ref
+
 import numpy as np
 
 from damageest.artefacts import Flags, Part, Solid, Surface
 from damageest.geometry.distance import distance_to_mesh
+
+_FOUND: WeakKeyDictionary[Solid, tuple[ReferenceType[Part], Flags]] = WeakKeyDictionary()
+"""What was found before: evidence, uncertainty and result ask it of the same solids."""
 
 
 def find_inner_faces(damage: Solid, part: Part) -> Flags:
     """Whether each face (F,) of a damage volume lies inside the part, and not on its skin.
 
     A face is on the skin if three points within it are at most 1e-7 of the part's diagonal from it. Both solids are in
-    the unit and frame of the part.
+    the unit and frame of the part. The array is read-only.
     """
+    known = _FOUND.get(damage)
+    if known is not None and known[0]() is part:
+        return known[1]
     corners = damage.triangles
     # Three points within each triangle, because a face inside the part may touch the skin at a corner or along an edge.
     weights = np.array([[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
     probes = np.einsum("pk,fkj->fpj", weights, corners).reshape(-1, 3)
     distance = distance_to_mesh(probes, part)
-    return np.asarray(distance.reshape(-1, 3).max(axis=1) > 1e-7 * part.diagonal)
+    inner = np.asarray(distance.reshape(-1, 3).max(axis=1) > 1e-7 * part.diagonal)
+    inner.flags.writeable = False
+    _FOUND[damage] = ref(part), inner
+    return inner
 
 
 def extract_ids(damage: Solid, part: Part) -> Surface:

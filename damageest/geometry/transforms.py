@@ -1,4 +1,4 @@
-"""Rigid transforms (4,4): the inverse of a pose, and moved meshes."""
+"""Rigid transforms (4,4): the inverse of a pose, moved meshes, and what is not rigid about a displacement."""
 
 from __future__ import annotations
 
@@ -29,3 +29,18 @@ def move_mesh(mesh: M, T: Floats | None) -> M:
     Translation and vertices are in one unit. Other fields stay as they are.
     """
     return mesh if T is None else replace(mesh, vertices=mesh.vertices @ T[:3, :3].T + T[:3, 3])
+
+
+def remove_rigid(points: Floats, displacement: Floats, weights: Floats) -> Floats:
+    """The displacement (N,3) of points (N,3) without the rigid motion that is nearest to it, by weighted least squares.
+
+    To first order in the angle, which is small.
+    """
+    at = points - points.mean(axis=0)
+    size = max(float(np.abs(at).max()), 1e-300)
+    zero, (x, y, z) = np.zeros(len(at)), at.T / size
+    turns = np.stack([np.stack(row, axis=1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], axis=2)
+    basis = np.concatenate([turns, np.broadcast_to(np.eye(3), (len(at), 3, 3))], axis=2)
+    root = np.sqrt(weights)[:, None]
+    found = np.linalg.lstsq((basis * root[..., None]).reshape(-1, 6), (displacement * root).ravel(), rcond=1e-9)[0]
+    return np.asarray(displacement - basis @ found)

@@ -13,6 +13,7 @@ from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid,
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.pipeline.uncertainty import shift_interval, shift_uncertainty
 from damageest.result import Result, Site
 
 
@@ -37,6 +38,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
     cut_back = any(site.damage is not found.damage for site, found in zip(sites, work.sites, strict=True))
     taken = (site.damage for site in work.sites if site.accepted)
     found = to_solid(unite(taken, origin), origin) if cut_back else damage
+    alone = sum(site.damage.volume for site in work.sites if site.accepted)
     result = Result(
         name=engine.job.name,
         units=engine.job.units,
@@ -56,6 +58,8 @@ def collect_result(engine: Engine, work: Work) -> Work:
         stages=tuple(engine.records),
         coverage=state.coverage,
         surplus=state.surplus,
+        fit=None if state.fitted is None else state.fitted.fit,
+        volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
     key = digest(
         engine.job.name, [state.keys[name] for name in sorted(state.keys)], [s.key("deposit") for s in work.sites]
@@ -81,6 +85,8 @@ def _describe_site(found: FoundSite) -> Site:
         refused=found.refused,
         verdict=found.verdict,
         accepted=found.accepted,
+        uncertainty=shift_uncertainty(found.uncertainty, damage.volume - found.damage.volume),
+        volume_rates=found.volume_rates,
         method=found.method,
         evidence=evidence,
         max_depth=max(float(-found.job.deviation.distance[members].min(initial=0.0)), 0.0),

@@ -11,6 +11,7 @@ from damageest.pipeline.coverage import describe_coverage, inspect_skin
 from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
+from damageest.pipeline.fit_model import correct_scan, fit_model, question_sites
 from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.prepare import (
@@ -30,6 +31,7 @@ from damageest.pipeline.sites import (
     where_damaged,
 )
 from damageest.pipeline.surplus import find_surplus, relate_surplus
+from damageest.pipeline.uncertainty import measure_uncertainty
 from damageest.pipeline.verdicts import choose_sites, judge_sites
 from damageest.stages.align import Align
 from damageest.stages.allowance import Allowance
@@ -48,8 +50,8 @@ from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
-    ReadPart, ReadScan, crop_scan, measure_scan, Sample, Align, place_scan, settle_tolerance,
-    Segment, check_intact, inspect_skin, Cluster, find_surplus, gather_intact,
+    ReadPart, ReadScan, crop_scan, measure_scan, Sample, Align, place_scan, correct_scan,
+    settle_tolerance, Segment, check_intact, inspect_skin, fit_model, Cluster, find_surplus, gather_intact,
 )  # fmt: skip
 BY_SITE: Route = (
     take_clusters, Reconstruct, Boundary, enclose_grouped(Background, Enclose), Repair, Boolean, gather_sites,
@@ -57,7 +59,7 @@ BY_SITE: Route = (
 AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
 CLOSE: Route = (
     add_lost_bodies, set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus,
-    judge_sites, make_deposits(Allowance), separate_deposits, collect_result,
+    question_sites, judge_sites, make_deposits(Allowance), separate_deposits, measure_uncertainty, collect_result,
 )  # fmt: skip
 
 WRITE: Route = (Export,)

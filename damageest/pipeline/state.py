@@ -30,9 +30,12 @@ from damageest.artefacts import (
     Surface,
 )
 from damageest.checks.coverage import SkinView
+from damageest.checks.model_fit import FittedModel
+from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
+from damageest.findings import Coverage, Interval, Surplus, Uncertainty, Verdict
 from damageest.pipeline.cache import digest
-from damageest.result import Coverage, Result, Surplus, Verdict
+from damageest.result import Result
 from damageest.stages.export import ExportedFiles, Writer
 from damageest.stages.report import ReportFiles
 
@@ -103,8 +106,12 @@ class JobState(State):
     sites = Value[Sites]()
     intact = Value[Floats]()
     skin = Value[SkinView]()
+    views = Value[ViewFits | None]()
+    corrected_scale = Value[float]()
+    fitted = Value[FittedModel | None]()
     coverage = Value[Coverage]()
     surplus = Value[tuple[Surplus, ...]]()
+    volume_95 = Value[Interval | None]()
     enclosures = Value[Enclosures]()
     result = Value[Result]()
     folder = Value[Path]()
@@ -158,7 +165,8 @@ class Candidate(_SiteState):
 class FoundSite(_SiteState):
     """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
     ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
-    ``questions``: what the scan leaves open about it."""
+    ``questions``: what the scan leaves open about it; ``uncertainty``: of the volume of ``damage``; ``volume_rates``:
+    as in `Site`."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -170,6 +178,8 @@ class FoundSite(_SiteState):
     accepted: bool = True
     doubts: tuple[str, ...] = ()
     questions: tuple[str, ...] = ()
+    uncertainty: Uncertainty | None = None
+    volume_rates: tuple[float, ...] = ()
 
     damage = Value[Solid]()
     others = Value[Solid | None]()

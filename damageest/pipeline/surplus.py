@@ -10,13 +10,13 @@ import numpy as np
 from damageest.artefacts import ADDED, DAMAGE, Sites
 from damageest.checks.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
 from damageest.errors import DamageestError, StageError
+from damageest.findings import Surplus
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples, label_strays
 from damageest.geometry.pieces import JoinedPieces, find_pieces, join_pieces
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
-from damageest.result import Surplus
 from damageest.stages.cluster import Cluster
 from damageest.stages.enclose import EncloseAll
 

@@ -10,6 +10,8 @@ import numpy as np
 from damageest.artefacts import Flags
 from damageest.checks.coverage import SkinView
 from damageest.checks.evidence import weigh_evidence
+from damageest.checks.free_pose import ask_free_pose, measure_dependence
+from damageest.checks.unseen_rim import ask_unseen_rim
 from damageest.checks.verdict import judge_site, measure_limits
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
@@ -56,17 +58,24 @@ def judge_sites(engine: Engine, work: Work) -> Work:
         _check_numbers("accept", accept, work.sites)
     limits = measure_limits(
         state.skin, state.aligned, state.deviation, state.surplus, state.tolerance, state.unit,
-        is_fitted=engine.job.implementations[Align].name != "none",
+        is_fitted=engine.job.implementations[Align].name != "none" and not state.pose.is_held,
     )  # fmt: skip
     done = []
+    reach = 2 * max(state.tolerance, state.aligned.spacing)
     for site in work.sites:
         area = measure_area(state.aligned.points[site.members], state.skin.cells.edge) if len(site.members) else 0.0
+        dependences = measure_dependence(site.damage, state.part, state.pose)
+        against, questions = ask_free_pose(dependences, site.damage.volume, state.unit)
+        by_rays = _is_proven_by_rays(state.skin, site)
+        at_rim = ask_unseen_rim(site.damage, state.part, state.coverage, reach)
+        against, questions = (*against, *at_rim[0]), (*questions, *at_rim[1])
         verdict = judge_site(
             site.evidence, -state.deviation.distance[site.members], area, state.pose, limits,
-            _is_proven_by_rays(state.skin, site), site.damage.area, site.questions, site.doubts,
+            by_rays, site.damage.area, (*site.questions, *questions), (*site.doubts, *against),
         )  # fmt: skip
         accepted = verdict.level != "doubtful" or accept == "all" or site.number in accept
-        done.append(replace(site, verdict=verdict, accepted=accepted))
+        rates = tuple(one.rate for one in dependences)
+        done.append(replace(site, verdict=verdict, accepted=accepted, volume_rates=rates))
     return replace(work, sites=tuple(done))
 
 
@@ -100,8 +109,9 @@ def _is_proven_by_rays(skin: SkinView, site: FoundSite) -> bool:
     if site.method == BY_RAYS_ALONE:
         return True
     cells, damage = skin.cells, site.damage
-    near: Flags = ((cells.centres > damage.bounds[0]) & (cells.centres < damage.bounds[1])).all(axis=1)
+    close = 1e-3 * cells.edge  # cells of a flat face lie on the bounds
+    near: Flags = ((cells.centres > damage.bounds[0] - close) & (cells.centres < damage.bounds[1] + close)).all(axis=1)
     index = np.flatnonzero(near & ~skin.perhaps_seen)
-    index = index[distance_to_mesh(cells.centres[index], damage) < 1e-3 * cells.edge] if len(index) else index
+    index = index[distance_to_mesh(cells.centres[index], damage) < close] if len(index) else index
     area = cells.areas[index]
     return bool(len(index)) and float(area[skin.rays.lost[index]].sum()) > BY_RAYS * float(area.sum())

@@ -9,8 +9,11 @@ from pydantic import Field
 from damageest.artefacts import Floats, Vector
 from damageest.report.base import JsonModel
 from damageest.report.deviation_json import DeviationReport, report_deviation
+from damageest.report.fit_json import FitReport, report_fit
+from damageest.report.free_json import FreeMotionReport, report_free_motion
 from damageest.report.site_json import MaterialReport, SiteReport, report_site, sum_material
 from damageest.report.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
+from damageest.report.uncertainty_json import report_interval
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
@@ -44,6 +47,10 @@ class AlignmentReport(JsonModel):
     alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
     notes: list[str]
     doubts: list[str] = Field(description="those of the notes that make every site doubtful")
+    free: list[FreeMotionReport] = Field(
+        description="motions after which the scan fits as well, since no unworn skin holds it"
+    )
+    held: bool = Field(description="whether unworn skin holds the pose, but for these motions")
 
 
 class ExportReport(JsonModel):
@@ -81,10 +88,12 @@ class Report(JsonModel):
     alignment: AlignmentReport
     deviation: DeviationReport
     coverage: CoverageReport | None
+    fit: FitReport | None = Field(description="null where too few points lie near the skin")
     sites: list[SiteReport]
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
     export: ExportReport
     damage_volume: float
+    volume_95: tuple[float, float] | None = Field(description="95 % interval of `damage_volume`; null: there is none")
     undamaged_volume: float
     material: MaterialReport = Field(description="what the whole repair takes")
     truth: TruthReport | None
@@ -135,13 +144,17 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
             notes=list(pose.notes),
             doubts=list(pose.doubts),
+            free=[report_free_motion(motion) for motion in pose.free],
+            held=pose.is_held,
         ),
         deviation=report_deviation(result.deviation),
         coverage=report_coverage(result.coverage),
+        fit=report_fit(result.fit),
         sites=sites,
         surplus=[report_surplus(item, result, written) for item in result.surplus],
         export=ExportReport(files=list(written.files), notes=list(written.notes)),
         damage_volume=result.damage_volume,
+        volume_95=report_interval(result.volume_95),
         undamaged_volume=result.undamaged_volume,
         material=sum_material([site.deposit for site in sites if site.deposit]),
         truth=_report_truth(result),

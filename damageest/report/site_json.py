@@ -8,6 +8,7 @@ from pydantic import Field
 
 from damageest.artefacts import Deposit, Vector
 from damageest.report.base import JsonModel
+from damageest.report.uncertainty_json import UncertaintyReport, report_interval, report_uncertainty
 from damageest.result import Site
 from damageest.stages.export import ExportedFiles
 
@@ -72,8 +73,12 @@ class SiteReport(JsonModel):
     id: int
     points: int
     volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
+    volume_95: tuple[float, float] | None = Field(description="95 % interval of `volume`; null where there is none")
+    depth_95: tuple[float, float] | None = Field(description="95 % interval of the largest depth, before a cut-back")
+    uncertainty: UncertaintyReport | None
     surface_area: float = Field(description="of the inner damage surface")
     max_depth: float = Field(description="of the scan below the nominal surface")
+    volume_rates: list[float] = Field(description="change of the volume for each unit of each motion of alignment.free")
     centroid: Vector
     bounds: tuple[Vector, Vector]
     method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
@@ -103,8 +108,12 @@ def report_site(site: Site, written: ExportedFiles) -> SiteReport:
         id=site.id,
         points=len(site.points),
         volume=site.damage.volume,
+        volume_95=report_interval(site.volume_95),
+        depth_95=report_interval(site.depth_95),
+        uncertainty=report_uncertainty(site),
         surface_area=site.surface.area,
         max_depth=site.max_depth,
+        volume_rates=list(site.volume_rates),
         centroid=tuple(site.centroid.tolist()),
         bounds=(tuple(low), tuple(high)),
         method=site.method,

@@ -8,8 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Vector
+from damageest.findings import Coverage, Surplus
 from damageest.report.base import JsonModel
-from damageest.result import Coverage, Result, Surplus
+from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from damageest.artefacts import Floats, Scan
 from damageest.checks.surplus import describe_surplus
+from damageest.findings import Surplus
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples
-from damageest.result import Surplus
 from damageest.stages.cluster.dbscan import Dbscan
 from damageest.stages.sample.edge_aware import EdgeAware
 from damageest.stages.segment.mesh_distance import MeshDistance

@@ -10,7 +10,7 @@ import pytest
 
 from damageest.artefacts import Evidence, Pose
 from damageest.checks.verdict import ScanLimits, judge_site
-from damageest.result import Verdict
+from damageest.findings import Verdict
 
 LIMITS = ScanLimits(tolerance=0.2, spacing=0.3, unit="mm")
 DEEP = np.full(500, 1.0)

@@ -35,3 +35,12 @@ def test_faces_that_touch_the_skin_along_an_edge_are_inside(away: np.ndarray) ->
     # three sides of the corner lie on the skin, three inside
     assert np.array_equal(inner, corner.cross.sum(axis=1) < 0)
     assert extract_ids(corner, Part(part.vertices, part.faces)).area == pytest.approx(3 * 16)
+
+
+def test_what_was_found_for_one_part_is_not_taken_for_another() -> None:
+    corner = box(4, np.full(3, 3.0))
+    small, large = box(10), box(40)
+    assert find_inner_faces(corner, Part(small.vertices, small.faces)).sum() == 6
+    part = Part(large.vertices, large.faces)
+    assert find_inner_faces(corner, part).all()
+    assert find_inner_faces(corner, part) is find_inner_faces(corner, part)

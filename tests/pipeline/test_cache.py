@@ -17,6 +17,7 @@ from damageest.artefacts import (
     Enclosure,
     Enclosures,
     Evidence,
+    FreeMotion,
     Mesh,
     Part,
     Pose,
@@ -34,7 +35,9 @@ BOX = trimesh.creation.box((3, 2, 1))
 SOLID = Solid(BOX.vertices + 1 / 3, BOX.faces)
 POINTS = np.random.default_rng(0).normal(size=(7, 3))
 TURN = np.array([[0.0, -1, 0, 1 / 3], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]])
+FREE = FreeMotion((0.0, 0.6, 0.8), -0.1, 1 / 3, (1.0, 2.0, 3.0), 0.02, "a turn")
 ARTEFACTS: list[Any] = [
+    FREE,
     Mesh(BOX.vertices, BOX.faces),
     SOLID,
     Surface(BOX.vertices, BOX.faces[:5]),
@@ -50,6 +53,8 @@ ARTEFACTS: list[Any] = [
     Scan(POINTS, viewpoints=POINTS[:2], view=np.arange(7) % 3 - 1),
     Samples(POINTS, POINTS, np.arange(7), np.zeros(7, np.uint8), 0.3),
     Pose(TURN, 0.01, 0.9, np.stack([TURN, np.eye(4)]), ("two ways",)),
+    FREE,
+    Pose(TURN, free=(FREE, FREE), is_held=True),
     Deviation(POINTS[:, 0], np.arange(7), np.array([0, 1, 2, 3, 0, 1, 2], np.uint8)),
     Sites(np.array([0, 1, 2], np.int32), 2, ("a note",)),
     Rims((np.arange(5), np.arange(3))),

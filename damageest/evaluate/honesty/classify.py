@@ -11,10 +11,11 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Pose, Solid
 from damageest.evaluate.scores import MATCH, measure_depth, measure_pose_error, score, unite_solids
+from damageest.findings import Coverage
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.solids import to_manifold, to_solid
-from damageest.result import Coverage, Result
+from damageest.result import Result
 
 RIGHT_IOU = 0.9
 """Least intersection over union of the accepted damage volumes and the true damage."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from damageest.evaluate.honesty import clutter, frame, lost, scanner, shape
+from damageest.evaluate.honesty import clutter, frame, lost, scanner, shape, wear
+from damageest.evaluate.honesty.form import FORM_TROUBLES
 from damageest.evaluate.honesty.names import (
     BENT,
     CLUTTER,
@@ -275,5 +276,7 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "undamaged part, few positions": Trouble(scanner.scan_intact, (), scan_from_few()),
     "undamaged part, few positions, depth in steps": Trouble(scanner.scan_in_steps, NOISE, scan_from_few(1.0)),
+    **FORM_TROUBLES,
+    **wear.WEAR_TROUBLES,
 }
 """Name of a kind: what makes it, what names it, and its cases."""

@@ -16,7 +16,8 @@ from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 
 
-def _make_box(low: tuple[float, ...], high: tuple[float, ...]) -> Any:
+def make_box(low: tuple[float, ...], high: tuple[float, ...]) -> Any:
+    """The box between two corners, as a Manifold."""
     from manifold3d import Manifold
 
     return Manifold.cube(tuple(np.subtract(high, low))).translate(low)
@@ -24,7 +25,7 @@ def _make_box(low: tuple[float, ...], high: tuple[float, ...]) -> Any:
 
 def lose_wall(case: Scanning) -> TroubleScene:
     """The upright wall of `wall_plate` is gone altogether. ``amount``: its thickness in tolerances."""
-    return case.scan(*case.cut(_make_box((-50, -10, 0), (50, 14, 2 * WALL_HEIGHT))))
+    return case.scan(*case.cut(make_box((-50, -10, 0), (50, 14, 2 * WALL_HEIGHT))))
 
 
 def bite_wall(case: Scanning) -> TroubleScene:
@@ -42,18 +43,18 @@ def lose_rib(case: Scanning) -> TroubleScene:
         "rib_bracket": ((-35, 2.4, 0), (-3, 5.1, 32)),
         "ribbed_plate": ((-28.5, 12.4, 0), (45.1, 15.6, 20)),
     }
-    return case.scan(*case.cut(_make_box(*boxes[case.name])))
+    return case.scan(*case.cut(make_box(*boxes[case.name])))
 
 
 def lose_pin(case: Scanning) -> TroubleScene:
     """A pin (`pin_plate`) or a bar (`grille`) is gone altogether."""
     boxes = {"pin_plate": ((-18, 2, 0), (-12, 8, 20)), "grille": ((-2.01, -29, -6), (2.01, 29, 0))}
-    return case.scan(*case.cut(_make_box(*boxes[case.name])))
+    return case.scan(*case.cut(make_box(*boxes[case.name])))
 
 
 def lose_body(case: Scanning) -> TroubleScene:
     """One of the two bodies of `two_blocks` is lost. ``amount`` 1: the larger one."""
-    box = _make_box((-5, -5, -5), (55, 45, 25)) if case.amount else _make_box((60, -5, -5), (90, 45, 25))
+    box = make_box((-5, -5, -5), (55, 45, 25)) if case.amount else make_box((60, -5, -5), (90, 45, 25))
     return case.scan(*case.cut(box))
 
 
@@ -138,7 +139,7 @@ def make_shallow_pit(case: Scanning) -> TroubleScene:
 def wear_face(case: Scanning) -> TroubleScene:
     """Wear of ``amount`` tolerances on the top face."""
     low, high = case.part.bounds
-    box = _make_box((*(low[:2] - 1), high[2] - case.amount * case.tolerance), tuple(high + 1))
+    box = make_box((*(low[:2] - 1), high[2] - case.amount * case.tolerance), tuple(high + 1))
     return case.scan(*case.cut(box))
 
 

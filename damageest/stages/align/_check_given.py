@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from damageest.artefacts import Floats, Part, Scan
 from damageest.errors import StageError
 from damageest.stages.align._check_pose import check_pose
+from damageest.stages.align._check_worn import check_with_wear, measure_given_wear
 from damageest.stages.align._fine import Fit, fit, move_points
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._points import draw_evenly, orient_scan, orient_surface
@@ -40,7 +41,8 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[st
     points = rng.permutation(dense[draw_evenly(dense, weights, POINTS, rng)])
     start = frame.scale_pose(T)
     near = fit(frame.target, points, start, max(REACH, 2 * band), noise, 60)
-    given = check_pose(frame.target, Fit(start, near.band, 0.0), points, dense, band)
+    worn = measure_given_wear(frame.target, start, points, noise, band)
+    given = check_with_wear(frame.target, Fit(start, near.band, 0.0), points, dense, band, worn)
     fitted = check_pose(frame.target, near, points, dense, band)
 
     D = near.pose @ np.linalg.inv(start)
@@ -54,7 +56,7 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[st
         raise StageError(
             f"in the given pose {given.on:.0%} of the scan lies on the part; moved by {shift:.3g} {part.unit} and "
             f"turned by {turn:.2g} degrees, {fitted.on:.0%} would: the given pose is wrong by that "
-            "much, or the part is bent or twisted",
+            "much, or the part is bent or twisted, or the scale of the scan is wrong",
             "use align: icp, which corrects it, or give the right T_part_scan",
         )
     if not given.is_acceptable:

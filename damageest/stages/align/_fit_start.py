@@ -6,22 +6,27 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
-from damageest.stages.align._check_pose import check_pose
+from damageest.stages.align._check_worn import check_with_wear
 from damageest.stages.align._choose import note_free_motion
+from damageest.stages.align._datum import Datum, DatumSkin
 from damageest.stages.align._fine import fit
+from damageest.stages.align._finish import Finish, finish_pose
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._largest_piece import prefer_largest_piece
 from damageest.stages.align._points import draw_evenly, orient_scan
 
 
 def fit_from_start(
-    scan: Scan, part: Part, tolerance: float, T: Floats, reach: float, iterations: int, seed: int, remedy: str
-) -> Pose:
+    scan: Scan, part: Part, tolerance: float, T: Floats, reach: float, iterations: int, seed: int, remedy: str,
+    datum: Datum = (),
+) -> Pose:  # fmt: skip
     """The pose that the robust fit finds from ``T`` (4,4), a T_part_scan in the job's unit.
 
-    ``reach``: largest distance of a scan point from the part in the first step, in diagonals of the part. Raises
-    StageError, with the ``remedy``, where its pose does not explain the scan, and where the fit does not converge.
+    ``reach``: largest distance of a scan point from the part in the first step, in diagonals of the part. ``datum``:
+    what fixes the pose in the last fit. Raises StageError, with the ``remedy``, where its pose does not explain the
+    scan, and where the fit does not converge.
     """
+    on_datum = DatumSkin.find(part, datum)
     frame = Frame.build(scan, part)
     noise = scan.noise / frame.size
     rng = np.random.default_rng(seed)
@@ -32,7 +37,11 @@ def fit_from_start(
     converged = best.residue <= 0.5 * max(noise, 1e-4)
     if converged:
         best = prefer_largest_piece(frame.target, points, best, noise)
-    result = check_pose(frame.target, best, points, dense, tolerance / frame.size)
+    finish = Finish(best)
+    if converged:
+        finish = finish_pose(frame, points, best, noise, tolerance / frame.size, part.unit, on_datum)
+        best = finish.fit
+    result = check_with_wear(frame.target, best, points, dense, tolerance / frame.size, finish.worn_depth)
     if not result.is_acceptable:
         raise result.build_error(remedy)
     if not converged:
@@ -43,4 +52,8 @@ def fit_from_start(
         )
     doubts = result.note_doubts() + note_free_motion(best.pose, frame.target, points, best.band)
     pose = frame.unscale_pose(best.pose)
-    return Pose(pose, result.rms * frame.size, result.inliers, notes=doubts, doubts=doubts)
+    notes = doubts + finish.notes
+    return Pose(
+        pose, result.rms * frame.size, result.inliers, notes=notes, doubts=doubts,
+        free=finish.free, is_held=finish.is_held,
+    )  # fmt: skip

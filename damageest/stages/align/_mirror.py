@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.errors import StageError
-from damageest.stages.align._check_pose import PoseCheck, check_pose
+from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, PoseCheck, check_pose
 from damageest.stages.align._choose import COARSE
 from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._fine import Fit, fit, move_points
@@ -96,6 +96,13 @@ def refuse_mirrored(
     if not check.is_acceptable:  # another part altogether
         return
     if gain > LARGE_GAIN or (gain > MIN_GAIN and 1 - check.agreement < LESS * (1 - best.agreement)):
+        if check.agreement < DOUBTFUL_AGREEMENT:
+            raise StageError(
+                f"in the best pose only {best.agreement:.0%} of what the scan shows near the part lies on its surface, "
+                f"and {check.agreement:.0%} of it if it were mirrored: it shows a mirrored part, another size, a "
+                "bent one, or another part",
+                "scan: {scale: auto} if the scale may be wrong; otherwise check which part was scanned",
+            )
         raise StageError(
             f"the scan is a mirror image of the part: {check.agreement:.0%} of what it shows near the part would lie "
             f"on its surface if it were mirrored, {best.agreement:.0%} does in the best pose",

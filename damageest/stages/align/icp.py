@@ -9,6 +9,7 @@ from pydantic import Field as Option
 
 from damageest.artefacts import Part, Pose, Scan
 from damageest.stages.align import Align
+from damageest.stages.align._datum import NO_DATUM, Datum
 from damageest.stages.align._frame import RigidPose
 
 
@@ -35,6 +36,7 @@ class Icp(Align):
     seed: int = Option(
         0, ge=0, description="seed of the random choice of points; the same seed gives the same pose, bit for bit"
     )
+    datum: Datum = NO_DATUM
 
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The fitted pose. Raises StageError where the fit does not converge, or its pose does not explain the scan."""
@@ -46,4 +48,4 @@ class Icp(Align):
             f"max_distance (now {reach * part.diagonal:.4g} {part.unit})"
         )
         T = np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan)
-        return fit_from_start(scan, part, tolerance, T, reach, self.iterations, self.seed, remedy)
+        return fit_from_start(scan, part, tolerance, T, reach, self.iterations, self.seed, remedy, self.datum)

@@ -11,6 +11,7 @@ from pydantic import Field as Option
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.stages.align import Align
+from damageest.stages.align._datum import NO_DATUM, Datum
 
 Point = tuple[float, float, float]
 
@@ -46,6 +47,7 @@ class Points(Align):
     seed: int = Option(
         0, ge=0, description="seed of the random choice of points; the same seed gives the same pose, bit for bit"
     )
+    datum: Datum = NO_DATUM
 
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The fitted pose. Raises StageError where the pairs contradict each other, and where the fit from them does
@@ -59,7 +61,7 @@ class Points(Align):
         reach = max(0.03, 1.5 * float(residuals.max()) / part.diagonal)
         listed = _list_residuals(residuals, part.unit)
         remedy = f"check the picked pairs, which are off by {listed} after their fit; or use align: register"
-        return fit_from_start(scan, part, tolerance, T, reach, self.iterations, self.seed, remedy)
+        return fit_from_start(scan, part, tolerance, T, reach, self.iterations, self.seed, remedy, self.datum)
 
 
 def fit_pairs(pairs: Floats) -> tuple[Floats, Floats]:

@@ -10,6 +10,7 @@ from pydantic import Field as Option
 
 from damageest.artefacts import Part, Pose, Scan
 from damageest.stages.align import Align
+from damageest.stages.align._datum import NO_DATUM, Datum
 
 
 class Register(Align):
@@ -26,12 +27,18 @@ class Register(Align):
         60_000, ge=1000, le=2_000_000, description="number of candidate poses tried; the best are refined"
     )
     points: int = Option(30_000, ge=1000, le=120_000, description="number of scan points used by the final fit")
+    fit_views: bool = Option(
+        True,
+        description="whether each view of a scan with known views is fitted to the part where the views disagree: a "
+        "misplaced one is put right, if it fixes its pose by itself",
+    )
+    datum: Datum = NO_DATUM
 
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The fitted pose. Raises StageError where no pose explains the scan: it shows another part, has another unit,
         or most of it is not the part."""
         from damageest.errors import StageError
-        from damageest.stages.align._check_pose import check_pose
+        from damageest.stages.align._check_worn import check_with_wear
         from damageest.stages.align._choose import (
             COARSE,
             choose_pose,
@@ -39,8 +46,10 @@ class Register(Align):
             note_ambiguity,
             note_free_motion,
         )
+        from damageest.stages.align._datum import DatumSkin
         from damageest.stages.align._field import PlaneGrid
         from damageest.stages.align._fine import fit
+        from damageest.stages.align._finish import finish_pose
         from damageest.stages.align._frame import MIN_POINTS, Frame
         from damageest.stages.align._largest_piece import prefer_largest_piece
         from damageest.stages.align._mirror import SUSPECT, fit_reflections, refuse_mirrored
@@ -55,6 +64,7 @@ class Register(Align):
         from damageest.stages.align._refine_pose import refine_pose
         from damageest.stages.align._search import search
 
+        datum = DatumSkin.find(part, self.datum)
         frame = Frame.build(scan, part)
         target, noise = frame.target, scan.noise / frame.size
         rng = np.random.default_rng(self.seed)
@@ -72,7 +82,9 @@ class Register(Align):
         choice = choose_pose(search(rough, oriented, field, rng), target, field, few, fine, noise)
         best = fit(target, fine, choice.pose, COARSE / 2, noise, 30)
         best = refine_pose(target, fine, prefer_largest_piece(target, fine, best, noise))
-        check = check_pose(target, best, fine, dense, tolerance / frame.size)
+        finish = finish_pose(frame, fine, best, noise, tolerance / frame.size, part.unit, datum)
+        best = finish.fit
+        check = check_with_wear(target, best, fine, dense, tolerance / frame.size, finish.worn_depth)
         mirrored = fit_reflections(target, field, fine, best, noise)
         if check.agreement < SUSPECT:
             flip = np.array([1.0, 1.0, -1.0])
@@ -83,13 +95,27 @@ class Register(Align):
             mirrored = replace(found, pose=found.pose @ np.diag([*flip, 1.0]))
         refuse_mirrored(target, fine, dense, best.pose, check, mirrored, tolerance / frame.size)
         if not check.is_acceptable:
-            raise check.build_error(
-                "check that the scan shows this part and that both have the right unit; crop away a fixture or table; "
-                "where the pose is known, give it to align: icp or align: none"
-            )
-        others = np.array([frame.unscale_pose(pose) for pose in choice.others]) if len(choice.others) else None
+            raise check.build_error(_advise(scan))
+        others = None
+        if len(choice.others):
+            # a symmetry of the part takes the pose found to each of the others
+            turns = choice.others @ np.linalg.inv(choice.pose)
+            poses = turns @ best.pose if finish.is_changed else choice.others
+            others = np.array([frame.unscale_pose(pose) for pose in poses])
         doubts = (
             check.note_doubts() + note_ambiguity(choice, target) + note_free_motion(best.pose, target, fine, best.band)
         )
-        notes = describe_choice(choice) + doubts
-        return Pose(frame.unscale_pose(best.pose), check.rms * frame.size, check.inliers, others, notes, doubts)
+        notes = describe_choice(choice) + doubts + finish.notes
+        pose = frame.unscale_pose(best.pose)
+        rms = check.rms * frame.size
+        return Pose(pose, rms, check.inliers, others, notes, doubts, finish.free, finish.is_held)
+
+
+def _advise(scan: Scan) -> str:
+    """What to do where no pose explains the scan."""
+    views = 0 if scan.view is None else len(np.unique(scan.view[scan.view >= 0]))
+    apart = f"check that the {views} views of the scan are not misplaced against each other; " if views > 1 else ""
+    return (
+        f"check that the scan shows this part and that both have the right unit; {apart}crop away a fixture or table; "
+        "where the pose is known, give it to align: icp or align: none"
+    )

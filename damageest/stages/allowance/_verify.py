@@ -11,9 +11,9 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_edges, distance_to_mesh, is_inside
+from damageest.geometry.selectors import Mask
 from damageest.geometry.solids import to_arrays
 from damageest.stages.allowance._limits import StockConflict
-from damageest.stages.allowance._selectors import Mask
 from damageest.stages.allowance._skin import ON_PART, SkinFaces, normalise
 
 MAX_VOLUME = 1e-4

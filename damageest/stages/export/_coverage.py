@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Mesh
+from damageest.findings import Coverage
 from damageest.geometry.transforms import move_mesh
 from damageest.io.meshes import write_ply
-from damageest.result import Coverage
 from damageest.stages.export import ExportedFiles
 
 

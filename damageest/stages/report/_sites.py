@@ -18,7 +18,7 @@ from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._drawing import draw
 from damageest.stages.report._section import choose_plane, draw_section, take_paper
-from damageest.stages.report._values import show_site_interval
+from damageest.stages.report._values import show_interval, show_site_interval
 
 PICTURE, THUMBNAIL = (320, 240), (104, 78)
 FEW = 6
@@ -40,6 +40,7 @@ class Shown:
     volume: str
     interval: str
     depth: str
+    depth_interval: str
     area: str
     points: str
     method: str
@@ -118,6 +119,7 @@ def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
         volume=f"{style.format_number(site.damage.volume)} {unit}³",
         interval=show_site_interval(site, unit),
         depth=f"{style.format_number(site.max_depth, 3)} {unit}",
+        depth_interval=show_interval(site.depth_95, unit),
         area=f"{style.format_number(site.surface.area)} {unit}²",
         points=style.format_number(len(site.points)),
         method=site.method,

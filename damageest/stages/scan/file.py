@@ -56,6 +56,11 @@ class ScanFile(ReadScan):
         description="meaning of the columns of a text file, e.g. 'x y z _ nx ny nz'; default: from the header or their "
         "number",
     )
+    scale: Literal["auto"] | None = Field(
+        None,
+        description="auto: where the scan is larger or smaller than the part, it is scaled by the factor that fits "
+        "best; default: a wrong scale is named and not corrected",
+    )
 
     @model_validator(mode="after")
     def _check_viewpoint(self) -> Self:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -13,6 +13,7 @@ from damageest.artefacts import Floats, Ints, Part, Scan, Truth
 from damageest.geometry.units import canonical_unit
 from damageest.stages.scan import ReadScan, _errors, _random_field, _views
 from damageest.stages.scan._scene import DetachedPiece, Scene, Table, build_scene
+from damageest.stages.scan.deformation import Deformation, deform
 from damageest.stages.scan.scanner import sample_seen
 from damageest.stages.scan.tools import AnyTool, Direction, RigidMatrix, SolidTool, Vector
 
@@ -64,6 +65,9 @@ class Simulate(ReadScan):
     detached: tuple[DetachedPiece, ...] = Field((), description="pieces of the part that are moved, not removed")
     surroundings: tuple[SolidTool, ...] = Field(
         (), description="tools that are bodies beside the part, such as a fixture: scanned with it, and they hide it"
+    )
+    deform: Deformation | None = Field(
+        None, description="how the part with its damage is bent and twisted before it is scanned; default: not"
     )
     table: Table | None = Field(None, description="a plane plate that the part stands on; default: none")
     points: kinds.PositiveInt = Field(150_000, description="number of points, outliers included")
@@ -134,7 +138,13 @@ class Simulate(ReadScan):
             for name in ("mixed", "misplaced"):
                 if getattr(self, name):
                     raise ValueError(f"{name}: needs `scanners`")
-        elif self.misplaced and (self.scanners if isinstance(self.scanners, int) else len(self.scanners)) < 2:
+        if self.deform and (self.surroundings or self.table):
+            raise ValueError("deform: is not possible with surroundings or a table, which would be deformed as well")
+        if (
+            self.scanners is not None
+            and self.misplaced
+            and (self.scanners if isinstance(self.scanners, int) else len(self.scanners)) < 2
+        ):
             raise ValueError("misplaced: needs at least 2 positions in `scanners`; the first view is not moved")
         return self
 
@@ -147,6 +157,8 @@ class Simulate(ReadScan):
         sigma = 0.0005 * part.diagonal if self.noise is None else self.noise
         outlier_count = round(self.outliers * self.points)
         draw = self._draw(scene, part, self.points - outlier_count, rng)
+        if self.deform:
+            draw = replace(draw, points=deform(draw.points, self.deform, part))
         points, view, scanners = self._add_errors(draw, part, sigma, rng)
         if outlier_count:
             margin = 0.1 * (part.bounds[1] - part.bounds[0])

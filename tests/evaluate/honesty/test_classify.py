@@ -17,8 +17,9 @@ from damageest.evaluate.honesty.classify import (
     judge_error,
     measure_seen_error,
 )
+from damageest.findings import Coverage, Surplus, UnseenRegion, Verdict
 from damageest.geometry.solids import to_arrays
-from damageest.result import Coverage, Result, Site, Surplus, UnseenRegion, Verdict
+from damageest.result import Result, Site
 
 TOLERANCE = 0.2
 EYE = np.eye(4)

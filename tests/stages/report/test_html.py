@@ -12,7 +12,7 @@ import pytest
 
 import damageest
 from damageest.artefacts import Pose
-from damageest.result import Verdict
+from damageest.findings import Verdict
 from damageest.stages.report.html import Html
 from tests import damaged_box
 from tests.stages.report import pages

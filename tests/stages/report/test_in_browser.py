@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import damageest
-from damageest.result import Surplus
+from damageest.findings import Surplus
 from tests.stages.report import browser, pages
 
 pytestmark = pytest.mark.xdist_group("browser")

@@ -1,0 +1,80 @@
+"""The model fit in words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.findings import ModelFit, ViewFit
+
+DONE = {"bend": "bent", "twist": "twisted", "shear": "sheared", "stretch": "stretched", "scale": "scaled"}
+
+
+def describe_fit(fit: ModelFit, unit: str, tolerance: float) -> ModelFit:
+    """The fit with its ``words``: the model with its amounts, in the job's ``unit``."""
+    words = {
+        "ok": "the part as designed explains the intact skin",
+        "scaled": _describe_scale(fit, unit),
+        "deformed": _describe_deformation(fit, unit),
+        "views disagree": _describe_views(fit, unit),
+        "wavy": f"the intact skin is wavy: it deviates by {fit.waviness:.3g} {unit} (standard deviation) over areas "
+        f"wider than {20 * tolerance:.3g} {unit}, inside and outside alike (waviness of scanner or part)",
+    }[fit.model]
+    if fit.corrected_scale != 1:
+        words = (
+            f"the scale of the scan was corrected by {100 * (fit.corrected_scale - 1):+.3g} %, as the job says; {words}"
+        )
+    return replace(fit, words=words)
+
+
+def name_model(fit: ModelFit) -> str:
+    """The model in a few words, for a sentence about a site."""
+    return {
+        "ok": "the part as designed",
+        "scaled": f"the scale is wrong by {100 * (fit.scale - 1):+.3g} %",
+        "deformed": "the part is " + " and ".join(DONE[kind] for kind, _ in fit.deformation),
+        "views disagree": "the views of the scan disagree",
+        "wavy": "the skin is wavy",
+    }[fit.model]
+
+
+def _describe_scale(fit: ModelFit, unit: str) -> str:
+    percent = 100 * (fit.scale - 1)
+    larger = "larger" if percent > 0 else "smaller"
+    return (
+        f"the scale is wrong: the scan is {abs(percent):.3g} % {larger} than the part (standard error "
+        f"{100 * fit.scale_error:.2g} %), up to {fit.amount:.3g} {unit} at its ends (unit, temperature or scale bar); "
+        "scan: {scale: auto} corrects it"
+    )
+
+
+def _describe_deformation(fit: ModelFit, unit: str) -> str:
+    kinds = " and ".join(f"{DONE[kind]} by {amount:.3g} {unit}" for kind, amount in fit.deformation)
+    return (
+        f"the part is {kinds}: the seen skin lies up to {fit.amount:.3g} {unit} (standard error "
+        f"{fit.amount_error:.2g}) away from where the nearest rigid part has it"
+    )
+
+
+def _describe_views(fit: ModelFit, unit: str) -> str:
+    apart = max((view.apart for view in fit.views), default=0.0)
+    moved = [_describe_view(view, unit) for view in fit.views if view.is_corrected]
+    left = [_describe_view(view, unit) for view in fit.views if not view.is_corrected and _is_elsewhere(view, apart)]
+    open_ = [str(view.number + 1) for view in fit.views if not view.is_determined and view.left > 0.5 * apart]
+    words = f"the views of the scan disagree by {apart:.3g} {unit} where they overlap"
+    if moved:
+        words += "; put right: " + ", ".join(moved)
+    if left:
+        words += "; misplaced, and not put right: " + ", ".join(left)
+    if open_:
+        words += f"; by themselves, these do not fix their pose, and were not moved: view {', '.join(open_)}"
+    return words
+
+
+def _is_elsewhere(view: ViewFit, apart: float) -> bool:
+    return view.is_determined and float(np.linalg.norm(view.shift)) > 0.25 * apart
+
+
+def _describe_view(view: ViewFit, unit: str) -> str:
+    return f"view {view.number + 1} by {np.linalg.norm(view.shift):.3g} {unit} and {view.turn:.2g} degrees"

@@ -1,0 +1,142 @@
+"""How exactly the intact skin fixes the pose, and how far it deviates from the part over whole areas.
+
+The mean distances of patches of intact skin are compared with the part. What the noise does not explain is systematic:
+form of the part, or of the scanner. It limits the pose as well, since a patch then counts as few points, not as many.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from damageest.artefacts import INTACT, Deviation, Flags, Floats, Part, Scan
+from damageest.geometry.voxels import number_faced_cubes
+
+PATCH = 1 / 15
+"""Edge of a patch of skin, in diagonals of the part."""
+FEWEST_POINTS, FEWEST_PATCHES = 8, 12
+"""Points of a patch, and patches, for their mean distances to be compared."""
+MOST_POINTS = 200_000
+"""Intact points that are used; more do not change the second digit."""
+ROUNDS = 10
+"""Rounds of the robust fit."""
+SIGNIFICANT = 22.5
+"""Square of a deviation of the pose, in its standard deviations, from which it is real: one in a thousand by chance, of
+six degrees of freedom."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseError:
+    """The error of the pose, and of the form of skin that is intact.
+
+    ``spread`` (6,K): columns of independent errors, one standard deviation each, of a small motion of the scan in the
+    part's frame: rotation about ``centre`` (3,) in radians, then shift. ``systematic``: standard deviation of the mean
+    distances of patches of intact skin that noise does not explain; ``patch_area``: area over which it is common.
+    """
+
+    centre: Floats
+    spread: Floats
+    systematic: float
+    patch_area: float
+
+    def of_volume(self, damage_skin: Floats, normals: Floats, areas: Floats) -> Floats:
+        """The errors (K,) of a volume, one for each column of ``spread``.
+
+        Args:
+            damage_skin: (F,3) centres of the triangles of the skin that the damage volume removes.
+            normals, areas: (F,3), (F,) their outward unit normals and areas.
+
+        A small motion v of the inner surface changes the volume by the integral of v.n over it. The flux of a rigid
+        motion through a closed surface is 0, so this is minus the integral over the skin, which is exact on triangles.
+        """
+        rows = _make_rows(damage_skin - self.centre, normals)
+        return np.asarray(-(areas @ rows) @ self.spread)
+
+    def of_distance(self, place: Floats, normal: Floats) -> float:
+        """Standard deviation of the signed distance of a place (3,) to the skin with the outward ``normal`` (3,)."""
+        row = _make_rows(place[None] - self.centre, normal[None])[0]
+        return float(np.linalg.norm(row @ self.spread))
+
+
+def measure_pose_error(
+    part: Part, aligned: Scan, deviation: Deviation, tolerance: float, free: Floats | None = None, form: float = 0.0
+) -> PoseError:
+    """The error that the intact points leave to the pose.
+
+    Args:
+        aligned, deviation: the scan in the part's frame, N points. tolerance: in the job's unit.
+        free: (6,F) motions that the scan does not fix, as the columns of `PoseError.spread` about the centre of the
+            part's bounds, each as far as it may go.
+        form: standard deviation by which the skin is known to deviate; the measured one where it is larger.
+
+    No direction of the pose is taken to be worse than the tolerance: a larger error would show as damage. Turning a
+    part of revolution about its axis changes no volume, though no point fixes it.
+    """
+    centre = part.bounds.mean(axis=0)
+    edge = PATCH * part.diagonal
+    radius = max(part.diagonal / 4, 1e-12)
+    scale = np.diag([1 / radius] * 3 + [1.0] * 3)
+    mean, rows, count = _average_patches(part, aligned, deviation, centre, edge)
+    if len(mean) < FEWEST_PATCHES:
+        spread = tolerance * scale
+        return PoseError(centre, _add_columns(spread, free), max(form, 0.0), edge**2)
+    rows = rows @ scale
+    prior = np.eye(6) / tolerance**2
+    variance = np.maximum(aligned.noise**2 / count, (1e-6 * part.diagonal) ** 2)
+    motion: Floats = np.zeros(6)
+    systematic, weights = 0.0, np.ones(len(mean))
+    for _ in range(ROUNDS):
+        trust = weights / (variance + systematic**2)
+        weighted = (rows * trust[:, None]).T
+        motion = np.asarray(np.linalg.solve(weighted @ rows + prior, weighted @ mean))
+        left = mean - rows @ motion
+        systematic = _measure_excess(left, variance)
+        limit = 3 * np.sqrt(variance + systematic**2)
+        weights = np.minimum(1, limit / np.maximum(np.abs(left), 1e-300))
+    systematic = max(systematic, form)
+    information = (rows / (variance + systematic**2)[:, None]).T @ rows + prior
+    covariance = np.linalg.inv(information)
+    values, vectors = np.linalg.eigh(covariance)
+    spread = vectors * np.sqrt(np.maximum(values, 0))
+    if motion @ information @ motion > SIGNIFICANT:
+        spread = np.column_stack([spread, motion])
+    return PoseError(centre, _add_columns(scale @ spread, free), systematic, edge**2)
+
+
+def _add_columns(spread: Floats, free: Floats | None) -> Floats:
+    return spread if free is None else np.column_stack([spread, free])
+
+
+def _make_rows(places: Floats, normals: Floats) -> Floats:
+    """(N,6) change of the signed distance of places (N,3) with a rotation about the origin, and with a shift."""
+    return np.concatenate([np.cross(places, normals), normals], axis=1)
+
+
+def _average_patches(
+    part: Part, aligned: Scan, deviation: Deviation, centre: Floats, edge: float
+) -> tuple[Floats, Floats, Floats]:
+    """Mean distance (P,) of patches of intact skin, mean rows (P,6) of `_make_rows`, and number of points (P,)."""
+    index = np.flatnonzero(deviation.label == INTACT)
+    step = max(1, -(-len(index) // MOST_POINTS))
+    index = index[::step]
+    if not len(index):
+        return np.empty(0), np.empty((0, 6)), np.empty(0)
+    normals = part.face_normals[deviation.face[index]]
+    places = aligned.points[index] - centre
+    _, number = number_faced_cubes(places, normals, edge)
+    _, group, count = np.unique(number, return_inverse=True, return_counts=True)
+    rows = _make_rows(places, normals)
+    mean = np.bincount(group, weights=deviation.distance[index]) / count
+    mean_rows = np.stack([np.bincount(group, weights=row) for row in rows.T], axis=1) / count[:, None]
+    enough: Flags = count >= FEWEST_POINTS
+    return mean[enough], mean_rows[enough], step * count[enough].astype(np.float64)
+
+
+def _measure_excess(left: Floats, variance: Floats) -> float:
+    """The standard deviation that the ``variance`` (P,) of patches does not explain in what is ``left`` (P,), robustly;
+    0 where it is within chance."""
+    size = left**2 / variance / 0.4549  # the median of a square of a normal variable
+    ratio = float(np.median(size))
+    chance = 1 + 2.5 * 1.6 / np.sqrt(len(left))
+    return float(np.sqrt(max(ratio - chance, 0.0) * np.median(variance)))

@@ -1,0 +1,182 @@
+"""The 95 % intervals of volumes and depths: what the errors of a site add up to, and those of all sites together.
+
+Errors that have nothing to do with one another add as squares: those of noise, of the spacing and of the rim. Errors
+that all sites share add as they are: a wrong pose moves all inner surfaces, and a deviating form is everywhere.
+What unseen surface may hide, and what fades out, makes a volume larger and never smaller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from damageest.artefacts import Evidence, Flags, Floats, Part, Scan, Solid
+from damageest.checks.inner_surface import measure_inner_surface, pair_faces
+from damageest.checks.pose_error import PoseError
+from damageest.findings import Coverage, Fading, Interval
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
+from damageest.geometry.neighbourhoods import find_nearby
+
+WIDTH = 2.0
+"""Half the width of a 95 % interval in standard deviations."""
+GAP = 8.0
+"""Area of a hole in the scan of an inner surface, in squares of the spacing or the tolerance, from which it may hide
+more than interpolation shows; as in `checks.verdict`."""
+HOLE = 0.5
+"""Depth that a hole in the scan of an inner surface may hide, in square roots of its area."""
+FLAT, SMOOTH = 0.05, 30.0
+"""Angles in degrees between triangles that are chords of one curved face."""
+ASKED = 2000
+"""Scan points among which the deepest ones of a site are looked for."""
+
+
+class _Place(NamedTuple):
+    """``depth`` below the skin of a place ``at`` (3,), and the outward ``normal`` (3,) of the skin nearest to it."""
+
+    depth: float
+    at: Floats
+    normal: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SiteError:
+    """The errors of one site's volume, each as one standard deviation, and of its largest depth.
+
+    ``pose`` (K,): signed, by the columns of `PoseError.spread`; ``excess``: by how much the volume is too large on
+    average; ``inside``, ``beside``, ``fading``: by how much the loss may be larger. ``depth``: of the damage volume,
+    corrected for its mean error; ``depth_error``: one standard deviation.
+    """
+
+    volume: float
+    noise: float
+    spacing: float
+    rim: float
+    excess: float
+    pose: Floats = field(default_factory=lambda: np.empty(0))
+    tessellation: float = 0.0
+    form: float = 0.0
+    inside: float = 0.0
+    beside: float = 0.0
+    fading: float = 0.0
+    depth: float = 0.0
+    depth_error: float = 0.0
+    deeper: float = 0.0
+
+
+def measure_site_error(
+    damage: Solid, inner: Flags, part: Part, aligned: Scan, members: Floats, evidence: Evidence, pose: PoseError,
+    tolerance: float, form: float = 0.0,
+) -> SiteError | None:  # fmt: skip
+    """The errors of one site; None where no scan point lies on its inner surface.
+
+    Args:
+        inner: (F,) which faces of ``damage`` are on its inner surface, as `find_inner_faces` gives them.
+        members: (M,3) its scan points, in the part's frame.
+        form: standard deviation by which the skin deviates systematically, in the job's unit, as a fit of the model
+            gives it; where it is less than what the intact skin shows, the latter counts.
+    """
+    surface = measure_inner_surface(damage, inner, members, aligned.noise, aligned.spacing, tolerance)
+    if surface is None or inner.all():
+        return None
+    area = np.linalg.norm(damage.cross, axis=1) / 2
+    skin = ~inner
+    skin_area = float(area[skin].sum())
+    patches = max(1.0, skin_area / max(pose.patch_area, 1e-300))
+    systematic = max(form, pose.systematic)
+    chord = part.tessellation_error * _measure_curved(damage, skin, area) if part.tessellation_error else 0.0
+    hole = evidence.ids_gap if evidence.ids_gap > GAP * max(tolerance, aligned.spacing) ** 2 else 0.0
+    deepest = _find_deepest(damage, inner, part, members, 3 * max(surface.gap, tolerance))
+    by_pose = pose.of_distance(deepest.at, deepest.normal)
+    return SiteError(
+        volume=damage.volume,
+        noise=surface.noise,
+        spacing=surface.spacing,
+        rim=surface.rim,
+        excess=surface.excess,
+        pose=pose.of_volume(damage.triangles[skin].mean(axis=1), damage.face_normals[skin], area[skin]),
+        tessellation=chord / np.sqrt(3),
+        # a form that a fit gives is common to the whole site; that of patches is different in each
+        form=float(max(form * skin_area, pose.systematic * skin_area / np.sqrt(patches))),
+        inside=HOLE * hole**1.5,
+        depth=deepest.depth - surface.depth_excess,
+        depth_error=float(np.sqrt(surface.depth**2 + by_pose**2 + systematic**2 + part.tessellation_error**2 / 3)),
+        deeper=HOLE * float(np.sqrt(hole)),
+    )
+
+
+def combine_site(error: SiteError) -> tuple[Interval, Interval]:
+    """The 95 % intervals of volume and depth of one site."""
+    depth_low = error.depth - WIDTH * error.depth_error
+    depth_high = error.depth + WIDTH * error.depth_error + error.deeper
+    return combine_total(error.volume, [error]), (max(depth_low, 0.0), depth_high)
+
+
+def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 0.0) -> Interval:
+    """The 95 % interval of the sites' ``volume`` together, which is in the unit's third power, and at least 0.
+
+    ``doubtful``: volume of sites that are not part of the damage, and may be.
+    """
+    if not errors:
+        return volume, volume + doubtful
+    alone = np.array([[one.noise, one.spacing, one.rim] for one in errors])
+    shared = np.array([[one.form, one.tessellation] for one in errors]).sum(axis=0)
+    moved = np.sum([one.pose for one in errors], axis=0)
+    deviation = float(np.sqrt((alone**2).sum() + (shared**2).sum() + (moved**2).sum()))
+    more = sum(one.inside + one.beside + one.fading for one in errors)
+    middle = volume - sum(one.excess for one in errors)
+    low = min(middle - WIDTH * deviation, volume)
+    high = max(middle + WIDTH * deviation, volume) + more
+    return max(low, 0.0), high + doubtful
+
+
+def limit_beside(coverage: Coverage, damage: Solid, reach: float, depth: float) -> float:
+    """By how much a loss may be larger where skin within ``reach`` of it is not seen: over all of that region, as deep
+    as it is itself, ``depth``."""
+    centres = coverage.skin.triangles.mean(axis=1)
+    low, high = damage.bounds[0] - reach, damage.bounds[1] + reach
+    near = np.flatnonzero((coverage.region >= 0) & ((centres > low) & (centres < high)).all(axis=1))
+    if not len(near):
+        return 0.0
+    touched = np.unique(coverage.region[near[distance_to_mesh(centres[near], damage) < reach]])
+    regions = [coverage.unseen[number] for number in touched]
+    return float(sum(min(one.volume, one.area * depth) for one in regions))
+
+
+def describe_fading(fading: Fading, volume: float, unit: str, tolerance: float) -> str:
+    """In words, how the volume of a shallow loss depends on where it is taken to end."""
+    share = fading.beyond / max(volume, 1e-300)
+    return (
+        "it is shallow, and the lost volume depends on the depth from which it counts: "
+        f"{fading.half:.4g} {unit}³ from half the tolerance of {tolerance:.3g} {unit} on, {fading.at:.4g} from the "
+        f"tolerance on, {fading.twice:.4g} from twice the tolerance on; {fading.beyond:.3g} {unit}³ ({share:.1%}) fade "
+        "out beyond its rim"
+    )
+
+
+def _find_deepest(damage: Solid, inner: Flags, part: Part, members: Floats, reach: float) -> _Place:
+    """The deepest place of a damage volume. It is near the deepest scan points, so that the other vertices are not
+    asked; ``reach``: how near."""
+    vertices = damage.vertices[np.unique(damage.faces[inner])]
+    step = max(1, len(members) // ASKED)
+    depth = distance_to_mesh(members[::step], part)
+    deep = members[::step][depth > depth.max() - reach]
+    near = vertices[find_nearby(vertices, deep, reach)]
+    distance, face, _ = closest_on_mesh(near if len(near) else vertices, part)
+    at = int(distance.argmax())
+    return _Place(float(distance[at]), (near if len(near) else vertices)[at], part.face_normals[face[at]])
+
+
+def _measure_curved(damage: Solid, skin: Flags, area: Floats) -> float:
+    """Area of the removed skin that is curved: triangles beside others that turn by a small angle. Chords err there."""
+    _, _, first, second = pair_faces(damage.faces)
+    between = skin[first] & skin[second]
+    first, second = first[between], second[between]
+    cosine = np.einsum("ij,ij->i", damage.face_normals[first], damage.face_normals[second])
+    turns = (cosine < np.cos(np.radians(FLAT))) & (cosine > np.cos(np.radians(SMOOTH)))
+    curved = np.zeros(len(area), bool)
+    curved[first[turns]] = True
+    curved[second[turns]] = True
+    return float(area[curved].sum())

@@ -1,0 +1,51 @@
+"""Where a damage volume ends because the scan ends there: its rim beside skin that the scan does not show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import Floats, Part, Solid
+from damageest.findings import Coverage
+from damageest.geometry.neighbourhoods import find_neighbours
+from damageest.geometry.skin import find_inner_faces
+
+ASKED, AGAINST = 0.08, 0.3
+"""Share of the rim beside unseen skin from which it is open where the damage ends there; from the second one on the
+volume is doubtful."""
+
+
+def ask_unseen_rim(
+    damage: Solid, part: Part, coverage: Coverage, reach: float
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What speaks against a damage volume, and what stays open, because its rim lies within ``reach`` of unseen skin.
+
+    Worn skin may go on where the scan does not show it: a bore that was scanned from both ends looks worn at the ends.
+    """
+    share = measure_unseen_rim(damage, part, coverage, reach)
+    if share < ASKED:
+        return (), ()
+    text = f"{share:.0%} of its rim lies beside skin that the scan does not show: the damage may go on there"
+    return ((text,), ()) if share > AGAINST else ((), (text,))
+
+
+def measure_unseen_rim(damage: Solid, part: Part, coverage: Coverage, reach: float) -> float:
+    """Share of the length of the rim within ``reach`` of an unseen region of the skin; 0 without a rim.
+
+    The rim are the edges between the faces of the damage volume inside the part and those on the skin.
+    """
+    unseen = coverage.skin.triangles[coverage.region >= 0].mean(axis=1)
+    start, end = _find_rim(damage, part)
+    if not len(unseen) or not len(start):
+        return 0.0
+    length = np.linalg.norm(end - start, axis=1)
+    gap = find_neighbours((start + end) / 2, 1, unseen, reach)[0].ravel()
+    return float(length[np.isfinite(gap)].sum() / max(float(length.sum()), 1e-300))
+
+
+def _find_rim(damage: Solid, part: Part) -> tuple[Floats, Floats]:
+    """The ends (E,3) of the edges that belong to one face inside the part and one on the skin."""
+    faces = damage.faces[find_inner_faces(damage, part)]
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(edges, axis=0, return_counts=True)
+    rim = edges[count == 1]
+    return damage.vertices[rim[:, 0]], damage.vertices[rim[:, 1]]

@@ -1,0 +1,182 @@
+"""What the checks find out about a result, as values: verdict, coverage, surplus, model fit, uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import Flags, Floats, Ints, Mesh, Solid
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a damage volume is worth: ``level``, and ``reasons`` that speak against it, in words.
+
+    `proven`: all that could contradict it was asked, and agrees. `likely`: nothing contradicts it, but not all could be
+    asked. `doubtful`: something contradicts it, or what it rests on cannot be told from errors of the scan.
+    """
+
+    level: Literal["proven", "likely", "doubtful"] = "proven"
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class UnseenRegion:
+    """Connected skin without scan points.
+
+    ``centre`` (3,) and ``bounds`` (2,3) of its cells; ``faces``: numbers of its CAD faces, empty where the part has
+    none; ``volume``: the most that can be lost behind it without a trace in the scan. ``why``: `hidden`: the part
+    itself is between it and every scanner position; `outside`: no view reached there; `no points`: a view reached there
+    and gave no points; `unknown`: no scanner position is known.
+    """
+
+    area: float
+    centre: Floats
+    bounds: Floats
+    faces: tuple[int, ...]
+    volume: float
+    why: Literal["unknown", "hidden", "outside", "no points"] = "unknown"
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """What the scan shows of the part's skin.
+
+    ``seen``: its share of the skin's area. ``skin``: the skin cut into cells, triangles of similar size, F of them.
+    ``is_seen`` (F,): whether the scan has points on a cell; ``distance`` (F,): their mean signed distance, NaN where
+    there are none; ``is_lost`` (F,): whether rays of the scanner passed through the metal behind it; ``region`` (F,):
+    the cell's place in ``unseen``, -1 for a cell in none. ``unseen``: largest first.
+    """
+
+    seen: float
+    unseen: tuple[UnseenRegion, ...]
+    skin: Mesh
+    is_seen: Flags
+    distance: Floats
+    is_lost: Flags
+    region: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Surplus:
+    """Metal or other matter outside the nominal surface.
+
+    ``points`` (M,) indices into the scan, ``share`` of it; ``solid``: its volume as a closed mesh, None where it cannot
+    be closed; ``height``: its largest distance from the skin; ``area``: skin that it covers. ``kind``: `surplus`, as a
+    weld bead or dirt; `displaced piece`, with losses of like size beside it; `surroundings`, as a fixture, a table or a
+    second specimen. ``clusters``: the point clusters of the losses beside it. ``notes`` say what was recognised.
+    """
+
+    id: int
+    points: NDArray[np.int64]
+    share: float
+    solid: Solid | None
+    height: float
+    area: float
+    kind: Literal["surplus", "displaced piece", "surroundings"] = "surplus"
+    clusters: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def volume(self) -> float | None:
+        return self.solid.volume if self.solid else None
+
+
+@dataclass(frozen=True)
+class PatchDeviation:
+    """Mean deviations of patches of skin of width ``size``: their standard deviation ``deviation``, what the noise of
+    their points explains (``noise``), and what is left after the form that the fit names (``left``)."""
+
+    size: float
+    deviation: float
+    noise: float
+    left: float
+
+
+@dataclass(frozen=True, eq=False)
+class ViewFit:
+    """How one view lies against the part: ``shift`` (3,) of the part's centre and ``turn`` in degrees that would put it
+    right, in the part's frame; ``apart``: how far it lies from the other views where they overlap. ``is_determined``:
+    whether it fixes its pose by itself. ``is_corrected``: whether it was put right."""
+
+    number: int
+    shift: Floats
+    turn: float
+    apart: float
+    left: float
+    is_determined: bool
+    is_corrected: bool
+
+
+Deformed = Literal["bend", "twist", "shear", "stretch", "scale"]
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFit:
+    """How well the part as designed, in one rigid pose, explains the intact skin.
+
+    ``scale``: length in the scan over length in the CAD, with its standard error; ``scale_by_axis`` (3,) along
+    ``axes`` (3,3, as rows); those of a model that is `ok` are within their errors and the scanner's. ``deformation``:
+    kinds and amounts: the largest displacement of the seen skin beyond the rigid motion nearest to it, with
+    ``amount`` for all together and ``amount_error``. ``waviness``: standard deviation of what no form explains.
+    ``corrected_scale``: the scale that was taken out of the scan, 1 where none was. ``words`` say it all.
+    """
+
+    model: Literal["ok", "scaled", "deformed", "views disagree", "wavy"]
+    words: str
+    deviations: tuple[PatchDeviation, ...]
+    scale: float
+    scale_error: float
+    axes: Floats
+    scale_by_axis: Floats
+    scale_by_axis_error: Floats
+    deformation: tuple[tuple[Deformed, float], ...]
+    amount: float
+    amount_error: float
+    views: tuple[ViewFit, ...]
+    waviness: float
+    corrected_scale: float = 1.0
+
+
+Interval = tuple[float, float]
+"""Low and high end."""
+
+
+@dataclass(frozen=True)
+class Fading:
+    """A shallow loss whose edge fades out: its volume where it is deeper than ``half`` the tolerance, than the
+    tolerance, ``at``, and than ``twice`` the tolerance; ``beyond``: what is lost beyond the rim of the site."""
+
+    half: float
+    at: float
+    twice: float
+    beyond: float
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How exactly a site's volume and its largest depth are known.
+
+    ``volume_95``, ``depth_95``: the 95 % intervals; None where the scan does not support one, and ``reasons`` say why.
+    The causes, each as one standard deviation of the volume: ``noise`` of the points; ``spacing`` of the points,
+    between which the inner surface is interpolated; ``rim``: where it meets the skin; ``pose``; ``tessellation`` of the
+    part; ``form`` of skin that deviates over whole areas. ``inside``, ``beside``: by how much the loss may be larger at
+    most where no points show the inner surface, and the skin beside it. ``fading``: None for a loss that is not
+    shallow.
+    """
+
+    volume_95: Interval | None
+    depth_95: Interval | None
+    noise: float = 0.0
+    spacing: float = 0.0
+    rim: float = 0.0
+    pose: float = 0.0
+    tessellation: float = 0.0
+    form: float = 0.0
+    inside: float = 0.0
+    beside: float = 0.0
+    fading: Fading | None = None
+    reasons: tuple[str, ...] = ()

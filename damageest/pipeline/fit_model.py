@@ -1,0 +1,155 @@
+"""Steps about parts and scans that one rigid pose does not explain: they are measured, named and, on request, put
+right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import Floats, Scan
+from damageest.checks.form_words import name_model
+from damageest.checks.model_fit import FittedModel, measure_fit
+from damageest.checks.scan_quality import choose_tolerance
+from damageest.checks.view_fit import fit_views
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.noise import measure_noise_and_spacing
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.stages.align import Align
+from damageest.stages.scan import ReadScan
+
+MEASURED = 40_000
+"""Points, about, that the scale is measured with before it is corrected."""
+NEAR, CLEAR = 2.0, 4.0
+"""Depth of a site over the systematic deviation there, below which it is doubtful, and below which it is open."""
+
+
+def correct_scan(engine: Engine, work: Work) -> Work:
+    """Compares the views, puts misplaced ones right where the alignment fits views, and corrects the scale where the
+    job says so."""
+    state = work.job
+    views = fit_views(
+        state.part, state.aligned, state.tolerance, getattr(engine.job.stages.get(Align), "fit_views", False)
+    )
+    key = digest("views", state.key("aligned"), state.key("part"), state.key("tolerance"))
+    state = state.with_value(JobState.views, views, key)
+    if views is not None and any(view.is_corrected for view in views.views):
+        pose = replace(state.pose, T_part_scan=_make_rigid(views.common @ state.pose.T_part_scan))
+        state = state.derive(JobState.pose, pose, JobState.pose, JobState.views)
+        state = _take_corrected(engine, state, views.apply(state.aligned))
+    scale = 1.0
+    if getattr(engine.job.stages.get(ReadScan), "scale", None) == "auto":
+        state, scale = _correct_scale(state)
+    state = state.with_value(JobState.corrected_scale, scale, digest("scale", key, scale))
+    return replace(work, job=state)
+
+
+def _take_corrected(engine: Engine, state: JobState, aligned: Scan) -> JobState:
+    """The state with views put right: noise, spacing and a tolerance `auto` are measured again."""
+    noise, spacing = measure_noise_and_spacing(aligned.points)
+    aligned = replace(aligned, noise=noise, spacing=spacing)
+    state = state.derive(JobState.aligned, aligned, JobState.aligned, JobState.views)
+    state = state.derive(JobState.noise, noise, JobState.aligned)
+    state = state.derive(JobState.spacing, spacing, JobState.aligned)
+    if engine.job.tolerance is None:
+        tolerance = min(state.tolerance, choose_tolerance(None, aligned, state.part)[0])
+        state = state.with_value(JobState.tolerance, tolerance, digest(tolerance))
+    return state
+
+
+def _correct_scale(state: JobState) -> tuple[JobState, float]:
+    """The state with the scan's scale corrected where it is wrong, and the scale that was taken out."""
+    part, aligned, tolerance = state.part, state.aligned, state.tolerance
+    points = aligned.points[:: max(1, len(aligned.points) // MEASURED)]
+    distance, _ = signed_distance(points, part)
+    found = measure_fit(part, points, distance, aligned.noise, tolerance, state.unit, None)
+    if found is None or found.form is None or found.fit.model != "scaled":
+        return state, 1.0
+    scale, form = found.fit.scale, found.form
+    # x = s R' p, undone by T and then by the scale about the frame's centre: a rigid motion of the scaled scan
+    T = form.T @ state.pose.T_part_scan
+    T[:3, 3] = (T[:3, 3] - form.frame.centre) / scale + form.frame.centre
+    scan = _divide(state.scan, scale)
+    pose = replace(state.pose, T_part_scan=_make_rigid(T))
+    state = state.derive(JobState.scan, scan, JobState.scan, JobState.aligned)
+    state = state.derive(JobState.pose, pose, JobState.pose, JobState.aligned)
+    moved = form.undo(aligned.points)
+    corrected = _divide(replace(aligned, points=moved * scale), scale)
+    if aligned.viewpoints is not None:
+        corrected = replace(corrected, viewpoints=form.undo(aligned.viewpoints))
+    return state.derive(JobState.aligned, corrected, JobState.scan, JobState.pose), scale
+
+
+def _divide(scan: Scan, scale: float) -> Scan:
+    viewpoints = None if scan.viewpoints is None else scan.viewpoints / scale
+    return replace(
+        scan, points=scan.points / scale, viewpoints=viewpoints, noise=scan.noise / scale, spacing=scan.spacing / scale
+    )
+
+
+def _make_rigid(T: Floats) -> Floats:
+    u, _, v = np.linalg.svd(T[:3, :3])
+    out = T.copy()
+    out[:3, :3] = u @ v
+    return out
+
+
+def fit_model(engine: Engine, work: Work) -> Work:
+    """Measures how well the part as designed explains the intact skin, and warns where it does not."""
+    state = work.job
+    aligned, deviation = state.aligned, state.deviation
+    found = measure_fit(
+        state.part, aligned.points, deviation.distance, aligned.noise, state.tolerance, state.unit, state.views,
+        state.corrected_scale,
+    )  # fmt: skip
+    sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.tolerance, JobState.views)
+    state = state.derive(JobState.fitted, found, *sources)
+    told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
+    words = (found.fit.words,) if found is not None and told else ()
+    return replace(work, job=state, warnings=(*work.warnings, *words))
+
+
+def question_sites(engine: Engine, work: Work) -> Work:
+    """Doubts sites that are not deeper than the systematic deviation of the intact skin there."""
+    state = work.job
+    if state.fitted is None or state.fitted.fit.model == "ok":
+        return work
+    sites = []
+    for site in work.sites:
+        if not len(site.members):
+            sites.append(site)
+            continue
+        local = measure_at_site(state, site)
+        depth = float(np.quantile(-state.deviation.distance[site.members], 0.95))
+        text = (
+            f"it is {depth:.3g} {state.unit} deep, and intact skin deviates by about {local:.3g} {state.unit} there: "
+            f"{name_model(state.fitted.fit)}"
+        )
+        if depth < NEAR * local:
+            site = replace(site, doubts=(*site.doubts, text))
+        elif depth < CLEAR * local:
+            site = replace(site, questions=(*site.questions, text))
+        sites.append(site)
+    return replace(work, sites=tuple(sites))
+
+
+def measure_at_site(state: JobState, site: FoundSite) -> float:
+    """How far intact skin deviates at a site by the model that the fit names; 0 where the part is as designed."""
+    members = site.members
+    if state.fitted is None or state.fitted.fit.model == "ok" or not len(members):
+        return 0.0
+    normals = state.part.face_normals[state.deviation.face[members]]
+    places = state.aligned.points[members] - state.deviation.distance[members, None] * normals
+    return measure_local(state.fitted, places, normals)
+
+
+def measure_local(fitted: FittedModel, places: Floats, normals: Floats) -> float:
+    """How far intact skin deviates at places on the skin (N,3) by the model that the fit names."""
+    fit = fitted.fit
+    by_form = float(np.quantile(np.abs(fitted.predict(places, normals)), 0.9))
+    by_waves = 2 * fit.waviness if fit.model == "wavy" else 0.0
+    apart = [view.apart for view in fit.views if not view.is_corrected]
+    by_views = max(apart, default=0.0) if fit.model == "views disagree" else 0.0
+    return max(by_form, by_waves, by_views)

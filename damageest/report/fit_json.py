@@ -1,0 +1,94 @@
+"""What result.json says of the model fit."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from damageest.artefacts import Vector
+from damageest.findings import ModelFit
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class PatchReport(_Model):
+    size: float = Field(description="width of the patches of skin")
+    deviation: float = Field(description="standard deviation of their mean distances from the part in the pose")
+    noise: float = Field(description="what the noise of their points explains of it")
+    left: float = Field(description="the same after the form that `model` names is undone")
+
+
+class ScaleReport(_Model):
+    value: float = Field(description="length in the scan over length in the CAD, the one that fits best")
+    error: float = Field(description="its standard error")
+    axes: tuple[Vector, Vector, Vector] = Field(description="directions of by_axis, in the part's frame")
+    by_axis: Vector
+    by_axis_error: Vector
+    corrected: float = Field(description="the scale that was taken out of the scan before; 1: none")
+
+
+class DeformationReport(_Model):
+    kind: Literal["bend", "twist", "shear", "stretch", "scale"]
+    amount: float = Field(description="largest displacement of the seen skin by it beyond the nearest rigid motion")
+
+
+class ViewReport(_Model):
+    number: int = Field(description="from 1 up, in the order of the scan's views")
+    shift: Vector = Field(description="of the part's centre, that puts the view right, in the part's frame")
+    turn: float = Field(description="in degrees, that puts the view right")
+    apart: float = Field(description="how far it lies from the other views where they overlap")
+    left: float = Field(description="the same with the views put right that are determined")
+    is_determined: bool = Field(description="whether its points fix its pose")
+    is_corrected: bool = Field(description="whether it was put right")
+
+
+class FitReport(_Model):
+    """How well the part as designed, in one rigid pose, explains the intact skin."""
+
+    model: Literal["ok", "scaled", "deformed", "views disagree", "wavy"]
+    words: str = Field(description="the model with its amounts")
+    deviations: list[PatchReport] = Field(description="at widths of 20, 50 and 100 tolerances, where the part has them")
+    scale: ScaleReport
+    deformation: list[DeformationReport] = Field(description="empty where the model is not deformed")
+    amount: float = Field(description="largest displacement of the seen skin by the model; 0 where it is ok")
+    amount_error: float = Field(description="its standard error")
+    views: list[ViewReport] = Field(description="empty where the views agree or are not known")
+    waviness: float = Field(description="standard deviation of what no model explains, inside and outside alike")
+
+
+def report_fit(fit: ModelFit | None) -> FitReport | None:
+    """The fit as values for JSON; None where too few points lie near the skin."""
+    if fit is None:
+        return None
+    return FitReport(
+        model=fit.model,
+        words=fit.words,
+        deviations=[PatchReport(**vars(one)) for one in fit.deviations],
+        scale=ScaleReport(
+            value=fit.scale,
+            error=fit.scale_error,
+            axes=tuple(tuple(row) for row in fit.axes.tolist()),
+            by_axis=tuple(fit.scale_by_axis.tolist()),
+            by_axis_error=tuple(fit.scale_by_axis_error.tolist()),
+            corrected=fit.corrected_scale,
+        ),
+        deformation=[DeformationReport(kind=kind, amount=amount) for kind, amount in fit.deformation],
+        amount=fit.amount,
+        amount_error=fit.amount_error,
+        views=[
+            ViewReport(
+                number=view.number + 1,
+                shift=tuple(view.shift.tolist()),
+                turn=view.turn,
+                apart=view.apart,
+                left=view.left,
+                is_determined=view.is_determined,
+                is_corrected=view.is_corrected,
+            )
+            for view in fit.views
+        ],
+        waviness=fit.waviness,
+    )

@@ -1,0 +1,77 @@
+"""Views that disagree are found, and put right where their points fix their pose."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from damageest.artefacts import Scan
+from damageest.checks.view_fit import fit_views
+from tests.checks.form_scenes import NOISE, TOLERANCE, add_noise, draw_skin, get_part
+
+SCANNERS = 200.0 * np.array([(1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1), (-1, 1, 1), (1, 1, -1)])
+
+
+def make_scan(move: np.ndarray, chosen: int = 1, count: int = 24_000) -> Scan:
+    points, normals = draw_skin("rib_bracket", count)
+    facing = normals @ SCANNERS.T > 0.1
+    view = np.argmax(facing * np.random.default_rng(5).random(facing.shape), axis=1).astype(np.int32)
+    moved = points @ move[:3, :3].T + move[:3, 3]
+    points = add_noise(np.where((view == chosen)[:, None], moved, points))
+    return Scan(points, noise=NOISE, spacing=0.8, viewpoints=SCANNERS, view=view)
+
+
+def make_motion(shift: float, turn: float) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(np.radians(turn) * np.array([0.6, 0, 0.8])).as_matrix()
+    T[:3, 3] = shift * np.array([0.48, 0.6, 0.64])
+    return T
+
+
+def test_views_that_agree_are_left_alone() -> None:
+    found = fit_views(get_part("rib_bracket"), make_scan(np.eye(4)), TOLERANCE, True)
+    assert found is not None
+    assert not found.disagree
+    assert found.views == ()
+
+
+def test_a_misplaced_view_is_named_and_put_right() -> None:
+    part, true = get_part("rib_bracket"), make_motion(0.8, 0.3)
+    scan = make_scan(true)
+    found = fit_views(part, scan, TOLERANCE, True)
+    assert found is not None
+    assert found.disagree
+    assert [view.number for view in found.views if view.is_corrected] == [1]
+    own = scan.view == 1
+    right = found.apply(scan).points[own]
+    clean = (scan.points[own] - true[:3, 3]) @ true[:3, :3]
+    assert np.linalg.norm(right - clean, axis=1).max() < 0.2 * TOLERANCE
+    inverse = np.linalg.inv(true)
+    centre = part.bounds.mean(axis=0)
+    shift = inverse[:3, :3] @ centre + inverse[:3, 3] - centre
+    assert found.views[1].shift == pytest.approx(shift, abs=0.2 * TOLERANCE)
+    assert found.views[1].turn == pytest.approx(0.3, abs=0.1)
+
+
+def test_a_view_is_named_only_where_it_is_not_to_be_corrected() -> None:
+    found = fit_views(get_part("rib_bracket"), make_scan(make_motion(0.8, 0)), TOLERANCE, False)
+    assert found is not None
+    assert found.disagree
+    assert not any(view.is_corrected for view in found.views)
+
+
+def test_a_bent_part_is_no_misplaced_view() -> None:
+    from dataclasses import replace
+
+    from damageest.stages.scan.deformation import Deformation, deform
+
+    scan, part = make_scan(np.eye(4)), get_part("rib_bracket")
+    found = fit_views(part, replace(scan, points=deform(scan.points, Deformation(bend=1.0), part)), TOLERANCE, True)
+    assert found is not None
+    assert not found.disagree
+
+
+def test_a_scan_without_views_is_not_compared() -> None:
+    scan = make_scan(np.eye(4))
+    assert fit_views(get_part("rib_bracket"), Scan(scan.points, noise=NOISE), TOLERANCE, True) is None
