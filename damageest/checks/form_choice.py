@@ -36,6 +36,8 @@ NARROWEST, BY_NOISE = 0.3, 1.25
 MOST_OUTSIDE, LEAST_OUTSIDE = 0.02, 0.5
 """Share of the skin that lies outside the rigid part by more than the second, in tolerances, from which all fields are
 also fitted from wide kernels on."""
+KEPT = 0.5
+"""Share of the points near the skin that have to stay there after a step."""
 BLOCKS, FOLDS = 6, 4
 """Blocks along the part's diagonal that cells are left out by, and the folds that these are dealt to."""
 LEAST_GAIN = 0.015
@@ -99,9 +101,16 @@ class _Task:
         return find_feet(self.skin, form, points, self.edge, REACH * self.tolerance, self.tolerance)
 
     def fit(self, form: Form, widths: tuple[float, ...], points: Floats, rounds: int = 2) -> Form:
-        """Fits a form with ever narrower kernels, the nearest places searched again for each."""
+        """Fits a form with ever narrower kernels, the nearest places searched again for each.
+
+        It ends where a step takes most points off the skin: too little skin was seen to hold the form.
+        """
+        held, least = form, 0.0
         for width in widths:
             feet = self.find_feet(form, points)
+            if len(feet.points) < least:
+                return held
+            held, least = form, KEPT * len(feet.points)
             for _ in range(rounds):
                 cells = feet.summarise(form)
                 if len(cells.count) < 30:
@@ -154,8 +163,12 @@ def choose_form(part: Part, points: Floats, distance: Floats, noise: float, tole
         name = "rigid"
     form = forms[name]
     if name != "rigid":
-        form = task.fit(form, (0.0,), every)
-        at = task.find_feet(form, every)
+        refined = task.fit(form, (0.0,), every)
+        after = task.find_feet(refined, every)
+        if len(after.points) > KEPT * len(at.points):
+            form, at = refined, after
+        else:
+            name, form = "rigid", forms["rigid"]
     scale = form if name == "scale" else forms["scale"]
     return FormChoice(
         name, form, forms["rigid"], scale, forms["stretch"], rich, at.summarise(form), at.summarise(forms["rigid"]),
