@@ -22,6 +22,10 @@ PROBES = 150
 """Points of a damage surface that are asked for from where they are seen."""
 
 
+GRAZING = 0.1
+"""Cosine of the angle between a normal and the way to the eye below which a place is not seen."""
+
+
 class View(NamedTuple):
     """A place to look at: ``centre`` (3,), ``radius`` of what is to be seen, ``direction`` (3,) from there to the eye,
     and ``up`` (3,)."""
@@ -49,7 +53,7 @@ def choose_view(left: RayCaster, surface: Mesh, bounds: Floats, scale: float, di
         ways = np.tile(directions, (len(places), 1))
         free = np.isinf(left.find_first(starts, ways)[0]).reshape(len(places), -1)
         facing = np.clip(normals @ directions.T, 0, None)
-        score = score + (free * (0.4 + 0.6 * facing)).mean(axis=0)
+        score = score + (free * (facing > GRAZING) * (0.4 + 0.6 * facing)).mean(axis=0)
     direction = directions[int(score.argmax())]
     up = np.array([0.0, 1.0, 0.0]) if abs(direction[2]) > 0.99 else np.array([0.0, 0.0, 1.0])
     return View(centre, max(radius, 1e-3 * scale), direction, up)

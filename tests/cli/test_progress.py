@@ -27,9 +27,15 @@ def read_until(stream: object, word: str) -> str:
     return text
 
 
+def allow_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # shells let what runs in the background ignore it
+
+
 def test_an_interrupt_says_what_is_kept_and_leaves_nothing_hidden(tmp_path: Path) -> None:
     job = damaged_box.write(tmp_path)
-    process = subprocess.Popen([*MAIN, "run", str(job)], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [*MAIN, "run", str(job)], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, preexec_fn=allow_interrupts
+    )
     assert process.stderr
     text = read_until(process.stderr, "enclose: ")  # a stage is named when it begins
     process.send_signal(signal.SIGINT)

@@ -29,6 +29,8 @@ from damageest.stages.export.files import Files
 from damageest.stages.part.file import PartFile
 from damageest.stages.reconstruct.signed_distance import SignedDistance
 from damageest.stages.repair.none import NoRepair as NoRepair
+from damageest.stages.report import ReportFiles
+from damageest.stages.report.html import Html
 from damageest.stages.sample.uniform import Uniform
 from damageest.stages.scan.simulate import Simulate
 from damageest.stages.segment.mesh_distance import MeshDistance
@@ -49,6 +51,7 @@ GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
     "Boolean": (Manifold(), {}),
     "Allowance": (NoAllowance(), {}),
     "Export": (Files(), {}),
+    "Report": (Html(), {}),
 }
 MEANING = {
     "Part": "test_has_the_volume_of_its_file",
@@ -66,6 +69,7 @@ MEANING = {
     "Boolean": "test_gives_what_lies_in_the_part",
     "Allowance": "test_deposit_holds_the_damage",
     "Export": "test_writes_the_files_it_names",
+    "Report": "test_writes_the_files_it_names",
 }
 """By contract: the check of the meaning of a result."""
 BAD_INPUT: dict[str, tuple[str, tuple[Any, ...]]] = {
@@ -103,7 +107,7 @@ def spoil(value: Any, by: float) -> Any:
             )
         case Enclosures():
             return Enclosures(tuple(replace(item, solid=spoil(item.solid, by)) for item in value.items))
-        case ExportedFiles():
+        case ExportedFiles() | ReportFiles():
             return replace(value, files=(*value.files, f"{by}.txt"))
         case None:
             return Solid(*(getattr(_scene.make_box(np.zeros(3), np.full(3, by), 9), n) for n in ("vertices", "faces")))
@@ -136,7 +140,7 @@ def make_checks(name: str, tmp_path: Path, fault: Fault) -> Any:
         return fault(base.call(self, stage, given), given)
 
     made = type("Case", (base,), {"stage": stage, "call": call, **told})()
-    if name == "Export":
+    if name in ("Export", "Report"):
         (tmp_path / "home").mkdir()
         made.home, made.count = tmp_path / "home", 0
     return made

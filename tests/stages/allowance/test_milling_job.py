@@ -48,8 +48,8 @@ def test_a_valid_job(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("20, 5]]", "oops, 5]]"), r"job.yaml:12:29: allowance.targets.1.box.1.1: .*'oops'"),
-        (("- box", "- boxx"), r"job.yaml:12:7: allowance.targets.1: unknown key 'boxx' \(did you mean 'box'\?\)"),
+        (("20, 5]]", "oops, 5]]"), r"job.yaml:13:29: allowance.targets.1.box.1.1: .*'oops'"),
+        (("- box", "- boxx"), r"job.yaml:13:7: allowance.targets.1: unknown key 'boxx' \(did you mean 'box'\?\)"),
         (("radius: 4", "radius: -4"), r"allowance.keep_out.0.cylinder.radius: .* greater than 0, not -4"),
         (("kind: cylinder", "kind: cone"), r"keep_out.2.kind: expected 'plane', 'cylinder' or 'other', not 'cone'"),
         (("box.stl}", "none.stl}"), r"none.stl: there is no such file"),
