@@ -50,6 +50,18 @@ def measure_coverage(part: Part, skin: SkinView, losses: Sequence[Solid], tolera
     return Coverage(share, regions, cells.mesh, seen, distance, lost, region)
 
 
+def find_removed_cells(damage: Solid, skin: SkinView) -> Flags:
+    """Which cells (C,) of the skin a damage volume removes."""
+    cells = skin.cells
+    removed = np.zeros(len(cells.areas), bool)
+    low, high = damage.bounds[0] - cells.edge, damage.bounds[1] + cells.edge
+    near = ((cells.centres > low) & (cells.centres < high)).all(axis=1)
+    index = np.flatnonzero(near)
+    if len(index):
+        removed[index] = distance_to_mesh(cells.centres[index], damage) < 1e-3 * cells.edge
+    return removed
+
+
 def _find_removed(cells: SkinCells, seen: Flags, losses: Sequence[Solid], reach: float) -> Flags:
     """Which unseen cells (F,) a damage volume removes."""
     removed = np.zeros(len(seen), bool)

@@ -12,7 +12,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh, Solid
-from damageest.checks.coverage import SkinView
+from damageest.checks.coverage import SkinView, find_removed_cells
+from damageest.checks.skin_cells import AVERAGED
 from damageest.findings import Fading
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
@@ -33,8 +34,6 @@ LEAST = 0.05
 """Depth in tolerances below which a patch does not count as lost."""
 BESIDE = 2.5
 """Distance in edges of a patch up to which patches are connected."""
-AVERAGED = 6
-"""Scan points that the mean distance of a skin cell is taken of, as in `checks.skin_cells`."""
 
 
 def measure_fading(
@@ -60,7 +59,7 @@ def measure_fading(
         return None
     taken = np.zeros(len(skin.cells.areas), bool)
     for other in others:
-        taken |= find_removed(other, skin)
+        taken |= find_removed_cells(other, skin)
     beyond_depth, beyond_area = _find_beyond(damage, skin, noise, systematic, tolerance, taken)
     inside = damage.volume / float(depth.sum())
 
@@ -76,25 +75,13 @@ def measure_fading(
     )
 
 
-def find_removed(damage: Solid, skin: SkinView) -> Flags:
-    """Which cells (C,) of the skin a damage volume removes."""
-    cells = skin.cells
-    removed = np.zeros(len(cells.areas), bool)
-    low, high = damage.bounds[0] - cells.edge, damage.bounds[1] + cells.edge
-    near = ((cells.centres > low) & (cells.centres < high)).all(axis=1)
-    index = np.flatnonzero(near)
-    if len(index):
-        removed[index] = distance_to_mesh(cells.centres[index], damage) < 1e-3 * cells.edge
-    return removed
-
-
 def _find_beyond(
     damage: Solid, skin: SkinView, noise: float, systematic: float, tolerance: float, others: Flags
 ) -> tuple[Floats, Floats]:
     """Depth (P,) and area (P,) of patches of skin beside a site that are lower than noise explains, connected to it."""
     cells = skin.cells
     nothing = np.empty(0), np.empty(0)
-    own = find_removed(damage, skin)
+    own = find_removed_cells(damage, skin)
     asked = np.flatnonzero(skin.perhaps_seen & np.isfinite(skin.distance) & ~own & ~others)
     if not len(asked) or not own.any():
         return nothing

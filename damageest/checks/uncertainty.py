@@ -16,15 +16,13 @@ import numpy as np
 from damageest.artefacts import Evidence, Flags, Floats, Part, Scan, Solid
 from damageest.checks.inner_surface import measure_inner_surface, pair_faces
 from damageest.checks.pose_error import PoseError
+from damageest.checks.verdict import GAP
 from damageest.findings import Coverage, Fading, Interval
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby
 
 WIDTH = 2.0
 """Half the width of a 95 % interval in standard deviations."""
-GAP = 8.0
-"""Area of a hole in the scan of an inner surface, in squares of the spacing or the tolerance, from which it may hide
-more than interpolation shows; as in `checks.verdict`."""
 HOLE = 0.5
 """Depth that a hole in the scan of an inner surface may hide, in square roots of its area."""
 FLAT, SMOOTH = 0.05, 30.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Part, Solid
+from damageest.checks.inner_surface import pair_faces
 from damageest.findings import Coverage
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.skin import find_inner_faces
@@ -44,8 +45,7 @@ def measure_unseen_rim(damage: Solid, part: Part, coverage: Coverage, reach: flo
 
 def _find_rim(damage: Solid, part: Part) -> tuple[Floats, Floats]:
     """The ends (E,3) of the edges that belong to one face inside the part and one on the skin."""
-    faces = damage.faces[find_inner_faces(damage, part)]
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    edges, count = np.unique(edges, axis=0, return_counts=True)
-    rim = edges[count == 1]
-    return damage.vertices[rim[:, 0]], damage.vertices[rim[:, 1]]
+    starts, ends, first, second = pair_faces(damage.faces)
+    inner = find_inner_faces(damage, part)
+    rim = inner[first] != inner[second]
+    return damage.vertices[starts[rim]], damage.vertices[ends[rim]]

@@ -7,14 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Flags
-from damageest.checks.coverage import SkinView
+from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import ask_free_pose, measure_dependence
 from damageest.checks.unseen_rim import ask_unseen_rim
 from damageest.checks.verdict import judge_site, measure_limits
 from damageest.errors import StageError
-from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import to_solid, unite
 from damageest.geometry.voxels import measure_area
 from damageest.pipeline.cache import digest
@@ -108,10 +106,6 @@ def _is_proven_by_rays(skin: SkinView, site: FoundSite) -> bool:
         return False
     if site.method == BY_RAYS_ALONE:
         return True
-    cells, damage = skin.cells, site.damage
-    close = 1e-3 * cells.edge  # cells of a flat face lie on the bounds
-    near: Flags = ((cells.centres > damage.bounds[0] - close) & (cells.centres < damage.bounds[1] + close)).all(axis=1)
-    index = np.flatnonzero(near & ~skin.perhaps_seen)
-    index = index[distance_to_mesh(cells.centres[index], damage) < close] if len(index) else index
-    area = cells.areas[index]
+    index = np.flatnonzero(find_removed_cells(site.damage, skin) & ~skin.perhaps_seen)
+    area = skin.cells.areas[index]
     return bool(len(index)) and float(area[skin.rays.lost[index]].sum()) > BY_RAYS * float(area.sum())
