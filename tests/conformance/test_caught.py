@@ -176,7 +176,7 @@ def test_an_edited_file(tmp_path: Path) -> None:
 def test_chance(name: str, tmp_path: Path) -> None:
     np.random.seed(1)  # noqa: NPY002
     made = make_checks(name, tmp_path, lambda result, given: spoil(result, 1e-5 * np.random.random()))  # noqa: NPY002
-    with pytest.raises(AssertionError, match="the second run (gave|wrote) other bytes"):
+    with pytest.raises(AssertionError, match=r"the second run (gave|wrote) other bytes"):
         made.test_same_bytes_twice()
 
 
