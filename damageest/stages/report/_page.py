@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from damageest.artefacts import Floats
 from damageest.errors import StageError
 from damageest.io import colours
 from damageest.io.files import file_sha256
@@ -17,7 +18,7 @@ from damageest.result import Result
 from damageest.stages.report import _style as style
 from damageest.stages.report._scene import LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
-from damageest.stages.report._sites import MOST_DRAWN, Shown, choose_overview
+from damageest.stages.report._sites import MOST_DRAWN, Shown
 from damageest.stages.report._values import list_fit, list_freedom, show_total_interval
 
 FOLDER = Path(__file__).parent / "page"
@@ -36,8 +37,10 @@ WHY = {
 }
 
 
-def fill_page(result: Result, content: Mapping[str, Any], job_text: str, scene: Scene, sites: list[Shown]) -> str:
-    """The whole page as text."""
+def fill_page(
+    result: Result, content: Mapping[str, Any], job_text: str, scene: Scene, sites: list[Shown], start: Floats
+) -> str:
+    """The whole page as text. ``start``: the direction (3,) from which the 3D view looks at first."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -53,7 +56,7 @@ def fill_page(result: Result, content: Mapping[str, Any], job_text: str, scene: 
         "objects": scene.objects,
         "layers": list(_used_layers(scene)),
         "sites": {site.id: site.view for site in sites},
-        "start": choose_overview(result).tolist(),
+        "start": start.tolist(),
         "origin": scene.origin,
         "size": scene.size,
         "unit": result.units,

@@ -18,9 +18,12 @@ from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._drawing import draw
 from damageest.stages.report._section import choose_plane, draw_section, take_paper
+from damageest.stages.report._thin import thin_mesh
 from damageest.stages.report._values import show_interval, show_site_interval
 
 PICTURE, THUMBNAIL = (320, 240), (104, 78)
+THUMBNAIL_TRIANGLES = 4000
+"""About as many as a thumbnail has pixels that show the mesh."""
 FEW = 6
 """Up to so many sites, pictures are drawn with smooth edges."""
 MOST_DRAWN = 12
@@ -53,13 +56,13 @@ class Shown:
     view: dict[str, Any] = field(default_factory=dict)
 
 
-def describe_sites(result: Result, content: Mapping[str, Any]) -> list[Shown]:
+def describe_sites(result: Result, content: Mapping[str, Any], remains: Remains) -> list[Shown]:
     """Values, pictures and sections of all sites. ``content``: that of result.json."""
     if not result.sites:
         return []
     part = to_manifold(result.part, result.part.bounds.mean(axis=0))
     drawn = {s.id for s in sorted(result.sites, key=lambda s: -s.damage.volume)[:MOST_DRAWN]}
-    remains, paper = _Remains(result), take_paper()
+    paper = take_paper()
     shown = []
     for site, told in zip(result.sites, content["sites"], strict=True):
         one = _describe(result, site, told)
@@ -72,31 +75,34 @@ def describe_sites(result: Result, content: Mapping[str, Any]) -> list[Shown]:
     return shown
 
 
-def choose_overview(result: Result) -> Floats:
-    """The direction (3,) from where most of the damage is seen, of those that all of the part is looked at from."""
-    left = result.undamaged
-    if not result.sites or left is None:
-        return np.asarray(OVERVIEWS[0])
-    vertices, faces, _ = concatenate_meshes([site.surface for site in result.sites])
-    return choose_view(RayCaster(left), Mesh(vertices, faces), left.bounds, left.diagonal, OVERVIEWS).direction
-
-
-class _Remains:
+class Remains:
     """What is left of the part, for rays: without all accepted sites, or without a single one that is not accepted."""
 
     def __init__(self, result: Result) -> None:
         self._result = result
-        self._shared: tuple[Mesh, RayCaster] | None = None
+        self._shared: RayCaster | None = None
+
+    def without_accepted(self, undamaged: Mesh) -> tuple[Mesh, RayCaster]:
+        """The undamaged volume and its rays, which are prepared once: of a million triangles that takes seconds."""
+        self._shared = self._shared or RayCaster(undamaged)
+        return undamaged, self._shared
 
     def without(self, site: Site) -> tuple[Mesh, RayCaster]:
         part = self._result.part
         if site.accepted and self._result.undamaged is not None:
-            if self._shared is None:
-                self._shared = self._result.undamaged, RayCaster(self._result.undamaged)
-            return self._shared
+            return self.without_accepted(self._result.undamaged)
         origin = part.bounds.mean(axis=0)
         left = to_solid(to_manifold(part, origin) - to_manifold(site.damage, origin), origin) or part
         return left, RayCaster(left)
+
+
+def choose_overview(result: Result, remains: Remains) -> Floats:
+    """The direction (3,) from where most of the damage is seen, of those that all of the part is looked at from."""
+    if not result.sites or result.undamaged is None:
+        return np.asarray(OVERVIEWS[0])
+    vertices, faces, _ = concatenate_meshes([site.surface for site in result.sites])
+    left, rays = remains.without_accepted(result.undamaged)
+    return choose_view(rays, Mesh(vertices, faces), left.bounds, left.diagonal, OVERVIEWS).direction
 
 
 def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
@@ -168,12 +174,12 @@ def _draw_site(
     at = ", ".join(style.format_number(x) for x in plane.origin)
     normal = ", ".join(style.format_number(x, 3) for x in np.round(plane.across, 4) + 0.0)
     one.plane = f"through ({at}), normal ({normal}); scan points within {style.format_number(slab, 2)} {result.units}"
-    damage = RayCaster(site.damage)
-    deposit = RayCaster(site.deposit) if site.deposit else damage
-    shapes = [("damage", damage, site.damage, one.colour), ("surface", surface, site.surface, one.colour)]
-    for kind, body, shape, colour in [*shapes, ("deposit", deposit, site.deposit or site.damage, colours.DEPOSIT)]:
-        if body and told["files"][kind]:
-            image = draw(near, [(body, shape, colour)], THUMBNAIL, smooth)
+    deposit = site.deposit or site.damage
+    shapes = [("damage", site.damage, one.colour), ("surface", site.surface, one.colour)]
+    for kind, shape, colour in [*shapes, ("deposit", deposit, colours.DEPOSIT)]:
+        if len(shape.faces) and told["files"][kind]:
+            small = thin_mesh(shape, THUMBNAIL_TRIANGLES)
+            image = draw(near, [(RayCaster(small), small, colour)], THUMBNAIL, smooth)
             one.files.append((kind, told["files"][kind], image))
 
 

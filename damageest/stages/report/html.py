@@ -32,9 +32,10 @@ class Html(Report):
         """Writes ``report.html`` into ``folder``."""
         from damageest.stages.report._page import fill_page
         from damageest.stages.report._scene import build_scene
-        from damageest.stages.report._sites import describe_sites
+        from damageest.stages.report._sites import Remains, choose_overview, describe_sites
 
-        scene = build_scene(result, self.points, self.triangles)
-        page = fill_page(result, content, job_text, scene, describe_sites(result, content))
+        scene, remains = build_scene(result, self.points, self.triangles), Remains(result)
+        sites = describe_sites(result, content, remains)
+        page = fill_page(result, content, job_text, scene, sites, choose_overview(result, remains))
         (folder / "report.html").write_text(page, encoding="utf-8")
         return ReportFiles(("report.html",))

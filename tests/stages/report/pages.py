@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -9,6 +10,7 @@ from tempfile import mkdtemp
 
 import numpy as np
 
+import damageest
 from damageest.artefacts import DAMAGE, Deviation, Scan
 from damageest.findings import Verdict
 from damageest.geometry.distance import signed_distance
@@ -19,16 +21,17 @@ from damageest.stages.export import ExportedFiles
 from damageest.stages.report.html import Html
 from tests.stages.export.results import make
 
+JOBS = Path(__file__).parents[3] / "jobs"
 NASTY = '<img src=x onerror="document.title=1">&"\'</script><script>document.title=2</script>'
 """Would run where it is not escaped."""
 
 
 @cache
-def two_sites() -> Result:
-    """The box with two bites, with a scan of it: 12,000 points."""
+def two_sites(count: int = 12_000) -> Result:
+    """The box with two bites, with a scan of it of ``count`` points."""
     plain = make()
     assert plain.undamaged is not None
-    points = sample_by_area(plain.undamaged, 12_000, np.random.default_rng(0))[0]
+    points = sample_by_area(plain.undamaged, count, np.random.default_rng(0))[0]
     points += np.random.default_rng(1).normal(0, 0.02, points.shape)
     distance, face = signed_distance(points, plain.part)
     label = np.where(distance < -3 * plain.tolerance, DAMAGE, 0).astype(np.uint8)
@@ -40,6 +43,19 @@ def two_sites() -> Result:
     return replace(
         plain, scan=scan, aligned=scan, deviation=Deviation(distance, face, label), site_label=number, sites=sites
     )
+
+
+def twelve_sites(folder: Path) -> Path:
+    """Runs a job with twelve damages, and gives its report's path."""
+    tools: list[dict[str, object]] = []
+    for k in range(12):
+        centre = [-52 + 34 * (k // 3), -33 + 33 * (k % 3), 0]
+        tools.append({"tool": "sphere", "centre": centre, "radius": 5 + 0.2 * k})
+    scan = {"use": "simulate", "points": 100_000, "noise": 0.06, "damage": tools}
+    job = {"version": 1, "tolerance": 0.3, "part": str(JOBS / "parts/ribbed_plate.stl"), "align": "none", "scan": scan}
+    (folder / "twelve.yaml").write_text(json.dumps(job))
+    damageest.run(folder / "twelve.yaml", output=folder / "out")
+    return folder / "out/report.html"
 
 
 def write(

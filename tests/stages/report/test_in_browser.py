@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import damageest
-from damageest.findings import Surplus
+from damageest.artefacts import Mesh
+from damageest.findings import Coverage, Surplus, UnseenRegion
 from tests.stages.report import browser, pages
 
 pytestmark = pytest.mark.xdist_group("browser")
@@ -29,11 +30,32 @@ def shown(chromium: Any) -> browser.Shown:
     result = pages.two_sites()
     some = np.arange(200)
     weld = Surplus(1, some, 0.01, result.sites[0].damage, 0.4, 3.0)
-    return browser.Shown(chromium, pages.write(replace(result, surplus=(weld,))))
+    return browser.Shown(chromium, pages.write(replace(result, surplus=(weld,), coverage=hide_the_bottom(result))))
+
+
+def hide_the_bottom(result: damageest.Result) -> Coverage:
+    """A coverage in which no scanner saw the bottom of the part."""
+    part = result.part
+    hidden = part.face_normals[:, 2] < -0.9
+    area = float((np.linalg.norm(part.cross, axis=1) / 2)[hidden].sum())
+    box = part.vertices[part.faces[hidden]].reshape(-1, 3)
+    region = UnseenRegion(area, box.mean(axis=0), np.stack([box.min(axis=0), box.max(axis=0)]), (), 1.0, "hidden")
+    skin = Mesh(part.vertices, part.faces)
+    no = np.zeros(len(hidden), bool)
+    return Coverage(1 - area / part.area, (region,), skin, ~hidden, np.zeros(len(hidden)), no, np.where(hidden, 0, -1))
 
 
 def count_changed(before: np.ndarray, after: np.ndarray) -> int:
     return int((np.abs(before - after).sum(axis=2) > 30).sum())
+
+
+def check_drawn(report: browser.Shown) -> None:
+    """Checks that the page has no fault and draws the damage, and closes it."""
+    before = report.picture()
+    report.switch("damage", False)
+    assert count_changed(before, report.picture()) > 20
+    assert not report.faults
+    report.page.close()
 
 
 def test_no_fault_and_no_request(shown: browser.Shown) -> None:
@@ -45,7 +67,7 @@ def test_each_layer_draws_and_switches(shown: browser.Shown) -> None:
         box.uncheck()
     shown.settle()
     empty = shown.picture()
-    for layer in ("part", "scan", "points", "damage", "surface", "deposit", "surplus"):
+    for layer in ("part", "scan", "points", "damage", "surface", "deposit", "surplus", "unseen"):
         shown.switch(layer, True)
         assert count_changed(empty, shown.picture()) > 60, layer
         shown.page.uncheck(f"input[data-layer={layer}]")
@@ -158,14 +180,45 @@ def test_without_sites_and_with_markup_in_every_name(chromium: Any) -> None:
 
 
 @pytest.mark.slow
+def test_an_incomplete_run_says_so(chromium: Any) -> None:
+    result = pages.two_sites()
+    told = replace(result, sites=result.sites[:1], failures=("boolean: manifold (site 2): it failed",))
+    report = browser.Shown(chromium, pages.write(told))
+    assert "incomplete: 1 failed" in report.page.inner_text("body")
+    assert report.page.locator("#sites tbody tr").count() == 1
+    check_drawn(report)
+
+
+@pytest.mark.slow
+def test_a_million_points(chromium: Any) -> None:
+    path = pages.write(pages.two_sites(1_000_000))
+    assert path.stat().st_size < 15e6
+    report = browser.Shown(chromium, path)
+    empty = report.picture()
+    report.switch("scan", True)
+    assert count_changed(empty, report.picture()) > 5000
+    check_drawn(report)
+
+
+@pytest.mark.slow
+def test_twelve_sites(chromium: Any, tmp_path: Path) -> None:
+    path = pages.twelve_sites(tmp_path)
+    assert path.stat().st_size < 15e6
+    report = browser.Shown(chromium, path)
+    assert report.page.locator("#sites tbody tr").count() == 12
+    for site in (1, 12):
+        assert report.page.locator(f"#section-{site}-damage-volume").count() == 1
+        before = report.camera()
+        report.page.click(f"#row-{site} td:nth-child(3)")
+        report.settle()
+        assert np.linalg.norm(report.camera()[3:] - before[3:]) > 1
+    check_drawn(report)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("job", sorted((Path(__file__).parents[3] / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_report_of_each_job(job: Path, chromium: Any, tmp_path: Path) -> None:
     damageest.run(job, output=tmp_path / "out")
     path = tmp_path / "out/report.html"
     assert path.stat().st_size < 15e6
-    report = browser.Shown(chromium, path)
-    assert not report.faults
-    before = report.picture()
-    report.switch("damage", False)
-    assert count_changed(before, report.picture()) > 20
-    report.page.close()
+    check_drawn(browser.Shown(chromium, path))
