@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
+import sys
 import webbrowser
 from pathlib import Path
 
@@ -73,6 +75,18 @@ def test_a_window_needs_a_display(folder: Path, monkeypatch: pytest.MonkeyPatch)
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(StageError, match="no display"):
         pictures.open_window(open_output(folder), 0)
+
+
+@pytest.mark.skipif(not shutil.which("xvfb-run"), reason="there is no virtual display: apt-get install xvfb xauth")
+def test_each_switch_of_the_window_changes_what_is_shown(folder: Path) -> None:
+    script = [sys.executable, "-m", "tests.cli.windowed", str(folder)]
+    told = subprocess.run(["xvfb-run", "-a", *script], capture_output=True, text=True, timeout=120, check=False)
+    assert told.returncode == 0, told.stderr
+    kinds, counts = zip(*(line.split() for line in told.stdout.splitlines()), strict=True)
+    assert kinds[0] == "colours"
+    assert int(counts[0]) > 100
+    assert len(counts) >= 6  # part, damage volumes, surfaces, deposits, scan, points
+    assert all(int(count) > 50 for count in counts[1:])
 
 
 def test_a_picture_shows_the_damage(folder: Path, tmp_path: Path) -> None:
