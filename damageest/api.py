@@ -12,6 +12,7 @@ import numpy as np
 from damageest.artefacts import Part, Scan
 from damageest.errors import InputError, StageError
 from damageest.io.files import expand_home
+from damageest.isolation import Limits
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
@@ -36,24 +37,26 @@ def run(
     settings: Sequence[str] = (),
     cache: bool = True,
     registry: Registry | None = None,
+    limits: Limits | None = None,
 ) -> Result:
     """Runs a job and gives its result; writes nothing unless ``output`` says where (True: where the job says).
 
     ``job``: a path, a mapping of the same shape, or a checked Job. ``part`` (a Part, a trimesh.Trimesh, or vertices and
     faces) and ``scan`` (a Scan, an (N,3) array, a trimesh mesh or point cloud) replace the job's files; both may
     also be in the mapping. ``settings`` are overrides such as ``"cluster.eps=0.4"``. Lengths are in the job's unit.
+    ``limits`` of memory and time hold for stages that run in a process of their own, those that call a native library.
 
     Raises JobError or InputError (job or input at fault) and StageError (a stage failed or refused).
     """
-    registry = registry or Registry.discover()
+    registry, limits = registry or Registry.discover(), limits or Limits()
     if not isinstance(job, Job):
         source, given = _split(job, part, scan)
         job = load(source, registry, settings, given)
     if output is False:
-        return follow(route_of(job.method), Engine(job, registry), start(job)).job.result
+        return follow(route_of(job.method), Engine(job, registry, limits=limits), start(job)).job.result
     target = job.output if output is True else expand_home(Path(output)).resolve()
     with open_workspace(target, cache) as place:
-        engine = Engine(job, registry, place.cache)
+        engine = Engine(job, registry, place.cache, limits=limits)
         work = follow(route_of(job.method), engine, start(job))
         state = work.job.with_value(JobState.folder, place.folder, digest(str(target)))
         state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))

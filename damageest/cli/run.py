@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from damageest.isolation.limits import STAGE_SECONDS, Limits, limit_this_process, parse_memory
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -38,6 +40,12 @@ def command(
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Compute all stages again.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print result.json on stdout, one line per job.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, no progress and no table.")] = False,
+    memory: Annotated[
+        str, typer.Option(metavar="SIZE", help="Memory that the run may allocate, as 6GB. Default: what is free.")
+    ] = "",
+    stage_timeout: Annotated[
+        float, typer.Option(min=0, help="Seconds after which a stage in a process of its own is ended; 0: never.")
+    ] = STAGE_SECONDS,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Run jobs: compute the damage volumes from part and scan."""
@@ -51,6 +59,8 @@ def command(
         raise JobError(
             [Fault("only valid with a single job; with several jobs, each job's own output folder is used")], "--output"
         )
+    limits = Limits(parse_memory(memory) if memory else None, stage_timeout)
+    limit_this_process(limits.memory)
     progress = Progress(quiet)
     registry = Registry.discover([progress])
     status = 0
@@ -67,7 +77,7 @@ def command(
 
         try:
             with progress.show_job(job.name), redirect_stdout(sys.stderr if as_json else sys.stdout):
-                result = run(job, output=output or True, cache=not no_cache, registry=registry)
+                result = run(job, output=output or True, cache=not no_cache, registry=registry, limits=limits)
         except DamageestError as error:
             status = max(status, _report_failure(error, job.source, as_json, debug))
             continue

@@ -13,6 +13,7 @@ import numpy as np
 
 from damageest.artefacts import ArtefactError
 from damageest.errors import DamageestError, InputError, StageError, describe_missing_library, is_interrupt
+from damageest.isolation import Limits, call_isolated
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache, digest
 from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
@@ -27,7 +28,8 @@ S = TypeVar("S", JobState, Candidate, FoundSite)
 @dataclass
 class Engine:
     """One run of a job. ``records`` grow as it goes; ``stems`` are the cache entries that it used. ``silent``: it
-    calls stages on values that are not the job's own, and observers do not get these calls."""
+    calls stages on values that are not the job's own, and observers do not get these calls. ``limits``: of stages that
+    run in a process of their own."""
 
     job: Job
     registry: Registry
@@ -36,6 +38,7 @@ class Engine:
     stems: list[str] = field(default_factory=list)
     memo: dict[str, Any] = field(default_factory=dict)
     silent: bool = False
+    limits: Limits = field(default_factory=Limits)
 
     def make_silent(self, *contracts: Contract) -> Engine:
         """An engine for calls of stages on other values than the job's own: with the same cache, without records.
@@ -66,7 +69,7 @@ class Engine:
             cached, value = self.remember(
                 contract.stage + (f"-{state.number}" if state.number else ""),
                 key,
-                lambda: _check_type(stage.run(**{name: state.get(name) for name in needs}), contract),  # type: ignore[attr-defined]
+                lambda: _check_type(self._run(stage, item, {name: state.get(name) for name in needs}), contract),
                 keep=contract.stage not in ("export", "report"),
             )
         except Exception as error:
@@ -78,6 +81,20 @@ class Engine:
         self.records.append(StageRecord(*where[:2], str(item.provider), state.number, round(seconds, 3), cached))
         tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
         return state.with_named(contract.gives, value, key)
+
+    def _run(self, stage: Stage, item: Implementation, arguments: dict[str, Any]) -> Any:
+        """What the stage gives, from a process of its own where its class says so. Raises StageError where it exits."""
+        run: Callable[..., Any] = stage.run  # type: ignore[attr-defined]
+        if item.cls.isolated:
+            worker = item.provider.module.partition(".")[0]
+            return call_isolated(run, arguments, worker=worker, owner=f"{item.provider}", limits=self.limits)
+        try:
+            return run(**arguments)
+        except SystemExit as end:
+            raise StageError(
+                f"called sys.exit({'' if end.code is None else end.code}), which would end the run",
+                f"another implementation; report it to the authors of {item.provider}",
+            ) from end
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
         """(was it known, value): from this run's memory, else from the cache, else computed and kept."""

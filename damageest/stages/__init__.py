@@ -47,7 +47,9 @@ class Stage(BaseModel):
 
     A contract sets ``stage``, its name in a job; ``gives``, the name under which later stages get the result; and
     ``per_site``, whether it runs once for each site or once for the job. A reader of part or scan sets ``reads``, the
-    suffixes of its files. An implementation sets ``use``, its own name in a job.
+    suffixes of its files. An implementation sets ``use``, its own name in a job, and ``isolated`` where it calls a
+    native library: ``run`` then has a process of its own, and a crash, a hang or a lack of memory there is the error of
+    this stage. Its class has to be in a module that can be imported.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
@@ -55,6 +57,7 @@ class Stage(BaseModel):
     gives: ClassVar[str] = ""
     per_site: ClassVar[bool] = False
     reads: ClassVar[tuple[str, ...]] = ()
+    isolated: ClassVar[bool] = False
 
     use: str
 

@@ -21,6 +21,7 @@ from damageest.stages.part import CadFace, ReadPart
 class Brep(ReadPart):
     """Reads the part from STEP, IGES or BREP; OpenCASCADE triangulates it, neighbouring faces share points."""
 
+    isolated: ClassVar[bool] = True
     use: Literal["brep"] = "brep"
     reads: ClassVar[tuple[str, ...]] = (".step", ".stp", ".iges", ".igs", ".brep")
     path: JobPath = Field(description="the file, relative to the job's folder")

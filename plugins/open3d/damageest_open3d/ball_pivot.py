@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, PositiveFloat
@@ -18,6 +18,7 @@ class BallPivot(Reconstruct):
     ends exactly where the points end.
     """
 
+    isolated: ClassVar[bool] = True
     use: Literal["ball_pivot"] = "ball_pivot"
     radii: tuple[PositiveFloat, ...] = Field(
         (1.5, 3.0),

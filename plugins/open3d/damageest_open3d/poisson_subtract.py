@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -43,6 +43,7 @@ class PoissonSubtract(EncloseAll):
     The difference has slivers: wherever noise or a rounded edge puts the body below intact skin.
     """
 
+    isolated: ClassVar[bool] = True
     use: Literal["poisson_subtract"] = "poisson_subtract"
     depth: int = Field(
         9, ge=5, le=13, description="most levels of the octree over the scan; it gets no finer than the points"

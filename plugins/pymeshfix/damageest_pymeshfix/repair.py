@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -24,6 +24,7 @@ class PyMeshFix(Repair):
     mesh has another shape than the given one.
     """
 
+    isolated: ClassVar[bool] = True
     use: Literal["pymeshfix"] = "pymeshfix"
     invented: float = Field(
         0.03,

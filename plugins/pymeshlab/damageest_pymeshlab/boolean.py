@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -17,6 +17,7 @@ class PyMeshLabBoolean(Boolean):
     Slower than `manifold`, and an independent check of it.
     """
 
+    isolated: ClassVar[bool] = True
     use: Literal["pymeshlab"] = "pymeshlab"
 
     def run(self, solid: Solid, part: Part) -> Solid | None:

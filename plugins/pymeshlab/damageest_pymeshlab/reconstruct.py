@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -25,6 +25,7 @@ class PyMeshLabReconstruct(Reconstruct):
     whose surface passes through the points.
     """
 
+    isolated: ClassVar[bool] = True
     use: Literal["pymeshlab"] = "pymeshlab"
     filter: Filter = Field("screened_poisson", description="PyMeshLab's filter")
     scale: float = Field(

@@ -1,0 +1,106 @@
+"""Values between two processes, their arrays in shared memory.
+
+A value is pickled with protocol 5. The pickle and, out of band, the arrays go into an anonymous file in memory, whose
+descriptor is sent through a socket. Nothing is left of it where a process is killed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import mmap
+import os
+import pickle
+import socket
+import struct
+import tempfile
+from collections.abc import Sequence
+from typing import Any
+
+_ALIGNED = 64
+"""Bytes to which the arrays are aligned."""
+
+
+def send(channel: socket.socket, value: Any) -> None:
+    """Sends a value. Raises what pickling raises, and then has sent nothing."""
+    buffers: list[pickle.PickleBuffer] = []
+    stream = io.BytesIO()
+    _Pickler(stream, protocol=5, buffer_callback=buffers.append).dump(value)
+    parts = [stream.getbuffer(), *(buffer.raw() for buffer in buffers)]
+    starts = _place([part.nbytes for part in parts])
+    file = _make_file()
+    try:
+        os.ftruncate(file, starts[-1])
+        with mmap.mmap(file, starts[-1]) as memory:
+            struct.pack_into(f"<{len(parts) + 1}Q", memory, 0, len(parts), *(part.nbytes for part in parts))
+            for start, part in zip(starts, parts, strict=False):
+                memory[start : start + part.nbytes] = part
+        socket.send_fds(channel, [b"v"], [file])
+    finally:
+        os.close(file)
+
+
+def receive(channel: socket.socket, copy: bool) -> Any:
+    """The next value. Its arrays lie in the shared memory, or with ``copy`` in this process' own.
+
+    An array in shared memory keeps a file open. Raises EOFError where the other process has ended.
+    """
+    return load(receive_parts(channel, copy))
+
+
+def receive_parts(channel: socket.socket, copy: bool) -> list[Any]:
+    """The parts of the next value, for `load`. Raises EOFError where the other process has ended."""
+    try:
+        word, files, _, _ = socket.recv_fds(channel, 1, 1)
+    except ConnectionError:
+        word, files = b"", []
+    if not word or not files:
+        raise EOFError
+    try:
+        memory = mmap.mmap(files[0], 0)
+    finally:
+        os.close(files[0])
+    count = struct.unpack_from("<Q", memory)[0]
+    sizes = struct.unpack_from(f"<{count}Q", memory, 8)
+    view = memoryview(memory)
+    parts: list[Any] = [view[a : a + n] for a, n in zip(_place(sizes), sizes, strict=False)]
+    return [bytearray(part) for part in parts] if copy else parts
+
+
+def load(parts: Sequence[Any]) -> Any:
+    """The value of `receive_parts`. Raises what unpickling raises, such as ImportError for its class."""
+    return pickle.loads(parts[0], buffers=parts[1:])
+
+
+def _place(sizes: Sequence[int]) -> list[int]:
+    """Where each part starts behind the table of sizes, and where the last one ends."""
+    starts, end = [], 8 * (len(sizes) + 1)
+    for size in sizes:
+        starts.append(-(-end // _ALIGNED) * _ALIGNED)
+        end = starts[-1] + size
+    return [*starts, end]
+
+
+def _make_file() -> int:
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create("damageest")
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
+
+
+class _Pickler(pickle.Pickler):
+    """Sends the fields of dataclasses alone: what they have cached is computed again where it is needed."""
+
+    def reducer_override(self, obj: Any) -> Any:
+        kind = type(obj)
+        if dataclasses.is_dataclass(kind) and "__reduce__" not in vars(kind) and not issubclass(kind, BaseException):
+            return _rebuild, (kind, {field.name: getattr(obj, field.name) for field in dataclasses.fields(obj)})
+        return NotImplemented
+
+
+def _rebuild(kind: type, fields: dict[str, Any]) -> Any:
+    """A dataclass as it was. Its checks are not repeated: the sender has passed them."""
+    value: Any = object.__new__(kind)
+    for name, field in fields.items():
+        object.__setattr__(value, name, field)
+    return value
