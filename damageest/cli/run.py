@@ -31,7 +31,8 @@ UNSEEN_WHY = {
 def command(
     jobs: Annotated[list[Path], typer.Argument(metavar="JOB...", help="Job files.")],
     output: Annotated[
-        Path | None, typer.Option(help="Output folder; only with a single job. Default: out/<name>.")
+        Path | None,
+        typer.Option("--output", "-o", help="Output folder; only with a single job. Default: out/<name>."),
     ] = None,
     settings: Annotated[
         list[str] | None,

@@ -96,19 +96,23 @@ def _draw_quietly(picture: Picture, path: str) -> None:
 
 def _draw(picture: Picture, path: str) -> None:
     import pyvista as pv
+    from PIL import Image
 
     rows, columns = len(picture.looks), len(picture.folders)
     size = [picture.size[0] * columns, picture.size[1] * rows]
     plotter = pv.Plotter(off_screen=True, shape=(rows, columns), window_size=size, border=False)
     plotter.set_background(GROUND)
-    plotter.enable_anti_aliasing("ssaa")
+    # Drawn at twice the size, then made smaller: VTK's own smoothing ("ssaa") draws translucent faces in no order.
+    plotter.disable_anti_aliasing()
+    plotter.ren_win.SetMultiSamples(0)
     for row, look in enumerate(picture.looks):
         for column, (folder, site) in enumerate(zip(picture.folders, picture.sites, strict=True)):
             plotter.subplot(row, column)
             plotter.enable_depth_peeling(8)
             _add_look(plotter, folder, site, look, " " * (row * columns + column))
             _place_camera(plotter, folder, site, picture.side)
-    plotter.screenshot(path)
+    large = Image.fromarray(plotter.screenshot(return_img=True, scale=2))
+    large.resize((size[0], size[1]), Image.Resampling.BOX).save(path)
 
 
 def _add_look(plotter: Any, folder: OutputFolder, site: int, look: Look, unique: str) -> None:
