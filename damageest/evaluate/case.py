@@ -26,6 +26,7 @@ from damageest.evaluate.parts import PARTS
 from damageest.evaluate.processes import MARK
 from damageest.evaluate.scores import measure_depth, score
 from damageest.evaluate.sized import make_sized_damage
+from damageest.isolation import cpu_seconds
 from damageest.registry import Registry
 from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate
@@ -138,7 +139,7 @@ def _run_measured(case: DamageCase, meter: Meter, start_seconds: float) -> dict[
     result = None
     registry = Registry.discover([meter])
     blind = Scan(scan.points, unit=scan.unit)  # without the truth
-    start, cpu_start = time.perf_counter(), time.process_time()
+    start, cpu_start = time.perf_counter(), cpu_seconds()
     try:
         # the damage is scored, and a cut-back would enlarge it
         settings = ["allowance=none", *case.settings]
@@ -146,7 +147,7 @@ def _run_measured(case: DamageCase, meter: Meter, start_seconds: float) -> dict[
     except DamageestError as error:
         # a refusal by a stage counts as flagged; an invalid job or input would be an error of the evaluation itself
         row |= {"error": _join_lines(error), "flagged": isinstance(error, StageError)}
-    row |= {"seconds": time.perf_counter() - start, "cpu_seconds": time.process_time() - cpu_start}
+    row |= {"seconds": time.perf_counter() - start, "cpu_seconds": cpu_seconds() - cpu_start}
     row["start_seconds"] = start_seconds
     # read before scoring, which needs memory of its own
     row |= {"megabytes": meter.measure_megabytes(), "stage_megabytes": meter.stage_megabytes}

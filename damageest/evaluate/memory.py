@@ -1,4 +1,4 @@
-"""Peak memory of this process, sampled by psutil in a second process.
+"""Peak memory of this process and of its workers, sampled by psutil in a second process.
 
 A thread of this process could not sample: it stops while a C++ library holds the interpreter lock, and that is when the
 most memory is in use. The second process is ``python memory.py PID``. For each line that it reads, it prints the peak
@@ -7,6 +7,7 @@ in bytes since its last answer. It ends when its input ends.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -15,6 +16,8 @@ import time
 
 INTERVAL = 0.02
 """Seconds between two samples."""
+LISTED = 5
+"""Samples between two lists of the processes that count: this one, and those of stages with a process of their own."""
 
 
 def require_psutil() -> None:
@@ -61,12 +64,19 @@ def _serve_peaks(process_id: int) -> None:
     import psutil
 
     process = psutil.Process(process_id)
-    lock, peak = threading.Lock(), 0
+    lock, peak, count = threading.Lock(), 0, 0
+    workers: list[psutil.Process] = []
 
     def sample() -> int:
-        nonlocal peak
+        nonlocal peak, count, workers
         with lock:
+            if count % LISTED == 0:  # the list of processes takes longer than a sample
+                workers = [child for child in process.children() if child.pid != os.getpid()]
+            count += 1
             now = process.memory_info().rss
+            for child in workers:
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    now += child.memory_info().rss
             peak = max(peak, now)
         return int(now)
 

@@ -1,15 +1,15 @@
 """Calls in a process of their own, for native libraries that may crash, hang or take all memory."""
 
 from damageest.isolation.limits import Limits, format_bytes, limit_this_process, measure_free_memory, parse_memory
-from damageest.isolation.worker import call_isolated, end_workers, worker_cpu_seconds
+from damageest.isolation.worker import call_isolated, cpu_seconds, end_workers
 
 __all__ = [
     "Limits",
     "call_isolated",
+    "cpu_seconds",
     "end_workers",
     "format_bytes",
     "limit_this_process",
     "measure_free_memory",
     "parse_memory",
-    "worker_cpu_seconds",
 ]

@@ -79,9 +79,9 @@ def call_isolated(
     return result
 
 
-def worker_cpu_seconds() -> float:
-    """Processor seconds of all calls of this process to workers so far."""
-    return _cpu_seconds
+def cpu_seconds() -> float:
+    """Processor seconds of this process and of its calls to workers so far."""
+    return time.process_time() + _cpu_seconds
 
 
 def end_workers() -> None:
@@ -156,10 +156,10 @@ class _Worker:
             send(self._channel, (sys.path, memory))
             send(self._channel, (function, arguments))
             self._wait(seconds)
-            kind, value, cpu_seconds = receive(self._channel, copy=True)
+            kind, value, seconds_used = receive(self._channel, copy=True)
         except (EOFError, ConnectionError):
             raise _Ended from None
-        _cpu_seconds += cpu_seconds
+        _cpu_seconds += seconds_used
         return kind, value
 
     def _wait(self, seconds: float) -> None:

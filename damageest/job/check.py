@@ -27,10 +27,12 @@ def load(
     registry: Registry,
     settings: Sequence[str] = (),
     given: Mapping[Contract, Any] | None = None,
+    without: Sequence[str] = (),
 ) -> Job:
     """Reads and checks a job: a YAML file, or a mapping of the same shape (its paths relative to the working folder).
 
-    ``settings`` are overrides ``stage.option=value`` or ``field=value``. Raises JobError naming every fault.
+    ``settings`` are overrides ``stage.option=value`` or ``field=value``. ``without``: keys of the file that are not
+    of the job. Raises JobError naming every fault.
     """
     if isinstance(source, Mapping):
         return _Check(dict(source), {}, "job", Path.cwd(), registry, given or {}).job(settings, "job")
@@ -38,9 +40,8 @@ def load(
     tree, positions = yamlfile.read(path)
     if not isinstance(tree, Mapping):
         raise JobError([Fault("a job is a mapping with at least version, part and scan")], str(path))
-    return _Check(dict(tree), positions, str(path), path.resolve().parent, registry, given or {}).job(
-        settings, path.stem
-    )
+    tree = {key: value for key, value in tree.items() if key not in without}
+    return _Check(tree, positions, str(path), path.resolve().parent, registry, given or {}).job(settings, path.stem)
 
 
 Chosen = tuple[Implementation, dict[str, Any]]

@@ -86,7 +86,7 @@ class Engine:
         """What the stage gives, from a process of its own where its class says so. Raises StageError where it exits."""
         run: Callable[..., Any] = stage.run  # type: ignore[attr-defined]
         if item.cls.isolated:
-            worker = item.provider.module.partition(".")[0]
+            worker = f"{item.provider.module.partition('.')[0]} {item.provider.fingerprint}"
             return call_isolated(run, arguments, worker=worker, owner=f"{item.provider}", limits=self.limits)
         try:
             return run(**arguments)

@@ -29,6 +29,7 @@ from damageest.evaluate.honesty.kinds import TROUBLES
 from damageest.evaluate.honesty.scene import Scanning, TroubleScene
 from damageest.evaluate.processes import MARK
 from damageest.geometry.transforms import invert_pose
+from damageest.isolation import cpu_seconds
 from damageest.registry import Registry
 from damageest.registry.hookspecs import hookimpl
 from damageest.result import Result
@@ -78,11 +79,11 @@ class StageClock:
     @hookimpl
     def damageest_before_stage(self, stage: str) -> None:
         """Takes the time before a stage."""
-        self._start = time.process_time()
+        self._start = cpu_seconds()
 
     @hookimpl
     def damageest_after_stage(self, stage: str) -> None:
-        self.stage_seconds += time.process_time() - self._start
+        self.stage_seconds += cpu_seconds() - self._start
 
 
 def make_scene(case: TroubleCase) -> TroubleScene:
@@ -126,7 +127,7 @@ def run_case(case: TroubleCase) -> dict[str, Any]:
     settings += scene.settings
     clock = StageClock()
     registry = Registry.discover([clock])
-    start, cpu_start = time.perf_counter(), time.process_time()
+    start, cpu_start = time.perf_counter(), cpu_seconds()
     try:
         result = damageest.run({"version": 1}, part=scene.part, scan=scan, settings=settings, registry=registry)
     except (StageError, InputError) as error:
@@ -135,7 +136,7 @@ def run_case(case: TroubleCase) -> dict[str, Any]:
         return row | vars(judge_error(message, names)) | {"iou": None, "error": message}
     except DamageestError as error:  # the job of the evaluation itself is at fault
         raise RuntimeError(f"the job of case {case.number} is not valid: {error}") from error
-    row["seconds"], row["cpu_seconds"] = time.perf_counter() - start, time.process_time() - cpu_start
+    row["seconds"], row["cpu_seconds"] = time.perf_counter() - start, cpu_seconds() - cpu_start
     row["step_seconds"] = row["cpu_seconds"] - clock.stage_seconds
     row |= _describe_result(result, scene)
     state = TrueState(scene.part, scene.damage, pose if scene.has_pose else None, names, scanning.tolerance)

@@ -1,0 +1,160 @@
+"""Calls in a process of their own: values pass unchanged, and whatever happens there is an error here."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from damageest.artefacts import Solid
+from damageest.errors import InputError, StageError
+from damageest.isolation import Limits, call_isolated, end_workers, format_bytes, measure_free_memory, parse_memory
+from tests import damaged_box
+from tests.isolation import faults
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _end() -> Iterator[None]:
+    yield
+    end_workers()
+
+
+def call(function: Callable[..., Any], limits: Limits | None = None, **arguments: Any) -> Any:
+    return call_isolated(function, arguments, worker="tests", owner="acme 1.2", limits=limits)
+
+
+def give_back(solid: Solid) -> Solid:
+    return solid
+
+
+def test_arrays_pass_unchanged() -> None:
+    first, second = np.arange(12.0).reshape(4, 3), np.asfortranarray(np.ones((4, 3)))
+    np.testing.assert_array_equal(call(faults.add, first=first, second=second), first + 1)
+    assert call(faults.add, first=np.empty((0, 3)), second=np.empty((0, 3))).shape == (0, 3)
+
+
+def test_artefacts_pass_with_their_fields_and_stay_read_only() -> None:
+    box = damaged_box.box()
+    assert box.volume > 0  # cached: it is no field
+    back = call(give_back, solid=box)
+    assert type(back) is type(box)
+    assert "volume" not in vars(back)
+    np.testing.assert_array_equal(back.vertices, box.vertices)
+    assert not back.vertices.flags.writeable
+
+
+def test_what_is_read_only_stays_so() -> None:
+    given = np.zeros(3)
+    assert call(faults.edit, first=given)[0] == 7
+    assert given[0] == 0
+    given.flags.writeable = False
+    with pytest.raises(ValueError, match="read-only"):
+        call(faults.edit, first=given)
+
+
+def test_the_process_stays_and_is_another() -> None:
+    assert call(faults.tell_process) == call(faults.tell_process) != os.getpid()
+
+
+FAULTS = {
+    faults.crash: r"segmentation fault \(SIGSEGV\)",
+    faults.abort: r"an abort \(SIGABRT\)",
+    faults.end: "ended its process with exit status 0",
+    faults.leave: r"called sys.exit\(0\)",
+    faults.fill_memory: "needed more memory than the .* GB that were free",
+}
+
+
+@pytest.mark.parametrize("function", FAULTS, ids=lambda function: function.__name__)
+def test_faults_are_errors(function: Callable[..., Any]) -> None:
+    with pytest.raises(StageError, match=FAULTS[function]) as caught:
+        call(function)
+    assert "acme 1.2" in caught.value.remedy or function is faults.fill_memory
+    assert call(faults.tell_process), "the next call has a new process"
+
+
+def test_what_the_process_printed_is_the_cause() -> None:
+    with pytest.raises(StageError) as caught:
+        call(faults.abort)
+    assert "an instance of 'acme'" in str(caught.value.__cause__)
+    assert "in abort" in str(caught.value.__cause__)
+
+
+def test_a_hang_ends_with_all_it_started() -> None:
+    with pytest.raises(StageError, match=r"not finished after 0\.5 s, the time limit of a stage"):
+        call(faults.start_and_loop, Limits(seconds=0.5))
+
+
+def test_memory_limit_is_one_of_the_run() -> None:
+    with pytest.raises(StageError, match=r"than the [\d.]+ MB that --memory leaves it"):
+        call(faults.fill_memory, Limits(memory=2**30))
+    with pytest.raises(StageError, match=r"the run holds [\d.]+ MB of the 10 MB"):
+        call(faults.tell_process, Limits(memory=10**7))
+
+
+def test_an_exception_that_cannot_pass_keeps_its_name() -> None:
+    with pytest.raises(Exception, match="not known elsewhere") as caught:
+        call(faults.raise_odd)
+    assert type(caught.value).__name__ == "OddError"
+    assert "raise_odd" in str(caught.value.__cause__)
+
+
+CALLER = """
+import os, sys, threading
+from damageest.isolation import call_isolated
+from tests.isolation import faults
+print(call_isolated(faults.tell_process, {}), flush=True)
+call_isolated(faults.loop, {})
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_no_process_outlives_its_caller(how: signal.Signals) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", CALLER], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as caller:
+        assert caller.stdout is not None
+        worker = int(caller.stdout.readline())
+        caller.send_signal(how)
+        caller.wait(timeout=30)
+    for _ in range(200):
+        try:
+            os.kill(worker, 0)
+        except ProcessLookupError:
+            return
+        if is_zombie(worker):
+            return
+        time.sleep(0.05)
+    pytest.fail("the worker still runs")
+
+
+def is_zombie(process_id: int) -> bool:
+    with open(f"/proc/{process_id}/stat") as stream:
+        return stream.read().rsplit(")", 1)[1].split()[0] == "Z"
+
+
+@pytest.mark.parametrize(
+    ("text", "size"), [("6GB", 6 * 10**9), ("512 MiB", 2**29), ("2e9", 2 * 10**9), ("1.5g", 1.5e9), ("2T", 2e12)]
+)
+def test_sizes(text: str, size: float) -> None:
+    assert parse_memory(text) == size
+
+
+@pytest.mark.parametrize("text", ["", "much", "-1GB", "0", "6 GX", "1e99", "5"])
+def test_sizes_that_are_none(text: str) -> None:
+    with pytest.raises(InputError, match=r"--memory: .* is not valid; give a size"):
+        parse_memory(text)
+
+
+def test_free_memory() -> None:
+    free = measure_free_memory()
+    assert free is not None
+    assert 0 < free < 2**50
+    assert format_bytes(6e9) == "6 GB"
