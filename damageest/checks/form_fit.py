@@ -10,6 +10,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.checks.form_fields import Field, FieldFrame
 from damageest.geometry.distance import SurfaceTree
+from damageest.geometry.transforms import make_motions, move_points
 from damageest.geometry.voxels import number_faced_cubes
 
 FEWEST = 3
@@ -63,7 +64,7 @@ class Form:
 
     def undo(self, points: Floats) -> Floats:
         """Where the scan's points (N,3) would be on a part as designed."""
-        moved = points @ self.T[:3, :3].T + self.T[:3, 3]
+        moved = move_points(points, self.T)
         if not len(self.fields):
             return np.asarray(moved)
         back = moved
@@ -174,11 +175,8 @@ def improve(form: Form, cells: Cells, width: float, tolerance: float) -> Form:
 def make_motion(twist: Floats, frame: FieldFrame) -> Floats:
     """The rigid motion (4,4) of a rotation vector, as displacement at half the diagonal from the centre, and a
     translation."""
-    from scipy.spatial.transform import Rotation
-
-    motion = np.eye(4)
-    motion[:3, :3] = Rotation.from_rotvec(twist[:3] / frame.half).as_matrix()
-    motion[:3, 3] = frame.centre - motion[:3, :3] @ frame.centre + twist[3:]
+    motion: Floats = make_motions(np.concatenate([twist[:3] / frame.half, twist[3:]])[None])[0]
+    motion[:3, 3] += frame.centre - motion[:3, :3] @ frame.centre
     return motion
 
 

@@ -11,6 +11,7 @@ from damageest.checks.form_fields import choose_frame
 from damageest.checks.form_fit import Form, Skin, find_feet, improve
 from damageest.findings import ViewFit
 from damageest.geometry.neighbourhoods import pick_one_per_cube
+from damageest.geometry.transforms import move_points
 from damageest.geometry.voxels import number_faced_cubes
 
 COMPARED, FITTED = 30_000, 6_000
@@ -54,10 +55,10 @@ class ViewFits:
         for one in self.views:
             move = self.moves[one.number] if one.is_corrected else self.common
             own = aligned.view == one.number
-            points[own] = points[own] @ move[:3, :3].T + move[:3, 3]
+            points[own] = move_points(points[own], move)
             scanners[one.number] = move[:3, :3] @ scanners[one.number] + move[:3, 3]
         other = aligned.view < 0
-        points[other] = points[other] @ self.common[:3, :3].T + self.common[:3, 3]
+        points[other] = move_points(points[other], self.common)
         return replace(aligned, points=points, viewpoints=scanners)
 
 
@@ -101,7 +102,7 @@ def fit_views(part: Part, aligned: Scan, tolerance: float, is_correcting: bool) 
     views = []
     for number in range(count):
         own = view == number
-        at = points[own] @ common[:3, :3].T + common[:3, 3]
+        at = move_points(points[own], common)
         along = np.einsum("ij,ij->i", moved[own] - at, normals[own])
         far = float(np.quantile(np.abs(along), 0.9)) if own.any() else 0.0
         elsewhere = bool(healed and determined[number] and far > APART / 2 * tolerance)

@@ -24,6 +24,7 @@ from damageest.evaluate.variants import VariationRequest
 from damageest.findings import ModelFit
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import measure_noise_and_spacing
+from damageest.geometry.transforms import move_points
 from damageest.registry import Registry
 from damageest.stages.align.register import Register
 from damageest.stages.scan.simulate import Simulate
@@ -57,7 +58,7 @@ def fit_scan(part: Part, scan: Scan, tolerance: float, is_registered: bool, seed
     noise, spacing = measure_noise_and_spacing(points)
     if is_registered:
         pose = Register().run(Scan(points, noise=noise, spacing=spacing), part, tolerance).T_part_scan
-        points = points @ pose[:3, :3].T + pose[:3, 3]
+        points = move_points(points, pose)
     found = measure_fit(part, points, signed_distance(points, part)[0], noise, tolerance, part.unit, None)
     return None if found is None else found.fit
 

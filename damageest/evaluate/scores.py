@@ -12,6 +12,7 @@ from damageest.artefacts import Floats, Mesh, Part, Solid
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.geometry.transforms import move_mesh, move_points
 
 MATCH = 0.1
 """Least share of a true damage's volume inside found sites, for it to count as found; and least share of a site's
@@ -78,7 +79,7 @@ def measure_pose_error(part: Mesh, found: Floats, true: Floats) -> tuple[float, 
     """
     points = sample_surface(part, 4000)[0]
     D = found @ np.linalg.inv(true)
-    moved = points @ D[:3, :3].T + D[:3, 3]
+    moved = move_points(points, D)
     path = np.linalg.norm(moved - points, axis=1)
     return float(np.sqrt((distance_to_mesh(moved, part) ** 2).mean())), float(np.sqrt((path**2).mean()))
 
@@ -144,7 +145,7 @@ def score(
     origin = part.bounds.mean(0)
     if true is None:
         return Score(float(not found), nan, nan, residual, false_sites=len(found))
-    moved = Solid(true.vertices @ D[:3, :3].T + D[:3, 3], true.faces)
+    moved = move_mesh(true, D)
     expected, sites = to_manifold(moved, origin), [to_manifold(solid, origin) for solid in found]
     counts = count_matches(sites, expected, part, tolerance, origin)
     if not found:
@@ -158,7 +159,7 @@ def score(
     found_ids = extract_ids(whole, part) if (whole := to_solid(actual, origin)) else None
     quantiles = (nan, nan, nan)
     if found_ids is not None and len(found_ids.faces) and len(true_ids.faces):
-        other = Mesh(true_ids.vertices @ D[:3, :3].T + D[:3, 3], true_ids.faces)
+        other = move_mesh(true_ids, D)
         gaps = measure_distances(found_ids, other, part, tolerance)
         quantiles = (
             (float(np.median(gaps)), float(np.quantile(gaps, 0.95)), float(gaps.max())) if len(gaps) else quantiles

@@ -23,12 +23,27 @@ def invert_pose(pose: Pose) -> Floats:
     return T
 
 
+def move_points(points: Floats, T: Floats) -> Floats:
+    """The points (N,3) mapped by ``T`` (4,4), whose translation is in their unit."""
+    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+
+
+def make_motions(twist: Floats) -> Floats:
+    """Rigid motions (H,4,4) from rotation vectors, in radians about the origin, and translations (H,6)."""
+    from scipy.spatial.transform import Rotation
+
+    T = np.tile(np.eye(4), (len(twist), 1, 1))
+    T[:, :3, :3] = Rotation.from_rotvec(twist[:, :3]).as_matrix()
+    T[:, :3, 3] = twist[:, 3:]
+    return T
+
+
 def move_mesh(mesh: M, T: Floats | None) -> M:
     """The mesh, of the same class, with its vertices mapped by a rigid ``T`` (4,4); the same mesh where T is None.
 
     Translation and vertices are in one unit. Other fields stay as they are.
     """
-    return mesh if T is None else replace(mesh, vertices=mesh.vertices @ T[:3, :3].T + T[:3, 3])
+    return mesh if T is None else replace(mesh, vertices=move_points(mesh.vertices, T))
 
 
 def remove_rigid(points: Floats, displacement: Floats, weights: Floats) -> Floats:

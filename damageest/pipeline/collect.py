@@ -10,6 +10,7 @@ from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Floats, Pose, S
 from damageest.checks.verdict import FEW
 from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid, unite
+from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
@@ -103,7 +104,7 @@ def _compare_with_truth(damage: Solid | None, scan: Scan, pose: Pose, tolerance:
     if truth is None:
         return np.array([0.0, iou(None, damage)])
     D = pose.T_part_scan @ np.linalg.inv(scan.truth.T_part_scan)
-    moved = truth.vertices @ D[:3, :3].T + D[:3, 3]
+    moved = move_points(truth.vertices, D)
     if np.linalg.norm(moved - truth.vertices, axis=1).max() > 5 * tolerance:
         truth = Solid(moved, truth.faces)
     return np.array([truth.volume, iou(truth, damage)])

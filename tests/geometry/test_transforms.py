@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from damageest.artefacts import Part, Pose
-from damageest.geometry.transforms import invert_pose, move_mesh
+from damageest.geometry.transforms import invert_pose, make_motions, move_mesh, move_points
 from tests.geometry.shapes import draw_pose, torus
 
 RING = torus()
@@ -38,3 +38,9 @@ def test_a_part_stays_a_part_and_without_transform_the_same() -> None:
     assert isinstance(moved, Part)
     assert (moved.unit, moved.path, moved.notes) == ("in", "a.step", ("read",))
     assert move_mesh(part, None) is part
+
+
+def test_motions_turn_about_the_origin_then_shift() -> None:
+    quarter, still = make_motions(np.array([[0, 0, np.pi / 2, 1, 2, 3], [0, 0, 0, 0, 0, 0]]))
+    assert move_points(np.array([[1.0, 0, 0]]), quarter)[0] == pytest.approx([1, 3, 3], abs=1e-12)
+    assert (still == np.eye(4)).all()

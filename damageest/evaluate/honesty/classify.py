@@ -15,6 +15,7 @@ from damageest.findings import Coverage
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.geometry.transforms import move_mesh
 from damageest.result import Result
 
 RIGHT_IOU = 0.9
@@ -199,8 +200,7 @@ def _split_damage(true: TrueState, motion: Floats | None) -> list[Solid]:
     """The connected bodies of the true damage, where the found pose puts them on a symmetric part."""
     if true.damage is None:
         return []
-    D = np.eye(4) if motion is None else motion
-    damage = Solid(true.damage.vertices @ D[:3, :3].T + D[:3, 3], true.damage.faces)
+    damage = move_mesh(true.damage, motion)
     origin = damage.bounds.mean(axis=0)
     pieces = [to_solid(piece, origin) for piece in to_manifold(damage, origin).decompose()]
     return [piece for piece in pieces if piece is not None]

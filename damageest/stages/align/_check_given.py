@@ -7,9 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Floats, Part, Scan
 from damageest.errors import StageError
+from damageest.geometry.transforms import move_points
 from damageest.stages.align._check_pose import check_pose
 from damageest.stages.align._check_worn import check_with_wear, measure_given_wear
-from damageest.stages.align._fine import Fit, fit, move_points
+from damageest.stages.align._fine import Fit, fit
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._points import draw_evenly, orient_scan, orient_surface
 
@@ -47,7 +48,7 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[st
 
     D = near.pose @ np.linalg.inv(start)
     surface = orient_surface(frame.target.mesh, 3000, rng).points
-    moved = float(np.quantile(np.abs(frame.target.closest(move_points(D, surface))[0]), 0.98)) * frame.size
+    moved = float(np.quantile(np.abs(frame.target.closest(move_points(surface, D))[0]), 0.98)) * frame.size
     gain, beside = fitted.on - given.on, given.beside - fitted.beside
     differs = fitted.is_acceptable and moved > tolerance
     if differs and (gain > LARGE_GAIN or (gain > MIN_GAIN and beside > MIN_BESIDE)):

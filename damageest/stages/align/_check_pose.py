@@ -8,8 +8,9 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.errors import StageError
+from damageest.geometry.transforms import move_points
 from damageest.stages.align._field import PartSurface
-from damageest.stages.align._fine import Fit, move_points
+from damageest.stages.align._fine import Fit
 from damageest.stages.align._points import draw_stratified, orient_surface
 
 MIN_ON_PART, MIN_ON_PART_IF_COVERED, MIN_COVER = 0.38, 0.15, 0.45
@@ -94,7 +95,7 @@ def check_pose(target: PartSurface, best: Fit, even: Floats, raw: Floats, tolera
     band = max(tolerance, min(best.band, 0.004))
     rng = np.random.default_rng(0)
     even, raw = (points[draw_stratified(len(points), CHECKED_POINTS, rng)] for points in (even, raw))
-    at = move_points(best.pose, even)
+    at = move_points(even, best.pose)
     distance = target.closest(at)[0]
     on = np.abs(distance) <= band
     surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
@@ -102,7 +103,7 @@ def check_pose(target: PartSurface, best: Fit, even: Floats, raw: Floats, tolera
     if on.sum() > 10:
         gap = 3 * float(np.sqrt(target.mesh.area / len(even)))
         cover = float(np.isfinite(cKDTree(at[on]).query(surface, distance_upper_bound=max(gap, 0.02))[0]).mean())
-    raw_distance = target.closest(move_points(best.pose, raw))[0]
+    raw_distance = target.closest(move_points(raw, best.pose))[0]
     hit = np.abs(raw_distance) <= band
     rms = float(np.sqrt((raw_distance[hit] ** 2).mean())) if hit.any() else float("inf")
     return PoseCheck(

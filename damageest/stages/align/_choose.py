@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
+from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align._field import PartSurface, PlaneGrid
-from damageest.stages.align._fine import fit, move_points, robust_cost
+from damageest.stages.align._fine import fit, robust_cost
 from damageest.stages.align._points import OrientedPoints, orient_surface
-from damageest.stages.align._search import make_motion, refine, score, select_distinct
+from damageest.stages.align._search import refine, score, select_distinct
 from damageest.stages.align._turns import Axis, find_common_axis, group_turns
 
 MAX_POSES = 40
@@ -91,12 +92,12 @@ def choose_pose(
 
 def _keep_near(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
     """The points (N,3) that a pose puts near the surface; exact distances of the others are slow and not needed."""
-    return points[np.abs(field.distance[field.find_cell(move_points(pose, points).astype(np.float32))]) < FAR]
+    return points[np.abs(field.distance[field.find_cell(move_points(points, pose).astype(np.float32))]) < FAR]
 
 
 def _measure_distance(target: PartSurface, field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
     """Signed distances (N,) of the moved points: exact near the surface, from the grid far from it."""
-    at = move_points(pose, points)
+    at = move_points(points, pose)
     distance = field.distance[field.find_cell(at.astype(np.float32))].astype(np.float64)
     near = np.abs(distance) < FAR
     distance[near] = target.closest(at[near])[0]
@@ -156,7 +157,7 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
     A bar with both ends missing or unseen fits at any place along its axis. Each motion that hardly changes the points'
     distances to their planes is tried, by a few bands in both directions.
     """
-    at = move_points(pose, points)
+    at = move_points(points, pose)
     distance, _, face = target.closest(at)
     on = np.abs(distance) < band
     jacobian = np.column_stack([np.cross(at[on], target.normals[face[on]]), target.normals[face[on]]])
@@ -164,10 +165,10 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
     surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
     here = robust_cost(distance, band)
     for twist in motions.T[stiffness < 0.01]:
-        for D in make_motion(np.stack([twist, -twist]) * 6 * band):
-            differs = float((np.abs(target.closest(move_points(D, surface))[0]) > band).mean())
+        for D in make_motions(np.stack([twist, -twist]) * 6 * band):
+            differs = float((np.abs(target.closest(move_points(surface, D))[0]) > band).mean())
             if differs > 0.002 and not is_worse(
-                robust_cost(target.closest(move_points(D @ pose, points))[0], band), here
+                robust_cost(target.closest(move_points(points, D @ pose))[0], band), here
             ):
                 return (
                     "the scan does not fix the pose: the part can be moved or turned a little and fits as well, "
@@ -197,7 +198,7 @@ def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[str, ...]:
         return ()
     surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
     motions = choice.others @ np.linalg.inv(choice.pose)
-    apart = max(float((np.abs(target.closest(move_points(D, surface))[0]) > choice.band).mean()) for D in motions)
+    apart = max(float((np.abs(target.closest(move_points(surface, D))[0]) > choice.band).mean()) for D in motions)
     if apart <= 0.002:
         return ()
     return (

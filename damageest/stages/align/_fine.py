@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align._field import PartSurface
-from damageest.stages.align._search import make_motion
 
 REACH = 3.5
 """Half-width of the kernel, in standard deviations of the points' distances to the surface."""
@@ -28,11 +28,6 @@ class Fit:
     residue: float
 
 
-def move_points(pose: Floats, points: Floats) -> Floats:
-    """The points (N,3) moved by a pose (4,4)."""
-    return points @ pose[:3, :3].T + pose[:3, 3]
-
-
 def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: float, rounds: int) -> Fit:
     """Point-to-plane Gauss-Newton steps on the closest points of the triangles, weighted by Tukey's biweight.
 
@@ -43,7 +38,7 @@ def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: f
     narrowest = max(REACH * noise, 2e-5)
     step = residue = drift = np.inf
     for step_number in range(rounds):
-        at = move_points(pose, points)
+        at = move_points(points, pose)
         if drift > MAX_DRIFT * band:
             distance, foot, face = target.closest(at)
             if step_number == 0:  # the pose moves by a few bands at most: points farther off are not needed
@@ -61,7 +56,7 @@ def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: f
         normal = normals[within]
         weight = (1 - (distance[within] / band) ** 2) ** 2
         twist, jacobian = solve_gauss_newton(at[within], normal, weight, offset[within])
-        pose = make_motion(twist[None])[0] @ pose
+        pose = make_motions(twist[None])[0] @ pose
         step = float(np.hypot(np.linalg.norm(twist[:3]) / 2, np.linalg.norm(twist[3:])))
         drift += step
         residue = float(np.sqrt(np.average((jacobian @ twist) ** 2, weights=weight + 1e-12)))

@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, FreeMotion
 from damageest.errors import StageError
+from damageest.geometry.transforms import make_motions
 from damageest.stages.align._check_worn import MOST_OUTSIDE, measure_outside, measure_wear
 from damageest.stages.align._datum import DatumSkin
 from damageest.stages.align._fine import Fit
@@ -16,7 +17,6 @@ from damageest.stages.align._free import MIN_MOVED as APART
 from damageest.stages.align._free import find_freedoms
 from damageest.stages.align._one_sided import measure_bands, search_motions
 from damageest.stages.align._patches import Patches, measure_patches
-from damageest.stages.align._search import make_motion
 from damageest.stages.align._words import describe_open, to_free_motion
 
 FORM_ERRORS = (0.03, 0.06, 0.12, 0.25)
@@ -95,7 +95,7 @@ def finish_pose(
         by_datum = on_datum is not None and moved > MIN_STEP * tolerance
         if number == ROUNDS or not (wanted or by_datum):
             break
-        fitted = replace(fitted, pose=make_motion((patches.basis @ motion)[None])[0] @ fitted.pose)
+        fitted = replace(fitted, pose=make_motions((patches.basis @ motion)[None])[0] @ fitted.pose)
     finish = _describe(frame, fitted, found, tolerance, unit, on_datum)
     return replace(finish, is_changed=fitted is not best)
 

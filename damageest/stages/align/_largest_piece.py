@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.transforms import move_points
 from damageest.stages.align._field import PartSurface
-from damageest.stages.align._fine import REACH, Fit, fit, move_points
+from damageest.stages.align._fine import REACH, Fit, fit
 
 WIDE = 1.2
 """How much wider than the noise explains the band of a fit has to be for another pose to be looked for."""
@@ -31,7 +32,7 @@ def prefer_largest_piece(target: PartSurface, points: Floats, best: Fit, noise: 
     if best.band <= WIDE * REACH * max(noise, 1e-5):
         return best
     some = points[:POINTS]
-    at = move_points(best.pose, some)
+    at = move_points(some, best.pose)
     fits = [best]
     for axis in range(3):
         low, high = np.quantile(at[:, axis], [1 - SHARE, SHARE])
@@ -41,7 +42,7 @@ def prefer_largest_piece(target: PartSurface, points: Floats, best: Fit, noise: 
     # Points are counted by how likely the noise puts them there: in a compromise many are within the band, but few are
     # near the surface.
     on = [
-        float(np.exp(-((target.closest(move_points(one.pose, some))[0] * REACH / band) ** 2) / 2).mean())
+        float(np.exp(-((target.closest(move_points(some, one.pose))[0] * REACH / band) ** 2) / 2).mean())
         for one in fits
     ]
     first = int(np.argmax(on))

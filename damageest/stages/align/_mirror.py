@@ -6,10 +6,11 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.errors import StageError
+from damageest.geometry.transforms import move_points
 from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, PoseCheck, check_pose
 from damageest.stages.align._choose import COARSE
 from damageest.stages.align._field import PartSurface, PlaneGrid
-from damageest.stages.align._fine import Fit, fit, move_points
+from damageest.stages.align._fine import Fit, fit
 from damageest.stages.align._points import orient_surface
 
 POINTS = 6000
@@ -42,16 +43,16 @@ def fit_reflections(target: PartSurface, field: PlaneGrid, points: Floats, best:
 
     A part that nearly has such a plane of symmetry fits its mirror image nearly as well; its holes and bosses do not.
     """
-    at = move_points(best.pose, points[:POINTS])
-    few = at[:1500].astype(np.float32)
+    at = move_points(points[:POINTS], best.pose)
+    few = at[:1500]
     mirrors = _make_reflections()
     on = [
-        float((np.abs(field.distance[field.find_cell(few @ mirror[:3, :3].T.astype(np.float32))]) < COARSE).mean())
+        float((np.abs(field.distance[field.find_cell(move_points(few, mirror).astype(np.float32))]) < COARSE).mean())
         for mirror in mirrors
     ]
     fits = []
     for k in np.argsort(-np.array(on), kind="stable")[:FITTED]:
-        one = fit(target, move_points(mirrors[k], at), np.eye(4), 3 * COARSE, noise, 30)
+        one = fit(target, move_points(at, mirrors[k]), np.eye(4), 3 * COARSE, noise, 30)
         fits.append(Fit(one.pose @ mirrors[k] @ best.pose, one.band, one.residue))
     return max(fits, key=lambda one: _measure_share_on(target, points[:POINTS], one.pose, best.band))
 
@@ -67,7 +68,7 @@ def _make_reflections() -> Floats:
 
 
 def _measure_share_on(target: PartSurface, points: Floats, pose: Floats, band: float) -> float:
-    return float((np.abs(target.closest(move_points(pose, points))[0]) < band).mean())
+    return float((np.abs(target.closest(move_points(points, pose))[0]) < band).mean())
 
 
 def refuse_mirrored(
@@ -85,10 +86,10 @@ def refuse_mirrored(
     ``raw`` as for `check_pose`.
     """
     surface = orient_surface(target.mesh, 4000, np.random.default_rng(0)).points
-    surface = move_points(mirrored.pose @ np.linalg.inv(pose), surface)
+    surface = move_points(surface, mirrored.pose @ np.linalg.inv(pose))
     # Fitted: the reflection of a scan with damage is inexact, and the part may be symmetric by one nearby.
     onto = fit(target, surface, np.eye(4), 3 * COARSE, 1e-5, 30).pose
-    off = np.abs(target.closest(move_points(onto, surface))[0]) > NEAR
+    off = np.abs(target.closest(move_points(surface, onto))[0]) > NEAR
     if off.mean() < SYMMETRIC:
         return
     check = check_pose(target, mirrored, points, raw, tolerance)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
+from damageest.geometry.transforms import move_points
 from damageest.geometry.voxels import number_faced_cubes
 from damageest.stages.align._field import PartSurface
-from damageest.stages.align._fine import move_points
 
 EDGE = 4.0
 """Edge of a patch, in mean distances between points: about sixteen points on a face."""
@@ -55,7 +55,7 @@ class Patches:
 def measure_patches(target: PartSurface, points: Floats, pose: Floats, noise: float, tolerance: float) -> Patches:
     """Averages the distances of points (N,3), in a pose (4,4), over cubes, those of each direction of the skin apart.
     ``points``: spread evenly over the scanned area."""
-    at = move_points(pose, points)
+    at = move_points(points, pose)
     distance, foot, face = target.closest(at)
     near = np.abs(distance) < REACH * tolerance
     if not near.any():

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.transforms import make_motions, move_points
 from damageest.geometry.voxels import number_faced_cubes
 from damageest.stages.align._field import PartSurface
-from damageest.stages.align._fine import REACH, Fit, move_points, solve_gauss_newton
-from damageest.stages.align._search import make_motion
+from damageest.stages.align._fine import REACH, Fit, solve_gauss_newton
 
 PATCH = 4.0
 """Edge of the cubes, in mean distances between points: about sixteen points on a face."""
@@ -26,24 +26,24 @@ def refine_pose(target: PartSurface, points: Floats, best: Fit, rounds: int = 8)
     """
     pose = best.pose
     edge = PATCH * float(np.sqrt(target.mesh.area / len(points)))
-    distance, foot, face = target.closest(move_points(pose, points))
+    distance, foot, face = target.closest(move_points(points, pose))
     within = np.abs(distance) < best.band
     points, foot, face = points[within], foot[within], face[within]
     normals = target.normals[face]
-    patch = np.unique(number_faced_cubes(move_points(pose, points), normals, edge)[1], return_inverse=True)[1]
+    patch = np.unique(number_faced_cubes(move_points(points, pose), normals, edge)[1], return_inverse=True)[1]
     count = np.bincount(patch)
     many = count >= MIN_POINTS
     if many.sum() < 30:
         return best
     for _ in range(rounds):
-        at = move_points(pose, points)
+        at = move_points(points, pose)
         offset = np.einsum("ij,ij->i", normals, at - foot)
         mean = np.bincount(patch, weights=offset) / np.maximum(count, 1)
         band = REACH * 1.4826 * float(np.median(np.abs(mean[many])))
         share = np.maximum(1 - (mean / max(band, 1e-12)) ** 2, 0) ** 2 * many
         weight = (1 - np.minimum(np.abs(offset) / best.band, 1) ** 2) ** 2 * share[patch]
         twist, _ = solve_gauss_newton(at, normals, weight, offset)
-        pose = make_motion(twist[None])[0] @ pose
+        pose = make_motions(twist[None])[0] @ pose
         if float(np.abs(twist).max()) < 1e-3 * band:
             break
     return replace(best, pose=pose)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.transforms import make_motions
 from damageest.stages.align._field import Floats32, PlaneGrid
 from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
@@ -50,18 +51,8 @@ def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats)
             hessian = (np.swapaxes(weighted, 1, 2) @ jacobian).astype(np.float64)
             gradient = (np.swapaxes(weighted, 1, 2) @ offset[..., None]).astype(np.float64)
             damping = 1e-3 * len(scan.points) * np.diag([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
-            poses[part] = make_motion(-np.linalg.solve(hessian + damping, gradient)[..., 0]) @ poses[part]
+            poses[part] = make_motions(-np.linalg.solve(hessian + damping, gradient)[..., 0]) @ poses[part]
     return poses
-
-
-def make_motion(twist: Floats) -> Floats:
-    """Rigid motions (H,4,4) from rotation vectors and translations (H,6)."""
-    from scipy.spatial.transform import Rotation
-
-    result = np.tile(np.eye(4), (len(twist), 1, 1))
-    result[:, :3, :3] = Rotation.from_rotvec(twist[:, :3]).as_matrix()
-    result[:, :3, 3] = twist[:, 3:]
-    return result
 
 
 def select_distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:

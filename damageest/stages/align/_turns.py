@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
-from damageest.stages.align._search import make_motion
+from damageest.geometry.transforms import make_motions
 
 PARALLEL, NEAR = 0.995, 0.02
 
@@ -22,7 +22,7 @@ class Axis:
 
     def make_turns(self, angles: Floats) -> Floats:
         """Rotations (K,4,4) about the axis by angles (K,) in radians."""
-        result = make_motion(np.column_stack([angles[:, None] * self.direction, np.zeros((len(angles), 3))]))
+        result = make_motions(np.column_stack([angles[:, None] * self.direction, np.zeros((len(angles), 3))]))
         result[:, :3, 3] = self.point - np.einsum("kij,j->ki", result[:, :3, :3], self.point)
         return result
 

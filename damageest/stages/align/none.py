@@ -9,6 +9,7 @@ from pydantic import Field as Option
 
 from damageest.artefacts import Part, Pose, Scan
 from damageest.errors import StageError
+from damageest.geometry.transforms import move_points
 from damageest.stages.align import Align
 from damageest.stages.align._frame import RigidPose
 
@@ -42,7 +43,7 @@ class KnownPose(Align):
         # fewer points show no pose to compare the given one with
         doubts = check_given(T, scan, part, tolerance) if len(scan.points) >= MIN_POINTS else ()
         points = scan.points[:: max(1, len(scan.points) // 100_000)]
-        distance = PartSurface(part).closest(points @ T[:3, :3].T + T[:3, 3])[0]
+        distance = PartSurface(part).closest(move_points(points, T))[0]
         hit = np.abs(distance) <= tolerance
         rms = float(np.sqrt((distance[hit] ** 2).mean())) if hit.any() else 0.0
         return Pose(T, rms, float(hit.mean()), notes=doubts, doubts=doubts)

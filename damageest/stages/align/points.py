@@ -10,6 +10,7 @@ from pydantic import Field as Option
 
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
+from damageest.geometry.transforms import move_points
 from damageest.stages.align import Align
 from damageest.stages.align._datum import NO_DATUM, Datum
 
@@ -74,7 +75,7 @@ def fit_pairs(pairs: Floats) -> tuple[Floats, Floats]:
     T = np.eye(4)
     T[:3, :3] = Rotation.align_vectors(centred[:, 1], centred[:, 0])[0].as_matrix()
     T[:3, 3] = middle[1] - T[:3, :3] @ middle[0]
-    return T, np.linalg.norm(pairs[:, 0] @ T[:3, :3].T + T[:3, 3] - pairs[:, 1], axis=1)
+    return T, np.linalg.norm(move_points(pairs[:, 0], T) - pairs[:, 1], axis=1)
 
 
 def _build_error(pairs: Floats, residuals: Floats, part: Part) -> StageError:

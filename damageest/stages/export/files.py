@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field
 
 from damageest.artefacts import Floats, Scan, Solid
 from damageest.geometry.simplification import simplify_within
-from damageest.geometry.transforms import invert_pose, move_mesh
+from damageest.geometry.transforms import invert_pose, move_mesh, move_points
 from damageest.io.meshes import write_ply, write_points
 from damageest.stages.export import Body, Export, ExportedFiles, Patch, Writer
 from damageest.stages.export._coverage import write_coverage
@@ -146,7 +146,7 @@ def _write_patches(
     done = []
     for number, patch in patches.items():
         name = f"{place}surface/site-{number}.{suffix}"
-        here = patch if T is None else replace(patch, poles=patch.poles @ T[:3, :3].T + T[:3, 3])
+        here = patch if T is None else replace(patch, poles=move_points(patch.poles, T))
         write(_make_folder(folder, name), f"damage surface site-{number}", here, unit)
         done.append(ExportedFiles((name,)))
     return done
