@@ -61,6 +61,9 @@ def run(
         state = work.job.with_value(JobState.folder, place.folder, digest(str(target)))
         state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
         written = follow(WRITE, engine, replace(work, job=state)).job.written
+        if written.warnings:
+            told = replace(state.result, warnings=(*state.result.warnings, *written.warnings))
+            state = state.with_value(JobState.result, told, state.key("result"))
         result, written = _show_result(engine, replace(work, job=state), target, written)
         write_report(result, job, place.folder, target, written)
         place.finish(engine.stems)

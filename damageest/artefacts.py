@@ -183,7 +183,8 @@ class Part(Solid):
 
     ``faces_brep`` (F,) gives the number of the CAD face that each triangle came from, ``face_names`` and
     ``face_kinds`` what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds
-    the distance between the CAD surface and the triangles. ``notes`` say what was repaired or converted.
+    the distance between the CAD surface and the triangles. ``cad_scale``: one length of the CAD file, as its reader
+    takes it, in ``unit``; 0 where the file was a mesh. ``notes`` say what was repaired or converted.
     """
 
     unit: str = "mm"
@@ -194,6 +195,7 @@ class Part(Solid):
     face_kinds: tuple[str, ...] = ()
     tessellation_error: float = 0.0
     notes: tuple[str, ...] = ()
+    cad_scale: float = 0.0
     _dtypes: ClassVar[dict[str, Any]] = {**Mesh._dtypes, "faces_brep": np.int64}
 
 

@@ -34,7 +34,8 @@ class Site:
     to deposit is not known. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into
     the scan; ``max_depth``: the farthest of them below the nominal surface. ``accepted``: whether the site is part of
     `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
-    unit of each motion of `Pose.free`.
+    unit of each motion of `Pose.free`. ``enclosures``: the closed surfaces that cut the DV out of the part; none where
+    the DV is an enlarged cavity or a whole body of the part.
     """
 
     id: int
@@ -52,6 +53,7 @@ class Site:
     accepted: bool = True
     volume_rates: tuple[float, ...] = ()
     uncertainty: Uncertainty | None = None
+    enclosures: tuple[Solid, ...] = ()
 
     @property
     def volume_95(self) -> Interval | None:

@@ -23,6 +23,7 @@ def make_part(
     face_kinds: tuple[str, ...] = (),
     tessellation_error: float = 0.0,
     notes: tuple[str, ...] = (),
+    cad_scale: float = 0.0,
 ) -> Part:
     """A part from vertices (V,3) and faces (F,3), repaired where that is safe (see `damageest.geometry.healing`).
 
@@ -37,6 +38,7 @@ def make_part(
         face_names, face_kinds: what the CAD file calls these faces.
         tessellation_error: bound of the distance between CAD surface and triangles, in ``unit``.
         notes: what was converted before; the repairs are added.
+        cad_scale: how many of ``unit`` are one length of the CAD file as read; 0 for a mesh.
 
     Raises InputError, which starts with ``path``, for a mesh that is not a solid and cannot safely be repaired.
     """
@@ -59,6 +61,6 @@ def make_part(
                 notes = (*notes, "the repair changed the triangles: the CAD face of each triangle is no longer known")
         elif open_edges(f):
             raise InputError("not watertight, and 'repair' is off; set repair: true, or export the part as a solid")
-        return Part(v, f, unit, path, sha256, faces_brep, face_names, face_kinds, tessellation_error, notes)
+        return Part(v, f, unit, path, sha256, faces_brep, face_names, face_kinds, tessellation_error, notes, cad_scale)
     except (InputError, ValueError) as error:
         raise InputError(f"{name}: {error}") from None

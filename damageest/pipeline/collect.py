@@ -88,6 +88,7 @@ def _describe_site(found: FoundSite) -> Site:
         accepted=found.accepted,
         uncertainty=shift_uncertainty(found.uncertainty, damage.volume - found.damage.volume),
         volume_rates=found.volume_rates,
+        enclosures=found.enclosures if damage is found.damage else (),
         method=found.method,
         evidence=evidence,
         max_depth=max(float(-found.job.deviation.distance[members].min(initial=0.0)), 0.0),

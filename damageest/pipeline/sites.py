@@ -72,15 +72,11 @@ def gather_sites(engine: Engine, work: Work) -> Work:
     for item in join_pieces(pieces):
         members = np.flatnonzero(np.isin(sites.label, item.clusters))
         evidence = weigh_evidence(item.damage, aligned.points[members], aligned, state.deviation, state.part, tolerance)
-        notes = [
-            note
-            for candidate in work.candidates
-            if set(candidate.clusters) & set(item.clusters)
-            for note in candidate.notes
-        ]
+        sources = [candidate for candidate in work.candidates if set(candidate.clusters) & set(item.clusters)]
+        notes = [note for candidate in sources for note in candidate.notes]
         site = FoundSite(
             job=state, clusters=item.clusters, method=method, members=members, evidence=evidence,
-            notes=tuple(dict.fromkeys(notes)),
+            notes=tuple(dict.fromkeys(notes)), enclosures=tuple(candidate.solid for candidate in sources),
         )  # fmt: skip
         out.append(site.with_value(FoundSite.damage, item.damage, digest(item.damage)))
     covered = {cluster for site in out for cluster in site.clusters}

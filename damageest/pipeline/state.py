@@ -165,8 +165,8 @@ class Candidate(_SiteState):
 class FoundSite(_SiteState):
     """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
     ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
-    ``questions``: what the scan leaves open about it; ``uncertainty``: of the volume of ``damage``; ``volume_rates``:
-    as in `Site`."""
+    ``questions``: what the scan leaves open about it; ``uncertainty``: of the volume of ``damage``; ``volume_rates``,
+    ``enclosures``: as in `Site`."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -180,6 +180,7 @@ class FoundSite(_SiteState):
     questions: tuple[str, ...] = ()
     uncertainty: Uncertainty | None = None
     volume_rates: tuple[float, ...] = ()
+    enclosures: tuple[Solid, ...] = ()
 
     damage = Value[Solid]()
     others = Value[Solid | None]()

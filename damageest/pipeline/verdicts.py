@@ -96,6 +96,7 @@ def _merge(engine: Engine, members: list[FoundSite]) -> FoundSite:
         members=points,
         evidence=evidence,
         notes=tuple(dict.fromkeys(note for site in members for note in site.notes)),
+        enclosures=tuple({id(solid): solid for site in members for solid in site.enclosures}.values()),
     )
     return whole.with_value(FoundSite.damage, damage, digest(damage))
 

@@ -45,6 +45,22 @@ class SplineReport(JsonModel):
     reason: str = Field(description="why none was written; empty where one was")
 
 
+class ExactReport(JsonModel):
+    """Whether the solid in STEP has the CAD's own faces."""
+
+    form: str = Field(
+        description="of the inner surface: shapes (planes, cylinders, spheres), spline, facets; none: facets all over"
+    )
+    faces: int
+    inner_faces: int = Field(description="faces inside the part")
+    volume: float | None
+    distance: float | None = Field(description="95 % of the inner surface are as near to the mesh's, both ways")
+    farthest: float | None = Field(description="largest distance of the inner surfaces, both ways")
+    beyond: float | None = Field(description="share of the inner surface farther than a quarter of the tolerance")
+    seconds: float
+    tried: list[str] = Field(description="what was refused before, and why")
+
+
 class ThicknessReport(JsonModel):
     """Height of the stock over the nominal surface, where stock was asked for."""
 
@@ -90,6 +106,7 @@ class SiteReport(JsonModel):
     )
     files: FilesReport
     spline: SplineReport | None = Field(description="null where the job asks for none")
+    exact: ExactReport | None = Field(description="null where no STEP is asked for, or the part has no CAD faces")
     warnings: list[str]
 
 
@@ -100,7 +117,7 @@ def report_site(site: Site, written: ExportedFiles) -> SiteReport:
         kind: [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"{folder}/site-{site.id}.")]
         for kind, folder in folders.items()
     }
-    spline = written.splines.get(site.id)
+    spline, exact = written.splines.get(site.id), written.exact.get(site.id)
 
     low, high = site.damage.bounds.tolist()
     evidence = {name: value for name, value in vars(site.evidence).items() if name not in ("reasons", "causes")}
@@ -125,6 +142,7 @@ def report_site(site: Site, written: ExportedFiles) -> SiteReport:
             **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
         ),
         spline=SplineReport(**vars(spline)) if spline else None,
+        exact=ExactReport(**{**vars(exact), "tried": list(exact.tried)}) if exact else None,
         warnings=list(site.warnings),
     )
 

@@ -19,12 +19,15 @@ class ExportedFiles:
 
     ``files``: paths relative to the output folder. ``notes``: what was written otherwise than asked for, or left out.
     ``splines``: for each site, by its number, how well a spline fits its inner damage surface; empty where the job asks
-    for none.
+    for none. ``exact``: for each site, by its number, whether its solid has the CAD's own faces; empty where none was
+    asked for. ``warnings``: those of the notes that the user is told at the end of the run.
     """
 
     files: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     splines: Mapping[int, Spline] = field(default_factory=dict)
+    exact: Mapping[int, ExactForm] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,29 @@ class Spline:
     deviation: float | None = None
     trimmed: bool = False
     reason: str = ""
+
+
+@dataclass(frozen=True)
+class ExactForm:
+    """How a damage volume was written whose outer faces are the CAD's own.
+
+    ``form``: of its inner surface: ``shapes`` (planes, cylinders, spheres), ``spline``, ``facets``, or ``none`` where
+    the solid could not be made and is written with facets all over. ``faces`` and ``inner_faces``: how many faces it
+    has, and how many of them are inside the part. ``volume``. ``distance``: 95 % of its inner surface are as near to
+    the mesh's, both ways; ``farthest``: all of it; ``beyond``: the share of it that is farther than a quarter of the
+    tolerance. What lies less deep than that below the skin counts as near. ``seconds``: what it took. ``tried``: what
+    was refused before it, and why.
+    """
+
+    form: str
+    faces: int = 0
+    inner_faces: int = 0
+    volume: float | None = None
+    distance: float | None = None
+    farthest: float | None = None
+    beyond: float | None = None
+    seconds: float = 0.0
+    tried: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,19 +98,29 @@ WriteFunction = Callable[[Path, str, Sequence[Body], str], ExportedFiles]
 What the format cannot hold is left out, and a note says why."""
 
 
+ExactFunction = Callable[[Path, Result, Mapping[str, Body], Mapping[str, Floats | None], float], ExportedFiles]
+"""A function of ``folder, result, bodies, places, seconds`` that writes solids with the CAD's own faces.
+
+``bodies``: what is to be written, by the stem of its file, in the part's frame; ``places``: the folders, as a prefix of
+the stem, with the transform (4,4) of a point from the part's frame, None for none; ``seconds``: the time limit for each
+site. Gives the files that it wrote; those of other bodies are then written as usual."""
+
+
 @dataclass(frozen=True)
 class Writer:
     """How a format is written.
 
     ``write``: writes solids. ``one_file``: whether all solids of a result go into one file. ``simplify``: whether it
     gets simplified solids, because each facet makes the file much larger. ``patch``: writes a spline, with the
-    arguments ``path, name, patch, unit``; None where the format cannot hold one.
+    arguments ``path, name, patch, unit``; None where the format cannot hold one. ``exact``: writes solids whose outer
+    faces are those of the part's CAD file; None where the format has only facets.
     """
 
     write: WriteFunction
     one_file: bool = False
     simplify: bool = False
     patch: Callable[[Path, str, Patch, str], None] | None = None
+    exact: ExactFunction | None = None
 
 
 class Export(Stage, ABC):

@@ -36,7 +36,15 @@ class Files(Export):
         ("stl",),
         description="format of the solids, one or a list: stl (single precision; a solid that rounding opens is "
         "written as ply too), ply (double precision), 3mf (one file for all, with unit, names and colours), step "
-        "(faceted; plugin cadquery)",
+        "(plugin cadquery)",
+    )
+    solids: Literal["auto", "exact", "faceted"] = Field(
+        "auto",
+        description="faces of STEP solids: exact (outer faces are the part's own CAD faces, for a part from STEP, IGES "
+        "or BREP), faceted, or auto (exact where the part has CAD faces)",
+    )
+    limit: float = Field(
+        120.0, gt=0, le=3600, description="longest time for the exact form of a site, in seconds; then it gets facets"
     )
     frame: Literal["part", "scan", "both"] = Field(
         "part", description="frame of the files: the part's, the scan's as measured (files in scan_frame/), or both"
@@ -63,12 +71,15 @@ class Files(Export):
         if detail and any(writers[name].simplify for name in self.format):
             coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}
         done: list[ExportedFiles] = []
-        places = {"part": [""], "scan": ["scan_frame/"], "both": ["", "scan_frame/"]}
-        for place in places[self.frame]:
-            T = invert_pose(result.pose) if place else None
+        chosen_places = {"part": [""], "scan": ["scan_frame/"], "both": ["", "scan_frame/"]}[self.frame]
+        places = {place: invert_pose(result.pose) if place else None for place in chosen_places}
+        ready = self._write_exact(result, folder, writers, coarse or bodies, places)
+        done.append(ready)
+        for place, T in places.items():
             for name in self.format:
                 chosen = coarse if coarse and writers[name].simplify else bodies
-                done += _write_solids(writers[name], folder, place, chosen, T, result.units)
+                left = {stem: body for stem, body in chosen.items() if f"{place}{stem}.{name}" not in ready.files}
+                done += _write_solids(writers[name], folder, place, left, T, result.units)
             done += self._write_surfaces(result, folder, place, T)
             if splines:
                 patches = {number: patch for number, (patch, _) in splines.items() if patch}
@@ -76,7 +87,28 @@ class Files(Export):
         done.append(self._write_truth(result, folder, writers))
         files = dict.fromkeys(f for one in done for f in one.files)  # the writer of STL may have written a PLY already
         notes = tuple(n for one in done for n in one.notes)
-        return ExportedFiles(tuple(files), notes, {number: spline for number, (_, spline) in splines.items()})
+        fits = {number: spline for number, (_, spline) in splines.items()}
+        return ExportedFiles(tuple(files), notes, fits, ready.exact, ready.warnings)
+
+    def _write_exact(
+        self,
+        result: Result,
+        folder: Path,
+        writers: Mapping[str, Writer],
+        bodies: Mapping[str, Body],
+        places: Mapping[str, Floats | None],
+    ) -> ExportedFiles:
+        """Writes solids with the CAD's own faces, in the first format that can hold them; nothing where the part has
+        none."""
+        writer = next((writers[name].exact for name in self.format if writers[name].exact), None)
+        if self.solids == "faceted" or writer is None:
+            return ExportedFiles()
+        if not result.part.cad_scale:
+            if self.solids == "auto":
+                return ExportedFiles()
+            note = "solids: exact was asked for, but the part is a mesh without CAD faces; STEP solids have facets"
+            return ExportedFiles(notes=(note,), warnings=(note,))
+        return writer(folder, result, bodies, places, self.limit)
 
     def _write_surfaces(self, result: Result, folder: Path, place: str, T: Floats | None) -> list[ExportedFiles]:
         """Writes surfaces and scan below ``place``; ``T`` (4,4) takes a point from the part's frame to theirs."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from damageest import hookimpl
 from damageest.stages import Stage
@@ -30,4 +30,10 @@ def damageest_writers() -> Mapping[str, Writer]:
     from damageest_cadquery._patch import write_patch
     from damageest_cadquery._step import write_step
 
-    return {"step": Writer(write_step, simplify=True, patch=write_patch)}
+    return {"step": Writer(write_step, simplify=True, patch=write_patch, exact=_write_exact)}
+
+
+def _write_exact(*values: Any) -> Any:
+    from damageest_cadquery.exact import write_exact  # imported late: it takes a second
+
+    return write_exact(*values)

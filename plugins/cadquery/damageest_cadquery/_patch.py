@@ -21,17 +21,17 @@ def write_patch(path: Path, name: str, patch: Patch, unit: str) -> None:
 def _build_face(patch: Patch, scale: float) -> Any:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 
-    surface = _build_surface(patch, scale)
+    surface = build_surface(patch, scale)
     if not patch.rims:
         return BRepBuilderAPI_MakeFace(surface, 1e-7).Face()
-    wires = [_build_wire(rim, surface) for rim in patch.rims]
+    wires = [build_wire(rim, surface) for rim in patch.rims]
     maker = BRepBuilderAPI_MakeFace(surface, wires[0], True)
     for wire in wires[1:]:
         maker.Add(wire)
     return maker.Face()
 
 
-def _build_surface(patch: Patch, scale: float) -> Any:
+def build_surface(patch: Patch, scale: float) -> Any:
     from OCP.Geom import Geom_BSplineSurface
     from OCP.gp import gp_Pnt
     from OCP.TColgp import TColgp_Array2OfPnt
@@ -54,7 +54,7 @@ def _build_surface(patch: Patch, scale: float) -> Any:
     return Geom_BSplineSurface(poles, u, v, u_times, v_times, patch.degree, patch.degree)
 
 
-def _build_wire(rim: Floats, surface: Any) -> Any:
+def build_wire(rim: Floats, surface: Any) -> Any:
     """A closed wire of straight segments in the parameters of the surface."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeVertex, BRepBuilderAPI_MakeWire
     from OCP.BRepLib import BRepLib

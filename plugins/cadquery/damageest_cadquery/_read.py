@@ -23,6 +23,8 @@ class Model:
     length: float
     name_of: Callable[[Any], str]
     notes: tuple[str, ...] = ()
+    colour_of: Callable[[Any], tuple[int, int, int] | None] = lambda face: None
+    solid_names: tuple[str, ...] = ()
 
 
 def read(path: Path, suffix: str) -> Model:
@@ -37,7 +39,8 @@ def read(path: Path, suffix: str) -> Model:
     if shape is None or shape.IsNull():
         raise InputError("holds no shape; export the part again as a solid")
     solids, notes = _solids(shape)
-    return Model(solids, unit, MILLIMETRES[unit] if unit else 1.0, name_of, notes)
+    names = tuple(name_of(solid) for solid in solids)
+    return Model(solids, unit, MILLIMETRES[unit] if unit else 1.0, name_of, notes, solid_names=names)
 
 
 def _no_name(face: Any) -> str:

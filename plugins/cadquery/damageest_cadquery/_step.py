@@ -36,6 +36,12 @@ def write_step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> Ex
     return ExportedFiles((f"{stem}.step",))
 
 
+def build_solid(solid: Solid) -> tuple[Any, int]:
+    """An OpenCASCADE solid with planar faces, or a compound of several, and its number of faces. In millimetres."""
+    parts = [[_find_planar_faces(each) for each in (outer, *cavities)] for outer, cavities in split_shells(solid)]
+    return _build_shape(parts, 1.0), sum(len(shell[1]) for part in parts for shell in part)
+
+
 def _find_planar_faces(solid: Solid) -> tuple[Floats, list[Facet]]:
     solid = weld(solid)
     return solid.vertices, find_facets(solid)
@@ -72,13 +78,21 @@ def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = Fal
             Interface_Static.SetCVal_s(key, value)
         for key, number in earlier.items():
             Interface_Static.SetIVal_s(key, number)
+    fix_header(path)
+
+
+def fix_header(path: Path) -> None:
+    """Removes from a STEP file the date, and the numbers that OpenCASCADE gives to products."""
     data = path.read_bytes()
     head, rest = data[:4096], data[4096:]
     head = re.sub(rb"'\d{4}-\d\d-\d\dT[\d:]+[^']*'", b"'1970-01-01T00:00:00'", head)
     # OpenCASCADE numbers the products that a process writes, and breaks the line by the length of the number
     product = rb"PRODUCT\('(.*?) \d+',\s*'.*? \d+',\s*'',\s*\(\s*(#\d+)\s*\)\s*\);"
     head = re.sub(product, rb"PRODUCT('\1','\1','',(\2));", head, flags=re.DOTALL)
-    path.write_bytes(head + rest)
+    data, number = head + rest, iter(range(1, 1_000_000))
+    # it numbers the components of assemblies too
+    use = rb"(NEXT_ASSEMBLY_USAGE_OCCURRENCE\(\s*)'\d+'"
+    path.write_bytes(re.sub(use, lambda found: found[1] + b"'%d'" % next(number), data))
 
 
 def _build_shape(parts: list[list[tuple[Floats, list[Facet]]]], scale: float) -> Any:

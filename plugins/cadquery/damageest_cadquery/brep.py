@@ -71,6 +71,7 @@ class Brep(ReadPart):
             face_kinds=mesh.kinds,
             tessellation_error=mesh.error * scale,
             notes=tuple(notes),
+            cad_scale=scale,
         )
 
     def cad_faces(self, unit: str) -> tuple[CadFace, ...]:

@@ -83,13 +83,14 @@ def test_noise_is_smoothed_within_the_tolerance() -> None:
 
 def test_the_deviation_is_the_true_one_both_ways() -> None:
     """Of a spline that was fitted to too little: the dent of 0.5 that the fit was not shown is its deviation."""
+    from damageest.geometry import height_spline
     from damageest.stages.export import _spline
 
     surface = bowl()
-    axes, _ = _spline._fit_plane(surface)
+    axes, _ = height_spline.fit_height_plane(surface)
     origin = surface.bounds.mean(axis=0)
     points = (surface.vertices - origin) @ axes.T
-    knots, poles = _spline._solve_least_squares(points, 16)
+    knots, poles = height_spline.fit_height_spline(points, 16)
     near = _spline._measure_deviation(points, surface, knots, poles)
     dented = points.copy()
     dented[np.linalg.norm(points[:, :2] - points[:, :2].mean(0), axis=1) < 1, 2] -= 0.5

@@ -1,0 +1,193 @@
+"""Finds the exact damage volume of a site: the part's CAD solids split by its inner damage surface.
+
+Tried in this order, and the first that passes the checks is taken: recognised shapes, one spline, few facets, more.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Part, Solid, Surface
+from damageest.errors import InputError
+from damageest.geometry.bodies import split_bodies
+from damageest.geometry.solids import to_manifold
+from damageest_cadquery._check import Measured, check_pieces
+from damageest_cadquery._cut import Cut, count_bad_edges, decimate, make_cut
+from damageest_cadquery._read import explore
+from damageest_cadquery._smooth import SPANS, build_shapes, build_spline, find_shapes, take_inner
+from damageest_cadquery._split import Piece, Tool, build_facets, measure_volume, split, triangulate
+
+FACETS = (250, 500, 1000, 2000, 4000)
+MOST_FACES = 5000
+SPECK = 1e-4
+"""Share of the damage volume below which a piece that a split leaves over is dropped."""
+
+
+@dataclass(frozen=True, eq=False)
+class SiteInput:
+    """A site as the exact form needs it, in the job's unit and the part's frame."""
+
+    number: int
+    damage: Solid
+    surface: Surface
+    enclosures: tuple[Solid, ...]
+    points: Floats
+    accepted: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """``pieces``: the damage volume; ``rest``: what is left of the solids; ``form``: shapes, spline, facets or body;
+    ``tried``: what was refused before, and why."""
+
+    pieces: tuple[Piece, ...]
+    rest: tuple[Piece, ...]
+    form: str
+    measured: Measured
+    seconds: float
+    tried: tuple[str, ...] = ()
+
+
+def start_solids(solids: Sequence[Any]) -> tuple[tuple[Piece, ...], tuple[Any, ...]]:
+    """The part's solids as pieces, and its faces by their number."""
+    from OCP.TopAbs import TopAbs_FACE
+
+    pieces: list[Piece] = []
+    faces: list[Any] = []
+    for owner, solid in enumerate(solids):
+        own = explore(solid, TopAbs_FACE)
+        pieces.append(Piece(solid, owner, tuple((len(faces) + k, -1) for k in range(len(own)))))
+        faces += own
+    return tuple(pieces), tuple(faces)
+
+
+def find_exact(
+    site: SiteInput, solids: Sequence[Piece], faces: Sequence[Any], part: Part, tolerance: float
+) -> tuple[Exact | None, tuple[str, ...]]:
+    """The exact damage volume of a site in ``solids``, which are in the job's unit, or None; and what was refused."""
+    start, tried = time.perf_counter(), []
+    cut = make_cut(site.damage, part, site.enclosures)
+    if cut is None:
+        return None, ("no surface is known that cuts it out of the part",)
+    bodies = len(split_bodies(site.damage))
+    for form, make, fuzzy in _list_tools(cut, tolerance):
+        tool = _call(make)
+        found = _split_all(solids, tool, fuzzy, site.damage, tolerance) if tool is not None else None
+        if found is None:
+            tried.append(f"{form}: no solid")
+            continue
+        pieces, rest = found
+        if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
+            tried.append(f"{form}: more than {MOST_FACES} faces")
+            continue
+        measured = check_pieces(
+            form.split()[0], pieces, bodies, site.damage, site.surface, part, site.points, tolerance, faces
+        )
+        if not measured.reason:
+            seconds = time.perf_counter() - start
+            return Exact(pieces, rest, form.split()[0], measured, seconds, tuple(tried)), tuple(tried)
+        tried.append(f"{form}: {measured.reason}")
+    return None, tuple(tried)
+
+
+def _list_tools(cut: Cut, tolerance: float) -> Iterator[tuple[str, Callable[[], Tool | None], float]]:
+    inner = take_inner(cut)
+    found = find_shapes(inner, tolerance)
+    if found is not None:
+        for beyond in (2.0, 1.0, 4.0):
+
+            def shapes(beyond: float = beyond) -> Tool | None:
+                made = build_shapes(inner, *found, tolerance, beyond * tolerance)
+                return made.tool if made else None
+
+            yield f"shapes {beyond:g}", shapes, 1e-6
+    for spans in SPANS[1:]:
+        for beyond in (2.0, 1.0):
+
+            def spline(spans: int = spans, beyond: float = beyond) -> Tool | None:
+                made = build_spline(inner, spans, beyond * tolerance)
+                return made.tool if made else None
+
+            yield f"spline {spans} {beyond:g}", spline, 1e-6
+    for count in FACETS:
+        mesh = decimate(cut, count)
+        if mesh is None or count_bad_edges(mesh.faces):
+            continue
+        for fuzzy in (1e-6, 1e-5):
+            yield f"facets {count} {fuzzy:g}", lambda mesh=mesh: build_facets(mesh), fuzzy  # type: ignore[misc]
+
+
+def _call(make: Callable[[], Tool | None]) -> Tool | None:
+    """A tool, or None where it cannot be built: OpenCASCADE's exceptions share no base of their own."""
+    try:
+        return make()
+    except Exception:
+        return None
+
+
+def _split_all(
+    solids: Sequence[Piece], tool: Tool, fuzzy: float, damage: Solid, tolerance: float
+) -> tuple[tuple[Piece, ...], tuple[Piece, ...]] | None:
+    """The pieces that are the damage volume, and all others; None where there are none of the first."""
+    taken: list[Piece] = []
+    rest: list[Piece] = []
+    try:
+        for solid in solids:
+            if not _touch(solid.shape, tool.shape):
+                rest.append(solid)
+                continue
+            made = split(solid.shape, solid.owner, solid.origins, tool, fuzzy)
+            if made is None:
+                return None
+            for piece in made:
+                volume = measure_volume(piece.shape)
+                if _is_damage(piece, volume, damage, tolerance):
+                    taken.append(piece)
+                elif volume > SPECK * damage.volume:
+                    rest.append(piece)
+    except (InputError, ValueError):
+        return None
+    except Exception:  # OpenCASCADE's
+        return None
+    return (tuple(taken), tuple(rest)) if taken else None
+
+
+def _is_damage(piece: Piece, volume: float, damage: Solid, tolerance: float) -> bool:
+    if not SPECK * damage.volume < volume < 1.5 * damage.volume:
+        return False
+    mesh = triangulate(piece.shape, tolerance / 16)
+    origin = damage.bounds.mean(axis=0)
+    common = to_manifold(mesh, origin) ^ to_manifold(damage, origin)
+    return bool(common.volume() > 0.5 * mesh.volume)
+
+
+def _touch(first: Any, second: Any) -> bool:
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+
+    boxes = []
+    for shape in (first, second):
+        box = Bnd_Box()
+        BRepBndLib.Add_s(shape, box, False)
+        boxes.append(box)
+    return not boxes[0].IsOut(boxes[1])
+
+
+def scale_shape(shape: Any, factor: float, T: Floats | None = None) -> Any:
+    """A shape scaled about the origin, then moved by ``T`` (4,4); its faces stay in their order."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+    from OCP.gp import gp_Trsf
+
+    transform = gp_Trsf()
+    if T is not None:
+        transform.SetValues(*np.asarray(T)[:3].ravel().tolist())
+    if factor != 1.0:
+        size = gp_Trsf()
+        size.SetScaleFactor(factor)
+        transform = transform.Multiplied(size)
+    return BRepBuilderAPI_Transform(shape, transform, True).Shape()

@@ -1,0 +1,198 @@
+"""Writes solids whose outer faces are the CAD's own, as STEP; and damage volumes as CadQuery solids."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import queue
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Mesh
+from damageest.errors import InputError
+from damageest.geometry.units import MILLIMETRES
+from damageest.result import Result
+from damageest.stages.export import Body, ExactForm, ExportedFiles
+from damageest_cadquery._exact import SiteInput, find_exact, scale_shape, start_solids
+from damageest_cadquery._read import read
+from damageest_cadquery._split import join_pieces
+from damageest_cadquery._worker import Request
+
+MOST_STARTS = 8
+"""How often the process is started; each time without the site that stopped it before."""
+
+
+def write_exact(
+    folder: Path,
+    result: Result,
+    bodies: Mapping[str, Body],
+    places: Mapping[str, Floats | None],
+    seconds: float,
+) -> ExportedFiles:
+    """Writes damage volumes, what is left of the part, and an assembly of all; see `damageest.stages.export.Writer`."""
+    request = make_request(result, folder, bodies, places)
+    if not request.sites:
+        return ExportedFiles()
+    said: dict[str, Any] = {}
+    for _ in range(MOST_STARTS):
+        said, site, reason = _run(request, seconds)
+        if said:
+            break
+        if site == 0:  # while it wrote the files
+            request = replace(request, skipped={each.number: reason for each in request.sites})
+        elif site in request.skipped:
+            break
+        else:
+            request = replace(request, skipped={**request.skipped, site: reason})
+    forms = {int(number): _read_form(form) for number, form in said.get("forms", {}).items()}
+    for site_input in request.sites:
+        why = (request.skipped.get(site_input.number, "the process for exact solids stopped"),)
+        forms.setdefault(site_input.number, ExactForm("none", tried=why))
+    notes = tuple(
+        f"site-{number}.step has facets, not the faces of the CAD file: {form.tried[-1] if form.tried else 'unknown'}"
+        for number, form in sorted(forms.items())
+        if form.form == "none"
+    )
+    if notes:
+        notes = (*notes, "damage.step and undamaged.step have facets too")
+    files = tuple(said.get("files", ()))
+    return ExportedFiles(files, notes, exact=dict(sorted(forms.items())), warnings=notes)
+
+
+def make_request(
+    result: Result, folder: Path, bodies: Mapping[str, Body], places: Mapping[str, Floats | None]
+) -> Request:
+    """What the process gets: everything in millimetres."""
+    factor = MILLIMETRES[result.units]
+    part = replace(
+        _scale(result.part, factor), tessellation_error=result.part.tessellation_error * factor, unit="mm", notes=()
+    )
+    moved = {place: None if T is None else _scale_shift(T, factor) for place, T in places.items()}
+    return Request(
+        part=part,
+        scale=result.part.cad_scale * factor,
+        tolerance=result.tolerance * factor,
+        unit=result.units,
+        sites=tuple(_take_site(result, number, factor) for number in range(len(result.sites))),
+        bodies={stem: replace(body, solid=_scale(body.solid, factor)) for stem, body in bodies.items()},
+        folder=str(folder),
+        places=moved,
+        skipped={},
+    )
+
+
+def _take_site(result: Result, index: int, factor: float) -> SiteInput:
+    site = result.sites[index]
+    return SiteInput(
+        number=site.id,
+        damage=_scale(site.damage, factor),
+        surface=_scale(site.surface, factor),
+        enclosures=tuple(_scale(solid, factor) for solid in site.enclosures),
+        points=np.asarray(result.aligned.points[site.points]) * factor,
+        accepted=site.accepted,
+    )
+
+
+def _scale(mesh: Any, factor: float) -> Any:
+    assert isinstance(mesh, Mesh)
+    return mesh if factor == 1 else replace(mesh, vertices=np.asarray(mesh.vertices) * factor)
+
+
+def _scale_shift(T: Floats, factor: float) -> Floats:
+    moved = np.array(T)
+    moved[:3, 3] *= factor
+    return moved
+
+
+def _read_form(values: dict[str, Any]) -> ExactForm:
+    return ExactForm(**{**values, "tried": tuple(values["tried"])})
+
+
+def _run(request: Request, seconds: float) -> tuple[dict[str, Any], int, str]:
+    """Starts the process once. Gives what it said at its end; or the number of the site, 0 for none, at which it
+    stopped, and why."""
+    with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
+        path = Path(place) / "request.pkl"
+        path.write_bytes(pickle.dumps(request))
+        process = subprocess.Popen(
+            [sys.executable, "-m", "damageest_cadquery._worker", str(path)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONWARNINGS": "ignore"},
+        )
+        try:
+            return _follow(process, seconds)
+        finally:
+            process.kill()
+            process.wait()
+
+
+def _follow(process: subprocess.Popen[str], seconds: float) -> tuple[dict[str, Any], int, str]:
+    lines: queue.Queue[str | None] = queue.Queue()
+    errors: list[str] = []
+
+    def listen() -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            lines.put(line)
+        lines.put(None)
+
+    def listen_to_errors() -> None:
+        assert process.stderr is not None
+        errors.extend(process.stderr)
+
+    threads = [threading.Thread(target=each, daemon=True) for each in (listen, listen_to_errors)]
+    for thread in threads:
+        thread.start()
+    site = 0
+    while True:
+        try:
+            line = lines.get(timeout=seconds)
+        except queue.Empty:
+            return {}, site, f"OpenCASCADE took longer than {seconds:g} s"
+        if line is None:
+            process.wait()
+            threads[1].join(timeout=5)
+            last = errors[-1].strip()[:200] if errors else f"exit status {process.returncode}"
+            return {}, site, f"OpenCASCADE stopped ({last})"
+        if not line.startswith("{"):
+            continue
+        said = json.loads(line)
+        if "forms" in said:
+            return said, site, ""
+        site = said.get("start", site)
+
+
+def as_cadquery(result: Result, what: str, site: int) -> Any:
+    """A ``cadquery.Shape`` of a site's damage volume with the CAD's own faces, in the part's frame and unit.
+
+    Raises InputError where the part has no CAD faces, or no exact form passes the checks.
+    """
+    import cadquery
+
+    if what != "damage":
+        raise ValueError(f"no '{what}' as CadQuery; there is: damage")
+    index = next((k for k, each in enumerate(result.sites) if each.id == site), None)
+    if index is None:
+        known = ", ".join(str(each.id) for each in result.sites) or "none"
+        raise ValueError(f"there is no site {site}; there are: {known}")
+    if not result.part.cad_scale:
+        raise InputError("the part is a mesh: only a part from STEP, IGES or BREP has CAD faces")
+    request = make_request(result, Path(), {}, {})
+    model = read(Path(request.part.path), Path(request.part.path).suffix.lower())
+    solids, faces = start_solids([scale_shape(solid, request.scale) for solid in model.solids])
+    exact, tried = find_exact(request.sites[index], solids, faces, request.part, request.tolerance)
+    if exact is None:
+        raise InputError(f"site {site} has no exact form: {tried[-1] if tried else 'unknown'}; take as_trimesh")
+    shape = join_pieces(exact.pieces)
+    return cadquery.Shape.cast(scale_shape(shape, 1 / MILLIMETRES[result.units]))
