@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from pathlib import Path
 
 from damageest.errors import DamageestError, InputError, describe_missing_library, is_interrupt
+
+WITHOUT_HOLES = 64 * 2**20
+"""Size in bytes from which a file is asked whether it was written as a whole."""
 
 
 def check_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
     """The file's suffix in lower case. Raises InputError if the file is missing, empty or not of ``suffixes``."""
     valid = f"{what} may have the format: {', '.join(suffixes)}"
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, not a file; {valid}")
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; {valid}")
+    if wrong := describe_no_file(path):
+        raise InputError(f"{path}: {wrong}; {valid}")
     suffix = path.suffix.lower()
     if suffix not in suffixes:
         raise InputError(f"{path}: the format '{suffix}' cannot be read; {valid}")
@@ -25,9 +27,32 @@ def check_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
         raise InputError(f"{path}: the file cannot be opened: {error.strerror or error}") from None
     if not start:
         raise InputError(f"{path}: the file is empty; {valid}")
+    _refuse_holes(path)
     if start.lstrip().lower().startswith((b"<!doctype html", b"<html")):
         raise InputError(f"{path}: the file is a web page, not {what}; {valid}\n  try: download the file again")
     return suffix
+
+
+def _refuse_holes(path: Path) -> None:
+    """Raises InputError for a large file of which less than half was ever written, as by a download that did not end:
+    reading it would fill the memory with zeros."""
+    size = path.stat().st_size
+    if size < WITHOUT_HOLES or not hasattr(os, "SEEK_HOLE"):
+        return
+    written = at = 0
+    with path.open("rb", buffering=0) as stream:
+        while at < size:
+            try:
+                start = os.lseek(stream.fileno(), at, os.SEEK_DATA)
+            except OSError:
+                break  # no data after this place
+            at = os.lseek(stream.fileno(), start, os.SEEK_HOLE)
+            written += at - start
+    if written < size / 2:
+        raise InputError(
+            f"{path}: only {written} of its {size} bytes were ever written, as of a copy that did not end; "
+            "copy the file again"
+        )
 
 
 def file_sha256(path: Path) -> str:
@@ -51,6 +76,26 @@ def raise_environment_fault(error: BaseException) -> None:
         raise error
     if fault := describe_missing_library(error):
         raise fault from error
+
+
+def describe_no_file(path: Path) -> str:
+    """Why a path names no file that can be read; empty where it does. Pipes and devices are no files: they may have no
+    end."""
+    try:
+        if path.is_dir():
+            return "is a folder, not a file"
+        if path.is_file():
+            return ""
+        if path.exists():
+            return "is a pipe or a device, not a file"
+        return "is a symbolic link that leads nowhere" if path.is_symlink() else "there is no such file"
+    except (OSError, ValueError) as error:
+        return f"cannot be opened: {getattr(error, 'strerror', None) or error}"
+
+
+def resolve_path(path: Path, folder: Path) -> Path:
+    """The absolute path of one that is given in a folder, without symbolic links as far as they lead somewhere."""
+    return Path(os.path.realpath(folder / expand_home(path)))
 
 
 def expand_home(path: Path) -> Path:

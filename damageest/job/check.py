@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from damageest.errors import Fault, JobError, PluginError, suggest
-from damageest.io.files import expand_home
+from damageest.io.files import describe_no_file, resolve_path
 from damageest.job import yamlfile
 from damageest.job.model import Header, Job
 from damageest.job.wording import describe_fault
@@ -41,7 +42,8 @@ def load(
     if not isinstance(tree, Mapping):
         raise JobError([Fault("a job is a mapping with at least version, part and scan")], str(path))
     tree = {key: value for key, value in tree.items() if key not in without}
-    return _Check(tree, positions, str(path), path.resolve().parent, registry, given or {}).job(settings, path.stem)
+    folder = Path(os.path.realpath(path)).parent
+    return _Check(tree, positions, str(path), folder, registry, given or {}).job(settings, path.stem)
 
 
 Chosen = tuple[Implementation, dict[str, Any]]
@@ -95,6 +97,8 @@ class _Check:
         contracts, method = self.find_route(method, chosen)
         pairs = {c: chosen.get(c) or self.find_default(c, method) for c in contracts if c not in self.given}
         stages = {c: self.check_stage(pair[0], pair[1]) for c, pair in pairs.items() if pair}
+        if header and not header.output and (header.name or stem) in (".", ".."):
+            self.add_fault("'.' and '..' name no folder of its own for the output; give another name, or  output", "name")
         if self.faults or header is None:
             raise JobError(sorted(self.faults, key=lambda f: (f.line, f.column)), self.source)
         name = header.name or stem
@@ -106,7 +110,7 @@ class _Check:
             method=method,
             stages={c: s for c, s in stages.items() if s is not None},
             implementations={c: pair[0] for c, pair in pairs.items() if pair},
-            output=(self.folder / expand_home(output)).resolve(),
+            output=resolve_path(output, self.folder),
             source=self.source,
             sites=header.sites,
             accept=header.accept,
@@ -246,9 +250,8 @@ class _Check:
             self.add_faults(told)
             return None
         for place, path in _find_paths(stage.model_dump()):
-            if not path.is_file():
-                what = "is a folder, not a file" if path.is_dir() else "there is no such file"
-                self.add_fault(f"{path}: {what}", key, *place)
+            if wrong := describe_no_file(path):
+                self.add_fault(f"{str(path)[-250:]}: {wrong}", key, *place)
         return stage
 
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
 from damageest.errors import Fault, JobError
-
-MOST_BYTES = 4 * 1024 * 1024
-"""Largest size of a job file."""
-MOST_VALUES = 100_000
-"""Largest number of values of a job, with each alias counted as often as it is used."""
+from damageest.job.yaml_limits import MOST_BYTES, check_events, find_bad_character
 
 Positions = dict[tuple[str | int, ...], tuple[int, int]]
 """Path of keys and indices to the (line, column) where the key or item stands, from 1."""
@@ -20,6 +17,15 @@ Positions = dict[tuple[str | int, ...], tuple[int, int]]
 
 def read(path: Path) -> tuple[Any, Positions]:
     """The file's content and the position of each key. Raises JobError for a file that cannot be read or parsed."""
+    if wrong := find_bad_character(str(path)):
+        raise JobError([Fault(f"its name {wrong}")], ascii(str(path)))
+    try:
+        return parse(_read_text(path), str(path))
+    except OSError as error:
+        raise JobError([Fault(f"cannot be read: {error.strerror or error}")], str(path)) from None
+
+
+def _read_text(path: Path) -> str:
     if path.is_dir():
         jobs = sorted(one.name for one in path.iterdir() if one.suffix in (".yaml", ".yml"))
         listed = ", ".join(jobs[:5]) + (", ..." if len(jobs) > 5 else "")
@@ -30,12 +36,11 @@ def read(path: Path) -> tuple[Any, Positions]:
     try:
         if path.stat().st_size > MOST_BYTES:
             raise JobError([Fault(f"is larger than {MOST_BYTES // 1024} kB, so it is no job file")], str(path))
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise JobError([Fault("there is no such file")], str(path)) from None
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise JobError([Fault(f"cannot be read as a text file: {error}")], str(path)) from None
-    return parse(text, str(path))
 
 
 def parse(text: str, source: str) -> tuple[Any, Positions]:
@@ -45,12 +50,7 @@ def parse(text: str, source: str) -> tuple[Any, Positions]:
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     try:
-        root = YAML(typ="rt").compose(text)
-        if root is not None and _count_values(root, {}) > MOST_VALUES:
-            message = (
-                f"its aliases stand for more than {MOST_VALUES} values, or contain themselves; write the values out"
-            )
-            raise JobError([Fault(message)], source)
+        check_events(YAML(typ="rt").parse(text), source)
         tree = YAML(typ="rt").load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -62,25 +62,32 @@ def parse(text: str, source: str) -> tuple[Any, Positions]:
     except (YAMLError, ValueError, RecursionError) as error:
         raise JobError([Fault(f"not valid YAML: {str(error).splitlines()[0]}")], source) from None
     positions: Positions = {}
-    return _to_plain(tree, (), positions), positions
+    plain = _to_plain(tree, (), positions)
+    faults = [
+        Fault(f"this value {wrong}", ".".join(map(str, place)), *positions.get(place, (1, 1)))
+        for place, text in _find_texts(plain, ())
+        if (wrong := find_bad_character(text))
+    ]
+    if faults:
+        raise JobError(faults, source)
+    return plain, positions
 
 
-def _count_values(node: Any, known: dict[int, int]) -> int:
-    """The number of values that a node of the YAML tree stands for. An alias is a node with several parents; one that
-    contains itself stands for more than any number."""
-    key = id(node)
-    if key not in known:
-        known[key] = MOST_VALUES + 1  # until its own count is known: what is met again inside itself has no end
-        items = node.value if isinstance(node.value, list) else []
-        members = [one for item in items for one in (item if isinstance(item, tuple) else (item,))]
-        known[key] = min(1 + sum(_count_values(one, known) for one in members), MOST_VALUES + 1)
-    return known[key]
+def _find_texts(node: Any, path: tuple[str | int, ...]) -> list[tuple[tuple[str | int, ...], str]]:
+    if isinstance(node, Mapping):
+        return [found for key, value in node.items() for found in _find_texts(value, (*path, key))]
+    if isinstance(node, list):
+        return [found for index, value in enumerate(node) for found in _find_texts(value, (*path, index))]
+    return [(path, node)] if isinstance(node, str) else []
 
 
 def _to_plain(node: Any, path: tuple[str | int, ...], positions: Positions) -> Any:
     if isinstance(node, Mapping):
         for key in node:
-            line, column = node.lc.key(key)  # type: ignore[attr-defined]
+            try:
+                line, column = node.lc.key(key)  # type: ignore[attr-defined]
+            except (KeyError, TypeError, AttributeError):
+                continue  # it is merged from another mapping
             positions[(*path, str(key))] = (line + 1, column + 1)
         return {str(key): _to_plain(value, (*path, str(key)), positions) for key, value in node.items()}
     if isinstance(node, list):
@@ -91,7 +98,7 @@ def _to_plain(node: Any, path: tuple[str | int, ...], positions: Positions) -> A
     for kind in (bool, int, float, str):
         if isinstance(node, kind):
             return kind(node)
-    return node
+    return node.isoformat() if isinstance(node, date) and not isinstance(node, datetime) else node
 
 
 def write(value: Any) -> str:

@@ -19,7 +19,7 @@ from typing import Annotated, Any, ClassVar, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
 
 from damageest.errors import PluginError
-from damageest.io.files import expand_home
+from damageest.io.files import resolve_path
 
 Given = TypeVar("Given")
 
@@ -35,7 +35,7 @@ def asked_by_name(run: Callable[..., Given]) -> Callable[..., Given]:
 
 def _resolve_beside_job(path: Path, info: ValidationInfo) -> Path:
     folder = (info.context or {}).get("folder")
-    return (Path(folder) / expand_home(path)).resolve() if folder is not None else path
+    return resolve_path(path, Path(folder)) if folder is not None else path
 
 
 JobPath = Annotated[Path, AfterValidator(_resolve_beside_job)]

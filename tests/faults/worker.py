@@ -1,0 +1,74 @@
+"""A process that runs spoiled jobs one after the other. For each line of its input, the path of a job, it prints a line
+of JSON with the outcome. `tests.faults.run` starts it, and starts another one where it dies.
+
+Usage: python -m tests.faults.worker read|run
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import sys
+import time
+from typing import Any
+
+MEMORY = 2 << 30
+"""Bytes that reading a hostile file may take at most."""
+ADDRESS_SPACE = 12 << 30
+"""Bytes of addresses, so that one wrong allocation cannot take the memory of the machine."""
+
+
+def _measure_peak() -> int:
+    with open("/proc/self/status") as stream:
+        return next(int(line.split()[1]) for line in stream if line.startswith("VmHWM")) * 1024
+
+
+def try_job(path: str, whole: bool, registry: Any) -> dict[str, Any]:
+    """Reads the inputs of a job, or runs the whole of it: the outcome, and the message of an error."""
+    import damageest
+    from damageest.errors import DamageestError
+    from damageest.job import load
+    from damageest.pipeline.prepare import read_inputs
+
+    try:
+        job = load(path, registry, ["report=none"])
+        if whole:
+            result = damageest.run(job, registry=registry)
+            return {"outcome": "done", "volume": result.damage_volume, "words": "; ".join(result.warnings)}
+        part, scan = read_inputs(job, registry)
+        return {"outcome": "done", "volume": part.volume, "points": len(scan.points)}
+    except DamageestError as error:
+        words = str(error)
+        if "unexpected" in words or "not valid:" in words or not words.strip():
+            return {"outcome": "unexpected", "words": words}
+        return {"outcome": "refused" if error.exit_status == 2 else "stopped", "words": words}
+    except BaseException as error:
+        return {"outcome": "unexpected", "words": f"{type(error).__name__}: {error}"}
+
+
+def main() -> None:
+    """Answers until the input ends."""
+    resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # libraries print into the output
+    os.dup2(1, 2)
+    from damageest.registry import Registry
+
+    registry = Registry.discover()
+    print("ready", file=answers, flush=True)
+    for line in sys.stdin:
+        with open("/proc/self/clear_refs", "w") as stream:
+            stream.write("5")  # begins a new peak
+        start = time.perf_counter()
+        row = try_job(line.strip(), sys.argv[1] == "run", registry)
+        row["seconds"] = round(time.perf_counter() - start, 2)
+        row["peak"] = _measure_peak()
+        if row["peak"] > MEMORY:
+            row["outcome"] = "memory"
+        print(json.dumps(row), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main()
