@@ -53,8 +53,8 @@ def run(
         source, given = _split(job, part, scan)
         job = load(source, registry, settings, given)
     if output is False:
-from damageest.io.files import resolve_path
-from damageest.isolation import Limits
+        return follow(route_of(job.method), Engine(job, registry, limits=limits), start(job)).job.result
+    target = job.output if output is True else resolve_path(Path(output), Path.cwd())
     with open_workspace(target, cache) as place:
         engine = Engine(job, registry, place.cache, limits=limits)
         work = follow(route_of(job.method), engine, start(job))

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Part, Scan
-from damageest.errors import StageError
+from damageest.errors import InputError, StageError
 
 AUTO_TOLERANCE = 4.0
 """Lambda over the scan's noise where the job says auto: 6 in 100,000 intact points deviate by more."""
+
+LEAST_TOLERANCE = 1e-6
+"""Least tolerance in diagonals of the part; coordinates in single precision, as in STL, have no more digits."""
 
 AUTO_STEPS = 1.5
 """Least lambda over the step of the scan's depth where the job says auto; a point is off by up to half a step."""
@@ -29,8 +32,15 @@ MOST_OUTSIDE = 0.02
 def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float = 0.0) -> tuple[float, list[str]]:
     """Lambda in the job's unit, and what is doubtful about it, in words.
 
-    ``wanted`` None: from the scan's noise and from the ``step`` of its depth (0: continuous).
+    ``wanted`` None: from the scan's noise and from the ``step`` of its depth (0: continuous). Raises InputError for a
+    tolerance that is no length of this part.
     """
+    if wanted is not None and not LEAST_TOLERANCE * part.diagonal <= wanted <= part.diagonal:
+        low, high = LEAST_TOLERANCE * part.diagonal, part.diagonal
+        raise InputError(
+            f"tolerance: {wanted:g} {part.unit} is no threshold for a part that is {part.diagonal:.4g} {part.unit} "
+            f"across; give {low:.2g} to {high:.4g}, or auto; is `units` right?"
+        )
     least = 1e-4 * part.diagonal
     auto = max(AUTO_TOLERANCE * scan.noise, AUTO_STEPS * step, 2 * part.tessellation_error, least)
     tolerance = wanted or auto

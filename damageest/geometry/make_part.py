@@ -8,6 +8,10 @@ from numpy.typing import ArrayLike
 from damageest.artefacts import Ints, Part, open_edges
 from damageest.errors import InputError
 from damageest.geometry.healing import heal
+from damageest.geometry.units import FARTHEST
+
+SMALLEST = 1e-9
+"""Least size of a part, in any unit: the powers of smaller ones would leave the range of numbers."""
 
 
 def make_part(
@@ -49,6 +53,10 @@ def make_part(
             raise ValueError(f"expected vertices (V,3) and faces (F,3), got {v.shape} and {f.shape}")
         if len(f) and (f.min() < 0 or f.max() >= len(v)):
             raise ValueError(f"a face has an index outside the {len(v)} vertices")
+        if len(v) and not np.nanmax(np.abs(v)) <= FARTHEST:
+            raise ValueError(f"coordinates above {FARTHEST:g}, or none that are finite; export the part again")
+        if len(v) and not np.ptp(v, axis=0).max() >= SMALLEST:
+            raise ValueError(f"smaller than {SMALLEST:g} {unit}; export the part again")
     except (ValueError, TypeError) as error:
         raise InputError(f"{name}: {error}") from None
     try:

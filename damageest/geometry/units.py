@@ -14,6 +14,10 @@ from damageest.errors import InputError, suggest
 MILLIMETRES = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
 """Millimetres in each unit, by the short name that a job file uses."""
 
+FARTHEST = 1e12
+"""Largest coordinate, in any unit: beyond it double precision leaves less than six digits for a metre of micrometres,
+and its powers would leave the range of numbers."""
+
 FULL_NAMES = {
     "um": "micrometres",
     "mm": "millimetres",

@@ -27,32 +27,9 @@ def check_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
         raise InputError(f"{path}: the file cannot be opened: {error.strerror or error}") from None
     if not start:
         raise InputError(f"{path}: the file is empty; {valid}")
-    _refuse_holes(path)
     if start.lstrip().lower().startswith((b"<!doctype html", b"<html")):
         raise InputError(f"{path}: the file is a web page, not {what}; {valid}\n  try: download the file again")
     return suffix
-
-
-def _refuse_holes(path: Path) -> None:
-    """Raises InputError for a large file of which less than half was ever written, as by a download that did not end:
-    reading it would fill the memory with zeros."""
-    size = path.stat().st_size
-    if size < WITHOUT_HOLES or not hasattr(os, "SEEK_HOLE"):
-        return
-    written = at = 0
-    with path.open("rb", buffering=0) as stream:
-        while at < size:
-            try:
-                start = os.lseek(stream.fileno(), at, os.SEEK_DATA)
-            except OSError:
-                break  # no data after this place
-            at = os.lseek(stream.fileno(), start, os.SEEK_HOLE)
-            written += at - start
-    if written < size / 2:
-        raise InputError(
-            f"{path}: only {written} of its {size} bytes were ever written, as of a copy that did not end; "
-            "copy the file again"
-        )
 
 
 def file_sha256(path: Path) -> str:
@@ -85,12 +62,32 @@ def describe_no_file(path: Path) -> str:
         if path.is_dir():
             return "is a folder, not a file"
         if path.is_file():
-            return ""
+            return _describe_holes(path)
         if path.exists():
             return "is a pipe or a device, not a file"
         return "is a symbolic link that leads nowhere" if path.is_symlink() else "there is no such file"
     except (OSError, ValueError) as error:
         return f"cannot be opened: {getattr(error, 'strerror', None) or error}"
+
+
+def _describe_holes(path: Path) -> str:
+    """What is wrong with a large file of which less than half was ever written, as by a download that did not end:
+    reading it would fill the memory with zeros. Empty for others."""
+    size = path.stat().st_size
+    if size < WITHOUT_HOLES or not hasattr(os, "SEEK_HOLE"):
+        return ""
+    written = at = 0
+    with path.open("rb", buffering=0) as stream:
+        while at < size:
+            try:
+                start = os.lseek(stream.fileno(), at, os.SEEK_DATA)
+            except OSError:
+                break  # no data after this place
+            at = os.lseek(stream.fileno(), start, os.SEEK_HOLE)
+            written += at - start
+    if written >= size / 2:
+        return ""
+    return f"only {written} of its {size} bytes were ever written, as of a copy that did not end; copy the file again"
 
 
 def resolve_path(path: Path, folder: Path) -> Path:

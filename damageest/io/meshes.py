@@ -26,6 +26,10 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
     if suffix == ".stl":
         vertices, faces = _read_stl(path)
         return vertices, faces, None
+    if suffix == ".3mf":
+        from damageest.io.three_mf_limits import check_archive
+
+        check_archive(path)
     import trimesh
 
     try:

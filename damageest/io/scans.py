@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints, Scan, Vector
 from damageest.errors import InputError
 from damageest.geometry.duplicates import find_duplicates
-from damageest.geometry.units import canonical_unit, unit_factor
+from damageest.geometry.units import FARTHEST, canonical_unit, unit_factor
 from damageest.io.points import read_points
 
 
@@ -31,7 +31,8 @@ def make_scan(
     ``viewpoints`` (V,3): scanner positions, in the unit and the frame of the points; ``view`` (N,): the number of each
     point's position, -1 where it is not known. ``viewpoints`` alone: one position (1,3) for all points.
 
-    Points that are not finite and duplicates are removed; the scan's notes give their numbers. Normals are scaled to
+    Points that are not finite or farther than 1e12 from the origin, and duplicates, are removed; the scan's notes give
+    their numbers. Normals are scaled to
     length 1. If one of them is zero or not finite, no normals are used. Raises InputError if no point remains.
     """
     name = ", ".join(paths) or "the scan"
@@ -46,12 +47,16 @@ def make_scan(
             )
     viewpoints, numbers = _check_views(name, len(points), viewpoints, view)
     scan = Scan(points, normals, canonical_unit(unit), paths, viewpoints=viewpoints, view=numbers)
-    finite = np.isfinite(points.sum(1))
+    finite = np.asarray(np.isfinite(points).all(axis=1))
     if not finite.all():
         notes = (*notes, f"removed {int((~finite).sum())} points with coordinates that are not finite")
         scan = scan.take(finite)
+    near = np.asarray((np.abs(scan.points) <= FARTHEST).all(axis=1))
+    if not near.all():
+        notes = (*notes, f"removed {int((~near).sum())} points with coordinates above {FARTHEST:g}, which no scan has")
+        scan = scan.take(near)
     if not len(scan.points):
-        raise InputError(f"{name}: has no points")
+        raise InputError(f"{name}: has no points" + (f" with valid coordinates; {notes[-1]}" if len(points) else ""))
     keep, _ = find_duplicates(scan.points)
     if len(keep) < len(scan.points):
         notes = (*notes, f"removed {len(scan.points) - len(keep)} duplicate points")
@@ -75,8 +80,8 @@ def _check_views(
             raise InputError(f"{name}: view needs viewpoints")
         return None, None
     viewpoints = np.asarray(viewpoints, dtype=np.float64)
-    if viewpoints.ndim != 2 or viewpoints.shape[1] != 3 or not np.isfinite(viewpoints).all():
-        raise InputError(f"{name}: viewpoints need the shape (V,3), and finite coordinates")
+    if viewpoints.ndim != 2 or viewpoints.shape[1] != 3 or not (np.abs(viewpoints) <= FARTHEST).all():
+        raise InputError(f"{name}: viewpoints need the shape (V,3), and coordinates up to {FARTHEST:g}")
     if view is None:
         if len(viewpoints) != 1:
             raise InputError(f"{name}: {len(viewpoints)} viewpoints need a view: the number of each point's viewpoint")

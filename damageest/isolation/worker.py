@@ -22,6 +22,11 @@ from damageest.isolation import serve
 from damageest.isolation.limits import Limits, format_bytes, measure_free_memory, own_memory
 from damageest.isolation.transfer import receive, send
 
+
+class ProcessError(StageError):
+    """The process of an isolated call crashed or exited, took too long, or needed too much memory."""
+
+
 T = TypeVar("T")
 START_SECONDS = 120.0
 """Longest time from the start of a worker until it answers."""
@@ -247,7 +252,7 @@ def _unpack(kind: str, value: Any, memory: int | None, limits: Limits, owner: st
     if kind == "value":
         return value
     if kind == "exit":
-        raise StageError(f"called sys.exit({value}), which would end the run", _blame(owner))
+        raise ProcessError(f"called sys.exit({value}), which would end the run", _blame(owner))
     if kind == "memory":
         raise _describe_memory(memory, limits)
     packed, name, text, trace = value
@@ -255,35 +260,35 @@ def _unpack(kind: str, value: Any, memory: int | None, limits: Limits, owner: st
     raise error from RemoteTraceback(trace)
 
 
-def _describe_end(status: int | None, output: str, memory: int | None, limits: Limits, owner: str) -> StageError:
+def _describe_end(status: int | None, output: str, memory: int | None, limits: Limits, owner: str) -> ProcessError:
     """The error for a process that gave no answer. ``status``: as of subprocess, None where it took too long."""
     if status is None:
-        error = StageError(
+        error = ProcessError(
             f"was ended: not finished after {limits.seconds:g} s, the time limit of a stage",
             f"a longer --stage-timeout, or {_blame(owner)}",
         )
     elif "bad_alloc" in output or "MemoryError" in output:
         error = _describe_memory(memory, limits)
     elif status == -signal.SIGKILL:
-        error = StageError(
+        error = ProcessError(
             "its process was killed (SIGKILL), as the system does where memory runs out",
             "a larger tolerance, fewer scan points, or a --memory that the machine has",
         )
     elif status < 0:
         name = signal.Signals(-status).name
-        error = StageError(f"its process ended by {_SIGNALS.get(-status, 'a signal')} ({name})", _blame(owner))
+        error = ProcessError(f"its process ended by {_SIGNALS.get(-status, 'a signal')} ({name})", _blame(owner))
     else:
-        error = StageError(f"ended its process with exit status {status}", _blame(owner))
+        error = ProcessError(f"ended its process with exit status {status}", _blame(owner))
     error.__cause__ = RemoteTraceback(output) if output else None
     return error
 
 
-def _describe_memory(memory: int | None, limits: Limits) -> StageError:
+def _describe_memory(memory: int | None, limits: Limits) -> ProcessError:
     most = "" if memory is None else f" than the {format_bytes(memory)} "
     if memory is not None:
         most += "that --memory leaves it" if limits.memory is not None else "that were free"
     larger = "a larger --memory" if limits.memory is not None else "a machine with more memory"
-    return StageError(f"needed more memory{most}", f"a larger tolerance, fewer scan points, or {larger}")
+    return ProcessError(f"needed more memory{most}", f"a larger tolerance, fewer scan points, or {larger}")
 
 
 def _blame(owner: str) -> str:

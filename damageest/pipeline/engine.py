@@ -13,7 +13,7 @@ import numpy as np
 
 from damageest.artefacts import ArtefactError
 from damageest.errors import DamageestError, InputError, StageError, describe_missing_library, is_interrupt
-from damageest.isolation import Limits, call_isolated
+from damageest.isolation import Limits, ProcessError, call_isolated
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache, digest
 from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
@@ -21,6 +21,9 @@ from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.registry import Implementation, Registry
 from damageest.result import StageRecord
 from damageest.stages import Stage
+
+READERS_SHARE = 1 / 6
+"""Share of the time limit of a stage that a reader has."""
 
 S = TypeVar("S", JobState, Candidate, FoundSite)
 
@@ -87,7 +90,17 @@ class Engine:
         run: Callable[..., Any] = stage.run  # type: ignore[attr-defined]
         if item.cls.isolated:
             worker = f"{item.provider.module.partition('.')[0]} {item.provider.fingerprint}"
-            return call_isolated(run, arguments, worker=worker, owner=f"{item.provider}", limits=self.limits)
+            owner, limits = f"{item.provider}", self.limits
+            if not item.cls.reads:
+                return call_isolated(run, arguments, worker=worker, owner=owner, limits=limits)
+            limits = replace(limits, seconds=limits.seconds * READERS_SHARE)
+            try:
+                return call_isolated(run, arguments, worker=worker, owner=owner, limits=limits)
+            except ProcessError as error:
+                raise InputError(
+                    f"{getattr(stage, 'path', item.contract.stage)}: the program that reads it {error.message}\n  try: "
+                    f"export the file again, since it is damaged; or report it to the authors of {owner}"
+                ) from error
         try:
             return run(**arguments)
         except SystemExit as end:

@@ -15,8 +15,9 @@ _NUMBER = re.compile(rb"(?<![\w.])-?\d+(\.\d*)?([eE][+-]?\d+)?(?![\w.])")
 _YAML = (
     "x: &a [*a]", "a: &a [1,1,1,1,1,1,1,1,1]\nb: &b [*a,*a,*a,*a,*a,*a,*a,*a]\nc: &c [*b,*b,*b,*b,*b,*b,*b,*b]",
     "<<: *near", "scan: !!python/object:os.system {}", "part: !x box.stl", "output: ~nobody/x", 'part: "bo\\0x.stl"',
-    "x: " + "[" * 3000, "tolerance: 1e-300", "tolerance: .nan", "units: !!binary aGk=", "name: ../../x", "? [a, b]\n: c",
-    "name: 2020-01-01", "tolerance: " + "9" * 5000, "part: " + "a" * 5000, "output: /proc/x", "output: /dev/null",
+    "x: " + "[" * 3000, "tolerance: 1e-300", "tolerance: .nan", "units: !!binary aGk=", "name: ../../x",
+    "? [a, b]\n: c", "name: 2020-01-01", "tolerance: " + "9" * 5000, "part: " + "a" * 5000, "output: /proc/x",
+    "output: /dev/null",
     "cluster: {neighbours: 1e400}", "sites: {drop: [99999999999999999999]}", "method: [auto]", "scan: [[points.npy]]",
     "%YAML 9.9\n---\n", "---\nversion: 1\n---\nversion: 1", "accept: {1: 2}", "align: {T_part_scan: [[1e300]]}",
 )  # fmt: skip

@@ -15,6 +15,8 @@ from typing import Any
 
 MEMORY = 2 << 30
 """Bytes that reading a hostile file may take at most."""
+SECONDS = 60.0
+"""Time limit of an isolated stage; a reader has a sixth of it."""
 ADDRESS_SPACE = 12 << 30
 """Bytes of addresses, so that one wrong allocation cannot take the memory of the machine."""
 
@@ -28,19 +30,26 @@ def try_job(path: str, whole: bool, registry: Any) -> dict[str, Any]:
     """Reads the inputs of a job, or runs the whole of it: the outcome, and the message of an error."""
     import damageest
     from damageest.errors import DamageestError
+    from damageest.isolation import Limits
     from damageest.job import load
-    from damageest.pipeline.prepare import read_inputs
+    from damageest.pipeline.engine import Engine, follow, start
+    from damageest.pipeline.prepare import crop_scan
+    from damageest.stages.part import ReadPart
+    from damageest.stages.scan import ReadScan
 
     try:
         job = load(path, registry, ["report=none"])
         if whole:
-            result = damageest.run(job, registry=registry)
+            result = damageest.run(job, registry=registry, limits=Limits(seconds=SECONDS))
             return {"outcome": "done", "volume": result.damage_volume, "words": "; ".join(result.warnings)}
-        part, scan = read_inputs(job, registry)
+        state = follow(
+            (ReadPart, ReadScan, crop_scan), Engine(job, registry, limits=Limits(seconds=SECONDS)), start(job)
+        ).job
+        part, scan = state.part, state.scan
         return {"outcome": "done", "volume": part.volume, "points": len(scan.points)}
     except DamageestError as error:
         words = str(error)
-        if "unexpected" in words or "not valid:" in words or not words.strip():
+        if "failed unexpectedly" in words or "gave a result that is not valid" in words or not words.strip():
             return {"outcome": "unexpected", "words": words}
         return {"outcome": "refused" if error.exit_status == 2 else "stopped", "words": words}
     except BaseException as error:

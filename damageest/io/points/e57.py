@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,9 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.io.points import FormatError, PointFile
+
+MOST_POINTS_PER_BYTE = 8
+"""Coordinates are packed in bits; a point takes at least one."""
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
@@ -21,9 +25,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     """
     import pye57
 
-    with path.open("rb") as stream:
-        if stream.read(8) != b"ASTM-E57":
-            raise FormatError("not an E57 file: it does not start with 'ASTM-E57'")
+    _check_file(path)
     pieces: list[Floats] = []
     normals: list[Floats | None] = []
     positions: list[Floats] = []
@@ -31,7 +33,10 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     posed = False
     with pye57.E57(str(path)) as file:
         for index in range(file.scan_count):
-            header, raw = file.get_header(index), file.read_scan_raw(index)
+            header = file.get_header(index)
+            if not 0 <= header.point_count <= MOST_POINTS_PER_BYTE * path.stat().st_size:
+                raise FormatError(f"the file is too small for the {header.point_count} points of scan {index + 1}")
+            raw = file.read_scan_raw(index)
             points, normal = _read_scan(header, raw, index)
             pieces.append(points)
             normals.append(normal)
@@ -52,6 +57,26 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         viewpoints=np.array(positions) if (numbers >= 0).any() else None,
         view=np.repeat(numbers, [len(piece) for piece in pieces]) if (numbers >= 0).any() else None,
     )
+
+
+def _check_file(path: Path) -> None:
+    """Raises FormatError for a file that is not whole, or whose XML declares entities, which may expand without end."""
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        head = stream.read(48)
+        if head[:8] != b"ASTM-E57":
+            raise FormatError("not an E57 file: it does not start with 'ASTM-E57'")
+        if len(head) < 48:
+            raise FormatError("the file is truncated: it ends in its header")
+        length, start, count, page = struct.unpack_from("<QQQQ", head, 16)
+        if length > size:
+            raise FormatError(f"the file is truncated: it has {size} of {length} bytes")
+        if start >= size or count > size or not 0 < page <= 2**20:
+            raise FormatError("the header of the E57 file is not valid")
+        stream.seek(start)
+        xml = stream.read(min(count + 4 * (count // page + 2), size))
+    if b"<!DOCTYPE" in xml or b"<!ENTITY" in xml:
+        raise FormatError("the XML of the E57 file declares entities, which no E57 file needs")
 
 
 def _read_pose(header: Any) -> Floats:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from damageest.io.points import FormatError, PointFile
+
+HEAD = 375
+"""Bytes of the longest header, that of LAS 1.4."""
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
@@ -15,8 +20,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
 
     size = path.stat().st_size
     with path.open("rb") as stream:
-        if stream.read(4) != b"LASF":
-            raise FormatError("not a LAS file: it does not start with 'LASF'")
+        _check_header(stream.read(HEAD), stream, size)
         stream.seek(0)
         with laspy.open(stream, closefd=False) as reader:
             count, width = reader.header.point_count, reader.header.point_format.size
@@ -29,3 +33,35 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     if len(points) < count:
         raise FormatError(f"the file is truncated: it has {len(points)} of {count} points")
     return PointFile(points)
+
+
+def _check_header(head: bytes, stream: BinaryIO, size: int) -> None:
+    """Raises FormatError for numbers of records that the file is too small for: reading them would have no end."""
+    if head[:4] != b"LASF":
+        raise FormatError("not a LAS file: it does not start with 'LASF'")
+    if len(head) < 227:
+        raise FormatError("the file is truncated: it ends in its header")
+    length, start, records = struct.unpack_from("<HII", head, 94)
+    if not 227 <= length <= start <= size or length + records * 54 > start:
+        raise FormatError(f"the file is truncated, or its header is wrong: it has no room for {records} records")
+    if head[25] >= 4 and len(head) == HEAD:
+        first, count = struct.unpack_from("<QI", head, 235)
+        if count and first + count * 60 > size:
+            raise FormatError(f"the file is truncated, or its header is wrong: it has no room for {count} records")
+    if head[104] & 0xC0:
+        _check_chunks(stream, start, size)
+
+
+def _check_chunks(stream: BinaryIO, start: int, size: int) -> None:
+    """Raises FormatError where the table of a LAZ file's compressed pieces cannot be in the file."""
+    stream.seek(start)
+    (table,) = struct.unpack("<q", stream.read(8).ljust(8, b"\0"))
+    if table == -1:  # it was not known when the file was begun, and stands at the end
+        stream.seek(max(size - 8, 0))
+        (table,) = struct.unpack("<q", stream.read(8).ljust(8, b"\0"))
+    if not start < table <= size - 8:
+        raise FormatError("the file is truncated: its table of compressed pieces is missing")
+    stream.seek(table)
+    _, count = struct.unpack("<II", stream.read(8))
+    if count > size:
+        raise FormatError(f"the table of compressed pieces is wrong: the file has no room for {count} of them")

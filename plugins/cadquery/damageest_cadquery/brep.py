@@ -11,11 +11,14 @@ from pydantic import Field
 
 from damageest.artefacts import Part
 from damageest.errors import InputError
-from damageest.geometry.make_part import make_part
-from damageest.geometry.units import UnitOption, canonical_unit, unit_factor
+from damageest.geometry.make_part import SMALLEST, make_part
+from damageest.geometry.units import FARTHEST, UnitOption, canonical_unit, unit_factor
 from damageest.io.files import check_file, file_sha256, raise_environment_fault, shorten_error
 from damageest.stages import JobPath
 from damageest.stages.part import CadFace, ReadPart
+
+LEAST_CHORD = 1e-7
+"""Least chord in diagonals of the part: OpenCASCADE's own tolerance for a part of one metre is 1e-7."""
 
 
 class Brep(ReadPart):
@@ -49,7 +52,16 @@ class Brep(ReadPart):
             source = self.unit or model.unit or unit
             # the factor from OpenCASCADE's lengths to the job's unit
             scale = unit_factor(source, unit) / model.length
-            chord = self.chord or (tolerance / 8 if tolerance else 5e-5 * measure_diagonal(model.solids) * scale)
+            diagonal = measure_diagonal(model.solids) * scale
+            if not SMALLEST <= diagonal <= FARTHEST:
+                raise InputError(f"is {diagonal:g} {unit} across; export the part again")
+            chord = self.chord or (tolerance / 8 if tolerance else 5e-5 * diagonal)
+            if chord < LEAST_CHORD * diagonal:
+                raise InputError(
+                    f"part.chord, by default an eighth of the tolerance, is {chord:g} {unit}, too small for a part "
+                    f"that is {diagonal:.4g} {unit} across; give at least {LEAST_CHORD * diagonal:.2g}"
+                )
+            chord = min(chord, diagonal)
             mesh = tessellate(model.solids, chord / scale, self.angle, model.name_of)
         notes = list(model.notes)
         if canonical_unit(source) != canonical_unit(unit):

@@ -260,7 +260,7 @@ def test_what_is_no_scan_is_refused_with_the_reason(name, content, says, tmp_pat
 
 
 def test_missing_file_and_folder_are_named(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere\.ply: no such file"):
+    with pytest.raises(InputError, match=r"nowhere\.ply: there is no such file"):
         ScanFile(path=tmp_path / "nowhere.ply").run(unit="mm")
     with pytest.raises(InputError, match="is a folder"):
         ScanFile(path=tmp_path).run(unit="mm")
