@@ -159,7 +159,7 @@ class Deposit(Solid):
 
     ``cavity`` is the damage volume (DV) enlarged by the cut-back into intact metal, None without a cut-back;
     ``cut_back_volume`` the volume that this removes in addition. ``stock_volume``: what is above the nominal surface;
-    ``thickness``: its least, mean and largest height over the skin where stock was asked for, None without any;
+    ``thickness``: its least, mean and largest height over the skin where stock was asked for, None where none was;
     ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`, empty where the part has
     none. ``notes`` are warnings.
     """

@@ -1,4 +1,4 @@
-"""`damageest validate`: checks jobs without computing anything."""
+"""`damageest validate`: checks jobs without computing a result."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ def command(
     ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """Check jobs without computing, and list all errors with line and column."""
-    from damageest.errors import JobError
+    """Check jobs without computing a result, and list all errors with line and column. Where a job selects faces or
+    skin of the part, the part is read."""
+    from damageest.errors import InputError, JobError, StageError
     from damageest.job import load
+    from damageest.pipeline.selections import check_with_part
     from damageest.registry import Registry
 
     registry = Registry.discover()
@@ -26,10 +28,15 @@ def command(
     for path in jobs:
         try:
             job = load(path, registry, settings or [])
+            check_with_part(job, registry)
         except JobError as error:
             status = 2
             for line in error.lines():
                 typer.echo(line, err=True)
+            continue
+        except (InputError, StageError) as error:
+            status = error.exit_status if status < 2 else status
+            typer.echo(f"{path}: {error}", err=True)
             continue
         stages = ", ".join(f"{contract.stage} {stage.use}" for contract, stage in job.stages.items())
         typer.echo(f"{path}: valid; method {job.method}: {stages}")

@@ -11,12 +11,15 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 
 from damageest.artefacts import Floats, Ints, Part
 from damageest.errors import StageError, suggest
+from damageest.geometry.cutting import cut_triangles
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Mask = NDArray[np.bool_]
 Plane = tuple[Floats, float]
 """Unit normal (3,) and offset: points x with ``normal . x > offset`` are beyond it."""
 
+ON_PLANE = 1e-7
+"""Distance from a plane, in diagonals of the part, up to which a corner lies on it."""
 MAX_LISTED = 12
 """Largest number of valid names that an error lists."""
 
@@ -133,6 +136,23 @@ class Selector(StrictMapping):
             kinds = np.array([kind if kind in ("plane", "cylinder") else "other" for kind in part.face_kinds])
             selected &= (kinds == self.kind)[numbers[parents]]
         return selected
+
+    def chooses_skin(self) -> bool:
+        """Whether it selects skin, rather than a region of space."""
+        return True
+
+    def finds_skin(self, part: Part) -> bool:
+        """Whether it selects any of the part's skin. Raises StageError where the part has no such CAD face."""
+        parents = np.arange(len(part.faces))
+        flat = self.model_copy(update={"box": None, "half_space": None})
+        parents = parents[flat.matches(part.triangles.mean(axis=1), part.face_normals, parents, part)]
+        vertices, faces = part.vertices, part.faces[parents]
+        for normal, offset in self.planes(np.zeros(3)):
+            value = vertices @ normal - offset
+            near = np.abs(value) < ON_PLANE * part.diagonal
+            vertices, faces, kept, _ = cut_triangles(vertices, faces, np.where(near, 0.0, value))
+            parents = parents[kept]
+        return bool(self.matches(vertices[faces].mean(axis=1), part.face_normals[parents], parents, part).any())
 
 
 def _require_brep(part: Part, option: str) -> Ints:

@@ -65,15 +65,18 @@ class _Check:
     """By their place, the settings that replaced a value of the job."""
 
     def add_fault(self, message: str, *path: str | int) -> None:
+        self.faults.append(self.make_fault(message, *path))
+
+    def make_fault(self, message: str, *path: str | int) -> Fault:
+        """The fault of a value of the job, with its line and column, or the setting that it is from."""
         place: tuple[str | int, ...] = path
         settings = [text for where, text in self.overridden.items() if path[: len(where)] == where]
         if settings:
-            self.faults.append(Fault(message, ".".join(map(str, path)), source=f"--set {settings[-1]}"))
-            return
+            return Fault(message, ".".join(map(str, path)), source=f"--set {settings[-1]}")
         while place and place not in self.positions:
             place = place[:-1]
         line, column = self.positions.get(place, (1, 1) if self.positions else (0, 0))
-        self.faults.append(Fault(message, ".".join(map(str, path)), line, column))
+        return Fault(message, ".".join(map(str, path)), line, column)
 
     def add_faults(self, told: list[tuple[tuple[str | int, ...], str]]) -> None:
         """Notes faults found by pydantic; what an option with several valid kinds says of each is one fault."""
@@ -117,6 +120,7 @@ class _Check:
             sites=header.sites,
             accept=header.accept,
             given=self.given,
+            make_fault=self.make_fault,
         )
 
     def override(self, setting: str) -> None:

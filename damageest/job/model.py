@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt
 
+from damageest.errors import Fault
 from damageest.registry.contracts import DEFAULTS, SURFACE_ONLY, Contract
 from damageest.registry.registry import Implementation
 from damageest.stages import Stage
@@ -64,10 +65,15 @@ class Header(BaseModel):
     output: Path | None = Field(None, description="output folder; default: out/<name>, beside the job file")
 
 
+def _make_fault(message: str, *path: str | int) -> Fault:
+    return Fault(message, ".".join(map(str, path)))
+
+
 @dataclass(frozen=True)
 class Job:
     """A checked job. ``stages`` holds one implementation with its options for every contract, ``given`` the artefacts
-    that a Python caller handed in instead of files. ``tolerance`` None: from the scan's noise."""
+    that a Python caller handed in instead of files. ``tolerance`` None: from the scan's noise. ``make_fault`` makes the
+    fault of an option, with its line and column."""
 
     name: str
     units: str
@@ -80,6 +86,7 @@ class Job:
     sites: SiteChoice = field(default_factory=SiteChoice)
     accept: Literal["all"] | tuple[int, ...] = ()
     given: Mapping[Contract, Any] = field(default_factory=dict)
+    make_fault: Callable[..., Fault] = field(default=_make_fault, compare=False)
 
     def to_values(self, beside: Path) -> dict[str, Any]:
         """The job as plain values with every default, its paths relative to the folder ``beside``."""

@@ -9,6 +9,7 @@ from typing import Any
 from damageest.artefacts import Deposit, Floats, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_manifold, to_solid, unite
+from damageest.geometry.touching import separate_sheets
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, Step
 from damageest.pipeline.state import FoundSite, Work
@@ -54,14 +55,14 @@ def separate_deposits(engine: Engine, work: Work) -> Work:
         deposit = site.deposit
         if isinstance(deposit, Deposit):
             for earlier in done:
-                deposit = _subtract_earlier(deposit, earlier, site.damage)
+                deposit = _subtract_earlier(deposit, earlier, site.damage, work.job.tolerance)
             key = digest("separate", site.key("deposit"), [earlier.key("deposit") for earlier in done])
             site = site.with_value(FoundSite.deposit, deposit, key)
         done.append(site)
     return replace(work, sites=tuple(done))
 
 
-def _subtract_earlier(deposit: Deposit, earlier: FoundSite, damage: Solid) -> Deposit:
+def _subtract_earlier(deposit: Deposit, earlier: FoundSite, damage: Solid, tolerance: float) -> Deposit:
     """A deposit minus the one of an earlier site, for the same damage volume."""
     other = earlier.deposit or earlier.damage
     if (deposit.bounds[0] > other.bounds[1]).any() or (other.bounds[0] > deposit.bounds[1]).any():
@@ -74,7 +75,7 @@ def _subtract_earlier(deposit: Deposit, earlier: FoundSite, damage: Solid) -> De
     common = (body ^ taken).volume()
     if common <= SPECK * deposit.volume:
         return deposit
-    left = to_solid(body - taken, origin)
+    left = separate_sheets(body - taken, origin, tolerance)
     cavity, cut_back = deposit.cavity, deposit.cut_back_volume
     if cavity is not None:
         cavity = _shorten(cavity, taken, origin)

@@ -22,6 +22,7 @@ from damageest.pipeline.prepare import (
     place_scan,
     settle_tolerance,
 )
+from damageest.pipeline.selections import check_selections
 from damageest.pipeline.sites import (
     gather_sites,
     number_sites,
@@ -50,7 +51,7 @@ from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
-    ReadPart, ReadScan, crop_scan, measure_scan, Sample, Align, place_scan, correct_scan,
+    ReadPart, check_selections, ReadScan, crop_scan, measure_scan, Sample, Align, place_scan, correct_scan,
     settle_tolerance, Segment, check_intact, inspect_skin, fit_model, Cluster, find_surplus, gather_intact,
 )  # fmt: skip
 BY_SITE: Route = (

@@ -67,7 +67,7 @@ def damageest_writers() -> Mapping[str, Writer]:
     from damageest.stages.export.threemf import write_threemf
 
     return {
-        "stl": Writer(write_stl_bodies),
+        "stl": Writer(write_stl_bodies, single=True),
         "ply": Writer(write_ply_bodies),
-        "3mf": Writer(write_threemf, one_file=True),
+        "3mf": Writer(write_threemf, one_file=True, single=True),
     }

@@ -14,12 +14,15 @@ import typing
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
 
 from damageest.errors import PluginError
 from damageest.io.files import resolve_path
+
+if TYPE_CHECKING:
+    from damageest.geometry.selectors import Selector
 
 Given = TypeVar("Given")
 
@@ -60,6 +63,20 @@ class Stage(BaseModel):
     isolated: ClassVar[bool] = False
 
     use: str
+
+    def find_selectors(self) -> list[tuple[tuple[str | int, ...], Selector]]:
+        """The selectors of skin among the options, each with its place below the stage's name in a job."""
+        from damageest.geometry.selectors import Selector
+
+        def walk(value: Any, place: tuple[str | int, ...]) -> list[tuple[tuple[str | int, ...], Selector]]:
+            if isinstance(value, Selector):
+                return [(place, value)]
+            items: Any = value.items() if isinstance(value, Mapping) else ()
+            items = enumerate(value) if isinstance(value, (list, tuple)) else items
+            items = dict(value).items() if isinstance(value, BaseModel) else items
+            return [found for step, item in items for found in walk(item, (*place, step))]
+
+        return walk(self, ())
 
     @classmethod
     def takes(cls) -> Mapping[str, Any]:

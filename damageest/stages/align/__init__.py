@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from damageest.artefacts import Part, Pose, Samples, Scan
+from damageest.geometry.selectors import Selector
 from damageest.stages import Stage, asked_by_name
 
 
@@ -53,6 +54,12 @@ class Align(Stage, ABC):
 
     stage: ClassVar[str] = "align"
     gives: ClassVar[str] = "pose"
+
+    def find_selectors(self) -> list[tuple[tuple[str | int, ...], Selector]]:
+        """Those of an option `datum` as well, which may name CAD faces without a selector."""
+        bare = [(("datum", k), Selector(faces=(face,))) for k, face in enumerate(getattr(self, "datum", ()))
+                if isinstance(face, (int, str))]  # fmt: skip
+        return [*super().find_selectors(), *bare]
 
     @asked_by_name
     @abstractmethod

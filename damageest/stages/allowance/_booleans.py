@@ -6,14 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
-from damageest.artefacts import Floats, Solid
-
 SLACK = 1e-5
 """Largest accepted change of a solid's volume, as a share of it; a tenth of what the check of a deposit accepts."""
-SAME = 5e-7
-"""Distance, as a share of the largest coordinate, within which single precision makes two points one."""
 DUST = 1e-9
 """Share of the stock's volume below which a piece of it is a rounding error."""
 
@@ -55,43 +49,3 @@ def join(filled: Any, stock: Any) -> Any:
         if tried[-1][0] <= SLACK * expected:
             break
     return min(tried, key=lambda item: item[0])[1]
-
-
-def separate_sheets(body: Any, origin: Floats, by: float) -> Solid | None:
-    """A Manifold as a Solid that stays closed when a reader merges vertices at one place, in single precision too.
-
-    A Boolean operation may leave lines along which two sheets touch, each with its own vertices. Merged, the edges
-    there have four triangles. Such vertices are moved inward by ``by``; where that is not enough, finer details are
-    removed first. None where the Manifold is empty; not changed where nothing helps.
-    """
-    from damageest.geometry.rounding import round_to_single
-    from damageest.geometry.solids import to_solid
-
-    first = to_solid(body, origin)
-    for detail in (0.0, 0.01, 0.1, 1.0):
-        simple = body.simplify(detail * by) if detail else body
-        if abs(simple.volume() - body.volume()) > SLACK * abs(body.volume()):
-            continue
-        tried = to_solid(simple, origin)
-        for _ in range(3):
-            if tried is None:
-                break
-            if round_to_single(tried, mend=False) is not None:
-                return tried
-            tried = _move_inward(tried, by)
-    return first
-
-
-def _move_inward(body: Solid, by: float) -> Solid | None:
-    """The solid with coincident vertices moved inward by ``by``; None where the result is not a solid."""
-    from scipy.spatial import cKDTree
-
-    points = body.vertices
-    pairs = cKDTree(points).query_pairs(SAME * float(np.abs(points).max()), output_type="ndarray")
-    coincident = np.unique(pairs)
-    moved = points.copy()
-    moved[coincident] -= by * body.vertex_normals[coincident]
-    try:
-        return Solid(moved, body.faces)
-    except ValueError:
-        return None

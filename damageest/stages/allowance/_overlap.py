@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh, Part
+from damageest.geometry.cutting import cut_triangles
 from damageest.geometry.distance import closest_on_mesh, distance_to_edges
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.allowance._selectors import StockPlan
-from damageest.stages.allowance._skin import ON_PART, SkinFaces, clip, label_skin
+from damageest.stages.allowance._skin import ON_PART, SkinFaces, label_skin
 
 
 def grow_over_rim(
@@ -32,7 +33,7 @@ def grow_over_rim(
     vertices, faces = to_arrays(near)
     value = overlap - distance_to_edges(vertices, skin.vertices, rim)
     close = (value[faces] > 0).any(axis=1)
-    vertices, faces, _, inside = clip(vertices, faces[close], value)
+    vertices, faces, _, inside = cut_triangles(vertices, faces[close], value)
     faces = faces[inside]
     if not len(faces):
         return None

@@ -56,6 +56,10 @@ class KeepOut(Selector):
         """Whether it describes a solid, not skin."""
         return self.conditions() in ([], ["box"])
 
+    def chooses_skin(self) -> bool:
+        """Whether it selects skin that gets no stock."""
+        return not self.is_solid()
+
 
 @dataclass(frozen=True)
 class StockPlan:

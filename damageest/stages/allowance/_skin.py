@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh, Part
+from damageest.geometry.cutting import cut_triangles
 from damageest.geometry.distance import closest_on_mesh
 from damageest.stages.allowance._selectors import StockPlan
 
@@ -79,7 +80,8 @@ def label_skin(vertices: Floats, faces: Ints, part: Part, plan: StockPlan, origi
     faces, parent = faces[on], parent[on]
     for normal, offset in plan.planes(origin):
         value = vertices @ normal - offset
-        vertices, faces, kept, _ = clip(vertices, faces, np.where(np.abs(value) < ON_PART * part.diagonal, 0.0, value))
+        value = np.where(np.abs(value) < ON_PART * part.diagonal, 0.0, value)
+        vertices, faces, kept, _ = cut_triangles(vertices, faces, value)
         parent = parent[kept]
     normal = normalise(part.cross)[parent]
     middle = vertices[faces].mean(axis=1) + origin
@@ -100,46 +102,6 @@ def find_on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> t
     # the direction of a sliver is arbitrary, and gaps would remain without the slivers
     sliver = np.linalg.norm(cross, axis=1) < (100 * ON_PART * part.diagonal) ** 2
     return near & (sliver | (np.einsum("ij,ij->i", cross, part.cross[parent]) > 0)), parent
-
-
-def clip(vertices: Floats, faces: Ints, value: Floats) -> tuple[Floats, Ints, Ints, NDArray[np.bool_]]:
-    """Cuts triangles where a field ``value`` (V,), linear on each, changes its sign. Neighbours stay connected.
-
-    Returns:
-        Vertices, faces, the original face of each, and whether the field is positive on it.
-    """
-    sign = np.sign(value)[faces]
-    crossed = (sign.max(axis=1) > 0) & (sign.min(axis=1) < 0)
-    whole = np.flatnonzero(~crossed)
-    cut = np.flatnonzero(crossed)
-    touching = (sign[cut] == 0).any(axis=1)
-    # corners are rotated so that the one on the plane, or the only one on its side, comes first
-    lone = np.where(touching[:, None], sign[cut] == 0, sign[cut] == -np.sign(sign[cut].sum(axis=1))[:, None])
-    turn = (lone.argmax(axis=1)[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(faces[cut], turn, axis=1).T
-    first, last = np.where(touching, b, a), np.where(touching, c, b)
-    pairs = np.concatenate([np.stack([first, last], 1), np.stack([a, c], 1)[~touching]])
-    edges, number = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
-    low, high = edges.T
-    share = value[low] / np.where(value[low] == value[high], 1, value[low] - value[high])
-    fresh = vertices[low] + share[:, None] * (vertices[high] - vertices[low])
-    number = number.reshape(-1) + len(vertices)
-    p, q = number[: len(cut)], np.zeros(len(cut), np.int64)
-    q[~touching] = number[len(cut) :]
-    two, three = np.flatnonzero(touching), np.flatnonzero(~touching)
-    pieces = [
-        (whole, faces[whole]),
-        (cut[two], np.stack([a[two], b[two], p[two]], 1)),
-        (cut[two], np.stack([a[two], p[two], c[two]], 1)),
-        (cut[three], np.stack([a[three], p[three], q[three]], 1)),
-        (cut[three], np.stack([p[three], b[three], c[three]], 1)),
-        (cut[three], np.stack([p[three], c[three], q[three]], 1)),
-    ]
-    parent = np.concatenate([owner for owner, _ in pieces])
-    out = np.concatenate([part for _, part in pieces])
-    all_values = np.concatenate([value, np.zeros(len(fresh))])
-    positive = all_values[out].sum(axis=1) > 0
-    return np.concatenate([vertices, fresh]), out, parent, positive
 
 
 def normalise(vectors: Floats) -> Floats:

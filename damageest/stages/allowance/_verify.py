@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_edges, distance_to_mesh, is_inside
+from damageest.geometry.rays import RayCaster
 from damageest.geometry.selectors import Mask
 from damageest.geometry.solids import to_arrays
 from damageest.stages.allowance._limits import StockConflict
@@ -50,7 +51,8 @@ class DepositGeometry:
 def check_deposit(
     work: DepositGeometry, part: Part, tolerance: float, conflicts: Sequence[StockConflict]
 ) -> tuple[float, float, float] | None:
-    """The smallest, mean and largest thickness of the stock; None where the job asks for none.
+    """The smallest, mean and largest thickness of the stock; None where the job asks for none. Where walls or regions
+    to keep free end the stock everywhere, the thickness up to them.
 
     ``conflicts``: places without room, where the stock may be thinner. Raises StageError with the measured value where
     the deposit does not keep a guarantee.
@@ -79,26 +81,33 @@ def check_deposit(
             f"the thickness of the stock is wrong on {wrong.mean():.1%} of the skin, by up to {worst:.3g}",
             "use a larger tolerance, or a smaller outer",
         )
+    away = 10 * ON_PART * part.diagonal
     # at the border a ray along the normal may leave through the side wall; that is not the thickness
     rims = tall.find_border_edges()
     inner = np.ones(len(found.thick), bool)
     if len(rims):
         inner = distance_to_edges(found.points, tall.vertices, rims) > tolerance / 2
     own = found.thick[inner & ~found.ended & ~found.covered]
-    return (float(own.min()), float(own.mean()), float(own.max())) if len(own) else None
+    if not len(own):  # nowhere its full height: what there is of it, up to the opposite wall
+        own = np.minimum(found.along, found.height)
+        first, _ = RayCaster(part).find_first(found.points + work.origin + away * found.normal, found.normal)
+        own = np.minimum(own, first + away)
+    return float(own.min()), float(own.mean()), float(own.max())
 
 
 @dataclass(frozen=True, eq=False)
 class Thickness:
     """The measured thickness of the stock at sampled points of skin.
 
-    ``points``: (N,3). ``height``: (N,) that the job asks for. ``thick``: (N,) measured along the normal; where the
-    point is ``covered`` (N,) by the stock of other skin, as in a concave corner, distance from the top of the stock to
-    the nearest skin. ``ended``: (N,) whether the stock ends at metal, at a region to keep free, or at a place without
-    room.
+    ``points``: (N,3), with the ``normal`` (N,3). ``along``: (N,) from there to where the deposit ends along it.
+    ``height``: (N,) that the job asks for. ``thick``: (N,) measured along the normal; where the point is ``covered``
+    (N,) by the stock of other skin, as in a concave corner, distance from the top of the stock to the nearest skin.
+    ``ended``: (N,) whether the stock ends at metal, at a region to keep free, or at a place without room.
     """
 
     points: Floats
+    normal: Floats
+    along: Floats
     height: Floats
     thick: Floats
     covered: Mask
@@ -136,7 +145,7 @@ def measure_thickness(
     for conflict in conflicts:
         away = np.asarray(cKDTree(conflict.points - work.origin).query(points, workers=2)[0])
         ended |= away <= 2 * height
-    return Thickness(points, height, np.where(covered, nearest, far), covered, ended)
+    return Thickness(points, normal, far, height, np.where(covered, nearest, far), covered, ended)
 
 
 def find_stray_stock(work: DepositGeometry, part: Part, tolerance: float) -> tuple[float, Floats]:

@@ -14,8 +14,6 @@ from damageest.stages.allowance._selectors import KeepOut, StockPlan, StockTarge
 
 MAX_DUST = 1e-6
 """Share of the stock's volume up to which an overlap is left: it is a rounding error."""
-SHEET_GAP = 1e-3
-"""Distance, in tolerances, by which sheets that touch are separated."""
 
 
 class Milling(Allowance):
@@ -64,7 +62,8 @@ class Milling(Allowance):
         from manifold3d import Manifold
 
         from damageest.geometry.solids import subtract_lost, to_manifold
-        from damageest.stages.allowance._booleans import join, keep_touching, separate_sheets, simplify_exactly
+        from damageest.geometry.touching import separate_sheets
+        from damageest.stages.allowance._booleans import join, keep_touching, simplify_exactly
         from damageest.stages.allowance._cut_back import cut_back
         from damageest.stages.allowance._keep_out import build_keep_out
         from damageest.stages.allowance._limits import find_stock_conflict
@@ -99,14 +98,11 @@ class Milling(Allowance):
         thickness = check_deposit(
             DepositGeometry(deposit, hole, left, barred, skin, band, origin), part, tolerance, conflicts
         )
-        body = separate_sheets(deposit, origin, SHEET_GAP * tolerance)
+        body = separate_sheets(deposit, origin, tolerance)
         if body is None:
             raise StageError("the deposit is empty", "use a slightly different outer")
         notes = [f"{conflict}; clipped there" for conflict in conflicts[:1]]
-        if thickness is None:
-            notes.append(
-                "the options ask for no stock on the skin of this damage: the deposit ends at the nominal surface"
-            )
+        notes += _describe_stock(thickness, skins)
         return Deposit(
             body.vertices,
             body.faces,
@@ -117,6 +113,19 @@ class Milling(Allowance):
             touched=() if part.faces_brep is None else _find_touched(part, skins),
             notes=tuple(notes),
         )
+
+
+def _describe_stock(thickness: tuple[float, float, float] | None, skins: list[Any]) -> list[str]:
+    """What to say of stock that is nowhere as high as the options ask for."""
+    if thickness is None:
+        return ["the options ask for no stock on the skin of this damage: the deposit ends at the nominal surface"]
+    least = min(float(each.height[each.height > 0].min(initial=np.inf)) for each in skins)
+    if thickness[2] >= least * (1 - 1e-6):
+        return []
+    if thickness[2] <= 1e-6 * least:
+        return ["the options ask for stock, but keep_out or metal leaves no room for any of it"]
+    text = f"the stock is nowhere as high as the options ask for: at most {thickness[2]:.4g} of {least:.4g}"
+    return [f"{text}; metal, other stock or keep_out ends it"]
 
 
 def _find_touched(part: Part, skins: list[Any]) -> tuple[int, ...]:

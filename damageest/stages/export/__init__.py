@@ -114,6 +114,8 @@ class Writer:
     gets simplified solids, because each facet makes the file much larger. ``patch``: writes a spline, with the
     arguments ``path, name, patch, unit``; None where the format cannot hold one. ``exact``: writes solids whose outer
     faces are those of the part's CAD file; None where the format has only facets.
+    ``single``: whether readers round coordinates to single precision; it then gets solids that this does not open, with
+    the same triangles in each frame.
     """
 
     write: WriteFunction
@@ -121,6 +123,7 @@ class Writer:
     simplify: bool = False
     patch: Callable[[Path, str, Patch, str], None] | None = None
     exact: ExactFunction | None = None
+    single: bool = False
 
 
 class Export(Stage, ABC):

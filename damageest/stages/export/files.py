@@ -13,6 +13,7 @@ from pydantic import AfterValidator, Field
 
 from damageest.artefacts import Floats, Scan, Solid
 from damageest.geometry.simplification import simplify_within
+from damageest.geometry.touching import separate_touching
 from damageest.geometry.transforms import invert_pose, move_mesh, move_points
 from damageest.io.meshes import write_ply, write_points
 from damageest.stages.export import Body, Export, ExportedFiles, Patch, Writer
@@ -70,6 +71,7 @@ class Files(Export):
         bodies, coarse = _collect_bodies(result), {}
         if detail and any(writers[name].simplify for name in self.format):
             coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}
+        rounded = {stem: replace(body, solid=_keep_closed(body.solid, result)) for stem, body in bodies.items()}
         done: list[ExportedFiles] = []
         chosen_places = {"part": [""], "scan": ["scan_frame/"], "both": ["", "scan_frame/"]}[self.frame]
         places = {place: invert_pose(result.pose) if place else None for place in chosen_places}
@@ -77,7 +79,7 @@ class Files(Export):
         done.append(ready)
         for place, T in places.items():
             for name in self.format:
-                chosen = coarse if coarse and writers[name].simplify else bodies
+                chosen = coarse if coarse and writers[name].simplify else rounded if writers[name].single else bodies
                 left = {stem: body for stem, body in chosen.items() if f"{place}{stem}.{name}" not in ready.files}
                 done += _write_solids(writers[name], folder, place, left, T, result.units)
             done += self._write_surfaces(result, folder, place, T)
@@ -153,6 +155,14 @@ def _collect_bodies(result: Result) -> dict[str, Body]:
     for item in result.surplus:
         found.append((f"surplus/site-{item.id}", f"surplus site-{item.id}", item.solid, SURPLUS))
     return {stem: Body(name, solid, colour) for stem, name, solid, colour in found if solid is not None}
+
+
+def _keep_closed(solid: Solid, result: Result) -> Solid:
+    """The solid, closed when single precision merges vertices in any of the two frames, with the same triangles."""
+    moved = move_mesh(solid, invert_pose(result.pose))
+    largest = max(float(np.abs(each.bounds).max()) for each in (solid, moved))
+    radius = 2 * float(np.spacing(np.float32(largest)))
+    return separate_touching(solid, radius, 10 * radius) or solid
 
 
 def _write_solids(

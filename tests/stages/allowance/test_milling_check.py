@@ -13,7 +13,7 @@ from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays
 from damageest.stages.allowance._booleans import join, keep_touching, simplify_exactly
 from damageest.stages.allowance._selectors import StockPlan, StockTarget
-from damageest.stages.allowance._skin import clip, take_skin
+from damageest.stages.allowance._skin import take_skin
 from damageest.stages.allowance._verify import DepositGeometry, check_deposit
 from tests.stages.allowance.shapes import TOLERANCE, block, part_of
 
@@ -76,24 +76,3 @@ def test_a_union_adds_up() -> None:
     whole = simplify_exactly(join(BITE, slab(1.0, -0.01)), 30.0)
     assert whole.volume() == pytest.approx(8 * 6 * 5)
     assert whole.num_tri() == 12
-
-
-def test_skin_is_cut_without_gaps() -> None:
-    """Into halves of the right area, whose common border has the same vertices."""
-    rng = np.random.default_rng(3)
-    ball = Manifold.sphere(1, 40)
-    vertices, faces = to_arrays(ball)
-    normal = rng.normal(size=3)
-    value = vertices @ (normal / np.linalg.norm(normal)) - 0.21
-    value[np.abs(value) < 0.02] = 0  # some of the vertices on the plane
-    cut_vertices, cut_faces, parent, positive = clip(vertices, faces, value)
-    corners = cut_vertices[cut_faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    before = vertices[faces]
-    whole = np.linalg.norm(np.cross(before[:, 1] - before[:, 0], before[:, 2] - before[:, 0]), axis=1)
-    assert np.bincount(parent, area, len(faces)) == pytest.approx(whole)
-    edges = np.sort(np.concatenate([cut_faces[:, [0, 1]], cut_faces[:, [1, 2]], cut_faces[:, [2, 0]]]), axis=1)
-    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
-    middle = np.concatenate([value, np.zeros(len(cut_vertices) - len(value))])[cut_faces]
-    assert (middle[positive] >= 0).all()
-    assert (middle[~positive] <= 0).all()

@@ -306,6 +306,42 @@ def test_options_that_are_wrong(chosen: dict[str, Any], message: str) -> None:
         Milling.model_validate(chosen)
 
 
+def test_stock_that_is_clipped_everywhere_has_the_thickness_of_the_room() -> None:
+    """Both gaps beside the middle tooth are 3 wide and get filled."""
+    tool = Manifold.cube((4, 6, 5)).translate((7, 4, 9))
+    flanks = [{"facing": {"direction": [k, 0, 0], "angle": 20}, "outer": 3.5} for k in (-1, 1)]
+    deposit = run(comb(3.0), tool, targets=flanks, crowded="clip")
+    assert deposit.stock_volume == pytest.approx(2 * 3 * 6 * 4, rel=1e-3)
+    assert deposit.thickness == pytest.approx((3, 3, 3), abs=1e-3)
+    assert "nowhere as high as the options ask for: at most 3 of 3.5" in deposit.notes[1]
+    assert not any("ask for no stock" in note for note in deposit.notes)
+
+
+def test_a_bore_that_stock_closes_is_filled_to_its_axis() -> None:
+    tool = Manifold.cylinder(6, 8, 8, 64).translate((15, 10, 8))
+    inward = {"half_space": {"point": [0, 0, 11.9], "normal": [0, 0, -1]}, "outer": 5.5}
+    deposit = run(bored(), tool, targets=[inward], crowded="clip")
+    assert deposit.stock_volume == pytest.approx(np.pi * 5**2 * 3.9, rel=0.01)
+    assert deposit.thickness == pytest.approx((5.5, 5.5, 5.5), rel=0.01)
+    assert "ask for no stock" not in " ".join(deposit.notes)
+
+
+def test_stock_between_two_damaged_walls_is_no_thicker_than_the_gap() -> None:
+    flanks = [{"facing": {"direction": [k, 0, 0], "angle": 20}, "outer": 3.5} for k in (-1, 1)]
+    tool = Manifold.cube((2, 6, 4)).translate((3, 4, 9)) + Manifold.cube((2, 6, 4)).translate((6, 4, 9))
+    deposit = run(comb(3.0), tool, targets=flanks, crowded="clip")
+    assert deposit.thickness is not None
+    assert deposit.thickness[2] == pytest.approx(3, abs=1e-3)
+
+
+def test_stock_without_any_room_says_so() -> None:
+    top = {"targets": [{"facing": {"direction": [0, 0, 1]}, "outer": 1}]}
+    deposit = run(block(), CHIP, **top, keep_out=[{"box": [[-9, -9, 12], [99, 99, 99]]}])
+    assert deposit.stock_volume == pytest.approx(0, abs=1e-6)
+    assert deposit.thickness == (0, 0, 0)
+    assert deposit.notes == ("the options ask for stock, but keep_out or metal leaves no room for any of it",)
+
+
 def test_no_stock_at_all_is_noted() -> None:
     deposit = run(block(), CHIP)
     assert deposit.volume == pytest.approx(120)

@@ -111,11 +111,24 @@ def test_the_same_result_gives_the_same_bytes(result, tmp_path):
         assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes()
 
 
+def touching_cubes(at: float) -> Solid:
+    """Two that share an edge, with vertices of their own."""
+    other = trimesh.creation.box((2, 2, 2)).apply_translation((2, 2, 0))
+    cubes = trimesh.util.concatenate([trimesh.creation.box((2, 2, 2)), other])
+    return Solid(cubes.vertices + at, cubes.faces)
+
+
+def test_a_solid_that_touches_itself_stays_closed(result, tmp_path):
+    result.damage = touching_cubes(0)
+    files = write(result, tmp_path)
+    assert "damage.ply" not in files
+    mesh = trimesh.load_mesh(tmp_path / "damage.stl")  # merges vertices
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(16, rel=1e-5)
+
+
 def test_a_solid_that_single_precision_would_open_comes_as_ply_too(result, tmp_path):
-    cubes = trimesh.util.concatenate(
-        [trimesh.creation.box((2, 2, 2)), trimesh.creation.box((2, 2, 2)).apply_translation((2, 2, 0))]
-    )
-    result.damage = Solid(cubes.vertices, cubes.faces)  # they share an edge, with vertices of their own
+    result.damage = touching_cubes(2e4)  # so far away that sheets cannot be moved apart without changing the volume
     files = write(result, tmp_path)
     assert {"damage.ply", "damage.stl"} <= set(files)
     vertices, faces, _ = read_mesh(tmp_path / "damage.ply")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from damageest.artefacts import Solid
 from damageest.errors import JobError
+from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.geometry.units import MILLIMETRES
 from damageest.job import load
 from damageest.registry import Registry
@@ -122,6 +125,31 @@ def test_the_scans_frame_holds_the_same_solids_where_the_scanner_saw_them(tmp_pa
             np.testing.assert_allclose(back, part.vertices, atol=1e-9 if name.endswith(".ply") else 1e-4)
     points = trimesh.load(tmp_path / "scan_frame/scan.ply").vertices
     np.testing.assert_array_equal(points, result.scan.points)
+
+
+def test_both_frames_hold_the_same_triangles(tmp_path: Path, registry: Registry) -> None:
+    """Also where single precision makes points one in only one of the frames: some are 1e-6 of their place apart."""
+    result = results.make()
+    fine = to_manifold(result.sites[1].deposit).refine(3)
+    points, faces = to_arrays(fine)
+    rng = np.random.default_rng(2)
+    near = rng.choice(len(points), 60, replace=False)
+    ends = faces[np.array([np.flatnonzero((faces == k).any(axis=1))[0] for k in near])]
+    other = ends[ends != near[:, None]].reshape(-1, 2)[:, 0]
+    points[near] = points[other] + rng.normal(size=(60, 3)) * np.geomspace(1e-9, 3e-4, 60)[:, None]
+    sites = (result.sites[0], replace(result.sites[1], deposit=Solid(points, faces)))
+    write(replace(result, sites=sites), tmp_path, registry, format=["stl", "3mf"], frame="both")
+    T = result.pose.T_part_scan
+    for name in ("deposit/site-2.stl", "result.3mf"):
+        part, there = (trimesh.load(tmp_path / place / name, process=False) for place in ("", "scan_frame"))
+        if name == "result.3mf":
+            part, there = (scene.geometry["deposit site-2"] for scene in (part, there))
+            np.testing.assert_array_equal(part.faces, there.faces)
+        np.testing.assert_allclose(trimesh.transform_points(there.triangles.reshape(-1, 3), T),
+                                   part.triangles.reshape(-1, 3), atol=1e-4)  # fmt: skip
+        for mesh in (part, there):
+            mesh.merge_vertices()
+            assert mesh.is_watertight
 
 
 def test_the_scans_frame_alone(tmp_path: Path, registry: Registry) -> None:
