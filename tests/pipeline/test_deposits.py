@@ -137,7 +137,7 @@ def lane(number: int, x: float, radius: float, grown: float, cavity: float = 0.0
 
 def separate(lanes: list[FoundSite]) -> list[Any]:
     """The deposits of the sites, separated."""
-    work = separate_deposits(engine(), Work(JobState(), sites=tuple(lanes)))
+    work = separate_deposits(engine(), Work(JobState().with_value(JobState.tolerance, 0.1, "0.1"), sites=tuple(lanes)))
     return [site.deposit for site in work.sites]
 
 
