@@ -8,19 +8,21 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from damageest.api import run as run
+    from damageest.batches.run import batch as batch
     from damageest.job import Job as Job
     from damageest.registry import Registry as Registry
     from damageest.registry.hookspecs import hookimpl as hookimpl
     from damageest.result import Result as Result
 
 _PUBLIC = {
+    "batch": "damageest.batches.run",
     "run": "damageest.api",
     "hookimpl": "damageest.registry.hookspecs",
     "Job": "damageest.job",
     "Registry": "damageest.registry",
     "Result": "damageest.result",
 }
-__all__ = ["Job", "Registry", "Result", "__version__", "hookimpl", "run"]
+__all__ = ["Job", "Registry", "Result", "__version__", "batch", "hookimpl", "run"]
 
 
 def __getattr__(name: str) -> Any:

@@ -22,11 +22,6 @@ from damageest.isolation import serve
 from damageest.isolation.limits import Limits, format_bytes, measure_free_memory, own_memory
 from damageest.isolation.transfer import receive, send
 
-
-class ProcessError(StageError):
-    """The process of an isolated call crashed or exited, took too long, or needed too much memory."""
-
-
 T = TypeVar("T")
 START_SECONDS = 120.0
 """Longest time from the start of a worker until it answers."""
@@ -48,6 +43,17 @@ _workers_lock = threading.Lock()
 _cpu_seconds = 0.0
 
 
+class ProcessError(StageError):
+    """A call in a worker that gave no value. ``why``: "time", "memory", "crash", or "exit" for sys.exit."""
+
+    def __init__(self, why: str, message: str, remedy: str = "") -> None:
+        self.why = why
+        super().__init__(message, remedy)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ProcessError, (self.why, self.message, self.remedy), vars(self)
+
+
 class RemoteTraceback(Exception):  # noqa: N818  (no error of its own: the cause of one, for --debug)
     """The traceback, or the output, of the process where an error arose."""
 
@@ -62,15 +68,16 @@ def call_isolated(
     worker: str = "",
     owner: str = "",
     limits: Limits | None = None,
+    show: bool = True,
 ) -> T:
     """``function(**arguments)`` in a worker process, which stays for the next call with the same name ``worker``.
 
     Function, arguments and result have to be picklable, the function by its name in a module that can be imported.
     Arrays go through shared memory; those that the function gets stay read-only where they were. An exception of the
     function is raised here as well, with its traceback as cause. ``owner``: whose code it is, as "damageest-open3d
-    0.1", for messages.
+    0.1", for messages. ``show``: what the function prints goes to the error stream of this process when the call ends.
 
-    Raises StageError where the process crashes or exits, or passes a limit.
+    Raises StageError, most often ProcessError, where the process crashes or exits, or passes a limit.
     """
     limits = limits or Limits()
     if serve.is_worker:
@@ -80,7 +87,7 @@ def call_isolated(
         found = _workers.get(key)
         if found is None:
             found = _workers[key] = _Worker()
-    result: T = found.call(function, arguments, limits, owner)
+    result: T = found.call(function, arguments, limits, owner, show)
     return result
 
 
@@ -89,13 +96,13 @@ def cpu_seconds() -> float:
     return time.process_time() + _cpu_seconds
 
 
-def end_workers() -> None:
-    """Ends all worker processes. The next call starts a new one."""
+def end_workers(beginning: str = "") -> None:
+    """Ends the worker processes whose names begin with this, also in the middle of a call; by default all. The next
+    call starts a new one."""
     with _workers_lock:
-        for (process_id, _), worker in _workers.items():
-            if process_id == os.getpid():
-                worker.kill()
-        _workers.clear()
+        for (process_id, name), worker in _workers.items():
+            if process_id == os.getpid() and name.startswith(beginning):
+                worker.interrupt()
 
 
 atexit.register(end_workers)
@@ -109,7 +116,9 @@ class _Worker:
         self._process: subprocess.Popen[bytes] | None = None
         self._output = bytearray()
 
-    def call(self, function: Callable[..., Any], arguments: Mapping[str, Any], limits: Limits, owner: str) -> Any:
+    def call(
+        self, function: Callable[..., Any], arguments: Mapping[str, Any], limits: Limits, owner: str, show: bool
+    ) -> Any:
         with self._lock:
             memory = _share_memory(limits, owner)
             if self._process is None or self._process.poll() is not None:
@@ -125,7 +134,9 @@ class _Worker:
                 raise
             if kind in ("exit", "memory"):
                 self.kill()  # what it had allocated may still be there
-            self._show_output()
+            output = self._take_output()
+            if show and output:
+                sys.stderr.write(output)
         return _unpack(kind, value, memory, limits, owner)
 
     def _start(self) -> None:
@@ -180,6 +191,12 @@ class _Worker:
             if left <= 0:
                 raise _Ended(late=True)
 
+    def interrupt(self) -> None:
+        """Ends the process from any thread; a call that waits for it then raises."""
+        if self._process is not None and self._process.poll() is None:
+            with contextlib.suppress(OSError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+
     def kill(self) -> None:
         """Ends the process and what it started."""
         if self._process is not None:
@@ -217,10 +234,6 @@ class _Worker:
         self._output.clear()
         return text
 
-    def _show_output(self) -> None:
-        if text := self._take_output():
-            sys.stderr.write(text)
-
 
 class _Ended(Exception):  # noqa: N818
     """The worker gives no answer: it has ended, or it is ``late``."""
@@ -252,7 +265,7 @@ def _unpack(kind: str, value: Any, memory: int | None, limits: Limits, owner: st
     if kind == "value":
         return value
     if kind == "exit":
-        raise ProcessError(f"called sys.exit({value}), which would end the run", _blame(owner))
+        raise ProcessError("exit", f"called sys.exit({value}), which would end the run", _blame(owner))
     if kind == "memory":
         raise _describe_memory(memory, limits)
     packed, name, text, trace = value
@@ -264,6 +277,7 @@ def _describe_end(status: int | None, output: str, memory: int | None, limits: L
     """The error for a process that gave no answer. ``status``: as of subprocess, None where it took too long."""
     if status is None:
         error = ProcessError(
+            "time",
             f"was ended: not finished after {limits.seconds:g} s, the time limit of a stage",
             f"a longer --stage-timeout, or {_blame(owner)}",
         )
@@ -271,14 +285,16 @@ def _describe_end(status: int | None, output: str, memory: int | None, limits: L
         error = _describe_memory(memory, limits)
     elif status == -signal.SIGKILL:
         error = ProcessError(
+            "crash",
             "its process was killed (SIGKILL), as the system does where memory runs out",
             "a larger tolerance, fewer scan points, or a --memory that the machine has",
         )
     elif status < 0:
         name = signal.Signals(-status).name
-        error = ProcessError(f"its process ended by {_SIGNALS.get(-status, 'a signal')} ({name})", _blame(owner))
+        what = f"its process ended by {_SIGNALS.get(-status, 'a signal')} ({name})"
+        error = ProcessError("crash", what, _blame(owner))
     else:
-        error = ProcessError(f"ended its process with exit status {status}", _blame(owner))
+        error = ProcessError("crash", f"ended its process with exit status {status}", _blame(owner))
     error.__cause__ = RemoteTraceback(output) if output else None
     return error
 
@@ -288,7 +304,7 @@ def _describe_memory(memory: int | None, limits: Limits) -> ProcessError:
     if memory is not None:
         most += "that --memory leaves it" if limits.memory is not None else "that were free"
     larger = "a larger --memory" if limits.memory is not None else "a machine with more memory"
-    return ProcessError(f"needed more memory{most}", f"a larger tolerance, fewer scan points, or {larger}")
+    return ProcessError("memory", f"needed more memory{most}", f"a larger tolerance, fewer scan points, or {larger}")
 
 
 def _blame(owner: str) -> str:

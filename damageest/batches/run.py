@@ -1,0 +1,186 @@
+"""`damageest.batch`: many jobs at once, each a row."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import uuid
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from damageest.batches.cluster import count_cores, open_client, require_dask
+from damageest.batches.files import write_page, write_tables
+from damageest.batches.jobs import BatchJob, find_jobs
+from damageest.batches.rows import Row, read_row
+from damageest.batches.work import compute_key, load_job, release, work
+from damageest.errors import DamageestError, Fault, JobError
+from damageest.io.files import expand_home
+from damageest.isolation import measure_free_memory
+from damageest.isolation.limits import STAGE_SECONDS
+
+TIMEOUT = 3600.0
+"""Default time limit of a job, in seconds."""
+TRIES = 2
+"""How many workers a job is given to, one after the other, where they die."""
+POLL = 0.5
+"""Seconds between two looks at a running batch."""
+
+Tell = Callable[[Sequence[BatchJob], Mapping[str, Row], set[str]], None]
+"""Called with all jobs, the rows that there are by name, and the names of those that run now."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How the jobs of a batch run. ``memory``: bytes for each job, ``timeout``: seconds for each, 0 for no limit."""
+
+    memory: int | None = None
+    timeout: float = TIMEOUT
+    stage_timeout: float = STAGE_SECONDS
+    cache: bool = True
+
+
+def batch(
+    jobs: str | Path | Iterable[str | Path],
+    *,
+    client: Any = None,
+    workers: int | None = None,
+    scheduler: str = "",
+    output: str | Path = "out/batch",
+    settings: Sequence[str] = (),
+    options: Options | None = None,
+    tell: Tell | None = None,
+) -> list[Row]:
+    """Runs many jobs and gives a row for each, in the order of the jobs. No job ends the batch.
+
+    ``jobs``: job files, folders, globs; a file with a ``matrix`` is a job for each combination of its values. Results
+    go to ``output/<name>``, the table to ``output/batch.csv``, ``.json`` and ``.html``. ``client``: a
+    ``distributed.Client``; without one, ``scheduler`` is the address of a cluster, and without that, ``workers`` local
+    processes are started (default: as many as there are cores). A script that starts local ones needs
+    ``if __name__ == "__main__":``. A cluster has to see the files under the same paths, and have damageest installed.
+
+    Jobs with a result from an earlier call, of which neither the job nor a file nor the code has changed, do not run
+    again. Raises JobError where there are no jobs, InputError where no scheduler answers.
+    """
+    require_dask()
+    words = [jobs] if isinstance(jobs, (str, Path)) else list(jobs)
+    found, folder = find_jobs(words, settings), expand_home(Path(output)).absolute()
+    if not found:
+        raise JobError([Fault("give at least one job file, folder or glob")], "batch")
+    options = options or Options()
+    rows = _find_done(found, folder) if options.cache else {}
+    rows |= {job.name: _row(job, folder, outcome="refused", error=job.fault) for job in found if job.fault}
+    waiting = [job for job in found if job.name not in rows]
+    with contextlib.ExitStack() as stack:
+        stack.callback(lambda: write_page(_in_order(found, rows), folder))
+        write_tables(_in_order(found, rows), folder)
+        if waiting and client is None:
+            count = min(workers or count_cores(), len(waiting))
+            if options.memory is None and not scheduler:
+                free = measure_free_memory()
+                options = replace(options, memory=None if free is None else free // count)
+            client = stack.enter_context(open_client(scheduler, count))
+        if waiting:
+            _run(client, waiting, folder, options, rows, lambda active: _report(found, rows, active, folder, tell))
+    return _in_order(found, rows)
+
+
+def _report(
+    jobs: Sequence[BatchJob], rows: Mapping[str, Row], active: set[str], folder: Path, tell: Tell | None
+) -> None:
+    write_tables(_in_order(jobs, rows), folder)
+    if tell:
+        tell(jobs, rows, active)
+
+
+def _in_order(jobs: Sequence[BatchJob], rows: Mapping[str, Row]) -> list[Row]:
+    return [rows[job.name] for job in jobs if job.name in rows]
+
+
+def _row(job: BatchJob, folder: Path, **values: Any) -> Row:
+    return Row(job.name, job.path, str(folder / job.name), settings=job.settings, **values)
+
+
+def _run(
+    client: Any,
+    jobs: Sequence[BatchJob],
+    folder: Path,
+    options: Options,
+    rows: dict[str, Row],
+    report: Callable[[set[str]], None],
+) -> None:
+    """Adds a row for each job. Where it is interrupted, what runs is ended."""
+    token = f"damageest-{uuid.uuid4().hex[:8]}"
+    tries = dict.fromkeys((job.name for job in jobs), 1)
+    places = {job.name: (number, job) for number, job in enumerate(jobs)}
+
+    def submit(name: str) -> Any:
+        number, job = places[name]
+        task = {"name": name, "job": job.path, "settings": list(job.settings), "output": str(folder / name)}
+        task |= {"batch": token, **vars(options)}
+        return client.submit(work, task, key=f"{token}-{name}-{tries[name]}", priority=-number, pure=False)
+
+    futures = {submit(name): name for name in places}
+    try:
+        while futures:
+            for future in _wait(list(futures)):
+                name = futures.pop(future)
+                if future.status == "finished":
+                    rows[name] = replace(read_row(future.result()), tries=tries[name])
+                elif future.status == "error" and tries[name] < TRIES:  # work() raises nothing: the worker died
+                    tries[name] += 1
+                    futures[submit(name)] = name
+                    continue
+                else:
+                    why = f"{tries[name]} workers died with it" if future.status == "error" else "the cluster ended"
+                    rows[name] = _row(places[name][1], folder, outcome="lost", error=why, tries=tries[name])
+                future.release()
+            report(_find_active(client, futures))
+    finally:
+        with contextlib.suppress(Exception):  # a cluster that has ended
+            if futures:
+                client.cancel(list(futures), force=True)
+            client.run(release, token)
+
+
+def _wait(futures: list[Any]) -> list[Any]:
+    """The futures that are done, after at most `POLL` seconds."""
+    from distributed import wait
+
+    with contextlib.suppress(TimeoutError):
+        wait(futures, timeout=POLL, return_when="FIRST_COMPLETED")
+    return [future for future in futures if future.done()]
+
+
+def _find_active(client: Any, futures: Mapping[Any, str]) -> set[str]:
+    """The names of the jobs that a worker has."""
+    names = {future.key: name for future, name in futures.items()}
+    try:
+        held = client.processing()
+    except (OSError, TimeoutError):
+        return set()
+    return {names[key] for keys in held.values() for key in keys if key in names}
+
+
+def _find_done(jobs: Sequence[BatchJob], folder: Path) -> dict[str, Row]:
+    """The rows of an earlier batch that stand: with a result that is there, of the same job, files and code."""
+    try:
+        stored = [read_row(values) for values in json.loads((folder / "batch.json").read_text())["jobs"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+    known = {row.name: row for row in stored if row.has_result and (Path(row.output) / "result.json").is_file()}
+    if not known:
+        return {}
+    from damageest.registry import Registry
+
+    registry = Registry.discover()
+    done: dict[str, Row] = {}
+    for job in jobs:
+        row = known.get(job.name)
+        if row is None or job.fault or row.output != str(folder / job.name):
+            continue
+        with contextlib.suppress(DamageestError, OSError):  # it is a row again when it runs
+            if compute_key(load_job(job.path, job.settings, registry), registry) == row.key:
+                done[job.name] = replace(row, job=job.path, settings=job.settings)
+    return done
