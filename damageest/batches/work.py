@@ -16,7 +16,7 @@ from typing import Any
 from damageest.batches.jobs import MATRIX
 from damageest.batches.rows import describe_result
 from damageest.errors import DamageestError, StageError
-from damageest.isolation import ProcessError, Limits, call_isolated, end_workers
+from damageest.isolation import Limits, ProcessError, call_isolated, end_workers
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
 from damageest.registry import Registry

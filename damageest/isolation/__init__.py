@@ -4,8 +4,8 @@ from damageest.isolation.limits import Limits, format_bytes, limit_this_process,
 from damageest.isolation.worker import ProcessError, call_isolated, cpu_seconds, end_workers
 
 __all__ = [
-    "ProcessError",
     "Limits",
+    "ProcessError",
     "call_isolated",
     "cpu_seconds",
     "end_workers",
