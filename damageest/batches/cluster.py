@@ -36,8 +36,7 @@ def open_client(scheduler: str, workers: int) -> Iterator[Any]:
     """
     import dask
 
-    # one job at a time on a worker, so that a worker that dies takes no waiting ones with it
-    chosen = {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-saturation": 1.0}
+    chosen = {"distributed.scheduler.allowed-failures": 0}
     quiet = {"logging.distributed": "critical"}  # what happens to workers is in the table
     with dask.config.set({**chosen, **quiet}):
         from distributed import Client, LocalCluster

@@ -110,33 +110,37 @@ def _run(
     rows: dict[str, Row],
     report: Callable[[set[str]], None],
 ) -> None:
-    """Adds a row for each job. Where it is interrupted, what runs is ended."""
+    """Adds a row for each job. Where it is interrupted, what runs is ended.
+
+    Dask gets as many jobs as it has threads: one that waits on a worker would count as tried where that worker dies.
+    """
     token = f"damageest-{uuid.uuid4().hex[:8]}"
-    tries = dict.fromkeys((job.name for job in jobs), 1)
-    places = {job.name: (number, job) for number, job in enumerate(jobs)}
+    tries = dict.fromkeys((job.name for job in jobs), 0)
+    waiting = list(reversed(jobs))
+    futures: dict[Any, BatchJob] = {}
 
-    def submit(name: str) -> Any:
-        number, job = places[name]
-        task = {"name": name, "job": job.path, "settings": list(job.settings), "output": str(folder / name)}
+    def submit(job: BatchJob) -> Any:
+        tries[job.name] += 1
+        task = {"name": job.name, "job": job.path, "settings": list(job.settings), "output": str(folder / job.name)}
         task |= {"batch": token, **vars(options)}
-        return client.submit(work, task, key=f"{token}-{name}-{tries[name]}", priority=-number, pure=False)
+        return client.submit(work, task, key=f"{token}-{job.name}-{tries[job.name]}", pure=False)
 
-    futures = {submit(name): name for name in places}
     try:
-        while futures:
+        while waiting or futures:
+            while waiting and len(futures) < max(1, sum(client.nthreads().values())):
+                job = waiting.pop()
+                futures[submit(job)] = job
             for future in _wait(list(futures)):
-                name = futures.pop(future)
+                job = futures.pop(future)
+                count = tries[job.name]
                 if future.status == "finished":
-                    rows[name] = replace(read_row(future.result()), tries=tries[name])
-                elif future.status == "error" and tries[name] < TRIES:  # work() raises nothing: the worker died
-                    tries[name] += 1
-                    futures[submit(name)] = name
-                    continue
+                    rows[job.name] = replace(read_row(future.result()), tries=count)
+                elif future.status == "error" and count < TRIES:  # work() raises nothing: the worker died
+                    waiting.append(job)
                 else:
-                    why = f"{tries[name]} workers died with it" if future.status == "error" else "the cluster ended"
-                    rows[name] = _row(places[name][1], folder, outcome="lost", error=why, tries=tries[name])
-                future.release()
-            report(_find_active(client, futures))
+                    why = f"{count} workers died with it" if future.status == "error" else "the cluster ended"
+                    rows[job.name] = _row(job, folder, outcome="lost", error=why, tries=count)
+            report({job.name for job in futures.values()})
     finally:
         with contextlib.suppress(Exception):  # a cluster that has ended
             if futures:
@@ -151,16 +155,6 @@ def _wait(futures: list[Any]) -> list[Any]:
     with contextlib.suppress(TimeoutError):
         wait(futures, timeout=POLL, return_when="FIRST_COMPLETED")
     return [future for future in futures if future.done()]
-
-
-def _find_active(client: Any, futures: Mapping[Any, str]) -> set[str]:
-    """The names of the jobs that a worker has."""
-    names = {future.key: name for future, name in futures.items()}
-    try:
-        held = client.processing()
-    except (OSError, TimeoutError):
-        return set()
-    return {names[key] for keys in held.values() for key in keys if key in names}
 
 
 def _find_done(jobs: Sequence[BatchJob], folder: Path) -> dict[str, Row]:
