@@ -1,0 +1,183 @@
+"""Batches on Dask: every job is a row, whatever it does; a batch that is stopped goes on where it was."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import damageest
+from damageest.batches.rows import Row
+from damageest.batches.work import work
+from damageest.isolation import end_workers
+from tests import damaged_box
+from tests.registry.test_registry import GROWN, Site, site
+
+__all__ = ["site"]
+BODY = "return Solid(damage.vertices * self.factor, damage.faces)"
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Any]:
+    """Workers that are threads: they start quickly, and each job has a process all the same."""
+    from distributed import Client
+
+    with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=None) as client:
+        yield client
+
+
+@pytest.fixture(autouse=True)
+def _end() -> Iterator[None]:
+    yield
+    end_workers()
+
+
+def without_times(folder: Path) -> dict[str, bytes]:
+    """The files of an output folder; of result.json without seconds."""
+    files = damaged_box.content(folder)
+    content = json.loads(files["result.json"])
+    for stage in content["stages"]:
+        del stage["seconds"]
+    files["result.json"] = json.dumps(content).encode()
+    return {name: data for name, data in files.items() if not name.endswith(".npz")}  # they hold the time of day
+
+
+def test_rows_of_a_batch(client: Any, tmp_path: Path) -> None:
+    """A job of a matrix, one that is refused, one whose scan is not there; then the same again, and what changed."""
+    job = damaged_box.write(tmp_path)
+    shutil.copy(tmp_path / "scan.ply", tmp_path / "second.ply")
+    matrix = damaged_box.JOB.replace("scan: scan.ply\n", "matrix: {scan: [second.ply, gone.ply]}\n")
+    (tmp_path / "night.yaml").write_text(matrix)
+    (tmp_path / "faulty.yaml").write_text("version: 1\npart: [")
+    words = [job, tmp_path / "night.yaml", tmp_path / "faulty.yaml"]
+    rows = damageest.batch(words, client=client, output=tmp_path / "b")
+    assert [row.name for row in rows] == ["job", "night-second", "night-gone", "faulty"]
+    assert [row.outcome for row in rows] == ["ok", "ok", "refused", "refused"]
+    assert rows[0].verdict == "1 proven"
+    assert rows[0].damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.02)
+    assert "gone.ply" in rows[2].error
+    assert {path.name for path in (tmp_path / "b").glob("batch.*")} == {"batch.csv", "batch.json", "batch.html"}
+
+    damageest.run(job, output=tmp_path / "b/alone")
+    assert without_times(tmp_path / "b/alone") == without_times(tmp_path / "b/job"), "the same bytes as damageest run"
+
+    told: list[set[str]] = []
+    job.write_text(job.read_text() + "cluster: {neighbours: 9}\n")
+    again = damageest.batch(
+        words, client=client, output=tmp_path / "b", tell=lambda jobs, rows, active: told.append(set(rows))
+    )
+    assert [row.outcome for row in again] == ["ok", "ok", "refused", "refused"]
+    assert again[1] == rows[1], "it did not run again"
+    assert again[0].key != rows[0].key
+    assert told[-1] == {row.name for row in rows}
+
+
+def run_one(tmp_path: Path, site: Site, body: str, **limits: Any) -> Row:
+    from damageest.batches.rows import read_row
+
+    site.add("acme-bad", GROWN.replace(BODY, body))
+    job = damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n")
+    task = {"name": "job", "job": str(job), "settings": [], "output": str(tmp_path / "b/job"), "batch": "test"}
+    return read_row(work({**task, "memory": None, "timeout": 60, "stage_timeout": 60, "cache": True, **limits}))
+
+
+FAULTS = {
+    "exits": ("import os; os._exit(0)", "crashed", "ended its process with exit status 0"),
+    "crashes": ("import ctypes; ctypes.string_at(0)", "crashed", "segmentation fault (SIGSEGV)"),
+    "hangs": ("\n        while True: pass", "timeout", "not finished after 8 s (--timeout)"),
+}
+
+
+@pytest.mark.parametrize("name", ["exits", pytest.param("crashes", marks=pytest.mark.slow), "hangs"])
+def test_a_stage_that_ends_the_process_is_named(name: str, site: Site, tmp_path: Path) -> None:
+    """The stage has no process of its own: it takes the job's process with it, and the row says which stage it was."""
+    body, outcome, text = FAULTS[name]
+    limits = {}
+    if name == "hangs":  # all before it is kept, so that the limit of time can be short
+        damageest.run(damaged_box.write(tmp_path), output=tmp_path / "b/job")
+        limits = {"timeout": 8}
+    row = run_one(tmp_path, site, body, **limits)
+    assert row.outcome == outcome
+    assert "allowance: doubled (site 1): " in row.error
+    assert text in row.error
+
+
+BATCH = """
+import sys
+from damageest.cli import main
+
+if __name__ == "__main__":
+    main()
+"""
+
+
+def start(tmp_path: Path, *words: str) -> subprocess.Popen[str]:
+    script = tmp_path / "batch.py"
+    script.write_text(BATCH)
+    command = [sys.executable, str(script), "batch", str(tmp_path / "night.yaml"), "--out", str(tmp_path / "b"), *words]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+
+
+def write_night(tmp_path: Path, count: int) -> None:
+    damaged_box.write(tmp_path)
+    for number in range(count):
+        shutil.copy(tmp_path / "scan.ply", tmp_path / f"scan-{number}.ply")
+    (tmp_path / "night.yaml").write_text(damaged_box.JOB.replace("scan: scan.ply\n", "matrix: {scan: scan-*.ply}\n"))
+
+
+def wait_for(tmp_path: Path, pattern: str) -> None:
+    for _ in range(600):
+        if list((tmp_path / "b").glob(pattern)):
+            return
+        time.sleep(0.1)
+    pytest.fail(f"no {pattern}")
+
+
+def find_workers(process_id: int) -> list[int]:
+    import psutil
+
+    return [one.pid for one in psutil.Process(process_id).children() if "spawn_main" in " ".join(one.cmdline())]
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed(tmp_path: Path) -> None:
+    write_night(tmp_path, 4)
+    with start(tmp_path, "--workers", "2") as batch:
+        wait_for(tmp_path, ".night*.partial")
+        os.kill(find_workers(batch.pid)[0], signal.SIGKILL)
+        _, err = batch.communicate(timeout=300)
+    assert batch.returncode == 0, err
+    rows = json.loads((tmp_path / "b/batch.json").read_text())["jobs"]
+    assert [row["outcome"] for row in rows] == ["ok"] * 4
+    assert sorted(row["tries"] for row in rows) == [1, 1, 1, 2]
+
+
+@pytest.mark.slow
+def test_an_interrupted_batch_goes_on(tmp_path: Path) -> None:
+    write_night(tmp_path, 3)
+    with start(tmp_path, "--workers", "1") as batch:
+        wait_for(tmp_path, "*/result.json")
+        wait_for(tmp_path, ".night*.partial")
+        os.killpg(batch.pid, signal.SIGINT)
+        _, err = batch.communicate(timeout=60)
+    assert batch.returncode == 130, err
+    assert "interrupted; the jobs that were done are in" in err
+    first = json.loads((tmp_path / "b/batch.json").read_text())["jobs"]
+    assert [row["outcome"] for row in first] == ["ok"]
+    with start(tmp_path, "--workers", "1") as batch:
+        out, err = batch.communicate(timeout=300)
+    assert batch.returncode == 0, err
+    assert "3 of 3 jobs ran" in out
+    rows = json.loads((tmp_path / "b/batch.json").read_text())["jobs"]
+    assert rows[0] == first[0]
+    assert {path.name for path in (tmp_path / "b").iterdir() if path.is_dir()} == {f"night-scan-{k}" for k in range(3)}
