@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from damageest.artefacts import Deposit, Floats, Solid
 from damageest.errors import StageError
-from damageest.geometry.solids import to_manifold, to_solid, unite
+from damageest.geometry.solids import concatenate_meshes, to_manifold, to_solid, unite
 from damageest.geometry.touching import separate_sheets
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, Step
@@ -106,5 +108,10 @@ def _shorten(cavity: Solid, taken: Any, origin: Floats) -> Solid:
 def _unite(solids: Sequence[Solid]) -> Solid | None:
     if not solids:
         return None
+    low, high = np.array([solid.bounds[0] for solid in solids]), np.array([solid.bounds[1] for solid in solids])
+    meet = (low[:, None] <= high[None]).all(axis=2) & (low[None] <= high[:, None]).all(axis=2)
+    if meet.sum() == len(solids):  # only each with itself
+        vertices, faces, _ = concatenate_meshes(solids)
+        return Solid(vertices, faces)
     origin = solids[0].bounds.mean(axis=0)
     return to_solid(unite(solids, origin), origin)

@@ -94,9 +94,10 @@ class Milling(Allowance):
             # cutting off rounding errors would leave lines where the stock only touches the skin below it
             if within.volume() > MAX_DUST * stock.volume():
                 stock = subtract_lost(stock, within)
-        deposit = simplify_exactly(join(hole, keep_touching(stock, hole, tolerance)), part.diagonal)
+        stock = keep_touching(stock, hole, tolerance)
+        deposit = simplify_exactly(join(hole, stock), part.diagonal)
         thickness = check_deposit(
-            DepositGeometry(deposit, hole, left, barred, skin, band, origin), part, tolerance, conflicts
+            DepositGeometry(deposit, hole, stock, left, barred, skin, band, origin), part, tolerance, conflicts
         )
         body = separate_sheets(deposit, origin, tolerance)
         if body is None:

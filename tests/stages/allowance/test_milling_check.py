@@ -27,7 +27,7 @@ def run_check(stock: Any, hole: Any = BITE, target: StockTarget = TOP) -> tuple[
     part = part_of(block())
     plan = StockPlan(0.0, (target,), ())
     skin = take_skin(Solid(*to_arrays(BITE)), part, plan, np.zeros(3))
-    work = DepositGeometry(hole + stock, BITE, block() - BITE, Manifold(), skin, None, np.zeros(3))
+    work = DepositGeometry(hole + stock, BITE, stock, block() - BITE, Manifold(), skin, None, np.zeros(3))
     return check_deposit(work, part, TOLERANCE, [])
 
 
