@@ -45,7 +45,20 @@ def fit_height_spline(data: Floats, spans: int, margin: float = _MARGIN) -> tupl
 
     Its parameters are x and y. ``spans``: of the longer side. It ends ``margin`` of that side beyond the points.
     """
-    low, high = data[:, :2].min(axis=0), data[:, :2].max(axis=0)
+    knots, heights = fit_parametric_spline(data[:, :2], data[:, 2:], spans, margin)
+    poles = np.dstack([*np.meshgrid(*map(_place_poles, knots), indexing="ij"), heights])
+    return knots, poles
+
+
+def fit_parametric_spline(
+    uv: Floats, values: Floats, spans: int, margin: float = _MARGIN
+) -> tuple[tuple[Floats, Floats], Floats]:
+    """Knots in both directions and poles (U,V,K) of the spline nearest to values (N,K) at parameters (N,2).
+
+    By least squares. ``spans``: of the longer side. It ends ``margin`` of that side beyond the parameters, and goes on
+    as straight as it can where there are none.
+    """
+    low, high = uv.min(axis=0), uv.max(axis=0)
     edge = margin * (high - low).max()
     long = (high - low).max()
     knots, basis, bend = [], [], []
@@ -53,20 +66,18 @@ def fit_height_spline(data: Floats, spans: int, margin: float = _MARGIN) -> tupl
         count = max(2, round(spans * (high[k] - low[k]) / long))
         inner = np.linspace(low[k] - edge, high[k] + edge, count + 1)
         knots.append(np.concatenate([np.full(DEGREE, inner[0]), inner, np.full(DEGREE, inner[-1])]))
-        basis.append(csr_array(BSpline.design_matrix(data[:, k], knots[k], DEGREE)))
+        basis.append(csr_array(BSpline.design_matrix(uv[:, k], knots[k], DEGREE)))
         bend.append(csr_array(_differ_twice(_place_poles(knots[k]))))
     sizes = [len(k) - DEGREE - 1 for k in knots]
     u, v = basis
     # at each point, DEGREE + 1 basis functions per direction are not 0: their products, row by row
-    rows = np.repeat(np.arange(len(data)), (DEGREE + 1) ** 2)
+    rows = np.repeat(np.arange(len(uv)), (DEGREE + 1) ** 2)
     columns = (u.indices.reshape(-1, DEGREE + 1, 1) * sizes[1] + v.indices.reshape(-1, 1, DEGREE + 1)).reshape(-1)
-    values = (u.data.reshape(-1, DEGREE + 1, 1) * v.data.reshape(-1, 1, DEGREE + 1)).reshape(-1)
-    A = csr_array((values, (rows, columns)), shape=(len(data), sizes[0] * sizes[1]))
+    weights = (u.data.reshape(-1, DEGREE + 1, 1) * v.data.reshape(-1, 1, DEGREE + 1)).reshape(-1)
+    A = csr_array((weights, (rows, columns)), shape=(len(uv), sizes[0] * sizes[1]))
     stiff = kron(bend[0].T @ bend[0], eye_array(sizes[1])) + kron(eye_array(sizes[0]), bend[1].T @ bend[1])
-    heights = spsolve((A.T @ A + _STIFF * len(data) / A.shape[1] * stiff).tocsc(), A.T @ data[:, 2])
-    at = [_place_poles(k) for k in knots]
-    poles = np.dstack([*np.meshgrid(*at, indexing="ij"), np.asarray(heights).reshape(sizes)])
-    return (knots[0], knots[1]), poles
+    found = spsolve((A.T @ A + _STIFF * len(uv) / A.shape[1] * stiff).tocsc(), A.T @ values)
+    return (knots[0], knots[1]), np.asarray(found).reshape(*sizes, values.shape[1])
 
 
 def _place_poles(knots: Floats) -> Floats:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Solid
 from damageest.geometry.distance import closest_on_mesh, signed_distance
@@ -19,6 +20,10 @@ from damageest.geometry.solids import concatenate_meshes
 
 RINGS = 3
 """Rings of triangles by which it reaches beyond the skin."""
+SPECK = 0.03
+"""Pieces of it with a smaller share of triangles than the largest are left out."""
+ISLAND = 0.1
+"""Triangles left out among those of the cut are taken in where they are fewer than this share of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +65,67 @@ def make_cut(damage: Solid, part: Part, enclosures: Sequence[Solid]) -> Cut | No
     for _ in range(RINGS):
         touched[faces[chosen]] = True
         chosen |= touched[faces].any(axis=1)
+    chosen = _close_gaps(faces, chosen)
     rows, renumbered = np.unique(faces[chosen], return_inverse=True)
     mesh = Mesh(vertices[rows], renumbered.reshape(-1, 3))
-    return Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen])
+    return _drop_specks(Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen]))
+
+
+def _drop_specks(cut: Cut) -> Cut:
+    """The cut without its smallest pieces: bubbles of a few triangles that noise left in the enclosure."""
+    pieces = split_cut(cut)
+    most = max(int(piece.core.sum()) for piece in pieces)
+    kept = [piece for piece in pieces if piece.core.sum() > SPECK * most]
+    if len(kept) == len(pieces):
+        return cut
+    vertices, faces, _ = concatenate_meshes([piece.mesh for piece in kept])
+    height, core = (np.concatenate([getattr(piece, name) for piece in kept]) for name in ("height", "core"))
+    return Cut(Mesh(vertices, faces), height, core)
+
+
+def _close_gaps(faces: Ints, chosen: Flags) -> Flags:
+    """The chosen triangles of a closed mesh with the small islands among them, and with those round a vertex in which
+    two rims would touch."""
+    for _ in range(4):
+        left = np.flatnonzero(~chosen)
+        if not len(left):
+            return chosen
+        corner = np.repeat(np.arange(len(left)), 3)
+        size = int(faces.max()) + 1
+        # triangles that share a vertex
+        graph = coo_array(
+            (np.ones(len(corner), bool), (corner, len(left) + faces[left].ravel())), shape=(len(left) + size,) * 2
+        )
+        label = connected_components(graph, directed=False)[1][: len(left)]
+        count = np.bincount(label)
+        small = (count < ISLAND * chosen.sum()) & (count < count.max())
+        chosen = chosen.copy()
+        chosen[left[small[label]]] = True
+        edges = np.concatenate([faces[chosen][:, [0, 1]], faces[chosen][:, [1, 2]], faces[chosen][:, [2, 0]]])
+        codes, opposite = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
+        starts = np.bincount(edges[~np.isin(codes, opposite), 0], minlength=size)
+        pinched = starts > 1
+        if not pinched.any():
+            return chosen
+        chosen |= pinched[faces].any(axis=1)
+    return chosen
+
+
+def split_cut(cut: Cut) -> list[Cut]:
+    """The connected pieces of a cut."""
+    count = len(cut.mesh.vertices)
+    ends = cut.mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    graph = coo_array((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(count, count))
+    pieces, label = connected_components(graph, directed=False)
+    if pieces == 1:
+        return [cut]
+    found = []
+    for number in range(pieces):
+        own = label[cut.mesh.faces[:, 0]] == number
+        used, renumbered = np.unique(cut.mesh.faces[own], return_inverse=True)
+        mesh = Mesh(cut.mesh.vertices[used], renumbered.reshape(-1, 3))
+        found.append(Cut(mesh, cut.height[used], cut.core[own]))
+    return [each for each in found if each.core.any()]
 
 
 def decimate(cut: Cut, count: int) -> Mesh | None:

@@ -8,24 +8,34 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Part, Solid, Surface
+from damageest.artefacts import Floats, Mesh, Part, Solid, Surface
 from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import Measured, check_pieces
-from damageest_cadquery._cut import Cut, count_bad_edges, decimate, make_cut
+from damageest_cadquery._cut import Cut, count_bad_edges, decimate, make_cut, split_cut
+from damageest_cadquery._flatten import flatten
 from damageest_cadquery._read import explore
-from damageest_cadquery._smooth import SPANS, build_shapes, build_spline, find_shapes, take_inner
-from damageest_cadquery._split import Piece, Tool, build_facets, measure_volume, split, triangulate
+from damageest_cadquery._smooth import SPANS, build_shapes, build_splines, find_shapes, take_inner
+from damageest_cadquery._split import (
+    Piece,
+    Tool,
+    build_facets,
+    is_opencascade_error,
+    measure_volume,
+    split,
+    triangulate,
+)
 
 FACETS = (250, 500, 1000, 2000, 4000)
 MOST_FACES = 5000
-SPECK = 1e-4
-"""Share of the damage volume below which a piece that a split leaves over is dropped."""
+SPECK = 1e-3
+"""Share of the damage volume below which a body of it, or a piece that a split leaves over, is dropped."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +84,13 @@ def find_exact(
     cut = make_cut(site.damage, part, site.enclosures)
     if cut is None:
         return None, ("no surface is known that cuts it out of the part",)
-    bodies = len(split_bodies(site.damage))
+    bodies = sum(body.volume > SPECK * site.damage.volume for body in split_bodies(site.damage))
     for form, make, fuzzy in _list_tools(cut, tolerance):
         tool = _call(make)
         found = _split_all(solids, tool, fuzzy, site.damage, tolerance) if tool is not None else None
         if found is None:
-            tried.append(f"{form}: no solid")
+            if tool is not None:
+                tried.append(f"{form}: it does not separate the solid")
             continue
         pieces, rest = found
         if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
@@ -106,27 +117,31 @@ def _list_tools(cut: Cut, tolerance: float) -> Iterator[tuple[str, Callable[[], 
                 return made.tool if made else None
 
             yield f"shapes {beyond:g}", shapes, 1e-6
-    for spans in SPANS[1:]:
-        for beyond in (2.0, 1.0):
-
-            def spline(spans: int = spans, beyond: float = beyond) -> Tool | None:
-                made = build_spline(inner, spans, beyond * tolerance)
-                return made.tool if made else None
-
-            yield f"spline {spans} {beyond:g}", spline, 1e-6
+    cuts = split_cut(cut)
+    places = [uv for uv in map(flatten, map(_take_mesh, cuts)) if uv is not None]
+    if len(places) == len(cuts):
+        for spans in SPANS:
+            tool = partial(build_splines, cuts, places, spans, tolerance)
+            yield f"spline {spans}", tool, 1e-6
     for count in FACETS:
         mesh = decimate(cut, count)
         if mesh is None or count_bad_edges(mesh.faces):
             continue
         for fuzzy in (1e-6, 1e-5):
-            yield f"facets {count} {fuzzy:g}", lambda mesh=mesh: build_facets(mesh), fuzzy  # type: ignore[misc]
+            yield f"facets {count} {fuzzy:g}", partial(build_facets, mesh), fuzzy
+
+
+def _take_mesh(cut: Cut) -> Mesh:
+    return cut.mesh
 
 
 def _call(make: Callable[[], Tool | None]) -> Tool | None:
-    """A tool, or None where it cannot be built: OpenCASCADE's exceptions share no base of their own."""
+    """A tool, or None where OpenCASCADE cannot build it."""
     try:
         return make()
-    except Exception:
+    except Exception as error:
+        if not is_opencascade_error(error):
+            raise
         return None
 
 
@@ -150,9 +165,10 @@ def _split_all(
                     taken.append(piece)
                 elif volume > SPECK * damage.volume:
                     rest.append(piece)
-    except (InputError, ValueError):
-        return None
-    except Exception:  # OpenCASCADE's
+    except Exception as error:
+        # of the others, a piece that cannot be triangulated, or whose triangles do not close
+        if not (is_opencascade_error(error) or isinstance(error, (InputError, ValueError))):
+            raise
         return None
     return (tuple(taken), tuple(rest)) if taken else None
 

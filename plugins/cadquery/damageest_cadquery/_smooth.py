@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import NdBSpline
 
 from damageest.artefacts import Floats, Ints, Mesh
-from damageest.geometry.height_spline import DEGREE, fit_height_plane, fit_height_spline
+from damageest.geometry.height_spline import DEGREE, fit_parametric_spline
 from damageest.stages.export import Patch
 from damageest_cadquery._cut import Cut
 from damageest_cadquery._patch import build_surface, build_wire
@@ -22,8 +23,9 @@ from damageest_cadquery._split import Tool
 
 LEFT = 0.12
 """Largest share of the surface that may lie off all recognised faces, as the rounding of edges and rims does."""
-OVERHANG = 0.02
-SPANS = (4, 8, 16, 32)
+SPANS = (8, 16, 28, 44)
+RIM = 48
+"""Edges of a spline face's rim, which lies outside the part."""
 _WRAP = 2 * np.pi
 
 
@@ -78,26 +80,42 @@ def build_shapes(inner: Mesh, shapes: Sequence[Shape], label: Ints, tolerance: f
     return _trim_by_others(faces, kinds, inner, label, tolerance)
 
 
-def build_spline(inner: Mesh, spans: int, beyond: float) -> Smooth | None:
-    """One spline through all of the surface; None where it is no height field."""
+def build_splines(cuts: Sequence[Cut], places: Sequence[Floats], spans: int, tolerance: float) -> Tool | None:
+    """A spline through each connected piece of a cut, by its ``places`` (V,2) in the unit disk.
+
+    None where one of them is farther from it than the checks allow.
+    """
+    from OCP.BRep import BRep_Builder
+    from OCP.TopoDS import TopoDS_Compound
+
+    faces = []
+    for cut, uv in zip(cuts, places, strict=True):
+        vertices = cut.mesh.vertices
+        knots, poles = fit_parametric_spline(uv, vertices, spans)
+        bounding = np.zeros(len(vertices), bool)
+        bounding[cut.mesh.faces[cut.core]] = True
+        bounding &= cut.height < -tolerance / 4
+        fitted = np.stack([NdBSpline(knots, poles[..., k], DEGREE)(uv[bounding]) for k in range(3)], axis=-1)
+        off = np.abs(np.einsum("ij,ij->i", fitted - vertices[bounding], cut.mesh.vertex_normals[bounding]))
+        if len(off) and (np.quantile(off, 0.98) > tolerance / 4 or off.max() > tolerance):
+            return None
+        angle = np.linspace(0, _WRAP, RIM, endpoint=False)
+        circle = 0.998 * np.column_stack([np.cos(angle), np.sin(angle)])
+        surface = build_surface(Patch(DEGREE, knots, poles), 1.0)
+        faces.append(_trim(surface, circle))
+    if len(faces) == 1:
+        return Tool(faces, faces[0])
+    builder, shape = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(shape)
+    for face in faces:
+        builder.Add(shape, face)
+    return Tool(faces, shape)
+
+
+def _trim(surface: Any, rim: Floats) -> Any:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 
-    axes, overhang = fit_height_plane(inner)
-    if overhang > OVERHANG:
-        return None
-    origin = inner.bounds.mean(axis=0)
-    points = (inner.vertices - origin) @ axes.T
-    corners = points[inner.faces]
-    outline = _trace_outline(corners[..., :2], beyond)
-    size = float(np.ptp(points[:, :2], axis=0).max())
-    knots, poles = fit_height_spline(np.concatenate([points, corners.mean(axis=1)]), spans, margin=1.2 * beyond / size)
-    patch = Patch(DEGREE, knots, origin + poles @ axes, tuple(outline))
-    surface = build_surface(patch, 1.0)
-    maker = BRepBuilderAPI_MakeFace(surface, build_wire(outline[0], surface), True)
-    for rim in outline[1:]:
-        maker.Add(build_wire(rim, surface))
-    face = maker.Face()
-    return Smooth(Tool([face], face), ("b_spline_surface",))
+    return BRepBuilderAPI_MakeFace(surface, build_wire(rim, surface), True).Face()
 
 
 def _build_shape(shape: Shape, corners: Floats, beyond: float) -> Any:

@@ -177,3 +177,8 @@ def join_pieces(pieces: Sequence[Piece]) -> Any:
     for piece in pieces:
         builder.Add(whole, piece.shape)
     return whole
+
+
+def is_opencascade_error(error: Exception) -> bool:
+    """Whether OpenCASCADE raised it: in Python its exceptions share no base of their own."""
+    return type(error).__module__.startswith("OCP")

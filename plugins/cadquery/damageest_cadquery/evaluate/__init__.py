@@ -1,0 +1,1 @@
+"""Measures the exact form of damage volumes on parts of many kinds."""

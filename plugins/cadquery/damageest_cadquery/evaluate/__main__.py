@@ -1,0 +1,173 @@
+"""``python -m damageest_cadquery.evaluate``: random damages on many parts, and what their exact forms are worth."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+POINTS = 50_000
+NOISE, TOLERANCE = 0.0005, 0.002
+"""Of the scan and of the job, in diagonals of the part."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(prog="python -m damageest_cadquery.evaluate", description=__doc__)
+    parser.add_argument("--output", type=Path, required=True, help="file of rows, one JSON object a line; grows")
+    parser.add_argument("--cases", type=int, default=65, help="random damages, spread over the parts")
+    parser.add_argument("--first", type=int, default=0, help="number of the first case")
+    parser.add_argument("--seconds", type=float, default=1e9, help="start no case after this time")
+    parser.add_argument("--step", type=Path, nargs="*", default=[], help="STEP files to use besides the built-in parts")
+    chosen = parser.parse_args(arguments)
+    start = time.perf_counter()
+    with tempfile.TemporaryDirectory() as place:
+        files = [*_write_parts(Path(place)), *chosen.step]
+        for number in range(chosen.first, chosen.first + chosen.cases):
+            if time.perf_counter() - start > chosen.seconds:
+                break
+            for row in run_case(files[number % len(files)], number, Path(place) / "out"):
+                with chosen.output.open("a") as stream:
+                    stream.write(json.dumps(row) + "\n")
+                print({key: value for key, value in row.items() if key != "tried"}, flush=True)
+    print(summarise([json.loads(line) for line in chosen.output.read_text().splitlines()]))
+
+
+def _write_parts(folder: Path) -> list[Path]:
+    import cadquery as cq
+
+    from damageest_cadquery.evaluate.parts import PARTS
+
+    paths = []
+    for name, make in PARTS.items():
+        paths.append(folder / f"{name}.step")
+        cq.exporters.export(make(), str(paths[-1]))
+    return paths
+
+
+def run_case(path: Path, seed: int, output: Path) -> list[dict[str, Any]]:
+    """A row for each site of one random damage; a single one with ``error`` where there is none."""
+    import damageest
+    from damageest.errors import DamageestError
+    from damageest.evaluate.damages import KINDS, make_random_damage
+    from damageest_cadquery.brep import Brep
+
+    base = {"part": path.stem, "seed": seed}
+    try:
+        rough = Brep(path=path).run(unit="mm", tolerance=None)
+        tolerance = TOLERANCE * rough.diagonal
+        part = Brep(path=path).run(unit="mm", tolerance=tolerance)
+        kind = list(KINDS)[seed % len(KINDS)]
+        drawn = make_random_damage(rough, seed, (kind,), count=1)
+        scan = {"use": "simulate", "points": POINTS, "noise": NOISE * rough.diagonal, "seed": seed}
+        scan["damage"] = [tool.model_dump(mode="json") for tool in drawn.tools]
+        job = {
+            "version": 1, "units": "mm", "tolerance": tolerance, "part": str(path), "align": "none", "scan": scan,
+            "accept": "all", "export": {"format": ["step"], "solids": "exact"}, "report": "none",
+        }  # fmt: skip
+        result = damageest.run(job, output=output, cache=False)
+    except (LookupError, DamageestError) as error:
+        return [base | {"error": " ".join(str(error).split())[:300]}]
+    said = json.loads((output / "result.json").read_text())
+    rows = []
+    truth = result.scan.truth.damage if result.scan.truth else None
+    for site, report in zip(result.sites, said["sites"], strict=True):
+        exact = report["exact"]
+        row = base | {"kind": drawn.kinds[0], "site": site.id, "mesh": site.damage.volume} | exact
+        if exact["form"] != "none":
+            row |= _read_back(output / f"damage/site-{site.id}.step", site.damage, truth, tolerance, part)
+        rows.append(row)
+    if not rows:
+        return [base | {"error": "no site"}]
+    seconds = next((s["seconds"] for s in said["stages"] if s["stage"] == "export"), 0.0)
+    return [row | {"export_seconds": seconds} for row in rows]
+
+
+def _read_back(path: Path, mesh: Any, truth: Any, tolerance: float, part: Any) -> dict[str, Any]:
+    """What cadquery and gmsh find in the file, and IoU of exact form and mesh with the truth around the site."""
+    import cadquery as cq
+
+    from damageest.geometry.solids import iou, to_manifold, to_solid
+    from damageest_cadquery.brep import Brep
+
+    solids = cq.importers.importStep(str(path)).solids().vals()
+    row: dict[str, Any] = {
+        "read_volume": sum(solid.Volume() for solid in solids),
+        "read_solids": len(solids),
+        "read_valid": all(solid.isValid() for solid in solids),
+        "gmsh": _read_with_gmsh(path),
+    }
+    if truth is None:
+        return row
+    origin = mesh.bounds.mean(axis=0)
+    size = mesh.bounds[1] - mesh.bounds[0] + 8 * tolerance
+    from manifold3d import Manifold
+
+    box = Manifold.cube(tuple(size.tolist()), True)
+    near = to_solid(to_manifold(truth, origin) ^ box, origin)
+    try:
+        exact = Brep(path=path, chord=tolerance / 16).run(unit="mm", tolerance=None)
+    except Exception as error:
+        return row | {"iou_error": str(error)[:200]}
+    return row | {"iou_mesh": iou(near, mesh), "iou_exact": iou(near, exact)}
+
+
+def _read_with_gmsh(path: Path) -> list[float] | None:
+    """Volume and number of solids by gmsh; None where it is not installed."""
+    try:
+        import gmsh
+    except (ImportError, OSError):
+        return None
+    gmsh.initialize(readConfigFiles=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        tags = gmsh.model.occ.importShapes(str(path))
+        solids = [tag for dimension, tag in tags if dimension == 3]
+        return [sum(gmsh.model.occ.getMass(3, tag) for tag in solids), float(len(solids))]
+    finally:
+        gmsh.finalize()
+
+
+def summarise(rows: Sequence[dict[str, Any]]) -> str:
+    """The figures over all sites, in words."""
+    sites = [row for row in rows if "form" in row]
+    good = [row for row in sites if row["form"] != "none"]
+    if not good:
+        return f"{len(sites)} sites, none exact"
+    forms = {form: sum(row["form"] == form for row in sites) for form in ("shapes", "spline", "facets", "none")}
+    off = np.array([abs(row["volume"] / row["mesh"] - 1) for row in good])
+    faces, seconds = np.array([row["faces"] for row in good]), np.array([row["seconds"] for row in good])
+    lines = [
+        f"{len(rows)} damages on {len({row['part'] for row in rows})} parts, {len(sites)} sites; "
+        f"exact {len(good) / len(sites):.1%}: {forms}",
+        f"seconds a site: median {np.median(seconds):.1f}, 95 % {np.quantile(seconds, 0.95):.1f}",
+        f"faces a site: median {np.median(faces):g}, 95 % {np.quantile(faces, 0.95):g}, most {faces.max()}",
+        f"volume against the mesh: median {np.median(off):.3%}, 95 % {np.quantile(off, 0.95):.3%}, "
+        f"most {off.max():.3%}",
+    ]
+    back = [row for row in good if "read_volume" in row]
+    same = [abs(row["read_volume"] / row["volume"] - 1) < 1e-4 and row["read_valid"] for row in back]
+    lines.append(f"read back by cadquery: {sum(same)} of {len(back)} with the same volume, valid")
+    other = [row for row in back if row["gmsh"]]
+    same = [abs(row["gmsh"][0] / row["volume"] - 1) < 1e-4 and row["gmsh"][1] == row["read_solids"] for row in other]
+    lines.append(f"read back by gmsh: {sum(same)} of {len(other)} with the same volume and number of solids")
+    both = np.array([[row["iou_exact"], row["iou_mesh"]] for row in good if "iou_exact" in row])
+    if len(both):
+        lines.append(
+            f"IoU with the truth: exact median {np.median(both[:, 0]):.4f}, mesh {np.median(both[:, 1]):.4f}; "
+            f"exact at least as good in {(both[:, 0] >= both[:, 1]).mean():.0%}, "
+            f"worst difference {(both[:, 0] - both[:, 1]).min():+.4f}"
+        )
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    main(sys.argv[1:])
