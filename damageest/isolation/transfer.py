@@ -31,10 +31,10 @@ def send(channel: socket.socket, value: Any) -> None:
     file = _make_file()
     try:
         os.ftruncate(file, starts[-1])
-        with mmap.mmap(file, starts[-1]) as memory:
-            struct.pack_into(f"<{len(parts) + 1}Q", memory, 0, len(parts), *(part.nbytes for part in parts))
-            for start, part in zip(starts, parts, strict=False):
-                memory[start : start + part.nbytes] = part
+        sizes = struct.pack(f"<{len(parts) + 1}Q", len(parts), *(part.nbytes for part in parts))
+        # written, not copied into a map of the file, which would cost a page fault for each page
+        for start, part in zip((0, *starts), (memoryview(sizes), *parts), strict=False):
+            _write(file, part, start)
         socket.send_fds(channel, [b"v"], [file])
     finally:
         os.close(file)
@@ -56,15 +56,34 @@ def receive_parts(channel: socket.socket, copy: bool) -> list[Any]:
         word, files = b"", []
     if not word or not files:
         raise EOFError
+    file = files[0]
     try:
-        memory = mmap.mmap(files[0], 0)
+        count = struct.unpack("<Q", os.pread(file, 8, 0))[0]
+        sizes = struct.unpack(f"<{count}Q", os.pread(file, 8 * count, 8))
+        starts = _place(sizes)
+        if copy:
+            parts: list[Any] = [bytearray(size) for size in sizes]
+            for start, part in zip(starts, parts, strict=False):
+                _read(file, memoryview(part), start)
+            return parts
+        flags = mmap.MAP_SHARED | getattr(mmap, "MAP_POPULATE", 0)
+        view = memoryview(mmap.mmap(file, 0, flags))
+        return [view[start : start + size] for start, size in zip(starts, sizes, strict=False)]
     finally:
-        os.close(files[0])
-    count = struct.unpack_from("<Q", memory)[0]
-    sizes = struct.unpack_from(f"<{count}Q", memory, 8)
-    view = memoryview(memory)
-    parts: list[Any] = [view[a : a + n] for a, n in zip(_place(sizes), sizes, strict=False)]
-    return [bytearray(part) for part in parts] if copy else parts
+        os.close(file)
+
+
+def _write(file: int, part: memoryview, start: int) -> None:
+    """Writes all of a part at an offset; the system may write less at a time, as 2 GB."""
+    done = 0
+    while done < part.nbytes:
+        done += os.pwrite(file, part[done:], start + done)
+
+
+def _read(file: int, part: memoryview, start: int) -> None:
+    done = 0
+    while done < part.nbytes:
+        done += os.preadv(file, [part[done:]], start + done)
 
 
 def load(parts: Sequence[Any]) -> Any:
