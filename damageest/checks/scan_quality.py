@@ -10,6 +10,9 @@ from damageest.errors import InputError, StageError
 AUTO_TOLERANCE = 4.0
 """Lambda over the scan's noise where the job says auto: 6 in 100,000 intact points deviate by more."""
 
+FEW_POINTS = 100
+"""Number of points below which a scan shows next to nothing of a part."""
+
 LEAST_TOLERANCE = 1e-6
 """Least tolerance in diagonals of the part; coordinates in single precision, as in STL, have no more digits."""
 
@@ -71,6 +74,17 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
             "surface between them is interpolated"
         )
     return tolerance, warnings
+
+
+def describe_few(scan: Scan) -> list[str]:
+    """A warning where the scan has next to no points; else nothing."""
+    count = len(scan.points)
+    if count >= FEW_POINTS:
+        return []
+    return [
+        f"the scan has {count} point{'s' * (count > 1)}, too few to show the skin between them: damage can be anywhere "
+        "else"
+    ]
 
 
 def measure_form_deviation(distance: Floats, within: float) -> float:

@@ -29,6 +29,10 @@ MOST_REACHES = 5000
 FACING = 1.5
 """Weight of a difference of normals, in reaches: points on the far side of a thin wall do not show the near side."""
 
+SPARSE = 1 / 16
+"""Largest radius, in diagonals of the part, of the skin that one point stands for. Points that lie farther apart show
+only the places where they are."""
+
 
 @dataclass(frozen=True, eq=False)
 class SkinCells:
@@ -79,7 +83,7 @@ class SkinCells:
 
 def cut_skin(part: Part, spacing: float) -> SkinCells:
     """Cuts the part's skin into cells about as large as three spacings of the scan."""
-    edge = max(3 * spacing, 2.2 * float(np.sqrt(part.area / MOST_CELLS)))
+    edge = max(3 * min(spacing, SPARSE * part.diagonal), 2.2 * float(np.sqrt(part.area / MOST_CELLS)))
     mesh, parent = cut_into_cells(part, edge, LEAST_AREA * edge**2)
     return SkinCells(mesh, parent, edge)
 
@@ -102,7 +106,7 @@ def find_seen(
         facing = part.face_normals[deviation.face[chosen]]
         # the places on the skin below the points: how far they are from it does not matter here
         points = aligned.points[chosen] - deviation.distance[chosen, None] * facing
-        reach = _measure_reach(points, cells.centres)
+        reach = np.minimum(_measure_reach(points, cells.centres), SPARSE * part.diagonal)
         usual = float(np.median(reach))
         reach = np.minimum(reach, 3 * usual) + cells.edge / 3
         weight = FACING * usual

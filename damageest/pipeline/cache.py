@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from damageest import artefacts
+from damageest.errors import Fault, JobError
 from damageest.io.files import file_sha256
 
 _KINDS = {
@@ -78,6 +79,16 @@ def _decode(value: Any, arrays: Mapping[str, Any]) -> Any:
     return _KINDS[value["kind"]](**fields)
 
 
+def _seal(arrays: Path, meta: Any) -> str:
+    """The hash of an entry: of its file of arrays, and of the rest as JSON."""
+    return hashlib.sha256((file_sha256(arrays) + json.dumps(meta)).encode()).hexdigest()
+
+
+def describe_unwritable(error: OSError, place: Path) -> JobError:
+    """The error for a place that cannot be written, such as a full disk."""
+    return JobError([Fault(f"{error.filename or place}: cannot be written: {error.strerror or error}", "output")])
+
+
 @dataclass(frozen=True)
 class Cache:
     """Entries in ``folder``; ``older`` folders are searched too, and an entry found there is copied."""
@@ -86,14 +97,16 @@ class Cache:
     older: tuple[Path, ...] = ()
 
     def get(self, name: str, key: str) -> tuple[bool, Any]:
-        """(found, value). A damaged entry counts as not found."""
+        """(found, value). An entry whose hash is not that of its content counts as not found."""
         stem = f"{name}-{key}"
         for folder in (self.folder, *self.older):
             try:
                 meta = json.loads((folder / f"{stem}.json").read_text())
+                if meta["sha256"] != _seal(folder / f"{stem}.npz", meta["value"]):
+                    continue
                 with np.load(folder / f"{stem}.npz", allow_pickle=False) as stored:
                     arrays = {n: stored[n] for n in stored.files}
-                value = _decode(meta, arrays)
+                value = _decode(meta["value"], arrays)
             except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
                 continue
             if folder != self.folder:
@@ -102,7 +115,16 @@ class Cache:
         return False, None
 
     def put(self, name: str, key: str, value: Any) -> None:
-        """Writes a value. A reader never sees half an entry: the .json that makes it valid is moved in last."""
+        """Writes a value. A reader never sees half an entry: the .json that makes it valid is moved in last.
+
+        Raises JobError where the folder cannot be written.
+        """
+        try:
+            self._put(name, key, value)
+        except OSError as error:
+            raise describe_unwritable(error, self.folder) from error
+
+    def _put(self, name: str, key: str, value: Any) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
         arrays: dict[str, Any] = {}
         meta = _encode(value, arrays)
@@ -110,9 +132,10 @@ class Cache:
         scratch = self.folder / f".{stem}.npz"
         with scratch.open("wb") as stream:
             np.savez(stream, **arrays)
+        seal = _seal(scratch, meta)
         os.replace(scratch, self.folder / f"{stem}.npz")
         scratch = self.folder / f".{stem}.json"
-        scratch.write_text(json.dumps(meta))
+        scratch.write_text(json.dumps({"sha256": seal, "value": meta}))
         os.replace(scratch, self.folder / f"{stem}.json")
 
     def keep_only(self, stems: Iterable[str]) -> None:

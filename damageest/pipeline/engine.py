@@ -7,6 +7,7 @@ import typing
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from damageest.artefacts import ArtefactError
 from damageest.errors import DamageestError, InputError, StageError, describe_missing_library, is_interrupt
 from damageest.isolation import Limits, ProcessError, call_isolated
 from damageest.job.model import Job
-from damageest.pipeline.cache import Cache, digest
+from damageest.pipeline.cache import Cache, describe_unwritable, digest
 from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
 from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.registry import Implementation, Registry
@@ -196,6 +197,8 @@ def _locate(error: Exception, item: Implementation, state: JobState | Candidate 
         error = missing
     if isinstance(error, OSError) and stage in ("part", "scan"):
         return InputError(f"{stage}: {item.name}: {error}")
+    if isinstance(error, OSError) and stage in ("export", "report") and error.errno:
+        return describe_unwritable(error, Path("the output"))
     placed = error if isinstance(error, StageError) else _explain(error, f"{item.provider}")
     placed.stage, placed.use, placed.site = stage, item.name, state.number
     if isinstance(state, Candidate):

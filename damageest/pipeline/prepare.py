@@ -6,11 +6,12 @@ import math
 from dataclasses import replace
 
 from damageest.artefacts import INTACT, Part, Scan
-from damageest.checks.scan_quality import check_walls, choose_tolerance, raise_tolerance, require_intact
+from damageest.checks.scan_quality import check_walls, choose_tolerance, describe_few, raise_tolerance, require_intact
 from damageest.errors import InputError, StageError
 from damageest.geometry.crops import crop_points
 from damageest.geometry.depth_steps import measure_depth_step
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.far_points import find_far
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.units import diagnose_scale, diagnose_size
 from damageest.job.model import Job
@@ -35,6 +36,22 @@ def crop_scan(engine: Engine, work: Work) -> Work:
     return replace(work, job=state.derive(JobState.scan, crop_points(state.scan, stage.crop), JobState.scan))
 
 
+def set_far_aside(engine: Engine, work: Work) -> Work:
+    """Removes points that are too far from all others to be of the part, and says how many."""
+    state = work.job
+    far = find_far(state.scan.points, state.part.diagonal)
+    if not far.any():
+        return work
+    text = (
+        f"{int(far.sum())} scan points were set aside, since they are farther from all others than the part is "
+        f"large ({state.part.diagonal:.4g} {state.part.unit}), and few"
+    )
+    scan = state.scan.take(~far)
+    scan = replace(scan, notes=(*scan.notes, text))
+    state = state.derive(JobState.scan, scan, JobState.scan, JobState.part)
+    return replace(work, job=state, warnings=(*work.warnings, text))
+
+
 def measure_scan(engine: Engine, work: Work) -> Work:
     """Measures the scan's noise and spacing and chooses the tolerance. Raises InputError for a scan of another size."""
     state = work.job
@@ -47,6 +64,7 @@ def measure_scan(engine: Engine, work: Work) -> Work:
         _, (noise, spacing, step) = engine.remember("measure", key, lambda: _measure(scan))
         scan = replace(scan, noise=noise, spacing=spacing)
     tolerance, warnings = choose_tolerance(engine.job.tolerance, scan, part, step)
+    warnings = [*describe_few(scan), *warnings]
     if wrong_unit := diagnose_size(part.vertices, part.unit):
         warnings = [wrong_unit, *warnings]
     state = state.derive(JobState.scan, scan, JobState.scan)
@@ -106,7 +124,7 @@ def gather_intact(engine: Engine, work: Work) -> Work:
 
 def read_inputs(job: Job, registry: Registry) -> tuple[Part, Scan]:
     """The part and the scan of a job, as their stages read them."""
-    state = follow((ReadPart, ReadScan, crop_scan), Engine(job, registry), start(job)).job
+    state = follow((ReadPart, ReadScan, crop_scan, set_far_aside), Engine(job, registry), start(job)).job
     return state.part, state.scan
 
 

@@ -20,6 +20,7 @@ from damageest.pipeline.prepare import (
     gather_intact,
     measure_scan,
     place_scan,
+    set_far_aside,
     settle_tolerance,
 )
 from damageest.pipeline.selections import check_selections
@@ -51,7 +52,8 @@ from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
-    ReadPart, check_selections, ReadScan, crop_scan, measure_scan, Sample, Align, place_scan, correct_scan,
+    ReadPart, check_selections, ReadScan, crop_scan, set_far_aside, measure_scan, Sample, Align, place_scan,
+    correct_scan,
     settle_tolerance, Segment, check_intact, inspect_skin, fit_model, Cluster, find_surplus, gather_intact,
 )  # fmt: skip
 BY_SITE: Route = (

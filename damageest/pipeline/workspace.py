@@ -19,7 +19,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from damageest.errors import DamageestError, Fault, JobError
-from damageest.pipeline.cache import Cache
+from damageest.pipeline.cache import Cache, describe_unwritable
 
 _OURS = re.compile(
     r"result\.json|report\.html|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?"
@@ -53,11 +53,11 @@ class Workspace:
 def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
     """Opens the hidden sibling of ``target``. Raises JobError where the target is not an output folder, or in use."""
     hidden = target.parent / f".{target.name}.partial"
-    _refuse_other_folder(target)
     try:
+        _refuse_other_folder(target)
         hidden.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise JobError([Fault(f"{target}: cannot be written: {error.strerror}", "output")]) from None
+        raise describe_unwritable(error, target) from None
     with _lock(hidden, target):
         if _old_path(target).exists() and not target.exists():
             os.replace(_old_path(target), target)
@@ -73,8 +73,10 @@ def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
             yield Workspace(target, folder, Cache(stages, older))
         except DamageestError:
             if not (target / "stages").is_dir():
-                shutil.rmtree(stages)
+                shutil.rmtree(stages, ignore_errors=True)
             raise
+        except OSError as error:
+            raise describe_unwritable(error, target) from error
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             _keep_stages(stages, target / "stages")

@@ -138,6 +138,16 @@ def test_an_array_changed_on_disk_is_not_given_out(tmp_path: Path) -> None:
     assert cache.get("stage", "k") == (False, None)
 
 
+def test_a_number_changed_on_disk_is_not_given_out(tmp_path: Path) -> None:
+    """One bit in the part that is text: still JSON, still of the right kind, and another value."""
+    cache = Cache(tmp_path)
+    cache.put("stage", "k", Evidence(0.125, 2))
+    entry = tmp_path / "stage-k.json"
+    assert cache.get("stage", "k")[0]
+    entry.write_text(entry.read_text().replace("0.125", "0.165"))
+    assert cache.get("stage", "k") == (False, None)
+
+
 def test_a_hit_in_an_older_folder_is_carried_over(tmp_path: Path) -> None:
     Cache(tmp_path / "old").put("stage", "k", SOLID)
     cache = Cache(tmp_path / "new", (tmp_path / "missing", tmp_path / "old"))

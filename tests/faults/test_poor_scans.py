@@ -1,0 +1,67 @@
+"""Scans with next to nothing on them, and with points far away: what they say, and no more."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from damageest.cli import app
+from damageest.io.meshes import write_points
+from tests import damaged_box
+
+RNG = np.random.default_rng(0)
+INTACT = damaged_box.scan()[damaged_box.scan()[:, 2] < 9.5]
+LINE = np.column_stack([np.linspace(-15, 15, 300), np.zeros(300), np.full(300, -10.0)])
+PLANE = np.column_stack([RNG.uniform(-19, 19, 900), RNG.uniform(-14, 14, 900), np.full(900, -10.0)])
+POOR = {
+    "1 point": INTACT[:1],
+    "15 points": INTACT[:: len(INTACT) // 15][:15],
+    "50 points": INTACT[:: len(INTACT) // 50][:50],
+    "50 equal points": np.repeat(INTACT[:1], 50, axis=0),
+    "a line": LINE,
+    "a plane": PLANE,
+}
+
+
+def write(folder: Path, points: np.ndarray, job: str) -> Path:
+    path = damaged_box.write(folder, job)
+    x, y, z = points.T
+    write_points(folder / "scan.ply", {"x": x, "y": y, "z": z})
+    return path
+
+
+@pytest.mark.parametrize("tolerance", ["0.2", "auto"])
+@pytest.mark.parametrize("name", POOR)
+def test_no_damage_is_found_in_next_to_nothing(name: str, tolerance: str, tmp_path: Path) -> None:
+    job = damaged_box.JOB.replace("tolerance: 0.2", f"tolerance: {tolerance}")
+    done = CliRunner().invoke(app, ["run", str(write(tmp_path, POOR[name], job))])
+    assert done.exit_code == 0, (done.output, done.exception)
+    assert "no damage deeper than" in done.stdout
+    if len(np.unique(POOR[name], axis=0)) < 100:
+        assert "too few to show the skin" in done.stdout
+    seen = json.loads((tmp_path / "out/job/result.json").read_text())["coverage"]["seen"]
+    assert seen < 0.6, "and it says that it saw little"
+    assert "that the scan shows" in done.stdout
+
+
+@pytest.mark.parametrize("align", ["none", "register"])
+def test_far_points_are_set_aside_counted_and_said(align: str, tmp_path: Path) -> None:
+    """Twenty points a thousand diagonals away change nothing of what is found."""
+    job = damaged_box.JOB.replace("align: none", f"align: {align}")
+    points = damaged_box.scan()
+    direction = RNG.normal(size=(20, 3))
+    far = 1000 * 54 * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    volumes = []
+    for scan in (points, np.vstack([points[:7000], far, points[7000:]])):
+        done = CliRunner().invoke(app, ["run", str(write(tmp_path, scan, job))])
+        assert done.exit_code == 0, (done.output, done.exception)
+        content = json.loads((tmp_path / "out/job/result.json").read_text())
+        volumes.append(content["damage_volume"])
+        assert content["scan"]["points"] == len(points)
+    assert volumes[0] == volumes[1]
+    assert "20 scan points were set aside" in " ".join(content["warnings"])
+    assert "20 scan points were set aside" in " ".join(done.stdout.split())
