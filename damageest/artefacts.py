@@ -217,7 +217,8 @@ class Scan(_Arrays):
     ``noise`` is the measured standard deviation of the points off the local surface and ``spacing`` the median distance
     to the nearest neighbours that a reconstructed surface has to bridge; both 0 until measured. ``viewpoints`` (V,3):
     where the scanner stood for each view, in the frame of the points; ``view`` (N,): the number of each point's view,
-    -1 where its scanner position is not known. Both None where no position is known.
+    -1 where its scanner position is not known. Both None where no position is known. ``total``: number of points in
+    the files where only some of them are here, else 0.
     """
 
     points: Floats
@@ -230,6 +231,7 @@ class Scan(_Arrays):
     notes: tuple[str, ...] = ()
     viewpoints: Floats | None = None
     view: NDArray[np.int32] | None = None
+    total: int = 0
     _dtypes: ClassVar[dict[str, Any]] = {
         "points": np.float64,
         "normals": np.float64,

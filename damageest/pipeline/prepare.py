@@ -17,6 +17,7 @@ from damageest.geometry.units import diagnose_scale, diagnose_size
 from damageest.job.model import Job
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
+from damageest.pipeline.large_scans import check_crops
 from damageest.pipeline.state import JobState, Work
 from damageest.registry.registry import Registry
 from damageest.stages.part import ReadPart
@@ -33,6 +34,8 @@ def crop_scan(engine: Engine, work: Work) -> Work:
     if not isinstance(stage, ReadScan) or not stage.crop:
         return work
     state = work.job
+    if state.scan.total:
+        check_crops(stage.crop)
     return replace(work, job=state.derive(JobState.scan, crop_points(state.scan, stage.crop), JobState.scan))
 
 

@@ -13,6 +13,7 @@ from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
 from damageest.pipeline.fit_model import correct_scan, fit_model, question_sites
 from damageest.pipeline.grouped_enclosure import enclose_grouped
+from damageest.pipeline.large_scans import add_points_near_damage
 from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.prepare import (
     check_intact,
@@ -53,8 +54,8 @@ from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
     ReadPart, check_selections, ReadScan, crop_scan, set_far_aside, measure_scan, Sample, Align, place_scan,
-    correct_scan,
-    settle_tolerance, Segment, check_intact, inspect_skin, fit_model, Cluster, find_surplus, gather_intact,
+    add_points_near_damage, correct_scan, settle_tolerance, Segment, check_intact, inspect_skin, fit_model, Cluster,
+    find_surplus, gather_intact,
 )  # fmt: skip
 BY_SITE: Route = (
     take_clusters, Reconstruct, Boundary, enclose_grouped(Background, Enclose), Repair, Boolean, gather_sites,

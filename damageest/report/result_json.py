@@ -33,6 +33,7 @@ class PartReport(JsonModel):
 class ScanReport(JsonModel):
     paths: list[str]
     points: int
+    total: int = Field(description="points in the files, of which `points` are used: all near damage, others evenly")
     noise: float = Field(description="measured standard deviation of the points off the local surface")
     spacing: float = Field(description="measured distance that a reconstructed surface has to bridge")
     notes: list[str]
@@ -131,6 +132,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
         scan=ScanReport(
             paths=[relative(path) for path in scan.paths],
             points=len(scan.points),
+            total=scan.total or len(scan.points),
             noise=scan.noise,
             spacing=scan.spacing,
             notes=list(scan.notes),

@@ -50,7 +50,7 @@ ARTEFACTS: list[Any] = [
     Truth(None, TURN, SOLID),
     Scan(POINTS, -POINTS, "um", ("x.ply", "y.ply"), 0.1, 0.2, Truth(SOLID, TURN), ("thinned",)),
     Scan(POINTS),
-    Scan(POINTS, viewpoints=POINTS[:2], view=np.arange(7) % 3 - 1),
+    Scan(POINTS, viewpoints=POINTS[:2], view=np.arange(7) % 3 - 1, total=10**9),
     Samples(POINTS, POINTS, np.arange(7), np.zeros(7, np.uint8), 0.3),
     Pose(TURN, 0.01, 0.9, np.stack([TURN, np.eye(4)]), ("two ways",)),
     FREE,

@@ -25,7 +25,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     """
     import pye57
 
-    _check_file(path)
+    check_header(path)
     pieces: list[Floats] = []
     normals: list[Floats | None] = []
     positions: list[Floats] = []
@@ -37,12 +37,12 @@ def read(path: Path, columns: str | None = None) -> PointFile:
             if not 0 <= header.point_count <= MOST_POINTS_PER_BYTE * path.stat().st_size:
                 raise FormatError(f"the file is too small for the {header.point_count} points of scan {index + 1}")
             raw = file.read_scan_raw(index)
-            points, normal = _read_scan(header, raw, index)
+            points, normal = read_scan(header, raw, index)
             pieces.append(points)
             normals.append(normal)
-            pose = _read_pose(header)
+            pose = read_pose(header)
             positions.append(pose[:3, 3])
-            known.append("sphericalRange" in raw or _is_range_image(raw))
+            known.append("sphericalRange" in raw or is_range_image(raw))
             posed |= not np.array_equal(pose, np.eye(4))
     if not pieces:
         raise FormatError("the E57 file has no scans")
@@ -59,7 +59,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     )
 
 
-def _check_file(path: Path) -> None:
+def check_header(path: Path) -> None:
     """Raises FormatError for a file that is not whole, or whose XML declares entities, which may expand without end."""
     size = path.stat().st_size
     with path.open("rb") as stream:
@@ -79,7 +79,7 @@ def _check_file(path: Path) -> None:
         raise FormatError("the XML of the E57 file declares entities, which no E57 file needs")
 
 
-def _read_pose(header: Any) -> Floats:
+def read_pose(header: Any) -> Floats:
     """The pose (4,4) of a scan in the frame of the file; identity where it has none."""
     pose = np.eye(4)
     if header.has_pose():
@@ -88,12 +88,12 @@ def _read_pose(header: Any) -> Floats:
     return pose
 
 
-def _is_range_image(raw: dict[str, Any]) -> bool:
+def is_range_image(raw: dict[str, Any]) -> bool:
     """Whether the points have rows and columns, of which there are several each."""
     return all(name in raw and np.ptp(raw[name]) > 0 for name in ("rowIndex", "columnIndex"))
 
 
-def _read_scan(header: Any, raw: dict[str, Any], index: int) -> tuple[Floats, Floats | None]:
+def read_scan(header: Any, raw: dict[str, Any], index: int) -> tuple[Floats, Floats | None]:
     if "cartesianX" in raw:
         points = np.column_stack([raw[f"cartesian{axis}"] for axis in "XYZ"]).astype(np.float64)
         state = raw.get("cartesianInvalidState")
@@ -113,7 +113,7 @@ def _read_scan(header: Any, raw: dict[str, Any], index: int) -> tuple[Floats, Fl
         points = points[valid]
         normals = None if normals is None else normals[valid]
     if header.has_pose():
-        pose = _read_pose(header)
+        pose = read_pose(header)
         R = pose[:3, :3]
         points = points @ R.T + pose[:3, 3]
         normals = None if normals is None else normals @ R.T

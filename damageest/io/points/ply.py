@@ -28,7 +28,7 @@ class _Element:
     )  # (position among the properties, type of the count, type of the items)
 
 
-def _read_header(data: bytes) -> tuple[str, list[_Element], int]:
+def read_header(data: bytes) -> tuple[str, list[_Element], int]:
     """The name of the format, the elements, and the position of the first byte after the header."""
     if not data.startswith(b"ply"):
         raise FormatError("not a PLY file: it does not start with 'ply'")
@@ -62,7 +62,7 @@ def _read_header(data: bytes) -> tuple[str, list[_Element], int]:
 def read(path: Path, columns: str | None = None) -> PointFile:
     """The properties x, y, z and, if present, nx, ny, nz of the element 'vertex'."""
     data = path.read_bytes()
-    form, elements, start = _read_header(data)
+    form, elements, start = read_header(data)
     order = [e.name for e in elements]
     if "vertex" not in order:
         raise FormatError("the PLY file has no element 'vertex'")
@@ -88,7 +88,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     return PointFile(stack("x", "y", "z"), normals)
 
 
-def _make_dtype(element: _Element, order: str) -> np.dtype[np.void]:
+def make_dtype(element: _Element, order: str) -> np.dtype[np.void]:
     try:
         return np.dtype([(name, order + kind) for name, kind in element.properties])
     except ValueError:
@@ -100,7 +100,7 @@ def _read_binary(
 ) -> np.ndarray[tuple[int], np.dtype[np.void]]:
     for element in before:
         if not element.lists:
-            start += element.count * _make_dtype(element, order).itemsize
+            start += element.count * make_dtype(element, order).itemsize
         elif element.properties or len(element.lists) > 1:
             raise FormatError(
                 f"the PLY element '{element.name}' before the vertices has lists and values, which is not supported"
@@ -113,7 +113,7 @@ def _read_binary(
                 if start + size > len(data):
                     raise FormatError("the PLY file is truncated")
                 start += size + width * int.from_bytes(data[start : start + size], way)  # type: ignore[arg-type]
-    kind = _make_dtype(vertex, order)
+    kind = make_dtype(vertex, order)
     have = (len(data) - start) // kind.itemsize
     if vertex.count < 0 or have < vertex.count:
         raise FormatError(f"the PLY file is truncated: it has {max(have, 0)} of {vertex.count} vertices")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from typing import ClassVar
 
 from pydantic import Field
@@ -70,3 +71,8 @@ class ReadScan(Stage, ABC):
     @asked_by_name
     @abstractmethod
     def run(self, unit: str, part: Part) -> Scan: ...
+
+    def read_pieces(self, unit: str) -> Iterator[Scan]:
+        """All points in pieces, where ``run`` gives only some of them (``total`` of its scan is above 0); the pipeline
+        takes those near damage from here, twice. Points as ``run`` gives them, without normals."""
+        return iter(())

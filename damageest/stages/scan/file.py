@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -9,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, T
 
 from damageest.artefacts import Scan
 from damageest.geometry.units import UnitOption
+from damageest.io.large_scans import LargeScan, open_large_scan
 from damageest.io.points import READERS
 from damageest.io.scans import read_scan
 from damageest.stages import JobPath
@@ -62,6 +64,13 @@ class ScanFile(ReadScan):
         "best; default: a wrong scale is named and not corrected",
     )
 
+    most_points: int = Field(
+        10_000_000,
+        ge=0,
+        description="of a larger file (PLY, NPY, LAS, LAZ, E57) about so many points are used, chosen evenly, and all "
+        "near damage in addition; 0: all points, whatever memory they need",
+    )
+
     @model_validator(mode="after")
     def _check_viewpoint(self) -> Self:
         if self.viewpoint is not None and not isinstance(self.path, Path):
@@ -70,9 +79,25 @@ class ScanFile(ReadScan):
 
     def run(self, unit: str) -> Scan:
         """The points in ``unit``, the job's. Raises InputError for a file that cannot be read or has no points."""
-        if isinstance(self.path, Path):
-            return read_scan((self.path,), unit, self.unit, self.columns, (self.viewpoint,))
-        files = [item if isinstance(item, ViewFile) else ViewFile(path=item) for item in self.path]
+        if large := self._open_large(unit):
+            return large.thin(self.most_points)
+        files = self._list_files()
         return read_scan(
             [file.path for file in files], unit, self.unit, self.columns, [file.viewpoint for file in files]
         )
+
+    def read_pieces(self, unit: str) -> Iterator[Scan]:
+        large = self._open_large(unit)
+        return iter(()) if large is None else large.read()
+
+    def _open_large(self, unit: str) -> LargeScan | None:
+        if not self.most_points:
+            return None
+        files = self._list_files()
+        places = [file.viewpoint for file in files]
+        return open_large_scan([file.path for file in files], unit, self.unit, places, self.most_points)
+
+    def _list_files(self) -> list[ViewFile]:
+        if isinstance(self.path, Path):
+            return [ViewFile(path=self.path, viewpoint=self.viewpoint)]
+        return [item if isinstance(item, ViewFile) else ViewFile(path=item) for item in self.path]
