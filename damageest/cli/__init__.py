@@ -39,9 +39,22 @@ def _options(
 
 
 def _add_commands() -> None:
-    from damageest.cli import batch, evaluate, faces, init, picture, plugins, run, schema, stages, validate, view
+    from damageest.cli import (
+        batch,
+        evaluate,
+        faces,
+        init,
+        picture,
+        plugins,
+        run,
+        schema,
+        stages,
+        validate,
+        verify,
+        view,
+    )
 
-    for module in (run, batch, view, picture, validate, init, faces, stages, plugins, schema):
+    for module in (run, batch, view, picture, verify, validate, init, faces, stages, plugins, schema):
         app.command(module.__name__.rsplit(".", 1)[1])(module.command)
     app.add_typer(evaluate.app, name="evaluate")
 

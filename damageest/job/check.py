@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from damageest.errors import Fault, JobError, PluginError, suggest
 from damageest.io.files import describe_no_file, resolve_path
 from damageest.job import yamlfile
-from damageest.job.model import Header, Job
+from damageest.job.model import Header, Job, find_paths
 from damageest.job.wording import describe_fault
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract
 from damageest.registry.registry import Implementation, Registry
@@ -29,14 +29,16 @@ def load(
     settings: Sequence[str] = (),
     given: Mapping[Contract, Any] | None = None,
     without: Sequence[str] = (),
+    folder: Path | None = None,
 ) -> Job:
-    """Reads and checks a job: a YAML file, or a mapping of the same shape (its paths relative to the working folder).
+    """Reads and checks a job: a YAML file, or a mapping of the same shape (its paths relative to ``folder``, by
+    default the working folder).
 
     ``settings`` are overrides ``stage.option=value`` or ``field=value``. ``without``: keys of the file that are not
     of the job. Raises JobError naming every fault.
     """
     if isinstance(source, Mapping):
-        return _Check(dict(source), {}, "job", Path.cwd(), registry, given or {}).job(settings, "job")
+        return _Check(dict(source), {}, "job", folder or Path.cwd(), registry, given or {}).job(settings, "job")
     path = Path(source)
     tree, positions = yamlfile.read(path)
     if not isinstance(tree, Mapping):
@@ -255,7 +257,7 @@ class _Check:
                 told.append(((key, *(place or fault["loc"])), describe_fault(fault, options, valid, item.name)))
             self.add_faults(told)
             return None
-        for place, path in _find_paths(stage.model_dump()):
+        for place, path in find_paths(stage.model_dump()):
             if wrong := describe_no_file(path):
                 self.add_fault(f"{str(path)[-250:]}: {wrong}", key, *place)
         return stage
@@ -265,12 +267,3 @@ def _spell_out(key: str, value: str | list[Any], registry: Registry) -> dict[str
     """The mapping that a bare value is short for: a name, or for part and scan a path (or paths)."""
     is_file = key in ("part", "scan") and value not in [item.name for item in registry.of(key)]
     return {"use": "file", "path": value} if is_file else {"use": value}
-
-
-def _find_paths(value: Any, place: tuple[str | int, ...] = ()) -> list[tuple[tuple[str | int, ...], Path]]:
-    """The paths among the options of a stage, each with its place."""
-    if isinstance(value, Path):
-        return [(place, value)]
-    items: Any = value.items() if isinstance(value, Mapping) else ()
-    items = enumerate(value) if isinstance(value, (list, tuple)) else items
-    return [found for step, item in items for found in _find_paths(item, (*place, step))]

@@ -108,3 +108,12 @@ def to_plain(value: Any, beside: Path) -> Any:
     if isinstance(value, (list, tuple)):
         return [to_plain(item, beside) for item in value]
     return value
+
+
+def find_paths(value: Any, place: tuple[str | int, ...] = ()) -> list[tuple[tuple[str | int, ...], Path]]:
+    """The paths among the options of a stage, each with its place."""
+    if isinstance(value, Path):
+        return [(place, value)]
+    items: Any = value.items() if isinstance(value, Mapping) else ()
+    items = enumerate(value) if isinstance(value, (list, tuple)) else items
+    return [found for step, item in items for found in find_paths(item, (*place, step))]

@@ -8,6 +8,7 @@ from typing import Any
 
 from damageest.job import yamlfile
 from damageest.job.model import Job, to_plain
+from damageest.report.provenance import build_provenance, seal
 from damageest.report.result_json import build_report
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
@@ -26,5 +27,7 @@ def describe_job(job: Job, target: Path) -> str:
 def write_report(result: Result, job: Job, folder: Path, target: Path, written: ExportedFiles) -> None:
     """Writes result.json and job.yaml into ``folder``, their paths relative to ``target``, where they will stand."""
     content = describe_result(result, target, written)
-    (folder / "result.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
     (folder / "job.yaml").write_text(describe_job(job, target))
+    content["provenance"] = build_provenance(job, folder, target)
+    content["provenance"]["sha256"] = seal(content)
+    (folder / "result.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")

@@ -11,6 +11,7 @@ from damageest.report.base import JsonModel
 from damageest.report.deviation_json import DeviationReport, report_deviation
 from damageest.report.fit_json import FitReport, report_fit
 from damageest.report.free_json import FreeMotionReport, report_free_motion
+from damageest.report.provenance import ProvenanceReport
 from damageest.report.site_json import MaterialReport, SiteReport, report_site, sum_material
 from damageest.report.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
 from damageest.report.uncertainty_json import report_interval
@@ -102,6 +103,7 @@ class Report(JsonModel):
     failures: list[str] = Field(description="sites without a damage volume or a deposit, and why")
     warnings: list[str]
     versions: dict[str, str]
+    provenance: ProvenanceReport | None = Field(None, description="null in a result that is not in files")
 
 
 def result_schema() -> dict[str, Any]:

@@ -1,0 +1,62 @@
+"""`damageest verify`: checks that an output folder is as the run left it, and that a repeated run gives the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of a run.")],
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="Run the job of result.json again, elsewhere, and compare.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
+) -> None:
+    """Check files and inputs of an output folder against the hashes in its result.json."""
+    from damageest.report.output_folder import open_output
+    from damageest.report.verification import find_changes, find_other_versions
+
+    content = open_output(folder).content
+    changes = find_changes(folder, content)
+    for text in changes:
+        typer.echo(f"error: {text}", err=True)
+    for text in find_other_versions(content):
+        typer.echo(f"note: {text}")
+    count, inputs = (len(content["provenance"][kind]) for kind in ("outputs", "inputs"))
+    if not changes:
+        typer.echo(f"{folder}: result.json, {count} files and {inputs} inputs are as the run left them")
+    if rerun:
+        changes += _run_again(folder, content)
+    raise typer.Exit(1 if changes else 0)
+
+
+def _run_again(folder: Path, content: dict[str, object]) -> list[str]:
+    """What a repeated run gives otherwise, in words; also printed."""
+    import tempfile
+    from typing import Any
+
+    from damageest.api import run
+    from damageest.errors import InputError
+    from damageest.job import load
+    from damageest.registry import Registry
+    from damageest.report.output_folder import open_output
+    from damageest.report.verification import find_differences, read_provenance
+
+    provenance: dict[str, Any] = read_provenance(folder, content)
+    if provenance["given"]:
+        raise InputError(
+            f"{folder}: {' and '.join(provenance['given'])} were arrays and no files; repeat the run from Python"
+        )
+    registry = Registry.discover()
+    job = load(provenance["job"], registry, folder=folder)
+    with tempfile.TemporaryDirectory(prefix="damageest-verify-") as place:
+        run(job, output=Path(place) / "out", registry=registry)
+        differences = find_differences(content, open_output(Path(place) / "out").content)
+    for text in differences:
+        typer.echo(f"error: {text}", err=True)
+    if not differences:
+        typer.echo(f"{folder}: a repeated run gives the same")
+    return differences
