@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 from collections.abc import Iterator
 from typing import Any
@@ -13,13 +14,13 @@ CONNECT_SECONDS = 30
 """Longest time until a scheduler answers."""
 
 
-def require_dask() -> None:
-    """Raises InputError where Dask is missing."""
+def require_dask(command: str, extra: str) -> None:
+    """Raises InputError where Dask is missing. ``extra``: that of damageest which installs it."""
     try:
         import distributed  # noqa: F401
     except ImportError:
         raise InputError(
-            "damageest batch needs dask distributed, which is not installed\n  try: pip install 'damageest[batch]'"
+            f"{command} needs dask distributed, which is not installed\n  try: pip install 'damageest[{extra}]'"
         ) from None
 
 
@@ -29,18 +30,17 @@ def count_cores() -> int:
 
 
 @contextlib.contextmanager
-def open_client(scheduler: str, workers: int) -> Iterator[Any]:
-    """A client of the scheduler at this address, or of new local workers, each a process with one thread.
+def open_client(scheduler: str, workers: int, processes: bool = True) -> Iterator[Any]:
+    """A client of the scheduler at this address, or of new local workers, each a process with one thread; or without
+    ``processes`` of as many threads of this process, for work that starts a process itself.
 
     A job is tried again by the batch, not by Dask. Raises InputError where no scheduler answers.
     """
     import dask
+    from distributed import Client, LocalCluster  # before the settings, which else would take its defaults with them
 
-    chosen = {"distributed.scheduler.allowed-failures": 0}
-    quiet = {"logging.distributed": "critical"}  # what happens to workers is in the table
-    with dask.config.set({**chosen, **quiet}):
-        from distributed import Client, LocalCluster
-
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what happens to workers is in the table
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
         if scheduler:
             try:
                 client = Client(scheduler, timeout=CONNECT_SECONDS)
@@ -53,10 +53,7 @@ def open_client(scheduler: str, workers: int) -> Iterator[Any]:
                 yield client
             return
         # the limit of memory is the job's process' own, so Dask's, which restarts workers, is off
-        with (
-            LocalCluster(
-                n_workers=workers, threads_per_worker=1, memory_limit=0, dashboard_address=None, silence_logs=50
-            ) as cluster,
-            Client(cluster) as client,
-        ):
+        size = {"n_workers": workers if processes else 1, "threads_per_worker": 1 if processes else workers}
+        fixed: dict[str, Any] = {"memory_limit": 0, "dashboard_address": None, "silence_logs": 50}
+        with LocalCluster(processes=processes, **size, **fixed) as cluster, Client(cluster) as client:
             yield client

@@ -14,6 +14,7 @@ from damageest.batches.cluster import count_cores, open_client, require_dask
 from damageest.batches.files import write_page, write_tables
 from damageest.batches.jobs import BatchJob, find_jobs
 from damageest.batches.rows import Row, read_row
+from damageest.batches.tasks import run_tasks
 from damageest.batches.work import compute_key, load_job, release, work
 from damageest.errors import DamageestError, Fault, JobError
 from damageest.io.files import expand_home
@@ -22,11 +23,6 @@ from damageest.isolation.limits import STAGE_SECONDS
 
 TIMEOUT = 3600.0
 """Default time limit of a job, in seconds."""
-TRIES = 2
-"""How many workers a job is given to, one after the other, where they die."""
-POLL = 0.5
-"""Seconds between two looks at a running batch."""
-
 Tell = Callable[[Sequence[BatchJob], Mapping[str, Row], set[str]], None]
 """Called with all jobs, the rows that there are by name, and the names of those that run now."""
 
@@ -63,7 +59,7 @@ def batch(
     Jobs with a result from an earlier call, of which neither the job nor a file nor the code has changed, do not run
     again. Raises JobError where there are no jobs, InputError where no scheduler answers.
     """
-    require_dask()
+    require_dask("damageest batch", "batch")
     words = [jobs] if isinstance(jobs, (str, Path)) else list(jobs)
     found, folder = find_jobs(words, settings), expand_home(Path(output)).absolute()
     if not found:
@@ -110,51 +106,28 @@ def _run(
     rows: dict[str, Row],
     report: Callable[[set[str]], None],
 ) -> None:
-    """Adds a row for each job. Where it is interrupted, what runs is ended.
-
-    Dask gets as many jobs as it has threads: one that waits on a worker would count as tried where that worker dies.
-    """
+    """Adds a row for each job. Where it is interrupted, what runs is ended."""
     token = f"damageest-{uuid.uuid4().hex[:8]}"
-    tries = dict.fromkeys((job.name for job in jobs), 0)
-    waiting = list(reversed(jobs))
-    futures: dict[Any, BatchJob] = {}
-
-    def submit(job: BatchJob) -> Any:
-        tries[job.name] += 1
-        task = {"name": job.name, "job": job.path, "settings": list(job.settings), "output": str(folder / job.name)}
-        task |= {"batch": token, **vars(options)}
-        return client.submit(work, task, key=f"{token}-{job.name}-{tries[job.name]}", pure=False)
-
+    shared = {"batch": token, **vars(options)}
+    places = {job.name: job for job in jobs}
+    tasks = {
+        job.name: (
+            shared
+            | {"name": job.name, "job": job.path, "settings": list(job.settings), "output": str(folder / job.name)},
+        )
+        for job in jobs
+    }
     try:
-        while waiting or futures:
-            while waiting and len(futures) < max(1, sum(client.nthreads().values())):
-                job = waiting.pop()
-                futures[submit(job)] = job
-            for future in _wait(list(futures)):
-                job = futures.pop(future)
-                count = tries[job.name]
-                if future.status == "finished":
-                    rows[job.name] = replace(read_row(future.result()), tries=count)
-                elif future.status == "error" and count < TRIES:  # work() raises nothing: the worker died
-                    waiting.append(job)
-                else:
-                    why = f"{count} workers died with it" if future.status == "error" else "the cluster ended"
-                    rows[job.name] = _row(job, folder, outcome="lost", error=why, tries=count)
-            report({job.name for job in futures.values()})
+        with contextlib.closing(run_tasks(client, work, tasks, token)) as steps:
+            for ended, active in steps:
+                for task in ended:
+                    lost = _row(places[task.name], folder, outcome="lost", error=task.why)
+                    row = lost if task.value is None else read_row(task.value)
+                    rows[task.name] = replace(row, tries=task.tries)
+                report(active)
     finally:
         with contextlib.suppress(Exception):  # a cluster that has ended
-            if futures:
-                client.cancel(list(futures), force=True)
             client.run(release, token)
-
-
-def _wait(futures: list[Any]) -> list[Any]:
-    """The futures that are done, after at most `POLL` seconds."""
-    from distributed import wait
-
-    with contextlib.suppress(TimeoutError):
-        wait(futures, timeout=POLL, return_when="FIRST_COMPLETED")
-    return [future for future in futures if future.done()]
 
 
 def _find_done(jobs: Sequence[BatchJob], folder: Path) -> dict[str, Row]:

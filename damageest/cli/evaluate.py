@@ -43,6 +43,9 @@ Settings = Annotated[
 ]
 Jobs = Annotated[int, typer.Option(min=1, help="Cases that run at the same time. More than 1 makes each run slower.")]
 Timeout = Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")]
+Scheduler = Annotated[
+    str, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster at this address, instead of --jobs here.")
+]
 Out = Annotated[
     Path | None,
     typer.Option(file_okay=False, help="Folder for cases.jsonl (to resume from), cases.csv, summary.json and plots."),
@@ -73,6 +76,7 @@ def job_command(
     settings: Settings = None,
     jobs: Jobs = 2,
     timeout: Timeout = 300,
+    scheduler: Scheduler = "",
     out: Out = None,
     plots: Plots = True,
 ) -> None:
@@ -82,18 +86,22 @@ def job_command(
     of the job's scan. Damage that the job itself simulates is not used. Default sizes: no damage, and depths of 2, 4, 8
     and 16 tolerances.
     """
+    from damageest.errors import InputError
     from damageest.evaluate.figures import summarise
     from damageest.evaluate.job import plan_study
     from damageest.evaluate.variants import VariationRequest
     from damageest.registry import Registry
 
     _prepare(out, plots)
+    if scheduler and not out:
+        raise InputError("--scheduler: give --out too, a folder that the cluster sees: the part is put there")
     request = VariationRequest(size, noise, points, tolerance, vary or (), settings or (), against or ())
-    with tempfile.TemporaryDirectory(prefix="damageest-evaluate-") as folder:
+    place = out.resolve() if out and scheduler else None
+    with tempfile.TemporaryDirectory(prefix="damageest-evaluate-", dir=place) as folder:
         study = plan_study(job, request, seeds, Registry.discover(), Path(folder))
         for note in study.notes:
             typer.echo(note)
-        rows = _run_cases(study.cases, jobs, timeout, out)
+        rows = _run_cases(study.cases, jobs, timeout, out, scheduler)
     _write_report(rows, [], study.unit, out, plots)
     typer.echo(f"\n{summarise(rows, study.unit)}")
 
@@ -129,6 +137,7 @@ def suite_command(
     ] = False,
     jobs: Jobs = 2,
     timeout: Timeout = 300,
+    scheduler: Scheduler = "",
     out: Out = None,
     plots: Plots = True,
     write: Annotated[
@@ -154,7 +163,7 @@ def suite_command(
             raise InputError(
                 "--intervals: varies noise and density itself; leave out --vary, --against, --set, --noise and --points"
             )
-        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, _format_command())
+        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, _format_command(), scheduler)
         return
     _prepare(out, plots)
     if write:
@@ -164,7 +173,8 @@ def suite_command(
     base = [f"method={method}", *(["align=none"] if pose == "identity" else [])]
     varied = [text for text in base if text.partition("=")[0] not in {name.partition("=")[0] for name in vary or ()}]
     request = VariationRequest(size, noise, points, tolerance, vary or (), [*varied, *(settings or ())], against or ())
-    rows = _run_cases(suite.make_cases(cases, seed, chosen, pose, request, Registry.discover()), jobs, timeout, out)
+    planned = suite.make_cases(cases, seed, chosen, pose, request, Registry.discover())
+    rows = _run_cases(planned, jobs, timeout, out, scheduler)
     first = ["part"] if len(chosen) > 1 or not collect_axes(rows) else []
     _write_report(rows, first, "mm", out, plots)
     typer.echo(f"\n{summarise(rows, 'mm')}")
@@ -177,17 +187,21 @@ def suite_command(
 
 
 def _prepare(out: Path | None, plots: bool) -> None:
+    from damageest.batches.cluster import require_dask
     from damageest.evaluate.memory import require_psutil
     from damageest.evaluate.plots import require_matplotlib
 
     require_psutil()
+    require_dask("damageest evaluate", "evaluate")
     if out and plots:
         require_matplotlib()
     if out:
         out.mkdir(parents=True, exist_ok=True)
 
 
-def _run_cases(cases: Sequence[DamageCase], jobs: int, timeout: float, out: Path | None) -> list[dict[str, Any]]:
+def _run_cases(
+    cases: Sequence[DamageCase], jobs: int, timeout: float, out: Path | None, scheduler: str
+) -> list[dict[str, Any]]:
     from damageest.evaluate.report import format_row
     from damageest.evaluate.rows import run_all
 
@@ -198,7 +212,7 @@ def _run_cases(cases: Sequence[DamageCase], jobs: int, timeout: float, out: Path
         count += 1
         typer.echo(f"[{count}/{len(cases)}] {format_row(row)}", err=True)
 
-    return run_all(cases, out / "cases.jsonl" if out else None, jobs, timeout, print_row)
+    return run_all(cases, out / "cases.jsonl" if out else None, jobs, timeout, print_row, scheduler)
 
 
 def _write_report(rows: list[dict[str, Any]], first: list[str], unit: str, out: Path | None, plots: bool) -> None:

@@ -22,6 +22,9 @@ def command(
     points: Annotated[int, typer.Option(min=100, help="Number of points of each scan.")] = 50_000,
     workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 2,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,
+    scheduler: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster at this address, instead of --workers here.")
+    ] = "",
     out: Annotated[
         Path | None, typer.Option(file_okay=False, help="Folder for honesty.jsonl, to resume from, and honesty.md.")
     ] = None,
@@ -35,6 +38,7 @@ def command(
     The troubles are those of real scans: lost walls, skin that was not scanned, a wrong part, frame or unit, fixtures,
     misplaced views, and others. A result is silent where it is wrong and nothing in it says so.
     """
+    from damageest.batches.cluster import require_dask
     from damageest.evaluate.honesty.report import describe_case, format_trouble_row, make_trouble_tables
     from damageest.evaluate.honesty.suite import make_trouble_cases
     from damageest.evaluate.job import fingerprint_code
@@ -44,6 +48,7 @@ def command(
 
     if write:
         replace_between_marks(write, None, "honesty")  # fails before the runs start if the marks are missing
+    require_dask("damageest evaluate", "evaluate")
     source = fingerprint_code(Registry.discover())
     cases = make_trouble_cases(
         _split(kinds), _split(parts), _parse_numbers("--seeds", seeds), points, _parse_numbers("--case", case), source
@@ -61,7 +66,7 @@ def command(
         count += 1
         typer.echo(f"[{count}/{len(cases)}] {row['number']} {format_trouble_row(row)}", err=True)
 
-    rows = run_all(cases, out / "honesty.jsonl" if out else None, workers, timeout, print_row)
+    rows = run_all(cases, out / "honesty.jsonl" if out else None, workers, timeout, print_row, scheduler)
     text = make_trouble_tables(rows, _format_command())
     typer.echo("\n" + text)
     if out:

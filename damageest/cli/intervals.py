@@ -11,7 +11,7 @@ import typer
 
 def run_intervals(
     cases: int, seed: int, parts: Sequence[str], jobs: int, timeout: float, out: Path | None,
-    write: Path | None, marks: str, command: str,
+    write: Path | None, marks: str, command: str, scheduler: str,
 ) -> None:  # fmt: skip
     """Runs the cases, prints the table, and puts it between the marks of ``write``."""
     from damageest.evaluate.intervals import format_interval_row, make_interval_cases, make_interval_tables
@@ -31,7 +31,7 @@ def run_intervals(
         count += 1
         typer.echo(f"[{count}/{len(planned)}] {format_interval_row(row)}", err=True)
 
-    rows = run_all(planned, out / "intervals.jsonl" if out else None, jobs, timeout, print_row)
+    rows = run_all(planned, out / "intervals.jsonl" if out else None, jobs, timeout, print_row, scheduler)
     text = make_interval_tables(rows, command)
     typer.echo("\n" + text)
     if write:

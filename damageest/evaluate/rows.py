@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import json
+import uuid
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
+from damageest.batches.cluster import open_client
+from damageest.batches.tasks import run_tasks
 from damageest.evaluate.processes import Row, run_in_process
 
 
@@ -35,30 +37,39 @@ class EvaluationCase(Protocol):
 
 
 def run_all(
-    cases: Sequence[EvaluationCase], out: Path | None, jobs: int, timeout: float, tell: Callable[[Row], None]
+    cases: Sequence[EvaluationCase],
+    out: Path | None,
+    jobs: int,
+    timeout: float,
+    tell: Callable[[Row], None],
+    scheduler: str = "",
 ) -> list[Row]:
     """The rows of all cases, in the order of the cases.
 
-    Rows that the file ``out`` already holds are read from it. New rows are appended to it. At most ``jobs`` cases run
-    at a time. ``tell`` is called with each row.
+    Rows that the file ``out`` already holds are read from it. New rows are appended to it. The cases run on Dask: at
+    most ``jobs`` at a time on this machine, or on the cluster whose ``scheduler`` has this address. ``tell`` is called
+    with each row.
     """
     rows_by_key = {row["key"]: row for row in read_rows(out)}
     waiting = {case.compute_key(): case for case in cases if case.compute_key() not in rows_by_key}
     for row in _collect_rows(cases, rows_by_key):
         tell(row)
-    with ThreadPoolExecutor(jobs) as pool:
-        futures = [pool.submit(_compute_row, case, timeout) for case in waiting.values()]
-        try:
-            for future in as_completed(futures):
-                row = future.result()
-                rows_by_key[row["key"]] = row
-                tell(row)
-                if out:
-                    with out.open("a") as stream:
-                        stream.write(json.dumps(row) + "\n")
-        except BaseException:  # as Ctrl-C: do not start the cases that wait
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    if not waiting:
+        return _collect_rows(cases, rows_by_key)
+    tasks = {key: (case, timeout) for key, case in waiting.items()}
+    # each case starts a process of its own, so threads are enough here
+    token = f"damageest-{uuid.uuid4().hex[:8]}"
+    with (
+        open_client(scheduler, jobs, processes=False) as client,
+        contextlib.closing(run_tasks(client, _compute_row, tasks, token)) as steps,
+    ):
+        for task in (task for ended, _ in steps for task in ended):
+            row = task.value or waiting[task.name].make_blank_row() | {"error": task.why}
+            rows_by_key[row["key"]] = row
+            tell(row)
+            if out:
+                with out.open("a") as stream:
+                    stream.write(json.dumps(row) + "\n")
     return _collect_rows(cases, rows_by_key)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 import damageest
-from damageest.batches.rows import Row
+from damageest.batches.rows import Row, read_row
 from damageest.batches.work import work
 from damageest.isolation import end_workers
 from tests import damaged_box
@@ -81,34 +81,57 @@ def test_rows_of_a_batch(client: Any, tmp_path: Path) -> None:
     assert told[-1] == {row.name for row in rows}
 
 
-def run_one(tmp_path: Path, site: Site, body: str, **limits: Any) -> Row:
-    from damageest.batches.rows import read_row
+HANGING = '''
+from damageest.artefacts import Part
+from damageest.stages.part import ReadPart
 
-    site.add("acme-bad", GROWN.replace(BODY, body))
-    job = damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n")
-    task = {"name": "job", "job": str(job), "settings": [], "output": str(tmp_path / "b/job"), "batch": "test"}
-    return read_row(work({**task, "memory": None, "timeout": 60, "stage_timeout": 60, "cache": True, **limits}))
+class Hanging(ReadPart):
+    """Hangs."""
+    use: Literal["hanging"] = "hanging"
+    def run(self, unit: str) -> Part:
+        while True: pass
+
+@hookimpl
+def damageest_stages():
+    return [Hanging]
+'''
+
+
+def run_one(job: Path, *settings: str, **limits: Any) -> Row:
+    task = {
+        "name": "job",
+        "job": str(job),
+        "settings": list(settings),
+        "output": str(job.parent / "b"),
+        "batch": "test",
+    }
+    return read_row(work({**task, "memory": None, "timeout": 100, "stage_timeout": 60, "cache": True, **limits}))
 
 
 FAULTS = {
-    "exits": ("import os; os._exit(0)", "crashed", "ended its process with exit status 0"),
-    "crashes": ("import ctypes; ctypes.string_at(0)", "crashed", "segmentation fault (SIGSEGV)"),
-    "hangs": ("\n        while True: pass", "timeout", "not finished after 8 s (--timeout)"),
+    "exits": ("import os; os._exit(0)", "ended its process with exit status 0"),
+    "crashes": ("import ctypes; ctypes.string_at(0)", "segmentation fault (SIGSEGV)"),
 }
 
 
-@pytest.mark.parametrize("name", ["exits", pytest.param("crashes", marks=pytest.mark.slow), "hangs"])
+@pytest.mark.parametrize("name", ["exits", pytest.param("crashes", marks=pytest.mark.slow)])
 def test_a_stage_that_ends_the_process_is_named(name: str, site: Site, tmp_path: Path) -> None:
     """The stage has no process of its own: it takes the job's process with it, and the row says which stage it was."""
-    body, outcome, text = FAULTS[name]
-    limits = {}
-    if name == "hangs":  # all before it is kept, so that the limit of time can be short
-        damageest.run(damaged_box.write(tmp_path), output=tmp_path / "b/job")
-        limits = {"timeout": 8}
-    row = run_one(tmp_path, site, body, **limits)
-    assert row.outcome == outcome
-    assert "allowance: doubled (site 1): " in row.error
+    body, text = FAULTS[name]
+    site.add("acme-bad", GROWN.replace(BODY, body))
+    row = run_one(damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n"))
+    assert row.outcome == "crashed"
+    assert row.error.startswith("allowance: doubled (site 1): ")
     assert text in row.error
+
+
+def test_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
+    site.add("acme-hang", HANGING)
+    job = damaged_box.write(tmp_path)
+    assert run_one(job, "part=none").outcome == "refused"  # the process has started, and is used again
+    row = run_one(job, "part=hanging", timeout=4)
+    assert row.outcome == "timeout"
+    assert row.error == "part: hanging: not finished after 4 s (--timeout)"
 
 
 BATCH = """

@@ -25,11 +25,12 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The keys of the cases that were run, in place of running them."""
     keys: list[str] = []
 
-    def row(case: DamageCase, timeout: float) -> dict[str, Any]:
+    def run(module: str, inputs: dict[str, Any], timeout: float) -> dict[str, Any]:
+        case = DamageCase(**inputs)
         keys.append(case.compute_key())
         return case.make_blank_row() | {"seconds": timeout}
 
-    monkeypatch.setattr(rows_module, "_compute_row", row)
+    monkeypatch.setattr(rows_module, "run_in_process", run)
     return keys
 
 

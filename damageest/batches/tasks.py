@@ -1,0 +1,70 @@
+"""Tasks on a Dask cluster: each has an end, whatever becomes of the workers."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+TRIES = 2
+"""How many workers a task is given to, one after the other, where they die."""
+POLL = 0.5
+"""Seconds between two looks at the tasks."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A task that has ended. ``value``: what the function gave; None where ``why`` says why there is none. ``tries``:
+    how many workers it was given to."""
+
+    name: str
+    value: Any
+    why: str
+    tries: int
+
+
+def run_tasks(
+    client: Any, function: Callable[..., Any], tasks: Mapping[str, tuple[Any, ...]], token: str
+) -> Generator[tuple[list[Ended], set[str]], None, None]:
+    """Calls ``function`` with the arguments of each task, and gives, at least every `POLL` seconds, those that have
+    ended since and the names of those that a worker has.
+
+    ``function`` catches its own exceptions: one that it raises counts as the death of its worker. ``token`` begins the
+    keys in Dask. Dask gets as many tasks as it has threads: one that waits on a worker would count as tried where
+    that worker dies. Where it is closed, tasks are cancelled.
+    """
+    tries = dict.fromkeys(tasks, 0)
+    waiting = list(tasks)[::-1]
+    futures: dict[Any, str] = {}
+    try:
+        while waiting or futures:
+            while waiting and len(futures) < max(1, sum(client.nthreads().values())):
+                name = waiting.pop()
+                tries[name] += 1
+                key = f"{token}-{name}-{tries[name]}"
+                futures[client.submit(function, *tasks[name], key=key, pure=False)] = name
+            ended = []
+            for future in _wait(list(futures)):
+                name = futures.pop(future)
+                if future.status == "finished":
+                    ended.append(Ended(name, future.result(), "", tries[name]))
+                elif future.status == "error" and tries[name] < TRIES:
+                    waiting.append(name)
+                else:
+                    why = f"{tries[name]} workers died with it" if future.status == "error" else "the cluster ended"
+                    ended.append(Ended(name, None, why, tries[name]))
+            yield ended, set(futures.values())
+    finally:
+        if futures:
+            with contextlib.suppress(Exception):  # a cluster that has ended
+                client.cancel(list(futures), force=True)
+
+
+def _wait(futures: list[Any]) -> list[Any]:
+    """The futures that are done, after at most `POLL` seconds."""
+    from distributed import wait
+
+    with contextlib.suppress(TimeoutError):
+        wait(futures, timeout=POLL, return_when="FIRST_COMPLETED")
+    return [future for future in futures if future.done()]
