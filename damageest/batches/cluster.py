@@ -14,6 +14,10 @@ CONNECT_SECONDS = 30
 """Longest time until a scheduler answers."""
 
 
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "IGL_NUM_THREADS")
+"""Variables with the number of threads of numerical libraries: the jobs share the cores."""
+
+
 def require_dask(command: str, extra: str) -> None:
     """Raises InputError where Dask is missing. ``extra``: that of damageest which installs it."""
     try:
@@ -40,7 +44,10 @@ def open_client(scheduler: str, workers: int, processes: bool = True) -> Iterato
     from distributed import Client, LocalCluster  # before the settings, which else would take its defaults with them
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what happens to workers is in the table
-    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
+    threads = str(max(1, count_cores() // workers))
+    environment = {name: os.environ.get(name, threads) for name in _THREADS}
+    chosen = {"distributed.scheduler.allowed-failures": 0, "distributed.nanny.pre-spawn-environ": environment}
+    with dask.config.set(chosen):
         if scheduler:
             try:
                 client = Client(scheduler, timeout=CONNECT_SECONDS)
