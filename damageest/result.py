@@ -21,6 +21,7 @@ from damageest.artefacts import (
     Solid,
     Surface,
 )
+from damageest.errors import InputError
 from damageest.findings import Coverage, Fading, Interval, ModelFit, Surplus, Uncertainty, Verdict
 from damageest.geometry.transforms import invert_pose
 from damageest.io.conversions import as_manifold, as_trimesh
@@ -185,6 +186,20 @@ class Result:
     def as_manifold(self, what: str, site: int | None = None, frame: Literal["part", "scan"] = "part") -> Any:
         """A ``manifold3d.Manifold`` in the part's frame or the scanner's; see `mesh`."""
         return as_manifold(_require_solid(self.mesh(what, site), what), self._transform_to(frame))
+
+    def as_cadquery(self, what: str, site: int | None = None) -> Any:
+        """A ``cadquery.Shape`` with the faces of the part's CAD file: the part, what is ``undamaged`` of it, or the
+        ``damage`` of a site. In the part's frame and in ``units``.
+
+        It takes the plugin cadquery, a part from STEP, IGES or BREP, and some seconds for each site. Raises ValueError
+        for another name, InputError where the part has no CAD faces or there is no exact form.
+        """
+        from importlib import import_module
+        from importlib.util import find_spec
+
+        if find_spec("damageest_cadquery") is None:
+            raise InputError("as_cadquery needs the plugin damageest-cadquery; install it, or take as_trimesh")
+        return import_module("damageest_cadquery.exact").as_cadquery(self, what, site)
 
     def _transform_to(self, frame: str) -> Floats | None:
         """T (4,4) that takes a point of the part to a frame; None for the part's own."""

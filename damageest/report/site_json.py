@@ -57,7 +57,7 @@ class ExactReport(JsonModel):
     distance: float | None = Field(description="95 % of the inner surface are as near to the mesh's, both ways")
     farthest: float | None = Field(description="largest distance of the inner surfaces, both ways")
     beyond: float | None = Field(description="share of the inner surface farther than a quarter of the tolerance")
-    seconds: float
+    seconds: float = Field(description="of the processor")
     tried: list[str] = Field(description="what was refused before, and why")
 
 

@@ -52,8 +52,8 @@ class ExactForm:
     the solid could not be made and is written with facets all over. ``faces`` and ``inner_faces``: how many faces it
     has, and how many of them are inside the part. ``volume``. ``distance``: 95 % of its inner surface are as near to
     the mesh's, both ways; ``farthest``: all of it; ``beyond``: the share of it that is farther than a quarter of the
-    tolerance. What lies less deep than that below the skin counts as near. ``seconds``: what it took. ``tried``: what
-    was refused before it, and why.
+    tolerance. What lies less deep than that below the skin counts as near. ``seconds`` of the processor. ``tried``:
+    what was refused before it, and why.
     """
 
     form: str

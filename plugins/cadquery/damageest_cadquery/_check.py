@@ -15,7 +15,7 @@ from damageest_cadquery._split import Piece, find_corners, measure_volume
 
 VOLUME = 0.003
 """Largest relative difference of the volumes, beside what the triangles of the part cut off its curved faces."""
-LIMITS = {"shapes": (0.1, 2.0), "spline": (0.01, 1.0), "facets": (0.01, 1.0)}
+LIMITS = {"shapes": (0.1, 2.0), "spline": (0.02, 1.5), "facets": (0.01, 1.0)}
 """By form: the share of the inner surface that may be farther than a quarter of the tolerance, and how far it may be,
 in tolerances. Where recognised faces meet, the mesh rounds their edge; there the scan decides which is right."""
 ON_CAD = 1e-6

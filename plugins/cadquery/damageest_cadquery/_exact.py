@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh, Part, Solid, Surface
+from damageest.artefacts import Floats, Part, Solid, Surface
 from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
@@ -34,6 +34,8 @@ from damageest_cadquery._split import (
 
 FACETS = (250, 500, 1000, 2000, 4000)
 MOST_FACES = 5000
+MOST_SPLINES = 3
+"""Splines near enough that are tried, the coarsest first."""
 SPECK = 1e-3
 """Share of the damage volume below which a body of it, or a piece that a split leaves over, is dropped."""
 
@@ -53,7 +55,7 @@ class SiteInput:
 @dataclass(frozen=True, eq=False)
 class Exact:
     """``pieces``: the damage volume; ``rest``: what is left of the solids; ``form``: shapes, spline, facets or body;
-    ``tried``: what was refused before, and why."""
+    ``seconds``: of the processor; ``tried``: what was refused before, and why."""
 
     pieces: tuple[Piece, ...]
     rest: tuple[Piece, ...]
@@ -80,59 +82,59 @@ def find_exact(
     site: SiteInput, solids: Sequence[Piece], faces: Sequence[Any], part: Part, tolerance: float
 ) -> tuple[Exact | None, tuple[str, ...]]:
     """The exact damage volume of a site in ``solids``, which are in the job's unit, or None; and what was refused."""
-    start, tried = time.perf_counter(), []
+    start, tried = time.process_time(), []
     cut = make_cut(site.damage, part, site.enclosures)
     if cut is None:
         return None, ("no surface is known that cuts it out of the part",)
     bodies = sum(body.volume > SPECK * site.damage.volume for body in split_bodies(site.damage))
-    for form, make, fuzzy in _list_tools(cut, tolerance):
+    for form, make, fuzzies in _list_tools(cut, tolerance):
         tool = _call(make)
-        found = _split_all(solids, tool, fuzzy, site.damage, tolerance) if tool is not None else None
-        if found is None:
-            if tool is not None:
+        for fuzzy in fuzzies if tool is not None else ():
+            assert tool is not None
+            found = _split_all(solids, tool, fuzzy, site.damage, tolerance)
+            if found is None:
                 tried.append(f"{form}: it does not separate the solid")
-            continue
-        pieces, rest = found
-        if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
-            tried.append(f"{form}: more than {MOST_FACES} faces")
-            continue
-        measured = check_pieces(
-            form.split()[0], pieces, bodies, site.damage, site.surface, part, site.points, tolerance, faces
-        )
-        if not measured.reason:
-            seconds = time.perf_counter() - start
-            return Exact(pieces, rest, form.split()[0], measured, seconds, tuple(tried)), tuple(tried)
-        tried.append(f"{form}: {measured.reason}")
+                continue
+            pieces, rest = found
+            if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
+                tried.append(f"{form}: more than {MOST_FACES} faces")
+                break
+            measured = check_pieces(
+                form.split()[0], pieces, bodies, site.damage, site.surface, part, site.points, tolerance, faces
+            )
+            if not measured.reason:
+                seconds = time.process_time() - start
+                return Exact(pieces, rest, form.split()[0], measured, seconds, tuple(tried)), tuple(tried)
+            tried.append(f"{form}: {measured.reason}")
+            if np.isfinite(measured.farthest):
+                break  # it is sound but not near enough, and another fuzzy value does not change that
     return None, tuple(tried)
 
 
-def _list_tools(cut: Cut, tolerance: float) -> Iterator[tuple[str, Callable[[], Tool | None], float]]:
+def _list_tools(cut: Cut, tolerance: float) -> Iterator[tuple[str, Callable[[], Tool | None], tuple[float, ...]]]:
+    """Names of forms, what builds their tools, and the fuzzy values to try them with, in millimetres."""
     inner = take_inner(cut)
     found = find_shapes(inner, tolerance)
     if found is not None:
         for beyond in (2.0, 1.0, 4.0):
-
-            def shapes(beyond: float = beyond) -> Tool | None:
-                made = build_shapes(inner, *found, tolerance, beyond * tolerance)
-                return made.tool if made else None
-
-            yield f"shapes {beyond:g}", shapes, 1e-6
+            yield f"shapes {beyond:g}", partial(build_shapes, inner, *found, tolerance, beyond * tolerance), (1e-6,)
     cuts = split_cut(cut)
-    places = [uv for uv in map(flatten, map(_take_mesh, cuts)) if uv is not None]
+    places = [uv for uv in (flatten(each.mesh) for each in cuts) if uv is not None]
     if len(places) == len(cuts):
+        near = 0
         for spans in SPANS:
-            tool = partial(build_splines, cuts, places, spans, tolerance)
-            yield f"spline {spans}", tool, 1e-6
+            tool = _call(partial(build_splines, cuts, places, spans, tolerance))
+            near += tool is not None
+            if tool is not None and near <= MOST_SPLINES:
+                yield f"spline {spans}", partial(_give, tool), (1e-6, 1e-5)
     for count in FACETS:
         mesh = decimate(cut, count)
-        if mesh is None or count_bad_edges(mesh.faces):
-            continue
-        for fuzzy in (1e-6, 1e-5):
-            yield f"facets {count} {fuzzy:g}", partial(build_facets, mesh), fuzzy
+        if mesh is not None and not count_bad_edges(mesh.faces):
+            yield f"facets {count}", partial(build_facets, mesh), (1e-6, 1e-5, 1e-4)
 
 
-def _take_mesh(cut: Cut) -> Mesh:
-    return cut.mesh
+def _give(tool: Tool) -> Tool:
+    return tool
 
 
 def _call(make: Callable[[], Tool | None]) -> Tool | None:

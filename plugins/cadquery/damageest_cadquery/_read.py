@@ -23,7 +23,6 @@ class Model:
     length: float
     name_of: Callable[[Any], str]
     notes: tuple[str, ...] = ()
-    colour_of: Callable[[Any], tuple[int, int, int] | None] = lambda face: None
     solid_names: tuple[str, ...] = ()
 
 

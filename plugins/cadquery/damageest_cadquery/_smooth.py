@@ -7,7 +7,6 @@ and what hangs over beyond their common edges is left out. Lengths are the mesh'
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,18 +22,10 @@ from damageest_cadquery._split import Tool
 
 LEFT = 0.12
 """Largest share of the surface that may lie off all recognised faces, as the rounding of edges and rims does."""
-SPANS = (8, 16, 28, 44)
+SPANS = (8, 14, 20, 28, 38, 50)
 RIM = 48
 """Edges of a spline face's rim, which lies outside the part."""
 _WRAP = 2 * np.pi
-
-
-@dataclass(frozen=True, eq=False)
-class Smooth:
-    """A tool with smooth faces; ``kinds`` of its faces, in their order."""
-
-    tool: Tool
-    kinds: tuple[str, ...]
 
 
 def take_inner(cut: Cut) -> Mesh:
@@ -64,20 +55,16 @@ def find_shapes(inner: Mesh, tolerance: float) -> tuple[list[Shape], Ints] | Non
     return [shapes[k] for k in real], np.searchsorted(real, own)
 
 
-def build_shapes(inner: Mesh, shapes: Sequence[Shape], label: Ints, tolerance: float, beyond: float) -> Smooth | None:
+def build_shapes(inner: Mesh, shapes: Sequence[Shape], label: Ints, tolerance: float, beyond: float) -> Tool | None:
     """Faces of recognised shapes, each trimmed by the others."""
     faces: list[Any] = []
-    kinds: list[str] = []
     for number, shape in enumerate(shapes):
         corners = inner.triangles[label == number]
         face = _build_shape(shape, corners, beyond)
         if face is None:
             return None
         faces.append(face)
-        kinds.append(shape.kind)
-    if len(faces) == 1:
-        return Smooth(Tool(faces, faces[0]), tuple(kinds))
-    return _trim_by_others(faces, kinds, inner, label, tolerance)
+    return Tool(faces, faces[0]) if len(faces) == 1 else _trim_by_others(faces, inner, label, tolerance)
 
 
 def build_splines(cuts: Sequence[Cut], places: Sequence[Floats], spans: int, tolerance: float) -> Tool | None:
@@ -179,7 +166,7 @@ def _trace_outline(triangles: Floats, beyond: float) -> list[Floats]:
     return sorted(loops, key=lambda loop: -np.ptp(loop, axis=0).prod())
 
 
-def _trim_by_others(faces: list[Any], kinds: list[str], inner: Mesh, label: Ints, tolerance: float) -> Smooth | None:
+def _trim_by_others(faces: list[Any], inner: Mesh, label: Ints, tolerance: float) -> Tool | None:
     """Splits faces by one another and drops the pieces that hang over beyond a common edge."""
     from OCP.BRep import BRep_Builder
     from OCP.BRepAlgoAPI import BRepAlgoAPI_BuilderAlgo
@@ -199,7 +186,7 @@ def _trim_by_others(faces: list[Any], kinds: list[str], inner: Mesh, label: Ints
 
     builder, shape = BRep_Builder(), TopoDS_Compound()
     builder.MakeCompound(shape)
-    kept, names = [], []
+    kept = []
     for number, face in enumerate(faces):
         for piece in list(algorithm.Modified(face)) or [face]:
             points, areas = _sample_face(piece, tolerance)
@@ -212,8 +199,7 @@ def _trim_by_others(faces: list[Any], kinds: list[str], inner: Mesh, label: Ints
             piece = TopoDS.Face_s(piece)
             builder.Add(shape, piece)
             kept.append(piece)
-            names.append(kinds[number])
-    return Smooth(Tool(kept, shape), tuple(names)) if kept else None
+    return Tool(kept, shape) if kept else None
 
 
 def _sample_face(face: Any, size: float) -> tuple[Floats, Floats]:

@@ -17,6 +17,7 @@ from typing import Any
 from damageest.artefacts import Floats, Part
 from damageest.stages.export import Body, ExactForm
 from damageest_cadquery._assembly import Colour, NamedShape, write_assembly
+from damageest_cadquery._colours import read_colours
 from damageest_cadquery._exact import Exact, SiteInput, find_exact, scale_shape, start_solids
 from damageest_cadquery._read import explore, read
 from damageest_cadquery._split import Piece, join_pieces
@@ -62,7 +63,7 @@ def main(path: Path) -> None:
     solids, faces = start_solids(shapes)
     originals = [face for solid in model.solids for face in _explore_faces(solid)]
     facts = CadFacts(
-        [model.name_of(face) for face in originals], [model.colour_of(face) for face in originals], model.solid_names
+        [model.name_of(face) for face in originals], read_colours(Path(part.path), len(originals)), model.solid_names
     )
     rest, found = solids, {}
     reasons: dict[int, tuple[str, ...]] = {}

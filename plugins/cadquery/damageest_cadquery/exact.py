@@ -22,11 +22,12 @@ from damageest.errors import InputError
 from damageest.geometry.units import MILLIMETRES
 from damageest.result import Result
 from damageest.stages.export import Body, ExactForm, ExportedFiles
-from damageest_cadquery._exact import SiteInput, find_exact, scale_shape, start_solids
+from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._read import read
-from damageest_cadquery._split import join_pieces
 from damageest_cadquery._worker import Request
 
+LIMIT = 120.0
+"""Longest time for a site, in seconds, where no job says so."""
 MOST_STARTS = 8
 """How often the process is started; each time without the site that stopped it before."""
 
@@ -173,26 +174,47 @@ def _follow(process: subprocess.Popen[str], seconds: float) -> tuple[dict[str, A
         site = said.get("start", site)
 
 
-def as_cadquery(result: Result, what: str, site: int) -> Any:
-    """A ``cadquery.Shape`` of a site's damage volume with the CAD's own faces, in the part's frame and unit.
+def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
+    """A ``cadquery.Shape`` with the CAD's own faces, in the part's frame and the result's unit.
 
-    Raises InputError where the part has no CAD faces, or no exact form passes the checks.
+    ``what``: part, undamaged, or damage of a ``site``. It is made in a process of its own, as for files. Raises
+    ValueError for another name or site, InputError where the part has no CAD faces or no exact form passes the checks.
     """
-    import cadquery
-
-    if what != "damage":
-        raise ValueError(f"no '{what}' as CadQuery; there is: damage")
-    index = next((k for k, each in enumerate(result.sites) if each.id == site), None)
-    if index is None:
-        known = ", ".join(str(each.id) for each in result.sites) or "none"
-        raise ValueError(f"there is no site {site}; there are: {known}")
+    if what not in ("part", "undamaged", "damage"):
+        raise ValueError(f"no '{what}' as CadQuery; there are: part, undamaged, damage")
+    known = [each.id for each in result.sites]
+    if what == "damage" and site not in known:
+        raise ValueError(f"there is no site {site}; there are: {', '.join(map(str, known)) or 'none'}")
     if not result.part.cad_scale:
         raise InputError("the part is a mesh: only a part from STEP, IGES or BREP has CAD faces")
-    request = make_request(result, Path(), {}, {})
-    model = read(Path(request.part.path), Path(request.part.path).suffix.lower())
-    solids, faces = start_solids([scale_shape(solid, request.scale) for solid in model.solids])
-    exact, tried = find_exact(request.sites[index], solids, faces, request.part, request.tolerance)
-    if exact is None:
-        raise InputError(f"site {site} has no exact form: {tried[-1] if tried else 'unknown'}; take as_trimesh")
-    shape = join_pieces(exact.pieces)
-    return cadquery.Shape.cast(scale_shape(shape, 1 / MILLIMETRES[result.units]))
+    if what == "part" or (what == "undamaged" and not result.sites):
+        return _take_shape(Path(result.part.path), result.part.cad_scale)
+    chosen = result if what == "undamaged" else replace(result, sites=tuple(s for s in result.sites if s.id == site))
+    with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
+        bodies = {}
+        for each in chosen.sites:
+            stem = f"damage/site-{each.id}" if each.accepted else f"doubtful/site-{each.id}"
+            bodies[stem] = Body(stem, each.damage, (0, 0, 0))
+        if result.undamaged is not None and result.damage is not None:
+            bodies["undamaged"] = Body("undamaged", result.undamaged, (0, 0, 0))
+            bodies["damage"] = Body("damage", result.damage, (0, 0, 0))
+        done = write_exact(Path(place), chosen, bodies, {"": None}, LIMIT)
+        wanted = [name for name in done.files if ("/" in name if what == "damage" else name == "undamaged.step")]
+        if not wanted:
+            raise InputError(f"{what} has no exact form; take as_trimesh ({'; '.join(done.notes)})")
+        return _take_shape(Path(place) / wanted[0], 1 / MILLIMETRES[result.units])
+
+
+def _take_shape(path: Path, scale: float) -> Any:
+    import cadquery
+    from OCP.BRep import BRep_Builder
+    from OCP.TopoDS import TopoDS_Compound
+
+    solids = [scale_shape(solid, scale) for solid in read(path, path.suffix.lower()).solids]
+    if len(solids) == 1:
+        return cadquery.Shape.cast(solids[0])
+    builder, whole = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(whole)
+    for solid in solids:
+        builder.Add(whole, solid)
+    return cadquery.Shape.cast(whole)

@@ -1,0 +1,237 @@
+"""Damage volumes with the CAD's own faces: what is in the files, and what is said where there is no exact form."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from damageest_cadquery._assembly import NamedShape, write_assembly
+from damageest_cadquery._read import read
+
+import damageest
+from damageest.errors import InputError
+from damageest.registry import Registry
+from damageest.result import Result
+from damageest.stages.export import ExportedFiles
+from damageest.stages.export.files import Files
+from tests.needs import import_for, needs_plugin
+
+pytestmark = needs_plugin("cadquery")
+cq = import_for("cadquery", "cadquery")
+
+GREEN = (20, 160, 60)
+BALL = {"tool": "sphere", "centre": [2, 10, 6], "radius": 5.5}
+NOTCH = {"tool": "box", "centre": [15, 0, 6], "size": [8, 5, 6]}
+
+
+@dataclass(frozen=True)
+class Run:
+    result: Result
+    folder: Path
+    said: dict[str, Any]
+
+    def site(self, form: str) -> dict[str, Any]:
+        return next(site for site in self.said["sites"] if site["exact"]["form"] == form)
+
+
+def write_part(path: Path) -> None:
+    """A block with a bore; each face has a name, and the top a colour."""
+    shape = cq.Workplane().box(30, 20, 12).faces(">Z").workplane().pushPoints([(-8, 0)]).hole(6).val()
+    names = [f"face {k}" for k in range(len(shape.Faces()))]
+    top = [GREEN if face.Center().z > 5.9 else None for face in shape.Faces()]
+    write_assembly(path, "block", [NamedShape("block", shape.wrapped, (90, 90, 90), names, top)], "mm")
+
+
+def run(folder: Path, part: Path, *settings: str, damage: Any = (BALL, NOTCH)) -> Run:
+    job = {
+        "version": 1, "units": "mm", "tolerance": 0.2, "part": str(part), "align": "none", "report": "none",
+        "scan": {"use": "simulate", "points": 25000, "noise": 0.04, "seed": 4, "damage": list(damage)},
+        "export": {"format": ["step"]},
+    }  # fmt: skip
+    result = damageest.run(job, output=folder, settings=settings)
+    return Run(result, folder, json.loads((folder / "result.json").read_text()))
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    place = tmp_path_factory.mktemp("exact")
+    write_part(place / "block.step")
+    return run(place / "out", place / "block.step")
+
+
+def take_solids(path: Path) -> list[Any]:
+    return list(cq.importers.importStep(str(path)).solids().vals())
+
+
+def test_a_ball_mark_is_a_sphere_and_a_notch_is_planes(done: Run) -> None:
+    assert [site["exact"]["form"] for site in done.said["sites"]] == ["shapes", "shapes"]
+    ball, notch = sorted(
+        (take_solids(done.folder / f"damage/site-{k}.step") for k in (1, 2)), key=lambda s: len(s[0].Faces())
+    )
+    assert [len(ball), len(notch)] == [1, 1]
+    assert ball[0].isValid()
+    assert notch[0].isValid()
+    assert sorted(face.geomType() for face in ball[0].Faces()) == ["PLANE", "PLANE", "SPHERE"]
+    assert {face.geomType() for face in notch[0].Faces()} == {"PLANE"}
+    assert len(notch[0].Faces()) == 6
+    truth = done.result.scan.truth
+    assert truth is not None
+    assert truth.damage is not None
+    assert ball[0].Volume() + notch[0].Volume() == pytest.approx(truth.damage.volume, rel=0.02)
+
+
+def test_outer_faces_keep_names_and_colours(done: Run) -> None:
+    from damageest_cadquery._colours import read_colours
+    from damageest_cadquery._faces import list_faces
+
+    path = done.folder / "damage/site-1.step"
+    listed = list_faces(read(path, ".step"), 1.0)
+    colours = read_colours(path, len(listed))
+    outer = [face for face in listed if face.name.startswith("face ")]
+    inner = [face for face in listed if "inner" in face.name]
+    assert len(outer) + len(inner) == len(listed)
+    (top,) = (face for face in outer if face.normal and face.normal[2] > 0.99)
+    assert colours[top.number] == GREEN
+    assert all(colours[face.number] != GREEN for face in listed if face is not top)
+
+
+def test_what_is_left_and_what_is_lost_are_the_part(done: Run) -> None:
+    (left,) = take_solids(done.folder / "undamaged.step")
+    lost = [solid for k in (1, 2) for solid in take_solids(done.folder / f"damage/site-{k}.step")]
+    whole = take_solids(Path(done.result.part.path))[0].Volume()
+    assert left.isValid()
+    assert left.Volume() + sum(solid.Volume() for solid in lost) == pytest.approx(whole, rel=5e-5)  # slivers
+
+
+def test_assembly_has_all_by_name_in_ap242(done: Run) -> None:
+    text = (done.folder / "result.step").read_text()
+    assert "AP242" in text
+    assert "1970-01-01" in text
+    for name in ("result", "undamaged part", "damage site-1", "damage site-2"):
+        assert f"PRODUCT('{name}'" in text
+    assert len(take_solids(done.folder / "result.step")) == 3
+
+
+def test_as_cadquery_is_the_same_solid(done: Run) -> None:
+    shape = done.result.as_cadquery("damage", 1)
+    assert shape.Volume() == pytest.approx(done.said["sites"][0]["exact"]["volume"], rel=1e-6)
+    with pytest.raises(ValueError, match="there are: 1, 2"):
+        done.result.as_cadquery("damage", 7)
+
+
+def export_again(result: Result, folder: Path, **options: Any) -> ExportedFiles:
+    folder.mkdir()
+    stage = Files.model_validate({"format": ["step"], **options})
+    return stage.run(result, folder, Registry.discover().writers)
+
+
+def test_a_site_that_takes_too_long_gets_facets_and_says_so(done: Run, tmp_path: Path) -> None:
+    late = export_again(done.result, tmp_path / "late", limit=0.01)
+    assert {exact.form for exact in late.exact.values()} == {"none"}
+    assert "longer than 0.01 s" in late.exact[1].tried[0]
+    assert any("site-1.step has facets" in warning for warning in late.warnings)
+    (solid,) = take_solids(tmp_path / "late/damage/site-1.step")
+    assert solid.Volume() == pytest.approx(done.result.sites[0].damage.volume, rel=0.01)
+    assert len(solid.Faces()) > 20
+
+
+@pytest.mark.slow
+def test_a_crash_of_opencascade_costs_only_the_exact_form(
+    done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A copy of the plugin that dies at site 2."""
+    (tmp_path / "crash.py").write_text(
+        "import os, sys\nfrom pathlib import Path\nfrom damageest_cadquery import _worker\nfind = _worker.find_exact\n"
+        "def fall(site, *rest):\n    if site.number == 2:\n        os.abort()\n    return find(site, *rest)\n"
+        "_worker.find_exact = fall\nimport pickle\n"
+        "_worker.main(Path(sys.argv[1]))\n"
+    )
+    start = subprocess.Popen
+
+    def start_other(command: list[str], **options: Any) -> Any:
+        return start([command[0], str(tmp_path / "crash.py"), command[-1]], **options)
+
+    monkeypatch.setattr(subprocess, "Popen", start_other)
+    told = export_again(done.result, tmp_path / "out")
+    assert [told.exact[k].form for k in (1, 2)] == ["shapes", "none"]
+    assert "OpenCASCADE stopped" in told.exact[2].tried[0]
+    assert (tmp_path / "out/damage/site-2.step").is_file()
+    assert (tmp_path / "out/undamaged.step").is_file()
+
+
+@pytest.mark.slow
+def test_the_same_job_gives_the_same_bytes(done: Run, tmp_path: Path) -> None:
+    again = run(tmp_path / "again", Path(done.result.part.path))
+    names = sorted(path.relative_to(done.folder) for path in done.folder.rglob("*.step"))
+    assert names
+    assert all((done.folder / name).read_bytes() == (again.folder / name).read_bytes() for name in names)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", ["brep", "iges"])
+def test_other_formats(done: Run, tmp_path: Path, suffix: str) -> None:
+    shape = cq.importers.importStep(done.result.part.path).val()
+    part = tmp_path / f"block.{suffix}"
+    if suffix == "brep":
+        shape.exportBrep(str(part))
+    else:
+        from OCP.IGESControl import IGESControl_Writer
+
+        writer = IGESControl_Writer("MM", 1)
+        writer.AddShape(shape.wrapped)
+        writer.ComputeModel()
+        writer.Write(str(part))
+    other = run(tmp_path / "out", part)
+    assert [site["exact"]["form"] for site in other.said["sites"]] == ["shapes", "shapes"]
+
+
+@pytest.mark.slow
+def test_solids_of_an_assembly_stay_apart(tmp_path: Path) -> None:
+    first = cq.Workplane().box(20, 20, 12).val()
+    second = cq.Workplane().box(14, 20, 12).translate((22, 0, 0)).val()
+    shapes = [NamedShape("left", first.wrapped, (9, 9, 9)), NamedShape("right", second.wrapped, GREEN)]
+    write_assembly(tmp_path / "two.step", "pair", shapes, "mm")
+    ball = {"tool": "sphere", "centre": [10, 10, 6], "radius": 4}
+    both = run(tmp_path / "out", tmp_path / "two.step", damage=[ball])
+    assert len(take_solids(both.folder / "undamaged.step")) == 2
+    text = (both.folder / "result.step").read_text()
+    assert "PRODUCT('undamaged left'" in text
+    assert "PRODUCT('undamaged right'" in text
+
+
+@pytest.mark.slow
+def test_a_blob_is_one_spline_or_few_facets(done: Run, tmp_path: Path) -> None:
+    blob = {"tool": "blob", "centre": [15, 10, 6], "radius": 5, "seed": 3}
+    rough = run(tmp_path / "out", Path(done.result.part.path), damage=[blob])
+    exact = rough.said["sites"][0]["exact"]
+    assert exact["form"] in ("spline", "facets")
+    assert exact["faces"] < 500
+    assert exact["volume"] == pytest.approx(rough.said["sites"][0]["volume"], rel=3e-3)
+
+
+@pytest.mark.slow
+def test_a_mesh_has_no_exact_form(done: Run, tmp_path: Path) -> None:
+    meshed = replace(done.result, part=replace(done.result.part, cad_scale=0.0))
+    told = export_again(meshed, tmp_path / "out", solids="exact")
+    assert any("without CAD faces" in warning for warning in told.warnings)
+    assert (tmp_path / "out/damage/site-1.step").is_file()
+    with pytest.raises(InputError, match="is a mesh"):
+        meshed.as_cadquery("part")
+
+
+def test_a_wrong_volume_is_refused(done: Run) -> None:
+    from damageest_cadquery._check import check_pieces
+    from damageest_cadquery._exact import start_solids
+
+    part = done.result.part
+    solids, faces = start_solids(read(Path(part.path), ".step").solids)
+    site = done.result.sites[0]
+    found = check_pieces(
+        "facets", solids, 1, site.damage, site.surface, part, np.empty((0, 3)), done.result.tolerance, faces
+    )
+    assert "volume differs" in found.reason
