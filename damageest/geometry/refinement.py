@@ -40,7 +40,7 @@ def refine_at(mesh: Mesh, face: Ints, foot: Floats, edge: float) -> tuple[Mesh, 
         length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
         if (length <= edge).all():
             break
-        vertices, faces, parent = _bisect_faces(vertices, faces, holders[(length > edge).any(axis=1)])
+        vertices, faces, parent = bisect_faces(vertices, faces, holders[(length > edge).any(axis=1)])
         face = _find_new_faces(vertices, faces, parent, face, foot)
     return Mesh(vertices, faces), face
 
@@ -69,12 +69,12 @@ def cut_into_cells(mesh: Mesh, edge: float, area: float = 0.0) -> tuple[Mesh, In
             long &= np.linalg.norm(cross, axis=1) > 2 * area
         if not long.any():
             break
-        vertices, faces, parent = _bisect_faces(vertices, faces, np.flatnonzero(long))
+        vertices, faces, parent = bisect_faces(vertices, faces, np.flatnonzero(long))
         origin = origin[parent]
     return Mesh(vertices, faces), origin
 
 
-def _bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, Ints]:
+def bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, Ints]:
     """Halves the longest edge of the ``wanted`` faces, and of the faces that would otherwise have a vertex within an
     edge.
 

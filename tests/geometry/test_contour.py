@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from manifold3d import Manifold
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Flags, Floats
 from damageest.errors import StageError
-from damageest.geometry.contour import MOST_NODES, extract_contour
+from damageest.geometry.contour import MOST_NODES, extract_contour, fit_contour
+from damageest.geometry.solids import to_manifold
 from tests.geometry.shapes import FAR
 
 RADIUS, CELL = 5.0, 0.4
@@ -51,3 +53,29 @@ def test_a_grid_too_large_is_refused_with_a_cell_that_fits() -> None:
 def test_nothing_inside_is_refused() -> None:
     with pytest.raises(StageError, match="empty"):
         extract_contour(Ball(np.full(3, 100.0)), np.zeros(3), (12, 12, 12), CELL)
+
+
+def test_a_rough_contour_is_fitted_to_the_distance_also_at_creases() -> None:
+    """Of two points: two balls, which meet in a crease; above z = 1 it is of no interest."""
+    places = np.array([[-2.0, 0, 0], [2.0, 0, 0]])
+
+    def closest(points: Floats) -> tuple[Floats, Floats]:
+        away = np.linalg.norm(points[:, None] - places, axis=2)
+        return away.min(axis=1), places[away.argmin(axis=1)]
+
+    def matters(points: Floats, radius: float) -> Flags:
+        return points[:, 2] < 1 + radius
+
+    def measure(points: Floats) -> Floats:
+        return closest(points)[0] - 3
+
+    rough = extract_contour(measure, np.full(3, -6.17), (26, 26, 26), 0.5, matters)
+    fine = fit_contour(rough, closest, 3.0, 0.02, matters)
+    below = np.concatenate([fine.vertices, fine.triangles.mean(axis=1)])
+    below = below[below[:, 2] < 1]
+    assert np.abs(measure(below)).max() <= 0.02
+    middle = rough.triangles.mean(axis=1)
+    assert np.abs(measure(middle[middle[:, 2] < 1])).max() > 0.06
+    half = to_manifold(fine) ^ Manifold.cube((20, 20, 20), True).translate((0, 0, -10))
+    balls = Manifold.sphere(3, 256).translate((-2, 0, 0)) + Manifold.sphere(3, 256).translate((2, 0, 0))
+    assert half.volume() == pytest.approx(balls.volume() / 2, rel=0.005)

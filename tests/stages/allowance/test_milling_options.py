@@ -180,6 +180,27 @@ def test_cut_back_removes_intact_metal_up_to_inner() -> None:
     assert far.max() < inner + TOLERANCE / 2
 
 
+def test_a_deep_cut_back_of_a_pocket_has_the_volume_of_the_offset() -> None:
+    """Thirty tolerances deep, round an L, whose inner corner gives the offset a crease."""
+    inner, depth, block_ = 3.0, 2.0, Manifold.cube((60, 60, 20))
+    arms = Manifold.cube((14, 6, depth)) + Manifold.cube((6, 14, depth))
+    deposit = run(block_, arms.translate((22, 22, 20 - depth)), outer=0, inner=inner)
+    assert deposit.cavity is not None
+
+    def offset(reach: float) -> float:
+        """Floor, walls, four rounded edges of the floor less what counts twice at the inner corner, and the rest."""
+        area, round_ = 14 * 6 + 6 * 8, np.pi * reach**2 / 4
+        floor = area * reach
+        walls = (14 + 6 + 8 + 8 + 6 + 14) * depth * reach + 5 * round_ * depth - reach**2 * depth
+        edges = (14 + 6 + 8 + 8 + 6 + 14) * round_ + 5 * np.pi * reach**3 / 6
+        return float(area * depth + floor + walls + edges - reach**3 * 2 / 3)
+
+    assert offset(inner) <= deposit.cavity.volume <= offset(inner + TOLERANCE / 2)
+    points = deposit.cavity.vertices[deposit.cavity.vertices[:, 2] < 20 - 1e-6]
+    away = nearest(points, solid_of(arms.translate((22, 22, 20 - depth))))[0]
+    assert inner <= away.min() <= away.max() <= inner + TOLERANCE / 2
+
+
 def test_cut_back_leaves_out_the_other_damages() -> None:
     other = solid_of(Manifold.cube((3, 3, 3)).translate((16.2, 8, 9)))
     tool = Manifold.cube((4, 4, 3)).translate((12, 8, 9))
