@@ -19,7 +19,7 @@ Matters = Callable[[Floats, float], Flags]
 Shape = tuple[int, int, int]
 BLOCK = 8
 """Nodes along each axis of the blocks in which the function is first evaluated once; a power of 2."""
-FIT_ROUNDS = 6
+FIT_ROUNDS = 8
 """How often faces are halved that are not where they should be."""
 AT_ONCE = 2_000_000
 """Largest number of points for which the function is called."""
