@@ -1,7 +1,8 @@
 """Calls in a process of their own, for native libraries that may crash, hang or take all memory."""
 
+from damageest.isolation.ends import ProcessError
 from damageest.isolation.limits import Limits, format_bytes, limit_this_process, measure_free_memory, parse_memory
-from damageest.isolation.worker import ProcessError, call_isolated, cpu_seconds, end_workers
+from damageest.isolation.worker import call_isolated, cpu_seconds, end_workers
 
 __all__ = [
     "Limits",

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from damageest.errors import StageError
 from damageest.isolation import serve
+from damageest.isolation.ends import ProcessError, RemoteTraceback, blame_authors, describe_end, describe_memory
 from damageest.isolation.limits import Limits, format_bytes, measure_free_memory, own_memory
 from damageest.isolation.transfer import receive, send
 
@@ -29,36 +30,11 @@ _CODE = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[3])\n"
     "from damageest.isolation.serve import main; main(int(sys.argv[1]), int(sys.argv[2]))"
 )
-_SIGNALS = {
-    int(signal.SIGSEGV): "a segmentation fault",
-    int(signal.SIGABRT): "an abort",
-    int(signal.SIGBUS): "a bus error",
-    int(signal.SIGFPE): "an arithmetic error",
-    int(signal.SIGILL): "an illegal instruction",
-}
 _MOST_OUTPUT = 1 << 16
 """Bytes of a worker's output that are kept until the call ends."""
 _workers: dict[tuple[int, str], _Worker] = {}
 _workers_lock = threading.Lock()
 _cpu_seconds = 0.0
-
-
-class ProcessError(StageError):
-    """A call in a worker that gave no value. ``why``: "time", "memory", "crash", or "exit" for sys.exit."""
-
-    def __init__(self, why: str, message: str, remedy: str = "") -> None:
-        self.why = why
-        super().__init__(message, remedy)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return ProcessError, (self.why, self.message, self.remedy), vars(self)
-
-
-class RemoteTraceback(Exception):  # noqa: N818  (no error of its own: the cause of one, for --debug)
-    """The traceback, or the output, of the process where an error arose."""
-
-    def __str__(self) -> str:
-        return "\n" + str(self.args[0])
 
 
 def call_isolated(
@@ -100,9 +76,9 @@ def end_workers(beginning: str = "") -> None:
     """Ends the worker processes whose names begin with this, also in the middle of a call; by default all. The next
     call starts a new one."""
     with _workers_lock:
-        for (process_id, name), worker in _workers.items():
-            if process_id == os.getpid() and name.startswith(beginning):
-                worker.interrupt()
+        for (process_id, name), worker in list(_workers.items()):
+            if process_id == os.getpid() and name.startswith(beginning) and worker.end():
+                del _workers[process_id, name]
 
 
 atexit.register(end_workers)
@@ -128,7 +104,7 @@ class _Worker:
             except _Ended as end:
                 status = None if end.late else self._wait_for_end()
                 self.kill()
-                raise _describe_end(status, self._take_output(), memory, limits, owner)  # noqa: B904  (it has a cause)
+                raise describe_end(status, self._take_output(), memory, limits, owner)  # noqa: B904  (it has a cause)
             except BaseException:  # as Ctrl-C: the worker may be anywhere in the call
                 self.kill()
                 raise
@@ -191,11 +167,18 @@ class _Worker:
             if left <= 0:
                 raise _Ended(late=True)
 
-    def interrupt(self) -> None:
-        """Ends the process from any thread; a call that waits for it then raises."""
+    def end(self) -> bool:
+        """Ends the process, from any thread. Gives whether no call was in progress; one that was raises then."""
+        if self._lock.acquire(blocking=False):
+            try:
+                self.kill()
+            finally:
+                self._lock.release()
+            return True
         if self._process is not None and self._process.poll() is None:
             with contextlib.suppress(OSError):
                 os.killpg(self._process.pid, signal.SIGKILL)
+        return False
 
     def kill(self) -> None:
         """Ends the process and what it started."""
@@ -265,50 +248,12 @@ def _unpack(kind: str, value: Any, memory: int | None, limits: Limits, owner: st
     if kind == "value":
         return value
     if kind == "exit":
-        raise ProcessError("exit", f"called sys.exit({value}), which would end the run", _blame(owner))
+        raise ProcessError("exit", f"called sys.exit({value}), which would end the run", blame_authors(owner))
     if kind == "memory":
-        raise _describe_memory(memory, limits)
+        raise describe_memory(memory, limits)
     packed, name, text, trace = value
     error = pickle.loads(packed) if packed else type(name, (Exception,), {})(text)
     raise error from RemoteTraceback(trace)
-
-
-def _describe_end(status: int | None, output: str, memory: int | None, limits: Limits, owner: str) -> ProcessError:
-    """The error for a process that gave no answer. ``status``: as of subprocess, None where it took too long."""
-    if status is None:
-        error = ProcessError(
-            "time",
-            f"was ended: not finished after {limits.seconds:g} s, the time limit of a stage",
-            f"a longer --stage-timeout, or {_blame(owner)}",
-        )
-    elif "bad_alloc" in output or "MemoryError" in output:
-        error = _describe_memory(memory, limits)
-    elif status == -signal.SIGKILL:
-        error = ProcessError(
-            "crash",
-            "its process was killed (SIGKILL), as the system does where memory runs out",
-            "a larger tolerance, fewer scan points, or a --memory that the machine has",
-        )
-    elif status < 0:
-        name = signal.Signals(-status).name
-        what = f"its process ended by {_SIGNALS.get(-status, 'a signal')} ({name})"
-        error = ProcessError("crash", what, _blame(owner))
-    else:
-        error = ProcessError("crash", f"ended its process with exit status {status}", _blame(owner))
-    error.__cause__ = RemoteTraceback(output) if output else None
-    return error
-
-
-def _describe_memory(memory: int | None, limits: Limits) -> ProcessError:
-    most = "" if memory is None else f" than the {format_bytes(memory)} "
-    if memory is not None:
-        most += "that --memory leaves it" if limits.memory is not None else "that were free"
-    larger = "a larger --memory" if limits.memory is not None else "a machine with more memory"
-    return ProcessError("memory", f"needed more memory{most}", f"a larger tolerance, fewer scan points, or {larger}")
-
-
-def _blame(owner: str) -> str:
-    return f"another implementation; report it to the authors of {owner}, with job and inputs" if owner else ""
 
 
 def _last_line(output: str) -> str:

@@ -1,0 +1,73 @@
+"""How a call in a worker ends without a value, in words for the user."""
+
+from __future__ import annotations
+
+import signal
+from typing import Any
+
+from damageest.errors import StageError
+from damageest.isolation.limits import Limits, format_bytes
+
+_SIGNALS = {
+    int(signal.SIGSEGV): "a segmentation fault",
+    int(signal.SIGABRT): "an abort",
+    int(signal.SIGBUS): "a bus error",
+    int(signal.SIGFPE): "an arithmetic error",
+    int(signal.SIGILL): "an illegal instruction",
+}
+
+
+class ProcessError(StageError):
+    """A call in a worker that gave no value. ``why``: "time", "memory", "crash", or "exit" for sys.exit."""
+
+    def __init__(self, why: str, message: str, remedy: str = "") -> None:
+        self.why = why
+        super().__init__(message, remedy)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ProcessError, (self.why, self.message, self.remedy), vars(self)
+
+
+class RemoteTraceback(Exception):  # noqa: N818  (no error of its own: the cause of one, for --debug)
+    """The traceback, or the output, of the process where an error arose."""
+
+    def __str__(self) -> str:
+        return "\n" + str(self.args[0])
+
+
+def describe_end(status: int | None, output: str, memory: int | None, limits: Limits, owner: str) -> ProcessError:
+    """The error for a process that gave no answer. ``status``: as of subprocess, None where it took too long."""
+    if status is None:
+        error = ProcessError(
+            "time",
+            f"was ended: not finished after {limits.seconds:g} s, the time limit of a stage",
+            f"a longer --stage-timeout, or {blame_authors(owner)}",
+        )
+    elif "bad_alloc" in output or "MemoryError" in output:
+        error = describe_memory(memory, limits)
+    elif status == -signal.SIGKILL:
+        error = ProcessError(
+            "crash",
+            "its process was killed (SIGKILL), as the system does where memory runs out",
+            "a larger tolerance, fewer scan points, or a --memory that the machine has",
+        )
+    elif status < 0:
+        name = signal.Signals(-status).name
+        what = f"its process ended by {_SIGNALS.get(-status, 'a signal')} ({name})"
+        error = ProcessError("crash", what, blame_authors(owner))
+    else:
+        error = ProcessError("crash", f"ended its process with exit status {status}", blame_authors(owner))
+    error.__cause__ = RemoteTraceback(output) if output else None
+    return error
+
+
+def describe_memory(memory: int | None, limits: Limits) -> ProcessError:
+    most = "" if memory is None else f" than the {format_bytes(memory)} "
+    if memory is not None:
+        most += "that --memory leaves it" if limits.memory is not None else "that were free"
+    larger = "a larger --memory" if limits.memory is not None else "a machine with more memory"
+    return ProcessError("memory", f"needed more memory{most}", f"a larger tolerance, fewer scan points, or {larger}")
+
+
+def blame_authors(owner: str) -> str:
+    return f"another implementation; report it to the authors of {owner}, with job and inputs" if owner else ""
