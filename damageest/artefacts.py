@@ -125,7 +125,9 @@ def open_edges(faces: Ints) -> int:
     if (np.diff(ordered) > 0).all() and (edges[:, 0] != edges[:, 1]).all() and (ordered == np.sort(backward)).all():
         return 0
     codes, counts = np.unique(forward, return_counts=True)
-    lone = (counts > 1) | ~np.isin(codes, backward) | (codes % (size + 1) == 0)  # the last: from a vertex to itself
+    lone = (
+        (counts > 1) | ~np.isin(codes, backward, assume_unique=True) | (codes % (size + 1) == 0)
+    )  # the last: from a vertex to itself
     return int(lone.sum())
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, open_edges
 from damageest.errors import InputError
+from damageest.geometry.duplicates import list_used
 
 _MOST_PAIRS = 5000
 """Pairs of bodies with overlapping bounds up to which each pair is compared; above it all bodies are united at once."""
@@ -179,7 +180,7 @@ def _reverse_faces(faces: Ints, which: Any) -> Ints:
 
 def _drop_unused_vertices(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
     """The same mesh without vertices that no face uses."""
-    used = np.unique(faces)
+    used = list_used(faces)
     if len(used) == len(vertices):
         return vertices, faces
     index = np.zeros(len(vertices), np.int64)

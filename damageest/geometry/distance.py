@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.duplicates import list_used
 
 
 class Closest(NamedTuple):
@@ -168,7 +169,7 @@ def _find_unreliable_vertices(mesh: Mesh, flat: Flags, scale: float) -> Flags:
     unreliable = np.zeros(len(mesh.vertices), bool)
     unreliable[mesh.faces[flat]] = True
     cell = np.round((mesh.vertices - mesh.bounds[0]) / (1e-9 * scale)).astype(np.int64)
-    used = np.unique(mesh.faces)
+    used = list_used(mesh.faces)
     _, inverse, count = np.unique(cell[used], axis=0, return_inverse=True, return_counts=True)
     unreliable[used[(count > 1)[inverse.ravel()]]] = True
     return unreliable

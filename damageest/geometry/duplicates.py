@@ -1,10 +1,39 @@
-"""Points that are exactly equal."""
+"""Values and points that are exactly equal.
+
+`numpy.unique` and `numpy.isin` hash numbers: where most of a million differ, that takes ten times as long as to sort
+them (numpy 2.4). So large arrays of numbers go through the functions here.
+"""
 
 from __future__ import annotations
 
+from typing import Any, TypeVar
+
 import numpy as np
 
-from damageest.artefacts import Floats, Ints
+from damageest.artefacts import Flags, Floats, Ints
+
+N = TypeVar("N", bound=np.integer[Any])
+
+
+def list_distinct(values: np.ndarray[Any, np.dtype[N]]) -> np.ndarray[tuple[int], np.dtype[N]]:
+    """The distinct ones of any number of integers, ascending."""
+    ordered = np.sort(values, axis=None)
+    first = np.ones(len(ordered), bool)
+    first[1:] = ordered[1:] != ordered[:-1]
+    return ordered[first]
+
+
+def find_members(values: Ints, others: Ints) -> Flags:
+    """Whether each of the integers ``values`` (N,) is one of the ``others`` (M,)."""
+    if not len(others):
+        return np.zeros(len(values), bool)
+    ordered = np.sort(others)
+    return np.asarray(ordered[np.minimum(np.searchsorted(ordered, values), len(ordered) - 1)] == values)
+
+
+def list_used(faces: Ints) -> Ints:
+    """The vertices that faces (F,3) use, ascending."""
+    return np.flatnonzero(np.bincount(faces.ravel()))
 
 
 def find_duplicates(points: Floats) -> tuple[Ints, Ints]:

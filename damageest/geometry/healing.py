@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints, open_edges
 from damageest.errors import InputError
 from damageest.geometry.body_repair import label_bodies, orient_faces, resolve_bodies, split_pinches
-from damageest.geometry.duplicates import find_duplicates
+from damageest.geometry.duplicates import find_duplicates, list_used
 
 _HOLE_EDGES = 12
 """Edges of a hole up to which it may be closed."""
@@ -111,7 +111,7 @@ def _drop_degenerate(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[F
     if not proper.all():
         notes.append(f"dropped {int((~proper).sum())} triangles with a repeated corner")
         faces = faces[proper]
-    used = np.unique(faces)
+    used = list_used(faces)
     if len(used) < len(vertices):
         index = np.zeros(len(vertices), np.int64)
         index[used] = np.arange(len(used))

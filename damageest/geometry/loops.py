@@ -6,6 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Ints, Surface
 from damageest.errors import StageError
+from damageest.geometry.duplicates import find_members
 
 MOST_FLAW_VERTICES = 10
 """Vertices up to which a boundary loop is a flaw of the reconstruction, to be closed, and not a rim (paper 3.2)."""
@@ -23,7 +24,7 @@ def trace_loops(faces: Ints) -> list[Ints]:
         return []
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = int(faces.max()) + 1
-    is_boundary = ~np.isin(edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0])
+    is_boundary = ~find_members(edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0])
     starts, ends = edges[is_boundary].T
     if len(np.unique(starts)) != len(starts):
         raise StageError(

@@ -9,6 +9,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.distance import closest_on_mesh
+from damageest.geometry.duplicates import find_members
 
 MOST_ROUNDS = 60
 """Rounds of halving after which refinement stops, even if edges are still too long."""
@@ -118,7 +119,7 @@ def bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, I
 
 def _find_new_faces(vertices: Floats, faces: Ints, parent: Ints, face: Ints, foot: Floats) -> Ints:
     """The face (N,) of each point after some faces were split; it is one of those that came from its face before."""
-    children = np.flatnonzero(np.isin(parent, face))
+    children = np.flatnonzero(find_members(parent, face))
     found, _ = find_nearest(Mesh(vertices, faces[children]), foot)
     return np.asarray(children[found])
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Solid, open_edges
+from damageest.geometry.duplicates import list_used
 
 ROUNDS = 8
 """How often sheets are moved apart, each time farther than before."""
@@ -103,7 +104,7 @@ def _remove_flat(faces: Ints) -> Ints:
 
 
 def _make_solid(vertices: Floats, faces: Ints, before: Solid) -> Solid | None:
-    used = np.unique(faces)
+    used = list_used(faces)
     try:
         found = Solid(vertices[used], np.searchsorted(used, faces))
     except ValueError:  # its volume is no more than the rounding

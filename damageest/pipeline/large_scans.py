@@ -16,6 +16,7 @@ from damageest.errors import InputError
 from damageest.geometry.crops import Crop, PieceCrop
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.distance_by_cells import signed_distance_by_cells
+from damageest.geometry.duplicates import list_distinct
 from damageest.geometry.transforms import move_points
 from damageest.io.large_scans import JoinedViews
 from damageest.io.scans import make_scan
@@ -77,13 +78,13 @@ class _Place:
             return np.empty(0, np.int64)
         near = 0.5 * self._tolerance
         distance, _ = signed_distance_by_cells(at, self._part, near, lambda some: signed_distance(some, self._part))
-        return np.unique(number[distance < -DEEP * self._tolerance])
+        return list_distinct(number[distance < -DEEP * self._tolerance])
 
     def widen(self, cubes: Ints) -> Ints:
         """The cubes and those beside them."""
         step = np.array([self._shape[1] * self._shape[2], self._shape[2], 1])
         around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) @ step
-        return np.unique(cubes[:, None] + around)
+        return list_distinct(cubes[:, None] + around)
 
     def is_in(self, points: Floats, cubes: Ints) -> Flags:
         """Whether each of the points (N,3) of the scan is in one of the cubes, which ascend."""
@@ -111,7 +112,7 @@ def _crop(pieces: Iterator[Scan], crops: tuple[Crop, ...]) -> Iterator[Scan]:
 def _gather(read: Callable[[], Iterator[Scan]], place: _Place, most: int, scan: Scan) -> Scan:
     """The scan with all points near damage; where these are more than ``most``, with so many of them."""
     found = [place.find_deep(piece.points) for piece in read()]
-    deep = np.unique(np.concatenate(found)) if found else np.empty(0, np.int64)
+    deep = list_distinct(np.concatenate(found)) if found else np.empty(0, np.int64)
     told = f"the files have {scan.total} points; an even selection of {len(scan.points)} is used"
     if not len(deep):
         return replace(scan, notes=(*scan.notes, f"{told}: no others lie deeper than {DEEP:g} tolerances"))

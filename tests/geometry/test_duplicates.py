@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from damageest.geometry.duplicates import find_duplicates
+from damageest.geometry.duplicates import find_duplicates, find_members, list_distinct, list_used
 
 
 @given(st.integers(0, 10_000), st.integers(0, 60), st.integers(1, 4), st.sampled_from([0.0, 1e5, 1e-300]))
@@ -51,3 +51,14 @@ def test_points_with_equal_hashes_are_compared_in_full() -> None:
     keep, inverse = find_duplicates(np.stack([first, other, first, other, other]))
     assert keep.tolist() == [0, 1]
     assert inverse.tolist() == [0, 1, 0, 1, 1]
+
+
+@given(st.lists(st.integers(-5, 5)), st.lists(st.integers(-5, 5)))
+def test_sorting_finds_what_numpy_finds(one: list[int], two: list[int]) -> None:
+    values, others = np.array(one, np.int64), np.array(two, np.int64)
+    assert np.array_equal(list_distinct(values), np.unique(values))
+    assert np.array_equal(find_members(values, others), np.isin(values, others))
+
+
+def test_vertices_that_no_face_uses_are_left_out() -> None:
+    assert list_used(np.array([[4, 1, 7], [1, 7, 2]])).tolist() == [1, 2, 4, 7]

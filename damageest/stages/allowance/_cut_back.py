@@ -11,6 +11,7 @@ from damageest.artefacts import Flags, Floats, Mesh, Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.bodies import label_pieces
 from damageest.geometry.distance import Closest, SurfaceTree, distance_to_mesh, is_inside, signed_distance
+from damageest.geometry.duplicates import list_used
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import BALANCE, subtract_lost, to_arrays, to_manifold, to_solid
 from damageest.stages.allowance._booleans import simplify_exactly
@@ -78,7 +79,7 @@ def _grow_faces(damage: Solid, faces: Any, part: Part, inner: float, tolerance: 
     origin = part.bounds.mean(axis=0)
     reach = inner + tolerance / 4
     mesh = Mesh(damage.vertices - origin, faces)
-    used = mesh.vertices[np.unique(faces)]
+    used = mesh.vertices[list_used(faces)]
     margin = reach + 2 * MAX_CELL * tolerance
     low = np.maximum(used.min(axis=0) - margin, part.bounds[0] - origin - 4 * tolerance)
     high = np.minimum(used.max(axis=0) + margin, part.bounds[1] - origin + 4 * tolerance)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.duplicates import find_members
 
 SLIVER = 1e-9
 """Area of a triangle, in squares of the skin's extent, below which its direction is not checked."""
@@ -76,5 +77,5 @@ def _find_border(corner: Ints) -> tuple[Ints, Ints]:
     """Start and end (B,) of the edges of one triangle only, in the direction of that triangle."""
     start, stop = corner.ravel(), corner[:, [1, 2, 0]].ravel()
     size = int(corner.max()) + 1
-    lone = ~np.isin(start * size + stop, stop * size + start)
+    lone = ~find_members(start * size + stop, stop * size + start)
     return start[lone], stop[lone]

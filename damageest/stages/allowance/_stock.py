@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.duplicates import find_members
 from damageest.stages.allowance._shells import build_shells
 from damageest.stages.allowance._skin import SkinFaces, normalise
 
@@ -80,7 +81,7 @@ def _inset_border(skin: SkinFaces, by: float) -> SkinFaces:
     """The skin with its border moved inward by ``by``."""
     start, stop = skin.faces.ravel(), skin.faces[:, [1, 2, 0]].ravel()
     size = len(skin.vertices)
-    lone = np.flatnonzero(~np.isin(start * size + stop, stop * size + start))
+    lone = np.flatnonzero(~find_members(start * size + stop, stop * size + start))
     a, b = start[lone], stop[lone]
     inward = normalise(np.cross(skin.normal[lone // 3], skin.vertices[b] - skin.vertices[a]))
     total, count = np.zeros_like(skin.vertices), np.zeros(size)

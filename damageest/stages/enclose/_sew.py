@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Rims, Surface
 from damageest.errors import StageError
+from damageest.geometry.duplicates import find_members
 from damageest.geometry.loops import trace_loops
 
 
@@ -160,13 +161,13 @@ def cut_off(faces: Ints, paths: list[Ints], against: bool) -> Ints | None:
     counter = np.concatenate([np.roll(c, -1) * size + c for c in paths])
     order = np.argsort(code)
     twin = order[np.searchsorted(code[order], back)]
-    cut = np.isin(code, along) | np.isin(code, counter)
+    cut = find_members(code, along) | find_members(code, counter)
     owner = np.arange(len(edges)) // 3
     links = coo_array((np.ones((~cut).sum()), (owner[~cut], owner[twin[~cut]])), shape=(len(faces),) * 2)
     _, piece = connected_components(links, directed=False)
     # Where the surface is turned over, its rim runs the other way, and so must the side that is joined to it.
-    wanted = np.unique(piece[owner[np.isin(code, along if against else counter)]])
-    unwanted = np.unique(piece[owner[np.isin(code, counter if against else along)]])
+    wanted = np.unique(piece[owner[find_members(code, along if against else counter)]])
+    unwanted = np.unique(piece[owner[find_members(code, counter if against else along)]])
     if np.intersect1d(wanted, unwanted).size:
         return None
     return np.asarray(faces[np.isin(piece, wanted)])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.duplicates import list_distinct
 
 Codes = NDArray[np.uint64]
 
@@ -77,10 +78,10 @@ class Tree:
 
 def build_tree(leaves: Codes, depth: int) -> Tree:
     """The octree whose finest nodes are the leaves (N,) and their siblings; coarser nodes fill the rest of the cube."""
-    current = np.unique(leaves)
+    current = list_distinct(leaves)
     starts, sizes = [current], [np.ones(len(current), np.int64)]
     for level in range(depth):
-        parents = np.unique(current >> np.uint64(3))
+        parents = list_distinct(current >> np.uint64(3))
         children = ((parents << np.uint64(3))[:, None] | np.arange(8, dtype=np.uint64)).ravel()
         empty = children[~np.isin(children, current, assume_unique=True)]
         starts.append(empty << np.uint64(3 * level))
@@ -97,7 +98,7 @@ def dilate(cells: Ints, reach: int) -> Ints:
         steps = np.zeros((2 * reach + 1, 3), np.int64)
         steps[:, axis] = np.arange(-reach, reach + 1)
         cells = np.maximum((cells[:, None] + steps).reshape(-1, 3), 0)
-        cells = decode(np.unique(encode(cells)))
+        cells = decode(list_distinct(encode(cells)))
     return cells
 
 
@@ -118,7 +119,7 @@ def find_touched_cells(triangles: Floats, depth: int) -> Ints:
             pieces.append((mine[is_hit], cells[is_hit]))
         which = np.concatenate([piece[0] for piece in pieces])
         low = np.concatenate([piece[1] for piece in pieces])
-    return decode(np.unique(encode(low)))
+    return decode(list_distinct(encode(low)))
 
 
 def _intersects(triangles: Floats, centres: Floats, half: float) -> NDArray[np.bool_]:
