@@ -11,9 +11,13 @@ from damageest.geometry.solids import concatenate_meshes, to_manifold, to_solid
 
 _SAME_VOLUME = 1e-3
 """Share of a body's volume by which it may change."""
+_NO_VOLUME = 1e-4
+"""Share of a body's volume by which it may change where flakes are removed."""
 _SLIVERS = 2e-3
 """Share of the old surface that may be farther than the detail from the new one: thin flakes and spikes without volume,
 as Booleans leave them, are removed."""
+_PROBES = np.array([[0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8], [1 / 3, 1 / 3, 1 / 3]])
+"""Places in a triangle at which it is measured how much of it is lost: a spike at a corner of a large one is little."""
 
 
 def simplify_within(solid: Solid, detail: float) -> Solid:
@@ -37,6 +41,7 @@ def simplify_within(solid: Solid, detail: float) -> Solid:
 
 def _simplify_shell(body: Solid, detail: float) -> Solid:
     """One shell simplified as far as the limits allow; the same where no attempt keeps them."""
+    body = _remove_flakes(body, detail)
     area = np.linalg.norm(body.cross, axis=1)
     origin = body.bounds.mean(0)
     for share in (0.5, 0.2, 0.05):
@@ -46,8 +51,23 @@ def _simplify_shell(body: Solid, detail: float) -> Solid:
             return body
         if less is None or len(less.faces) >= len(body.faces):
             continue
-        lost = area[(distance_to_mesh(body.vertices, less) > detail)[body.faces].any(axis=1)].sum() / area.sum()
+        far = np.flatnonzero((distance_to_mesh(body.vertices, less) > detail)[body.faces].any(axis=1))
+        probes = np.einsum("pk,fkj->fpj", _PROBES, body.triangles[far]).reshape(-1, 3)
+        share_far = (distance_to_mesh(probes, less) > detail).reshape(-1, len(_PROBES)).mean(axis=1)
+        lost = (area[far] * share_far).sum() / area.sum()
         same = abs(less.volume / body.volume - 1) <= _SAME_VOLUME
         if same and lost <= _SLIVERS and distance_to_mesh(less.vertices, body).max() <= detail:
             return less
     return body
+
+
+def _remove_flakes(body: Solid, detail: float) -> Solid:
+    """The shell without sheets that are thinner than a hundredth of ``detail`` and have no volume."""
+    origin = body.bounds.mean(0)
+    try:
+        less = to_solid(to_manifold(body, origin).simplify(0.01 * detail), origin)
+    except ValueError:
+        return body
+    if less is None or len(less.faces) == len(body.faces) or abs(less.volume / body.volume - 1) > _NO_VOLUME:
+        return body
+    return less

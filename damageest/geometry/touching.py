@@ -23,6 +23,8 @@ SAME_ANGLE = 1e-4
 """Angle in radians up to which two faces at an edge coincide."""
 FLAT = 0.05
 """Length of the mean normal at a vertex below which the faces there lie on one another."""
+SAME_VOLUME = 1e-6
+"""Share of the volume within which sheets without volume may be removed."""
 MAX_CHANGE = 1e-3
 """Largest share of the volume that may change."""
 
@@ -64,7 +66,11 @@ def separate_sheets(body: Any, origin: Floats, tolerance: float) -> Solid | None
     if found is None:
         return None
     radius = max(SHEET_GAP / 10 * tolerance, 4 * float(np.spacing(np.float32(np.abs(found.vertices).max()))))
-    return separate_touching(found, radius, 10 * radius) or found
+    # sheets without volume, as Booleans leave them, go first
+    plain = to_solid(body.simplify(radius), origin)
+    if plain is None or abs(plain.volume - found.volume) > SAME_VOLUME * found.volume:
+        plain = found
+    return separate_touching(plain, radius, 10 * radius) or separate_touching(found, radius, 10 * radius) or found
 
 
 def merge_close(vertices: Floats, faces: Ints, radius: float) -> tuple[Floats, Ints]:

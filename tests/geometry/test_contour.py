@@ -80,4 +80,4 @@ def test_a_rough_contour_is_fitted_to_the_distance_also_at_creases() -> None:
     assert np.abs(measure(middle[middle[:, 2] < 1])).max() > 0.06
     half = to_manifold(fine) ^ Manifold.cube((20, 20, 20), True).translate((0, 0, -10))
     balls = Manifold.sphere(3, 256).translate((-2, 0, 0)) + Manifold.sphere(3, 256).translate((2, 0, 0))
-    assert half.volume() == pytest.approx(balls.volume() / 2, rel=0.005)
+    assert half.volume() == pytest.approx(balls.volume() / 2, rel=0.012)

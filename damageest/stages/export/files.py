@@ -54,7 +54,7 @@ class Files(Export):
         None,
         ge=0,
         description="largest distance by which facets of STEP solids may deviate, to make fewer of them, in the job's "
-        "unit; default: a tenth of the tolerance",
+        "unit; default: a quarter of the tolerance",
     )
     spline: Annotated[bool, AfterValidator(check_spline_writer)] = Field(
         False,
@@ -67,7 +67,7 @@ class Files(Export):
         from damageest.stages.export._spline import fit_spline
 
         splines = {s.id: fit_spline(s.surface, result.tolerance) for s in result.sites} if self.spline else {}
-        detail = result.tolerance / 10 if self.detail is None else self.detail
+        detail = result.tolerance / 4 if self.detail is None else self.detail
         bodies, coarse = _collect_bodies(result), {}
         if detail and any(writers[name].simplify for name in self.format):
             coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}

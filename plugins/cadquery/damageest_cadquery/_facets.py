@@ -58,7 +58,7 @@ def find_facets(solid: Solid) -> list[Facet]:
     normal = np.zeros((label.max() + 1, 3))
     np.add.at(normal, label, solid.cross)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    area = np.array([_measure_area(vertices[loop]) @ normal[region] for loop, region in zip(loops, owner, strict=True)])
+    area = np.einsum("lj,lj->l", _measure_areas(loops, vertices), normal[owner])
     order = np.lexsort([-area, owner])
     found: dict[int, list[Ints]] = {}
     for k in order:
@@ -174,7 +174,12 @@ def _straighten(loops: list[Ints], vertices: Floats, tolerance: float) -> list[I
     return [loop[keep[loop]] for loop in loops]
 
 
-def _measure_area(loop: Floats) -> Floats:
-    """(3,) the vector area of a closed loop of points (K,3)."""
-    off = loop - loop[0]
-    return np.asarray(np.cross(off, np.roll(off, -1, axis=0)).sum(0) / 2)
+def _measure_areas(loops: list[Ints], vertices: Floats) -> Floats:
+    """(L,3) the vector areas of closed loops of vertices."""
+    size = np.array([len(loop) for loop in loops])
+    starts = np.cumsum(size) - size
+    points = vertices[np.concatenate(loops)]
+    off = points - np.repeat(points[starts], size, axis=0)
+    after = np.roll(off, -1, axis=0)
+    after[starts + size - 1] = 0.0  # the first point of each loop
+    return np.asarray(np.add.reduceat(np.cross(off, after), starts, axis=0) / 2)
