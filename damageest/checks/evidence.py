@@ -127,6 +127,14 @@ def _count_intact_over(
     step = max(1, len(here) // MOST)
     here = here[::step]
     feet = aligned.points[here] - deviation.distance[here, None] * part.face_normals[deviation.face[here]]
+    skin_only = Mesh(damage.vertices, damage.faces[~inner])
+    if not len(skin_only.faces):
+        return 0.0
+    feet = feet[
+        distance_to_mesh(feet, skin_only) < 0.02 * tolerance
+    ]  # its faces are few, and most points are not there
+    if not len(feet):
+        return 0.0
     distance, face, _ = closest_on_mesh(feet, damage)
     return float(step * ((distance < 0.02 * tolerance) & ~inner[face]).sum())
 
