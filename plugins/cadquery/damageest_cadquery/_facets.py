@@ -158,8 +158,10 @@ def _trace_loops(label: Ints, edges: Ints, other: Ints, count: int) -> tuple[lis
 def _straighten(loops: list[Ints], vertices: Floats, tolerance: float) -> list[Ints]:
     """The loops without vertices in the middle of a straight edge between two faces."""
     at = np.concatenate(loops)
-    before = np.concatenate([np.roll(loop, 1) for loop in loops])
-    after = np.concatenate([np.roll(loop, -1) for loop in loops])
+    size = np.array([len(loop) for loop in loops])
+    first = np.cumsum(size) - size
+    before, after = np.roll(at, 1), np.roll(at, -1)
+    before[first], after[first + size - 1] = at[first + size - 1], at[first]
     way = vertices[after] - vertices[before]
     length = np.maximum(np.linalg.norm(way, axis=1), 1e-300)
     off = np.linalg.norm(np.cross(vertices[at] - vertices[before], way), axis=1) / length

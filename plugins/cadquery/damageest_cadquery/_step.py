@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -128,22 +129,22 @@ def _build_shell(vertices: Floats, planar: list[Facet]) -> Any:
 
     builder = BRep_Builder()
     close = max(1e-7, 4 * FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0))))
+    places = vertices.tolist()
     corners: dict[int, Any] = {}
     edges: dict[tuple[int, int], Any] = {}
 
     def corner(index: int) -> Any:
         if index not in corners:
             corners[index] = TopoDS_Vertex()
-            builder.MakeVertex(corners[index], gp_Pnt(*vertices[index].tolist()), close)
+            builder.MakeVertex(corners[index], gp_Pnt(*places[index]), close)
         return corners[index]
 
     def edge(start: int, end: int) -> Any:
         key = (min(start, end), max(start, end))
         if key not in edges:
-            way = vertices[key[1]] - vertices[key[0]]
-            length = float(np.linalg.norm(way))
-            made = TopoDS_Edge()
-            line = Geom_Line(gp_Pnt(*vertices[key[0]].tolist()), gp_Dir(*(way / length).tolist()))
+            (x, y, z), (u, v, w) = places[key[0]], places[key[1]]
+            made, length = TopoDS_Edge(), math.dist(places[key[0]], places[key[1]])
+            line = Geom_Line(gp_Pnt(x, y, z), gp_Dir(u - x, v - y, w - z))
             builder.MakeEdge(made, line, close)
             builder.Add(made, corner(key[0]))
             builder.Add(made, corner(key[1]).Oriented(TopAbs_REVERSED))
@@ -162,7 +163,7 @@ def _build_shell(vertices: Floats, planar: list[Facet]) -> Any:
             builder.MakeWire(wire)
             indices = loop.tolist()
             for start, end in zip(indices, indices[1:] + indices[:1], strict=True):
-                if (vertices[start] != vertices[end]).any():  # no length, no direction
+                if places[start] != places[end]:  # no length, no direction
                     builder.Add(wire, edge(start, end))
             wire.Closed(True)
             builder.Add(face, wire)
