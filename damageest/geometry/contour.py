@@ -12,6 +12,7 @@ from damageest.errors import StageError
 from damageest.geometry.isosurface import extract_region
 from damageest.geometry.poisson import Grid
 from damageest.geometry.refinement import bisect_faces
+from damageest.isolation.foresee import require_memory
 
 Measure = Callable[[Floats], Floats]
 Nearest = Callable[[Floats], tuple[Floats, Floats]]
@@ -25,6 +26,8 @@ AT_ONCE = 2_000_000
 """Largest number of points for which the function is called."""
 MOST_NODES = 60_000_000
 """Nodes of a grid in memory at once, at about 12 bytes each."""
+BYTES_OF_NODE = 20
+"""Memory of a grid, for each node."""
 
 
 def extract_contour(
@@ -55,6 +58,7 @@ def extract_contour(
             f"a voxel grid of {nodes:,} nodes, {cell:.3g} apart, does not fit in memory; at most {MOST_NODES:,} do",
             f"a cell of {cell * (nodes / MOST_NODES) ** (1 / 3) * 1.05:.3g} or more, or method: implicit",
         )
+    require_memory(BYTES_OF_NODE * nodes, f"a voxel grid of {nodes:,} nodes, {cell:.3g} apart", "a larger tolerance")
     field = -_sample(distance, low, shape, cell, matters)
     solid = extract_region(Grid(low, cell, shape), np.ascontiguousarray(field, dtype=np.float64))
     if solid is None:

@@ -10,7 +10,10 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.duplicates import find_members
+from damageest.isolation.foresee import require_memory
 
+BYTES_OF_FACE = 600
+"""Memory of one round of refinement, for each triangle before or after it."""
 MOST_ROUNDS = 60
 """Rounds of halving after which refinement stops, even if edges are still too long."""
 
@@ -81,6 +84,8 @@ def bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, I
 
     Gives vertices, faces, and the face (F,) that each of them came from.
     """
+    needed = BYTES_OF_FACE * (len(faces) + 3 * len(wanted))
+    require_memory(needed, f"a mesh of {len(faces):,} triangles that is refined", "a larger tolerance")
     corners = vertices[faces]
     length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     longest = length.argmax(axis=1)

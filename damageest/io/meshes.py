@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.errors import InputError
+from damageest.io.file_memory import require_memory_for
 from damageest.io.files import check_file, raise_environment_fault, shorten_error
 
 MESH_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf")
@@ -23,6 +24,7 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
     file, if it is not a mesh in the format of its suffix, or if it is truncated.
     """
     suffix = check_file(path, MESH_SUFFIXES, "a mesh")
+    require_memory_for(path)
     if suffix == ".stl":
         vertices, faces = _read_stl(path)
         return vertices, faces, None

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from damageest.artefacts import Floats, Ints
 from damageest.errors import InputError
+from damageest.io.file_memory import require_memory_for
 from damageest.io.files import check_file, raise_environment_fault, shorten_error
 
 
@@ -62,6 +63,7 @@ READERS = {
 def read_points(path: Path, columns: str | None = None) -> PointFile:
     """The points of one file. Raises InputError, which names the file, if it cannot be read or has no points."""
     suffix = check_file(path, tuple(READERS), "a scan")
+    require_memory_for(path)
     module = importlib.import_module(f"{__name__}.{READERS[suffix]}")
     try:
         cloud: PointFile = module.read(path, columns)
