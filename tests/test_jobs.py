@@ -13,7 +13,15 @@ from damageest.job import yamlfile
 from tests.needs import needs_plugin
 
 JOBS = Path(__file__).parents[1] / "jobs"
-SITES = {"block_wedge": 1, "gear_teeth": 4, "cylinder_two_sides": 2, "half_torus": 1, "four_sites": 4, "worn_shaft": 1}
+SITES = {
+    "block_wedge": 1,
+    "gear_teeth": 4,
+    "gear_exact": 3,
+    "cylinder_two_sides": 2,
+    "half_torus": 1,
+    "four_sites": 4,
+    "worn_shaft": 1,
+}
 STOCK = {"stock_uniform": 0.8, "stock_flanks": 0.3, "worn_bore": 0.5}
 """Millimetres of stock that the jobs ask for; each has as many sites as `DEPOSITS` says."""
 DEPOSITS = {"stock_uniform": 1, "stock_flanks": 2, "worn_bore": 2}

@@ -45,7 +45,10 @@ class Files(Export):
         "or BREP), faceted, or auto (exact where the part has CAD faces)",
     )
     limit: float = Field(
-        120.0, gt=0, le=3600, description="longest time for the exact form of a site, in seconds; then it gets facets"
+        120.0,
+        gt=0,
+        le=3600,
+        description="longest time for the exact form of a site, in seconds of the processor; then it gets facets",
     )
     frame: Literal["part", "scan", "both"] = Field(
         "part", description="frame of the files: the part's, the scan's as measured (files in scan_frame/), or both"

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from damageest_cadquery._canonical import canonicalise
 from damageest_cadquery._read import explore
 from damageest_cadquery._step import UNITS, fix_header
 
@@ -71,6 +72,7 @@ def write_assembly(path: Path, name: str, shapes: Sequence[NamedShape], unit: st
         if writer.Write(str(path)) != IFSelect_RetDone:
             raise OSError(f"{path}: OpenCASCADE could not write it")
     fix_header(path)
+    canonicalise(path)
 
 
 def _add(tool: Any, colours: Any, each: NamedShape) -> Any:

@@ -127,6 +127,7 @@ def _write(request: Request, found: Mapping[int, Exact], rest: Sequence[Piece] |
 
 
 def _save(request: Request, stem: str, name: str, shapes: Sequence[NamedShape]) -> str:
+    _tell(start=0)  # each file has the time of a site
     path = Path(request.folder) / f"{stem}.step"
     path.parent.mkdir(parents=True, exist_ok=True)
     write_assembly(path, name, shapes, request.unit)

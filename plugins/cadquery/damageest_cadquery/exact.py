@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +29,8 @@ from damageest_cadquery._worker import Request
 
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
+WAIT = 20.0
+"""Longest time by the clock on the wall, in limits, for a process that uses no processor."""
 MOST_STARTS = 8
 """How often the process is started; each time without the site that stopped it before."""
 
@@ -155,12 +158,15 @@ def _follow(process: subprocess.Popen[str], seconds: float) -> tuple[dict[str, A
     threads = [threading.Thread(target=each, daemon=True) for each in (listen, listen_to_errors)]
     for thread in threads:
         thread.start()
-    site = 0
+    site, clock = 0, _Clock(process.pid)
     while True:
         try:
-            line = lines.get(timeout=seconds)
+            line = lines.get(timeout=min(seconds, 0.5))
         except queue.Empty:
-            return {}, site, f"OpenCASCADE took longer than {seconds:g} s"
+            if clock.has_passed(seconds):
+                return {}, site, f"OpenCASCADE took longer than {seconds:g} s"
+            continue
+        clock = _Clock(process.pid)
         if line is None:
             process.wait()
             threads[1].join(timeout=5)
@@ -172,6 +178,27 @@ def _follow(process: subprocess.Popen[str], seconds: float) -> tuple[dict[str, A
         if "forms" in said:
             return said, site, ""
         site = said.get("start", site)
+
+
+class _Clock:
+    """Time since it was made: of the processor where the system tells it, since a busy machine is no reason to stop."""
+
+    def __init__(self, process: int) -> None:
+        self.process = process
+        self.wall, self.used = time.monotonic(), self._measure()
+
+    def _measure(self) -> float | None:
+        try:
+            fields = Path(f"/proc/{self.process}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            return None
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def has_passed(self, seconds: float) -> bool:
+        wall, used = time.monotonic() - self.wall, self._measure()
+        if used is None or self.used is None:
+            return wall > seconds
+        return used - self.used > seconds or wall > WAIT * seconds
 
 
 def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
