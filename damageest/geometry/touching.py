@@ -29,18 +29,20 @@ MAX_CHANGE = 1e-3
 """Largest share of the volume that may change."""
 
 
-def separate_touching(solid: Solid, radius: float, gap: float) -> Solid | None:
+def separate_touching(solid: Solid, radius: float, gap: float, rounds: int = ROUNDS) -> Solid | None:
     """The solid, closed also for a reader that merges vertices up to ``radius`` apart; its own are merged so.
 
-    Where it touches itself, its sheets are moved inward by ``gap``, or by some ``gap`` where that is not enough. None
+    Where it touches itself, its sheets are moved inward by ``gap``, or by some ``gap`` where that is not enough, in up
+    to ``rounds`` steps; 1: nothing is moved. None
     where that does not help, or changes the volume by more than `MAX_CHANGE`.
     """
-    return next(filter(None, (_separate(solid, radius, share * gap) for share in (1.0, 2.5, 0.4))), None)
+    shares = (1.0, 2.5, 0.4) if rounds > 1 else (1.0,)
+    return next(filter(None, (_separate(solid, radius, share * gap, rounds) for share in shares)), None)
 
 
-def _separate(solid: Solid, radius: float, gap: float) -> Solid | None:
+def _separate(solid: Solid, radius: float, gap: float, rounds: int) -> Solid | None:
     vertices, faces = solid.vertices, solid.faces
-    for number in range(ROUNDS):
+    for number in range(rounds):
         vertices, faces = merge_close(vertices, faces, radius)
         faces = _remove_flat(faces)
         if not len(faces):

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field
 
 from damageest.artefacts import Floats, Scan, Solid
 from damageest.geometry.simplification import simplify_within
-from damageest.geometry.touching import separate_touching
+from damageest.geometry.touching import ROUNDS, separate_touching
 from damageest.geometry.transforms import invert_pose, move_mesh, move_points
 from damageest.io.meshes import write_ply, write_points
 from damageest.stages.export import Body, Export, ExportedFiles, Patch, Writer
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 UNDAMAGED, DAMAGE, DEPOSIT, DOUBTFUL = (150, 155, 165), (215, 50, 40), (40, 130, 205), (225, 165, 40)
 SURPLUS = (150, 90, 190)
+FEW = 20_000
+"""Triangles of a solid of several sites up to which its sheets are moved apart where they touch."""
 LABELLED = np.array([UNDAMAGED, DAMAGE, SURPLUS, (90, 90, 90)], np.uint8)
 """Colour of a scan point by its label: intact, damage, added, outlier."""
 
@@ -74,7 +76,10 @@ class Files(Export):
         bodies, coarse = _collect_bodies(result), {}
         if detail and any(writers[name].simplify for name in self.format):
             coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}
-        rounded = {stem: replace(body, solid=_keep_closed(body.solid, result)) for stem, body in bodies.items()}
+        rounded = {
+            stem: replace(body, solid=_keep_closed(body.solid, result, "/" in stem or len(body.solid.faces) <= FEW))
+            for stem, body in bodies.items()
+        }
         done: list[ExportedFiles] = []
         chosen_places = {"part": [""], "scan": ["scan_frame/"], "both": ["", "scan_frame/"]}[self.frame]
         places = {place: invert_pose(result.pose) if place else None for place in chosen_places}
@@ -160,12 +165,16 @@ def _collect_bodies(result: Result) -> dict[str, Body]:
     return {stem: Body(name, solid, colour) for stem, name, solid, colour in found if solid is not None}
 
 
-def _keep_closed(solid: Solid, result: Result) -> Solid:
-    """The solid, closed when single precision merges vertices in any of the two frames, with the same triangles."""
+def _keep_closed(solid: Solid, result: Result, moving: bool = True) -> Solid:
+    """The solid, closed when single precision merges vertices in any of the two frames, with the same triangles.
+
+    ``moving``: whether sheets that touch are moved apart. Neighbouring sites in one large solid touch on whole faces,
+    which takes long.
+    """
     moved = move_mesh(solid, invert_pose(result.pose))
     largest = max(float(np.abs(each.bounds).max()) for each in (solid, moved))
     radius = 2 * float(np.spacing(np.float32(largest)))
-    return separate_touching(solid, radius, 10 * radius) or solid
+    return separate_touching(solid, radius, 10 * radius, ROUNDS if moving else 1) or solid
 
 
 def _write_solids(
