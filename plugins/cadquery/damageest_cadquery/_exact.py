@@ -108,7 +108,7 @@ def find_exact(
             tried.append(f"{form}: {measured.reason}")
             if np.isfinite(measured.farthest):
                 break  # it is sound but not near enough, and another fuzzy value does not change that
-    return None, tuple(tried)
+    return None, tuple(tried) or ("no surface could be built that cuts it out of the part",)
 
 
 def _list_tools(cut: Cut, tolerance: float) -> Iterator[tuple[str, Callable[[], Tool | None], tuple[float, ...]]]:
