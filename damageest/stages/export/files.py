@@ -47,7 +47,7 @@ class Files(Export):
         "or BREP), faceted, or auto (exact where the part has CAD faces)",
     )
     limit: float = Field(
-        120.0,
+        60.0,
         gt=0,
         le=3600,
         description="longest time for the exact form of a site, in seconds of the processor; then it gets facets",
