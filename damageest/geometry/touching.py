@@ -33,8 +33,8 @@ def separate_touching(solid: Solid, radius: float, gap: float, rounds: int = ROU
     """The solid, closed also for a reader that merges vertices up to ``radius`` apart; its own are merged so.
 
     Where it touches itself, its sheets are moved inward by ``gap``, or by some ``gap`` where that is not enough, in up
-    to ``rounds`` steps; 1: nothing is moved. None
-    where that does not help, or changes the volume by more than `MAX_CHANGE`.
+    to ``rounds`` steps; 1: nothing is moved. None where that does not help, or changes the volume by more than
+    `MAX_CHANGE`.
     """
     shares = (1.0, 2.5, 0.4) if rounds > 1 else (1.0,)
     return next(filter(None, (_separate(solid, radius, share * gap, rounds) for share in shares)), None)
@@ -59,15 +59,15 @@ def _separate(solid: Solid, radius: float, gap: float, rounds: int) -> Solid | N
 
 
 def separate_sheets(body: Any, origin: Floats, tolerance: float) -> Solid | None:
-    """A Manifold, relative to ``origin`` (3,), as a Solid that stays closed in single precision and when vertices are
-    merged. Its shape changes by some `SHEET_GAP`, in tolerances, where it touches itself. None where it is empty; not
-    changed where nothing helps."""
+    """A Manifold, relative to ``origin`` (3,), as a Solid that stays closed when vertices are merged, as in single
+    precision near the origin. Its shape changes by some `SHEET_GAP`, in tolerances, where it touches itself, wherever it
+    lies. None where it is empty; not changed where nothing helps."""
     from damageest.geometry.solids import to_solid
 
     found = to_solid(body, origin)
     if found is None:
         return None
-    radius = max(SHEET_GAP / 10 * tolerance, 4 * float(np.spacing(np.float32(np.abs(found.vertices).max()))))
+    radius = max(SHEET_GAP / 10 * tolerance, 4 * float(np.finfo(np.float32).eps) * found.diagonal)
     # sheets without volume, as Booleans leave them, go first
     plain = to_solid(body.simplify(radius), origin)
     if plain is None or abs(plain.volume - found.volume) > SAME_VOLUME * found.volume:

@@ -91,7 +91,7 @@ def test_what_is_no_mesh_is_refused_with_name_and_valid_suffixes(name, content, 
 
 
 def test_missing_files_and_folders_are_named(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere\.stl: no such file; .*\.3mf"):
+    with pytest.raises(InputError, match=r"nowhere\.stl: there is no such file; .*\.3mf"):
         PartFile(path=tmp_path / "nowhere.stl").run(unit="mm")
     with pytest.raises(InputError, match="is a folder"):
         PartFile(path=tmp_path).run(unit="mm")
