@@ -64,6 +64,9 @@ _add_commands()
 
 def main() -> None:
     """Runs the command line. Exit status 0: done; 1: a stage failed or refused; 2: the job or an input is not valid."""
+    from damageest.cli import _process
+
+    _process.is_command = True
     built_in = {command.name for command in app.registered_commands} | {group.name for group in app.registered_groups}
     word = next((argument for argument in sys.argv[1:] if not argument.startswith("-")), "")
     try:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from damageest.cli._process import end_with
+
 if TYPE_CHECKING:
     from damageest.stages.part import CadFace
 
@@ -20,9 +22,15 @@ def command(
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """List a part's CAD faces: number, name, kind, area, centre, and normal, or axis and radius."""
+    end_with(lambda: _list_faces(part, units, as_json))
+
+
+def _list_faces(part: Path, units: str, as_json: bool) -> int:
     from damageest.errors import JobError
     from damageest.geometry.units import canonical_unit
+    from damageest.isolation import Limits
     from damageest.job import load
+    from damageest.pipeline.calls import call_implementation
     from damageest.registry import Registry
     from damageest.stages.part import ReadPart
     from damageest.stages.scan import ReadScan
@@ -32,13 +40,14 @@ def command(
         job = load({"version": 1, "units": unit, "part": str(part)}, Registry.discover(), given={ReadScan: None})
     except JobError as error:
         raise JobError(error.faults, str(part)) from None
-    reader = job.stages[ReadPart]
+    reader, item = job.stages[ReadPart], job.implementations[ReadPart]
     assert isinstance(reader, ReadPart)
-    faces = reader.cad_faces(unit)
+    faces = call_implementation(reader.cad_faces, {"unit": unit}, reader, item, Limits())
     if as_json:
         typer.echo(json.dumps({"part": str(part), "units": unit, "faces": [asdict(face) for face in faces]}, indent=1))
     else:
         _print_table(faces, unit)
+    return 0
 
 
 def _print_table(faces: tuple[CadFace, ...], unit: str) -> None:

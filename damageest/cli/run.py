@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import sys
 from contextlib import redirect_stdout
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from damageest.cli._process import end_with_each
 from damageest.isolation.limits import STAGE_SECONDS, Limits, limit_this_process, parse_memory
+from damageest.isolation.notes import note_job
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -45,50 +48,79 @@ def command(
         str, typer.Option(metavar="SIZE", help="Memory that the run may allocate, as 6GB. Default: what is free.")
     ] = "",
     stage_timeout: Annotated[
-        float, typer.Option(min=0, help="Seconds after which a stage in a process of its own is ended; 0: never.")
+        float, typer.Option(min=0, help="Seconds after which a stage is ended; 0: never.")
     ] = STAGE_SECONDS,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Run jobs: compute the damage volumes from part and scan."""
-    from damageest.cli import _interrupt
-    from damageest.cli._progress import Progress
-    from damageest.errors import DamageestError, Fault, JobError
-    from damageest.job import load
-    from damageest.registry import Registry
-
+    limits = Limits(parse_memory(memory) if memory else None, stage_timeout)
+    given = _Given(output, tuple(settings or ()), not no_cache, limits, as_json, quiet, debug)
     if output is not None and len(jobs) > 1:
+        from damageest.errors import Fault, JobError
+
         raise JobError(
             [Fault("only valid with a single job; with several jobs, each job's own output folder is used")], "--output"
         )
-    limits = Limits(parse_memory(memory) if memory else None, stage_timeout)
-    limit_this_process(limits.memory)
-    progress = Progress(quiet)
+    end_with_each(
+        lambda first: _run_jobs(jobs[first:], given),
+        [str(path) for path in jobs],
+        lambda error, source: _report_failure(error, source, as_json, debug),
+    )
+
+
+@dataclass(frozen=True)
+class _Given:
+    """The options of the command."""
+
+    output: Path | None
+    settings: tuple[str, ...]
+    cache: bool
+    limits: Limits
+    as_json: bool
+    quiet: bool
+    debug: bool
+
+
+def _run_jobs(jobs: list[Path], given: _Given) -> int:
+    """Runs jobs one after the other, all in this process. Gives the exit status."""
+    from damageest.cli import _interrupt
+    from damageest.cli._progress import Progress
+    from damageest.errors import DamageestError
+    from damageest.job import load
+    from damageest.registry import Registry
+
+    limit_this_process(given.limits.memory)
+    progress = Progress(given.quiet)
     registry = Registry.discover([progress])
     status = 0
     loaded = []
     for path in jobs:  # every job is checked before the first one runs
         try:
-            loaded.append(load(path, registry, settings or []))
+            loaded.append(load(path, registry, given.settings))
         except DamageestError as error:
-            status = max(status, _report_failure(error, str(path), as_json, debug))
+            status = max(status, _report_failure(error, str(path), given.as_json, given.debug))
     if status:
-        raise typer.Exit(status)
-    for job in loaded:
+        return status
+    for number, job in enumerate(loaded):
         from damageest.api import run
 
+        note_job(number)
+        output = given.output or job.output
         try:
-            with progress.show_job(job.name), redirect_stdout(sys.stderr if as_json else sys.stdout):
-                result = run(job, output=output or True, cache=not no_cache, registry=registry, limits=limits)
+            with progress.show_job(job.name), redirect_stdout(sys.stderr if given.as_json else sys.stdout):
+                result = run(
+                    job, output=given.output or True, cache=given.cache, registry=registry, limits=given.limits
+                )
         except DamageestError as error:
-            status = max(status, _report_failure(error, job.source, as_json, debug))
+            status = max(status, _report_failure(error, job.source, given.as_json, given.debug))
             continue
         except KeyboardInterrupt:
-            _interrupt.text = progress.describe_kept(output or job.output)
+            _interrupt.text = progress.describe_kept(output)
             raise
-        target = (output or job.output).resolve()
-        if as_json:
+        target = output.resolve()
+        if given.as_json:
             typer.echo(json.dumps(json.loads((target / "result.json").read_text())))
-        elif not quiet:
+        elif not given.quiet:
             _print_table(result, target)
         if result.sites and not any(site.accepted for site in result.sites):
             status = max(status, 1)
@@ -99,9 +131,9 @@ def command(
             )
         if result.failures:
             status = max(status, 1)
-            for failure in result.failures if quiet or as_json else ():
+            for failure in result.failures if given.quiet or given.as_json else ():
                 typer.echo(f"error: {failure}", err=True)
-    raise typer.Exit(status)
+    return status
 
 
 def _list_reasons(result: Result) -> list[str]:

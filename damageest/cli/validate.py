@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from damageest.cli._process import end_with
+
 
 def command(
     jobs: Annotated[list[Path], typer.Argument(metavar="JOB...", help="Job files.")],
@@ -18,6 +20,11 @@ def command(
 ) -> None:
     """Check jobs without computing a result, and list all errors with line and column. Where a job selects faces or
     skin of the part, the part is read."""
+    end_with(lambda: _check(jobs, settings or []))
+
+
+def _check(jobs: list[Path], settings: list[str]) -> int:
+    """Prints what is wrong, and gives the exit status."""
     from damageest.errors import InputError, JobError, StageError
     from damageest.job import load
     from damageest.pipeline.selections import check_with_part
@@ -27,7 +34,7 @@ def command(
     status = 0
     for path in jobs:
         try:
-            job = load(path, registry, settings or [])
+            job = load(path, registry, settings)
             check_with_part(job, registry)
         except JobError as error:
             status = 2
@@ -40,4 +47,4 @@ def command(
             continue
         stages = ", ".join(f"{contract.stage} {stage.use}" for contract, stage in job.stages.items())
         typer.echo(f"{path}: valid; method {job.method}: {stages}")
-    raise typer.Exit(status)
+    return status

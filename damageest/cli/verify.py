@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from damageest.cli._process import end_with
+
 
 def command(
     folder: Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of a run.")],
@@ -16,6 +18,11 @@ def command(
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Check files and inputs of an output folder against the hashes in its result.json."""
+    end_with(lambda: _check(folder, rerun))
+
+
+def _check(folder: Path, rerun: bool) -> int:
+    """Prints what changed, and gives the exit status."""
     from damageest.report.output_folder import open_output
     from damageest.report.verification import find_changes, find_other_versions
 
@@ -30,7 +37,7 @@ def command(
         typer.echo(f"{folder}: result.json, {count} files and {inputs} inputs are as the run left them")
     if rerun:
         changes += _run_again(folder, content)
-    raise typer.Exit(1 if changes else 0)
+    return 1 if changes else 0
 
 
 def _run_again(folder: Path, content: dict[str, object]) -> list[str]:

@@ -2,11 +2,13 @@
 
 from damageest.isolation.ends import ProcessError
 from damageest.isolation.limits import Limits, format_bytes, limit_this_process, measure_free_memory, parse_memory
+from damageest.isolation.notes import at_work
 from damageest.isolation.worker import call_isolated, cpu_seconds, end_workers
 
 __all__ = [
     "Limits",
     "ProcessError",
+    "at_work",
     "call_isolated",
     "cpu_seconds",
     "end_workers",

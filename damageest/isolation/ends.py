@@ -45,20 +45,23 @@ def describe_end(status: int | None, output: str, memory: int | None, limits: Li
         )
     elif "bad_alloc" in output or "MemoryError" in output:
         error = describe_memory(memory, limits)
-    elif status == -signal.SIGKILL:
-        error = ProcessError(
-            "crash",
-            "its process was killed (SIGKILL), as the system does where memory runs out",
-            "a larger tolerance, fewer scan points, or a --memory that the machine has",
-        )
     elif status < 0:
-        name = signal.Signals(-status).name
-        what = f"its process ended by {_SIGNALS.get(-status, 'a signal')} ({name})"
-        error = ProcessError("crash", what, blame_authors(owner))
+        what, remedy = describe_signal(-status)
+        error = ProcessError("crash", what, remedy or blame_authors(owner))
     else:
         error = ProcessError("crash", f"ended its process with exit status {status}", blame_authors(owner))
     error.__cause__ = RemoteTraceback(output) if output else None
     return error
+
+
+def describe_signal(number: int) -> tuple[str, str]:
+    """What a signal that ended a process means, and what to do where that is not for the authors of the code."""
+    if number == signal.SIGKILL:
+        return (
+            "its process was killed (SIGKILL), as the system does where memory runs out",
+            "a larger tolerance, fewer scan points, or a --memory that the machine has",
+        )
+    return f"its process ended by {_SIGNALS.get(number, 'a signal')} ({signal.Signals(number).name})", ""
 
 
 def describe_memory(memory: int | None, limits: Limits) -> ProcessError:

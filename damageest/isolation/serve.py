@@ -6,17 +6,15 @@
 from __future__ import annotations
 
 import faulthandler
-import fcntl
 import os
 import pickle
-import select
-import signal
 import socket
 import sys
 import time
 import traceback
 from typing import Any
 
+from damageest.isolation.leash import end_with_parent
 from damageest.isolation.limits import limited
 from damageest.isolation.transfer import load, receive, receive_parts, send
 
@@ -28,7 +26,7 @@ def main(channel_file: int, leash: int) -> None:
     """Serves until the channel closes. What stages print goes to the error stream, as what libraries print does."""
     global is_worker
     is_worker = True
-    _end_with_parent(leash)
+    end_with_parent(leash)
     os.dup2(2, 1)
     faulthandler.enable()
     channel = socket.socket(fileno=channel_file)
@@ -38,16 +36,6 @@ def main(channel_file: int, leash: int) -> None:
             _answer(channel)
     except (EOFError, ConnectionError):
         os._exit(0)  # without the libraries' own ends, some of which crash
-
-
-def _end_with_parent(leash: int) -> None:
-    """Lets the kernel end this process when the other end of the pipe ``leash`` closes, so also in a native loop."""
-    if hasattr(fcntl, "F_SETSIG"):
-        fcntl.fcntl(leash, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(leash, fcntl.F_SETSIG, signal.SIGKILL)
-        fcntl.fcntl(leash, fcntl.F_SETFL, fcntl.fcntl(leash, fcntl.F_GETFL) | os.O_ASYNC)
-    if select.select([leash], [], [], 0)[0]:  # it closed before
-        os._exit(0)
 
 
 def _answer(channel: socket.socket) -> None:

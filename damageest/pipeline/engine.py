@@ -14,17 +14,15 @@ import numpy as np
 
 from damageest.artefacts import ArtefactError
 from damageest.errors import DamageestError, InputError, StageError, describe_missing_library, is_interrupt
-from damageest.isolation import Limits, ProcessError, call_isolated
+from damageest.isolation import Limits, at_work
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache, describe_unwritable, digest
+from damageest.pipeline.calls import run_stage
 from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
 from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.registry import Implementation, Registry
 from damageest.result import StageRecord
 from damageest.stages import Stage
-
-READERS_SHARE = 1 / 6
-"""Share of the time limit of a stage that a reader has."""
 
 S = TypeVar("S", JobState, Candidate, FoundSite)
 
@@ -32,8 +30,8 @@ S = TypeVar("S", JobState, Candidate, FoundSite)
 @dataclass
 class Engine:
     """One run of a job. ``records`` grow as it goes; ``stems`` are the cache entries that it used. ``silent``: it
-    calls stages on values that are not the job's own, and observers do not get these calls. ``limits``: of stages that
-    run in a process of their own."""
+    calls stages on values that are not the job's own, and observers do not get these calls. ``limits``: of each stage,
+    of memory for those that run in a process of their own."""
 
     job: Job
     registry: Registry
@@ -73,7 +71,10 @@ class Engine:
             cached, value = self.remember(
                 contract.stage + (f"-{state.number}" if state.number else ""),
                 key,
-                lambda: _check_type(self._run(stage, item, {name: state.get(name) for name in needs}), contract),
+                lambda: _check_type(
+                    run_stage(stage, item, {name: state.get(name) for name in needs}, self.limits, state.number),
+                    contract,
+                ),
                 keep=contract.stage not in ("export", "report"),
             )
         except Exception as error:
@@ -86,29 +87,9 @@ class Engine:
         tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
         return state.with_named(contract.gives, value, key)
 
-    def _run(self, stage: Stage, item: Implementation, arguments: dict[str, Any]) -> Any:
-        """What the stage gives, from a process of its own where its class says so. Raises StageError where it exits."""
-        run: Callable[..., Any] = stage.run  # type: ignore[attr-defined]
-        if item.cls.isolated:
-            worker = f"{item.provider.module.partition('.')[0]} {item.provider.fingerprint}"
-            owner, limits = f"{item.provider}", self.limits
-            if not item.cls.reads:
-                return call_isolated(run, arguments, worker=worker, owner=owner, limits=limits)
-            limits = replace(limits, seconds=limits.seconds * READERS_SHARE)
-            try:
-                return call_isolated(run, arguments, worker=worker, owner=owner, limits=limits)
-            except ProcessError as error:
-                raise InputError(
-                    f"{getattr(stage, 'path', item.contract.stage)}: the program that reads it {error.message}\n  try: "
-                    f"export the file again, since it is damaged; or report it to the authors of {owner}"
-                ) from error
-        try:
-            return run(**arguments)
-        except SystemExit as end:
-            raise StageError(
-                f"called sys.exit({'' if end.code is None else end.code}), which would end the run",
-                f"another implementation; report it to the authors of {item.provider}",
-            ) from end
+    def _run(self, stage: Stage, item: Implementation, state: S) -> Any:
+        named = {name: state.get(name) for name in item.cls.needs()}
+        return run_stage(stage, item, named, self.limits, state.number)
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
         """(was it known, value): from this run's memory, else from the cache, else computed and kept."""
@@ -136,7 +117,8 @@ def follow(route: Sequence[Contract | Step], engine: Engine, work: Work) -> Work
     """
     for step in route:
         if not isinstance(step, type):
-            work = step(engine, work)
+            with at_work(step.__name__.replace("_", " ").strip(), engine.limits.seconds):
+                work = step(engine, work)
         elif issubclass(step, Stage) and step.per_site:
             work = call_each(engine, step, work)
         else:
@@ -166,7 +148,7 @@ def _tell(hook: Callable[..., Any], **what: Any) -> None:
     """Calls observers. A failing one becomes a warning: it changes nothing of what is computed."""
     try:
         hook(**what)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         text = f"a plugin that observes stage {what['stage']} failed: {type(error).__name__}: {error}"
         warnings.warn(text, RuntimeWarning, stacklevel=2)
 

@@ -17,6 +17,7 @@ from typing import Any
 import pluggy
 
 from damageest.errors import PluginError, find_missing_library, is_interrupt
+from damageest.isolation import at_work
 from damageest.registry import hookspecs
 
 GROUP = "damageest"
@@ -64,7 +65,7 @@ def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[t
     own = EntryPoint("builtins", "damageest.registry.builtins", GROUP)
     for point, provider in [(own, _describe_own()), *_list_installed()]:
         try:
-            with ignore_shadow_warnings():
+            with ignore_shadow_warnings(), at_work(f"the import of {provider}", owner=f"{provider}"):
                 plugin = point.load()
             manager.register(plugin, f"{provider.name}:{point.name}")
         except (Exception, SystemExit) as error:

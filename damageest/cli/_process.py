@@ -1,0 +1,51 @@
+"""The process of the command line, which may watch a fork of itself that does the work."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+import typer
+
+from damageest.errors import StageError
+from damageest.isolation.supervise import IS_POSSIBLE, end_alike, supervise
+
+is_command = False
+"""Whether this process runs the command line alone. In another program, such as one with tests, it must not fork."""
+
+
+def end_with(work: Callable[[], int]) -> NoReturn:
+    """As `end_with_each`, for work that is one item."""
+
+    def report(error: StageError, _: str) -> int:
+        typer.echo(f"error: {error}", err=True)
+        return error.exit_status
+
+    end_with_each(lambda _: work(), [""], report)
+
+
+def end_with_each(
+    work: Callable[[int], int], names: Sequence[str], report: Callable[[StageError, str], int]
+) -> NoReturn:
+    """Does ``work`` and ends this process with the exit status that it gives.
+
+    Where this process runs the command line alone, the work is done in a fork of it. ``work`` is called with the number
+    of the item to begin with. Where the fork crashes, ``report`` gets the error and the name of the item, and gives an
+    exit status; the next fork goes on with the item after it.
+    """
+    if not (is_command and IS_POSSIBLE and threading.active_count() == 1):
+        raise typer.Exit(work(0))
+    first = status = 0
+    while first < len(names):
+        start = first
+        end = supervise(lambda: work(start))  # noqa: B023  (called at once)
+        if end.error is None:
+            end_alike(end.status if end.status < 0 else max(status, end.status))
+        if sys.stderr.isatty():
+            sys.stderr.write("\x1b[?25h")  # a live display hides the cursor
+        sys.stderr.write("\n")
+        status = max(status, report(end.error, names[start + max(end.job, 0)]))
+        first = start + end.job + 1 if end.job >= 0 else len(names)
+    end_alike(status)

@@ -1,0 +1,122 @@
+"""A process that watches another one, its fork: for code that has no process of its own and may crash, exit or hang.
+
+The fork is made before anything large is imported, so it costs some milliseconds. The terminal, the working directory
+and the process group are the same, so that Ctrl-C, Ctrl-Z and pipes work as with one process.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NoReturn
+
+from damageest.errors import StageError
+from damageest.isolation.ends import describe_signal
+from damageest.isolation.leash import end_with_parent
+from damageest.isolation.notes import Entry, close_entry, read_entry, share_page
+
+PASSED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+"""Signals that are passed on to the fork."""
+TICK = 0.5
+"""Seconds between two looks at the clock. A process that is stopped for longer, as by Ctrl-Z, loses no time by it."""
+IS_POSSIBLE = hasattr(os, "fork") and hasattr(signal, "sigtimedwait")
+_USER = 0
+"""How the system marks a signal of another process; those of a terminal reach the whole group."""
+
+
+@dataclass(frozen=True)
+class End:
+    """``status``: the exit status of the fork; ``error``: what ended it where it did not end by itself, in ``job``."""
+
+    status: int
+    error: StageError | None = None
+    job: int = -1
+
+
+def supervise(work: Callable[[], int]) -> End:
+    """Runs ``work``, which gives an exit status, in a fork of this process, and gives how the fork ended.
+
+    In the fork this never returns: it raises SystemExit, or what ``work`` raises. The fork is killed where it stays in
+    what it notes (`at_work`) for longer than the time limit noted with it, and where this process ends.
+    """
+    share_page()
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    leash, held = os.pipe()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {*PASSED, signal.SIGCHLD})
+    sys.stdout.flush()
+    sys.stderr.flush()
+    child = os.fork()
+    if child == 0:
+        os.close(held)
+        end_with_parent(leash)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        status = 1
+        try:
+            status = work()
+        finally:
+            close_entry(status)
+        sys.exit(status)
+    os.close(leash)
+    try:
+        return _describe(*_wait(child), read_entry())
+    finally:
+        os.close(held)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def end_alike(status: int) -> NoReturn:
+    """Ends this process as its fork ended, without the libraries' own ends; ``status`` as of subprocess."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if status < 0:
+        signal.signal(-status, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {-status})
+        os.kill(os.getpid(), -status)
+    os._exit(status if status >= 0 else 128 - status)
+
+
+def _wait(child: int) -> tuple[int, bool]:
+    """The exit status of the fork, as of subprocess, and whether it was killed since it was late."""
+    count, spent, before, late = -1, 0.0, time.monotonic(), False
+    while True:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status), late
+        found = signal.sigtimedwait({*PASSED, signal.SIGCHLD}, TICK)
+        if found and found.si_signo in PASSED and found.si_code <= _USER:
+            os.kill(child, found.si_signo)
+        entry, now = read_entry(), time.monotonic()
+        spent = 0.0 if entry.count != count else spent + min(now - before, 2 * TICK)
+        count, before = entry.count, now
+        if entry.seconds and spent > entry.seconds and not late:
+            late = True
+            os.kill(child, signal.SIGKILL)
+
+
+def _describe(status: int, late: bool, entry: Entry) -> End:
+    """How the fork ended. A crash after it had come to its end, as of a library that is unloaded, is none."""
+    if not late and -status in PASSED:
+        return End(status)
+    if not late and not entry.open:
+        return End(status if status >= 0 else entry.status)
+    remedy = f"another implementation; report it to the authors of {entry.owner}, with job and inputs"
+    if late:
+        message = f"was ended: not finished after {entry.seconds:g} s, the time limit of a stage"
+        remedy = f"a longer --stage-timeout{f', or {remedy}' if entry.owner else ''}"
+    elif status < 0:
+        message, killed = describe_signal(-status)
+        remedy = killed or remedy
+    else:
+        message = f"ended its process with exit status {status}"
+    error = StageError(message if entry.what else f"the run {message}", remedy if entry.owner or late else "")
+    return End(1, _name(error, entry.what), entry.job)
+
+
+def _name(error: StageError, what: str) -> StageError:
+    """The error of the stage that was at work. StageError puts it in front of the message."""
+    error.message = f"{what}: {error.message}" if what else error.message
+    return error

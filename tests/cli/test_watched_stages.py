@@ -1,0 +1,188 @@
+"""A stage without a process of its own that crashes, exits, hangs or takes all memory: the command line names it, its
+exit status is 1, the earlier output stays, and the jobs after it run."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import damageest
+from tests import damaged_box
+from tests.registry.test_registry import Site, site
+
+__all__ = ["site"]
+MAIN = [sys.executable, "-c", "from damageest.cli import main; main()", "run"]
+FAULTY = '''
+from damageest.artefacts import Part, Samples
+from damageest.stages.sample import Sample
+from damageest.stages.sample.edge_aware import EdgeAware
+
+class Faulty(Sample):
+    """Does what its option says."""
+    use: Literal["faulty"] = "faulty"
+    fault: str
+    def run(self, part: Part, tolerance: float) -> Samples:
+        exec(self.fault)
+        return EdgeAware().run(part, tolerance)
+
+class Watcher:
+    @hookimpl
+    def damageest_before_stage(self, stage: str) -> None:
+        if stage == "align":
+            raise SystemExit(0)
+
+@hookimpl
+def damageest_stages():
+    return [Faulty]
+'''
+FAULTS = {
+    "segmentation fault": ("import ctypes; ctypes.string_at(0)", "its process ended by a segmentation fault (SIGSEGV)"),
+    "abort": ("import os; os.abort()", "its process ended by an abort (SIGABRT)"),
+    "exit at once": ("import os; os._exit(0)", "ended its process with exit status 0"),
+    "exit": ("import sys; sys.exit(0)", "called sys.exit(0), which would end the run"),
+    "memory": ("import numpy as np; np.ones(30 * 10**9 // 8)", "ran out of memory"),
+    "kill": ("import os; os.kill(os.getpid(), 9)", "its process was killed (SIGKILL)"),
+    "hang": ("import time; time.sleep(600)", "was ended: not finished after 8 s, the time limit of a stage"),
+}
+
+
+def write_job(folder: Path, name: str, fault: str) -> Path:
+    path = folder / f"{name}.yaml"
+    path.write_text(f"{damaged_box.JOB}sample: {{use: faulty, fault: {json.dumps(fault)}}}\n")
+    return path
+
+
+def environment(site: Site) -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(site.folder), os.environ.get("PYTHONPATH", "")])}
+
+
+def test_each_fault_is_named_and_the_next_job_runs(site: Site, tmp_path: Path) -> None:
+    site.add("acme-bad", FAULTY)
+    damaged_box.write(tmp_path)
+    jobs = [write_job(tmp_path, name, fault) for name, (fault, _) in FAULTS.items()]
+    jobs.append(write_job(tmp_path, "sound", ""))
+    for path in jobs:  # an output of an earlier run, so that none of them has to compute it
+        (tmp_path / "out" / path.stem).mkdir(parents=True)
+        (tmp_path / "out" / path.stem / "result.json").write_text('{"earlier": true}')
+    before = damaged_box.content(tmp_path / "out")
+    command = [*MAIN, *map(str, jobs), "--stage-timeout", "8", "--memory", "3GB", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment(site), timeout=100)
+    said = " ".join(done.stderr.split())
+    assert done.returncode == 1, said
+    for _, text in FAULTS.values():
+        assert f"error: sample: faulty: {text}" in said
+    assert "acme-bad 1.2" in said
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [row["status"] for row in rows] == ["failed"] * len(FAULTS) + ["ok"]
+    assert [Path(row["job"]).stem for row in rows[:-1]] == list(FAULTS)
+    after = damaged_box.content(tmp_path / "out")
+    old = [name for name in before if not name.startswith("sound/")]
+    assert {name: after[name] for name in old} == {name: before[name] for name in old}
+    assert json.loads(after["sound/result.json"])["sites"], "it was run"
+
+
+def test_a_plugin_that_crashes_as_it_is_loaded_is_named(site: Site, tmp_path: Path) -> None:
+    site.add("acme-broken", "import os; os.abort()")
+    command = [*MAIN, str(damaged_box.write(tmp_path))]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment(site))
+    assert done.returncode == 1
+    assert "the import of acme-broken 1.2: its process ended by an abort" in " ".join(done.stderr.split())
+
+
+READER = '''
+from typing import ClassVar
+from damageest.artefacts import Part
+from damageest.stages import JobPath
+from damageest.stages.part import CadFace, ReadPart
+
+class Acme(ReadPart):
+    """Aborts."""
+    reads: ClassVar[tuple[str, ...]] = (".acme",)
+    isolated: ClassVar[bool] = ISOLATED
+    use: Literal["acme"] = "acme"
+    path: JobPath
+    def run(self, unit: str) -> Part:
+        import os; os.abort()
+    def cad_faces(self, unit: str) -> tuple[CadFace, ...]:
+        import os; os.abort()
+
+@hookimpl
+def damageest_stages():
+    return [Acme]
+'''
+
+
+@pytest.mark.parametrize("isolated", [True, False])
+def test_a_reader_that_crashes_is_named_by_faces(isolated: bool, site: Site, tmp_path: Path) -> None:
+    """As OpenCASCADE on a damaged file: with a process of its own it is the file's fault."""
+    site.add("acme-reader", READER.replace("ISOLATED", str(isolated)))
+    (tmp_path / "part.acme").write_text("x")
+    command = [*MAIN[:-1], "faces", str(tmp_path / "part.acme")]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment(site))
+    said = " ".join(done.stderr.split())
+    assert done.returncode == (2 if isolated else 1), said
+    assert ("part.acme: the program that reads it" if isolated else "part: acme: its process ended by an abort") in said
+    assert "acme-reader 1.2" in said
+
+
+def test_an_observer_that_exits_is_a_warning(site: Site, tmp_path: Path) -> None:
+    import importlib
+
+    from damageest.registry import Registry
+
+    site.add("acme-bad", FAULTY)
+    watcher = importlib.import_module("acme_bad").Watcher()
+    with pytest.warns(RuntimeWarning, match="a plugin that observes stage align failed: SystemExit"):
+        assert damageest.run(damaged_box.write(tmp_path), registry=Registry.discover([watcher])).sites
+
+
+@pytest.mark.parametrize("how", ["terminal", "killed"])
+def test_the_process_that_works_ends_with_the_one_that_watches(how: str, site: Site, tmp_path: Path) -> None:
+    """Ctrl-C on a terminal reaches both; SIGKILL only the one that watches."""
+    site.add("acme-bad", FAULTY)
+    damaged_box.write(tmp_path)
+    mark = tmp_path / "mark"
+    job = write_job(
+        tmp_path, "job", f"import os; open({str(mark)!r}, 'w').write(str(os.getpid())); import time; time.sleep(600)"
+    )
+    child, terminal = pty.fork()
+    if child == 0:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        os.execve(sys.executable, [*MAIN, str(job)], environment(site))
+    try:
+        end = time.monotonic() + 60
+        while not (mark.exists() and mark.read_text()):
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        worker = int(mark.read_text())
+        assert worker != child
+        if how == "terminal":
+            os.write(terminal, b"\x03")
+        else:
+            os.kill(child, signal.SIGKILL)
+        text = b""
+        while more := _read(terminal):
+            text += more
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        assert status == (130 if how == "terminal" else -signal.SIGKILL)
+        assert text.count(b"interrupted in sample") == (how == "terminal")
+        while Path(f"/proc/{worker}").exists():
+            assert time.monotonic() < end
+            time.sleep(0.01)
+    finally:
+        os.close(terminal)
+
+
+def _read(terminal: int) -> bytes:
+    try:
+        return os.read(terminal, 1 << 12)
+    except OSError:  # the other end is closed
+        return b""
