@@ -21,11 +21,11 @@ from damageest.stages.report._section import choose_plane, draw_section, take_pa
 from damageest.stages.report._thin import thin_mesh
 from damageest.stages.report._values import show_interval, show_site_interval
 
-PICTURE, THUMBNAIL = (320, 240), (104, 78)
+PICTURE, SMALLER, THUMBNAIL = (320, 240), (240, 180), (104, 78)
 THUMBNAIL_TRIANGLES = 4000
 """About as many as a thumbnail has pixels that show the mesh."""
 FEW = 6
-"""Up to so many sites, pictures are drawn with smooth edges."""
+"""Up to so many sites, pictures are drawn in full size with smooth edges."""
 MOST_DRAWN = 12
 """Sites with pictures and a section, so that a report takes few seconds; of more, those of the largest volume."""
 
@@ -165,10 +165,11 @@ def _draw_site(
     rays, mesh = left
     smooth, near = len(result.sites) <= FEW, view._replace(radius=1.05 * view.radius)
     layers = [(rays, mesh, "#c3ccd2")]
-    surface = RayCaster(site.surface) if len(site.surface.faces) else None
-    if surface:
-        layers.append((surface, site.surface, one.colour))
-    one.picture = draw(view._replace(radius=1.7 * view.radius), layers, PICTURE, smooth)
+    # of many sites the picture shows the thinned surface, as the thumbnail does: rays are prepared once for both
+    surface = site.surface if smooth else thin_mesh(site.surface, THUMBNAIL_TRIANGLES)
+    prepared = {"surface": (RayCaster(surface), surface)} if len(surface.faces) else {}
+    layers += [(*both, one.colour) for both in prepared.values()]
+    one.picture = draw(view._replace(radius=1.7 * view.radius), layers, PICTURE if smooth else SMALLER, smooth)
     plane = choose_plane(result, site)
     one.section, slab = draw_section(result, site, plane, part, paper)
     at = ", ".join(style.format_number(x) for x in plane.origin)
@@ -178,8 +179,10 @@ def _draw_site(
     shapes = [("damage", site.damage, one.colour), ("surface", site.surface, one.colour)]
     for kind, shape, colour in [*shapes, ("deposit", deposit, colours.DEPOSIT)]:
         if len(shape.faces) and told["files"][kind]:
-            small = thin_mesh(shape, THUMBNAIL_TRIANGLES)
-            image = draw(near, [(RayCaster(small), small, colour)], THUMBNAIL, smooth)
+            if kind not in prepared:
+                small = thin_mesh(shape, THUMBNAIL_TRIANGLES)
+                prepared[kind] = RayCaster(small), small
+            image = draw(near, [(*prepared[kind], colour)], THUMBNAIL, smooth)
             one.files.append((kind, told["files"][kind], image))
 
 
