@@ -48,7 +48,8 @@ class DamageCase:
     """The inputs of one case. Equal cases give equal scans.
 
     ``part``: name of a built-in part, or the display name of the part in ``file`` (.npz). ``first``: kind of the first
-    damage. ``size``: depth of the damage in the part's unit; 0: no damage; None: random. ``scanner``: options of
+    damage. ``size``: depth of the damage in the part's unit; 0: no damage; None: random. ``tools``: damage that is
+    given, as in option damage of `simulate`; then nothing is random. ``scanner``: options of
     `simulate` other than damage and seed. ``job``: path of a job file, empty for the defaults; ``settings`` are applied
     to it. ``source``: digest of both files and of the code. ``tolerance``: the tolerance that the run is expected to
     use. ``varied``: the values under which the case is listed in the tables.
@@ -60,6 +61,7 @@ class DamageCase:
     first: str
     tolerance: float
     size: float | None = None
+    tools: Sequence[Mapping[str, Any]] = ()
     scanner: Mapping[str, Any] = field(default_factory=dict)
     settings: Sequence[str] = ()
     varied: Mapping[str, float | str] = field(default_factory=dict)
@@ -103,9 +105,9 @@ def load_part(case: DamageCase) -> Part:
 
 def simulate_scan(case: DamageCase, part: Part) -> tuple[Scan, tuple[str, ...]]:
     """The simulated scan with its truth, and the damages' kinds. Raises LookupError if no damage fits the part."""
-    tools: tuple[Any, ...] = ()
+    tools: tuple[Any, ...] = tuple(case.tools)
     kinds: tuple[str, ...] = ()
-    if case.size != 0:
+    if case.size != 0 and not tools:
         drawn = make_random_damage(part, case.seed, (case.first,)) if case.size is None else None
         drawn = drawn or make_sized_damage(part, case.seed, float(case.size or 0), case.first)
         tools, kinds = drawn.tools, drawn.kinds

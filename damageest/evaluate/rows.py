@@ -61,7 +61,7 @@ def run_all(
     token = f"damageest-{uuid.uuid4().hex[:8]}"
     with (
         open_client(scheduler, jobs, processes=False) as client,
-        contextlib.closing(run_tasks(client, _compute_row, tasks, token)) as steps,
+        contextlib.closing(run_tasks(client, run_one, tasks, token)) as steps,
     ):
         for task in (task for ended, _ in steps for task in ended):
             row = task.value or waiting[task.name].make_blank_row() | {"error": task.why}
@@ -82,7 +82,7 @@ def _collect_rows(cases: Sequence[EvaluationCase], rows_by_key: Mapping[str, Row
     ]
 
 
-def _compute_row(case: EvaluationCase, timeout: float) -> Row:
+def run_one(case: EvaluationCase, timeout: float) -> Row:
     """The case's row. A crash or a timeout gives a row with ``error``, not flagged."""
     row = run_in_process(case.module, asdict(case), timeout)
     return row if isinstance(row, dict) else case.make_blank_row() | {"error": row, "seconds": timeout}
