@@ -16,6 +16,10 @@ from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import list_used
 
 
+LARGE = 16.0
+"""Longest edge of a triangle, in medians of all, from which it is a large one."""
+
+
 class Closest(NamedTuple):
     """The nearest places on a mesh: ``distance`` (N,) to it, not signed; ``face`` (N,) the nearest triangle; ``place``
     (N,3) the nearest point on that triangle."""
@@ -27,15 +31,12 @@ class Closest(NamedTuple):
 
 def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
     """The nearest place on a mesh for each of ``points`` (N,3). The mesh may be open; it must have a triangle."""
-    import igl
-
     if not len(points):
         return Closest(np.empty(0), np.empty(0, np.int64), np.empty((0, 3)))
     centre = mesh.bounds.mean(axis=0)
-    squared, face, place = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(points - centre), np.ascontiguousarray(mesh.vertices - centre), np.array(mesh.faces)
-    )
-    return Closest(np.sqrt(np.asarray(squared)), np.asarray(face, np.int64), np.asarray(place) + centre)
+    tree = SurfaceTree(Mesh(mesh.vertices - centre, mesh.faces))
+    distance, face, place = tree.closest(points - centre)
+    return Closest(distance, face, place + centre)
 
 
 def distance_to_mesh(points: Floats, mesh: Mesh) -> Floats:
@@ -67,19 +68,41 @@ class SurfaceTree:
         self.mesh = mesh
 
     @cached_property
-    def _tree(self) -> Any:
+    def _trees(self) -> list[tuple[Any, Ints, Ints]]:
+        """A tree over triangles of about one size, these triangles (K,3), and their numbers (K,), for each size."""
         import igl
 
-        tree = igl.AABB()
-        tree.init(self.mesh.vertices, self.mesh.faces)
-        return tree
+        trees = []
+        for numbers in _group_by_size(self.mesh):
+            tree, faces = igl.AABB(), np.ascontiguousarray(self.mesh.faces[numbers])
+            tree.init(self.mesh.vertices, faces)
+            trees.append((tree, faces, numbers))
+        return trees
 
     def closest(self, points: Floats) -> Closest:
         """The nearest place on the mesh for each of ``points`` (N,3), N at least 1, as `closest_on_mesh` gives it."""
-        squared, face, place = self._tree.squared_distance(
-            self.mesh.vertices, self.mesh.faces, np.ascontiguousarray(points, np.float64)
-        )
+        query, found = np.ascontiguousarray(points, np.float64), []
+        for tree, faces, numbers in self._trees:
+            squared, face, place = tree.squared_distance(self.mesh.vertices, faces, query)
+            found.append((np.reshape(squared, -1), numbers[np.reshape(face, -1)], np.reshape(place, (-1, 3))))
+        squared, face, place = found[0]
+        for other, its_face, its_place in found[1:]:
+            nearer = other < squared
+            squared, face = np.where(nearer, other, squared), np.where(nearer, its_face, face)
+            place = np.where(nearer[:, None], its_place, place)
         return Closest(np.sqrt(squared), face, place)
+
+
+def _group_by_size(mesh: Mesh) -> list[Ints]:
+    """The numbers of the small triangles of a mesh, and those of the large ones where there are some.
+
+    A tree of boxes that holds both is slow: the boxes of long slivers, as flat faces of CAD models are cut into, cover
+    those of the small triangles. Measured on a damage volume: four times the time.
+    """
+    triangles = mesh.triangles
+    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    large = longest > LARGE * np.median(longest)
+    return [np.flatnonzero(~large), np.flatnonzero(large)] if large.any() else [np.arange(len(longest))]
 
 
 def winding_number(points: Floats, mesh: Mesh) -> Floats:

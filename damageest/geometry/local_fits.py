@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.neighbourhoods import find_neighbours
+from damageest.geometry.neighbourhoods import find_neighbours, make_tree, query_neighbours
 
 ROUNDS = 3
 """How often the planes are fitted again with the weights that the last normals give."""
@@ -54,12 +54,10 @@ def average_points(points: Floats, counts: Ints, noise: float, chosen: Ints) -> 
         noise: standard deviation of one scan point from the surface.
         chosen: (M,) indices of the points to move.
     """
-    from scipy.spatial import cKDTree
-
-    distance, index = find_neighbours(points, SCALES[0])
+    tree = make_tree(points)
+    distance, index = query_neighbours(tree, points, min(SCALES[0], len(points)))
     normals, _ = _fit_planes(points, index, distance, noise)
     out, tilted = points[chosen], normals[chosen]
-    tree = cKDTree(points)
     for start in range(0, len(chosen), CHUNK):
         own = slice(start, start + CHUNK)
         out[own], tilted[own] = _choose_widest(tree, points, counts, noise, normals, chosen[own])
@@ -71,8 +69,7 @@ def _choose_widest(
 ) -> tuple[Floats, Floats]:
     """Position (M,3) and normal (M,3) of the points ``own`` (M,), each by the widest fit that noise explains."""
     at, way = points[own], normals[own]
-    distance, index = tree.query(at, k=min(SCALES[-1], len(points)), workers=2)
-    distance, index = distance.reshape(len(at), -1), index.reshape(len(at), -1)
+    distance, index = query_neighbours(tree, at, min(SCALES[-1], len(points)))
     best, normals_of_best = at.copy(), way.copy()
     is_explained = np.ones(len(at), bool)
     narrower_fits: list[tuple[Floats, Floats]] = []

@@ -5,10 +5,17 @@ All lengths and points of a call are in one unit and one frame.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, number_cubes
+
+MANY = 20_000
+"""Points from which a tree and its queries are made for speed."""
+ALONG = 48
+"""Cubes along the longest side of the places asked, in whose order they are asked."""
 
 
 def find_nearby(points: Floats, places: Floats, reach: float) -> Ints:
@@ -70,12 +77,34 @@ def find_neighbours(
             neighbour.
         reach: beyond this distance none is found: the distance is infinite and the index M.
     """
+    among = points if among is None else among
+    return query_neighbours(make_tree(among), points, min(count, len(among)), reach)
+
+
+def make_tree(points: Floats) -> Any:
+    """A k-d tree over points (N,D), at least 1, for `query_neighbours`.
+
+    Of many points it is built by halving cells, not by medians: that takes half the time.
+    """
     from scipy.spatial import cKDTree
 
-    among = points if among is None else among
-    count = min(count, len(among))
-    distance, index = cKDTree(among).query(points, k=count, distance_upper_bound=reach, workers=2)
-    return np.reshape(distance, (len(points), count)), np.reshape(index, (len(points), count))
+    plain = len(points) < MANY
+    return cKDTree(points, balanced_tree=plain, compact_nodes=plain)
+
+
+def query_neighbours(tree: Any, points: Floats, count: int, reach: float = np.inf) -> tuple[Floats, Ints]:
+    """As `find_neighbours`, among the points of a tree of `make_tree` that has at least ``count``."""
+    shape = (len(points), count)
+    if len(points) < MANY:
+        distance, index = tree.query(points, k=count, distance_upper_bound=reach, workers=2)
+        return np.reshape(distance, shape), np.reshape(index, shape)
+    # places that lie near one another are asked one after the other: the nodes that they need are in the cache then
+    low, high = points[:, :3].min(axis=0), points[:, :3].max(axis=0)
+    order = np.argsort(number_cubes(points[:, :3], max(float((high - low).max()) / ALONG, 1e-300))[1], kind="stable")
+    distance, index = np.empty(shape), np.empty(shape, np.intp)
+    found = tree.query(points[order], k=count, distance_upper_bound=reach, workers=2)
+    distance[order], index[order] = np.reshape(found[0], shape), np.reshape(found[1], shape)
+    return distance, index
 
 
 def measure_local_areas(points: Floats) -> Floats:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Mesh, Solid
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.distance import closest_on_mesh
+from damageest.geometry.neighbourhoods import find_in_box
 from damageest.geometry.solids import concatenate_meshes
 from damageest.geometry.voxels import number_cubes
 
@@ -53,12 +54,18 @@ def find_pieces(damage: Solid, points: Floats, label: NDArray[np.integer], reach
     """
     solids = split_bodies(damage)
     vertices, faces, owner = concatenate_meshes(solids)
+    # points far from all pieces, as those of other losses are, take the most time and count for nothing
+    low, high = damage.bounds
+    asked = find_in_box(points, low - 1.001 * reach, high + 1.001 * reach)
+    points, label, clusters = points[asked], label[asked], int(label.max(initial=0)) + 1
+    if not len(points):
+        return [], sum(solid.volume for solid in solids)
     # of points much closer together than the reach, the distance is computed for one
     cell = number_cubes(points, reach / 2)[1]
     _, first, counts = np.unique(np.stack([cell, label]), axis=1, return_index=True, return_counts=True)
     distance, face, _ = closest_on_mesh(points[first], Mesh(vertices, faces))
     near = distance < reach
-    touching = np.zeros((len(solids), int(label.max(initial=0)) + 1), np.int64)
+    touching = np.zeros((len(solids), clusters), np.int64)
     np.add.at(touching, (owner[face[near]], label[first[near]]), counts[near])
     kept, dropped = [], 0.0
     for solid, counts in zip(solids, touching, strict=True):

@@ -8,7 +8,12 @@ import numpy as np
 
 from damageest.artefacts import Flags, Part, Solid, Surface
 from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.duplicates import list_used
 
+ON_SKIN = 1e-7
+"""Distance, in diagonals of the part, up to which a point lies on its skin."""
+CLEARLY_OFF = 1e-5
+"""Distance, in diagonals of the part, from which a corner is clearly off the skin."""
 _FOUND: WeakKeyDictionary[Solid, tuple[ReferenceType[Part], Flags]] = WeakKeyDictionary()
 """What was found before: evidence, uncertainty and result ask it of the same solids."""
 
@@ -16,18 +21,22 @@ _FOUND: WeakKeyDictionary[Solid, tuple[ReferenceType[Part], Flags]] = WeakKeyDic
 def find_inner_faces(damage: Solid, part: Part) -> Flags:
     """Whether each face (F,) of a damage volume lies inside the part, and not on its skin.
 
-    A face is on the skin if three points within it are at most 1e-7 of the part's diagonal from it. Both solids are in
+    A face is on the skin if three points within it are at most `ON_SKIN` from it. Both solids are in
     the unit and frame of the part. The array is read-only.
     """
     known = _FOUND.get(damage)
     if known is not None and known[0]() is part:
         return known[1]
-    corners = damage.triangles
-    # Three points within each triangle, because a face inside the part may touch the skin at a corner or along an edge.
+    # a face with a corner clearly off the skin is inside
+    off = np.zeros(len(damage.vertices), bool)
+    used = list_used(damage.faces)
+    off[used] = distance_to_mesh(damage.vertices[used], part) > CLEARLY_OFF * part.diagonal
+    inner = np.asarray(off[damage.faces].any(axis=1))
+    # Three points within each other triangle, because a face inside the part may have all corners on the skin.
     weights = np.array([[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
-    probes = np.einsum("pk,fkj->fpj", weights, corners).reshape(-1, 3)
-    distance = distance_to_mesh(probes, part)
-    inner = np.asarray(distance.reshape(-1, 3).max(axis=1) > 1e-7 * part.diagonal)
+    open_ = np.flatnonzero(~inner)
+    probes = np.einsum("pk,fkj->fpj", weights, damage.triangles[open_]).reshape(-1, 3)
+    inner[open_] = distance_to_mesh(probes, part).reshape(-1, 3).max(axis=1) > ON_SKIN * part.diagonal
     inner.flags.writeable = False
     _FOUND[damage] = ref(part), inner
     return inner

@@ -53,11 +53,10 @@ def gather_losses(
     ``band``: width of skin round the damaged points that counts as neither lost nor intact; ``push``: how far the
     intact skin is moved outward; both in tolerances.
     """
-    from scipy.spatial import cKDTree
-
     points, label, grown, face = _grow_to_rim(aligned, deviation, sites, tolerance)
     skin = sample_skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
-    free = cKDTree(points).query(skin.points, workers=2)[0] < np.maximum(band * tolerance, 1.6 * skin.usual)
+    away = find_neighbours(skin.points, 1, points)[0][:, 0]
+    free = away < np.maximum(band * tolerance, 1.6 * skin.usual)
     above = part.face_normals[face]
     groups, lost_by = _group_losses(points, above, label, skin, free, tolerance, aligned.spacing, aligned.noise)
     areas = measure_local_areas(skin.points)

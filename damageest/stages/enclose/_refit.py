@@ -6,6 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Solid
 from damageest.geometry.neighbourhoods import find_neighbours
+from damageest.geometry.solids import to_manifold, to_solid
 
 NEIGHBOURS = 12
 """Points that each vertex is fitted to."""
@@ -44,5 +45,17 @@ def refit_region(region: Solid, points: Floats, normals: Floats, most: float) ->
     moved[near] += (np.clip(move, -most, most) * fade)[:, None] * way
     try:
         return Solid(moved, region.faces)
+    except ValueError:
+        return region
+
+
+def thin_region(region: Solid, most: float) -> Solid:
+    """The region with fewer triangles: its surface moves by less than ``most``. A grid gives triangles of one size,
+    also where the surface is flat. The same where ``most`` is 0, or where no closed surface comes out."""
+    if not most:
+        return region
+    origin = region.bounds.mean(axis=0)
+    try:
+        return to_solid(to_manifold(region, origin).simplify(most), origin) or region
     except ValueError:
         return region

@@ -27,8 +27,6 @@ def sample_skin_near(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, grown: Flags, samples: Samples, tolerance: float
 ) -> SkinSamples:
     """The skin in the neighbourhood of the sites, and as far from them as it is bare."""
-    from scipy.spatial import cKDTree
-
     intact = (deviation.label == INTACT) & ~grown
     added = deviation.label == ADDED
     flat = samples.kind == 0
@@ -51,9 +49,8 @@ def sample_skin_near(
     clear = np.maximum(1.5 * usual, 2 * tolerance)
     # The normal counts as fourth to sixth coordinate: points on the far side of a thin wall must not count here.
     weight = 1.5 * tolerance
-    tree = cKDTree(np.concatenate([hit, weight * outward], axis=1))
-    most = float(clear.max()) * 1.001
-    gap = tree.query(np.concatenate([points, weight * normals], axis=1), distance_upper_bound=most, workers=2)[0]
+    among, asked = (np.concatenate([at, weight * way], axis=1) for at, way in ((hit, outward), (points, normals)))
+    gap = find_neighbours(asked, 1, among, float(clear.max()) * 1.001)[0][:, 0]
     return SkinSamples(points, normals, gap > clear, usual)
 
 

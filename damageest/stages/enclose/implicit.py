@@ -33,6 +33,12 @@ class Implicit(EncloseAll):
     screening: float = Field(
         1.0, gt=0, le=100, description="weight of the points against the smoothness of the surface"
     )
+    detail: float = Field(
+        0.03,
+        ge=0,
+        le=1,
+        description="how far the surface may move for fewer triangles, in tolerances; 0: as the grid gives it",
+    )
     most_cells: int = Field(
         4_000_000, ge=50_000, le=60_000_000, description="most grid cells for one loss; a larger loss gets larger cells"
     )
@@ -44,7 +50,7 @@ class Implicit(EncloseAll):
         from damageest.geometry.isosurface import extract_region
         from damageest.geometry.poisson import make_grid, solve_coarse_to_fine
         from damageest.stages.enclose._gather import cut_beyond_reach, gather_losses, select_in_grid
-        from damageest.stages.enclose._refit import refit_region
+        from damageest.stages.enclose._refit import refit_region, thin_region
 
         if not sites.count:
             return Enclosures(())
@@ -68,6 +74,7 @@ class Implicit(EncloseAll):
             region = extract_region(grid, field)
             if region is not None:
                 region = refit_region(region, points, normals, 0.5 * tolerance)
+                region = thin_region(region, self.detail * tolerance)
                 items.append(Enclosure(region, group.sites, notes))
         if not items:
             raise StageError(
