@@ -6,7 +6,9 @@ import numpy as np
 
 from damageest.artefacts import INTACT, Deviation, Flags, Floats, Ints, Part, Scan
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.duplicates import find_members, list_distinct
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
+from damageest.geometry.voxels import number_cubes
 
 STEP = 1.25
 """How far from a point the part is asked for metal, in tolerances."""
@@ -16,6 +18,8 @@ TURNED = 0.85
 """Cosine of the angle between the normals of scan and skin below which a point may lie on another surface."""
 NEIGHBOURS = (12, 48)
 """Fewest and most points that a normal is fitted to."""
+DEEP = 0.25
+"""Share of the points of a small cube that lie deeper than most noise, from which they may lie on another surface."""
 FLAT = 0.35
 """Largest thickness of a patch over its width: a patch across an edge has no clear normal."""
 
@@ -32,6 +36,7 @@ def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: floa
         return turned
     near = deviation.label == INTACT
     asked = np.flatnonzero(near & (deviation.distance < -max(1.5 * aligned.noise, 0.1 * tolerance)))
+    asked = _drop_single(aligned, asked, near, tolerance)
     for _ in range(2):  # the second round asks the neighbours of what the first one found
         if not len(asked):
             return turned
@@ -51,6 +56,21 @@ def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: floa
         gap = find_neighbours(aligned.points[around], 1, aligned.points[found], reach)[0]
         asked = around[np.isfinite(gap).ravel()]
     return turned
+
+
+def _drop_single(aligned: Scan, asked: Ints, near: Flags, tolerance: float) -> Ints:
+    """Those of the points ``asked`` (A,) that noise alone does not explain: on another surface most points lie deep, on
+    the skin a few. All where the scan is too sparse to tell."""
+    edge = 3 * aligned.spacing
+    if edge > 2 * tolerance or not len(asked):
+        return asked
+    around = np.flatnonzero(near)
+    cube = number_cubes(aligned.points[around], edge)[1]
+    cubes = list_distinct(cube)
+    place = np.searchsorted(cubes, cube)
+    deep = find_members(around, asked)
+    share = np.bincount(place[deep], minlength=len(cubes)) / np.bincount(place, minlength=len(cubes))
+    return np.asarray(around[deep & (share[place] >= DEEP)])
 
 
 def _fit_normals(aligned: Scan, asked: Ints, tolerance: float) -> tuple[Floats, Flags]:

@@ -102,7 +102,9 @@ def find_seen(
     intact = np.flatnonzero(deviation.label == INTACT)
     seen, perhaps, mean = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
     if len(intact):
-        chosen = intact[pick_one_per_cube(aligned.points[intact], 0.35 * max(tolerance, aligned.spacing))]
+        # more than some points for each cell would show nothing more
+        apart = max(0.35 * max(tolerance, aligned.spacing), cells.edge / 6)
+        chosen = intact[pick_one_per_cube(aligned.points[intact], apart)]
         facing = part.face_normals[deviation.face[chosen]]
         # the places on the skin below the points: how far they are from it does not matter here
         points = aligned.points[chosen] - deviation.distance[chosen, None] * facing

@@ -15,7 +15,6 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import list_used
 
-
 LARGE = 16.0
 """Longest edge of a triangle, in medians of all, from which it is a large one."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -37,6 +37,7 @@ def test_facing_takes_the_skin_of_that_direction() -> None:
 def test_a_half_space_and_its_opposite_share_the_skin(offset: float, axis: int) -> None:
     point, normal = np.zeros(3), np.eye(3)[axis]
     point[axis] = offset
+    assume(abs(abs(offset) - np.abs(BOX.bounds[0, axis])) > 1e-9)  # skin in the plane itself belongs to neither
     one = choose(BOX, half_space={"point": point.tolist(), "normal": normal.tolist()})[3]
     other = choose(BOX, half_space={"point": point.tolist(), "normal": (-normal).tolist()})[3]
     assert (one ^ other).all()

@@ -17,6 +17,13 @@ from damageest.stages.enclose._skin import SkinSamples, push_outward, sample_ski
 APART = 0.75
 """Edge of the cubes with one averaged point each, in cells of the surface."""
 
+APART_FLAT, FLAT_CUBE, RIM = 1.5, 6.0, 4.0
+"""The same where the surface is flat; edge of the cubes in which it has to be flat; depth up to which points count as
+near the rim. All in cells of the surface."""
+
+MOST_LOST = 2500
+"""Samples of the lost skin that tell on which side of the points the lost metal is."""
+
 OrientedPoints = tuple[Floats, Floats, Floats]
 """Points (M,3), unit normals (M,3) toward the lost side, and the area (M,) that each point stands for."""
 
@@ -53,12 +60,12 @@ def gather_losses(
     ``band``: width of skin round the damaged points that counts as neither lost nor intact; ``push``: how far the
     intact skin is moved outward; both in tolerances.
     """
-    points, label, grown, face = _grow_to_rim(aligned, deviation, sites, tolerance)
+    points, label, grown, of_scan = _grow_to_rim(aligned, deviation, sites, tolerance)
     skin = sample_skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
-    away = find_neighbours(skin.points, 1, points)[0][:, 0]
-    free = away < np.maximum(band * tolerance, 1.6 * skin.usual)
-    above = part.face_normals[face]
-    groups, lost_by = _group_losses(points, above, label, skin, free, tolerance, aligned.spacing, aligned.noise)
+    beside = np.maximum(band * tolerance, 1.6 * skin.usual)
+    free = find_neighbours(skin.points, 1, points, float(beside.max(initial=0.0)))[0][:, 0] < beside
+    above, depth = part.face_normals[deviation.face[of_scan]], -deviation.distance[of_scan]
+    groups, lost_by = _group_losses(points, above, depth, label, skin, free, tolerance, aligned.spacing, aligned.noise)
     areas = measure_local_areas(skin.points)
     kept = np.flatnonzero((lost_by < 0) & ~free)
     moved = push_outward(part, skin.points[kept], skin.normals[kept], push * tolerance)
@@ -103,20 +110,21 @@ def cut_beyond_reach(grid: Grid, field: GridValues, gathered: GatheredLosses, nu
 
 
 def _build_surface(
-    points: Floats, above: Floats, lost: Floats, lost_normals: Floats, noise: float, cell: float
+    points: Floats, above: Floats, depth: Floats, lost: Floats, lost_normals: Floats, noise: float, cell: float
 ) -> OrientedPoints:
     """The points (M,3) of one group, smoothed, thinned and oriented toward the lost side.
 
-    ``above`` (M,3): the normal of the part's skin nearest to each point; ``lost`` (L,3): samples of the skin that is
-    lost with them.
+    ``above`` (M,3): the normal of the part's skin nearest to each point, and ``depth`` (M,) below it; ``lost`` (L,3):
+    samples of the skin that is lost with them.
     """
     points, counts, first = thin_points(points, 0.5 * cell)
     # The local fits overlap much farther than this, so that more of them would add nothing.
     chosen = pick_one_per_cube(points, APART * cell)
+    chosen = _thin_flat(points, chosen, depth[first], noise, cell)
     above = above[first][chosen]
     points, normals = average_points(points, counts, noise, chosen)
     size, chosen = cell, np.arange(len(lost))
-    while len(chosen) > 5000:
+    while len(chosen) > MOST_LOST:
         size *= 1.3
         chosen = pick_one_per_cube(lost, size)
     places = lost[chosen]
@@ -127,6 +135,7 @@ def _build_surface(
 def _group_losses(
     points: Floats,
     above: Floats,
+    depth: Floats,
     label: Ints,
     skin: SkinSamples,
     free: Flags,
@@ -165,19 +174,37 @@ def _group_losses(
             continue
         lost = bare[of_bare == number]
         lost_by[lost] = len(groups)
-        surface = _build_surface(
-            points[members], above[members], skin.points[lost], skin.normals[lost], noise, 0.8 * tolerance
-        )
+        of_skin = skin.points[lost], skin.normals[lost]
+        surface = _build_surface(points[members], above[members], depth[members], *of_skin, noise, 0.8 * tolerance)
         groups.append(LossGroup(*surface, skin.points[lost], labels))
     return tuple(groups), lost_by
+
+
+def _thin_flat(points: Floats, chosen: Ints, depth: Floats, noise: float, cell: float) -> Ints:
+    """Of the points ``chosen`` (M,), one in each larger cube where the surface is flat and not near the rim.
+
+    Flat are cubes of `FLAT_CUBE` cells in which the points (N,3) lie on a plane within their noise.
+    """
+    cubes, cube = np.unique(number_cubes(points, FLAT_CUBE * cell)[1], return_inverse=True)
+    size = np.bincount(cube, minlength=len(cubes))
+    mean = np.stack([np.bincount(cube, points[:, axis]) for axis in range(3)], axis=1) / size[:, None]
+    off = points - mean[cube]
+    moments = np.stack([np.bincount(cube, off[:, i] * off[:, j]) for i in range(3) for j in range(3)], axis=1)
+    thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(moments.reshape(-1, 3, 3) / size[:, None, None])[:, 0], 0))
+    flat = (thickness < 1.2 * noise + 0.05 * cell)[cube[chosen]] & (depth[chosen] > RIM * cell)
+    interior = chosen[flat]
+    if not len(interior):
+        return chosen
+    kept = interior[pick_one_per_cube(points[interior], APART_FLAT * cell)]
+    return np.sort(np.concatenate([chosen[~flat], kept]))
 
 
 def _grow_to_rim(
     aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float
 ) -> tuple[Floats, Ints, Flags, Ints]:
     """The sites' points, and neighbours that lie deeper than noise explains: the rim, where the damage is shallower
-    than the tolerance. Gives points (M,3), their sites (M,), which scan points (N,) were added, and nearest triangles
-    (M,)."""
+    than the tolerance. Gives points (M,3), their sites (M,), which scan points (N,) were added, and the points' numbers
+    in the scan (M,)."""
     deep = (sites.label == 0) & (deviation.distance < -max(2 * aligned.noise, 0.1 * tolerance))
     deep &= deviation.distance >= -tolerance * 1.0001
     candidates = np.flatnonzero(deep)
@@ -189,5 +216,5 @@ def _grow_to_rim(
         hit = np.isfinite(distance[:, 0])
         label[candidates[hit]] = label[seeds[index[hit, 0]]]
     grown = (label > 0) & (sites.label == 0)
-    chosen = label > 0
-    return aligned.points[chosen], label[chosen], grown, deviation.face[chosen]
+    chosen = np.flatnonzero(label > 0)
+    return aligned.points[chosen], label[chosen], grown, chosen
