@@ -9,6 +9,10 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, number_cubes
+from damageest.isolation.foresee import FEWER_POINTS, require_memory
+
+BYTES_OF_PLACE = 30
+"""Memory of a search for each point, beside its neighbours, and for each point that may be one, measured."""
 
 
 def find_nearby(points: Floats, places: Floats, reach: float) -> Ints:
@@ -74,6 +78,8 @@ def find_neighbours(
 
     among = points if among is None else among
     count = min(count, len(among))
+    needed = (16 * count + BYTES_OF_PLACE) * len(points) + BYTES_OF_PLACE * len(among)
+    require_memory(needed, f"the {count} nearest neighbours of {len(points):,} points", FEWER_POINTS)
     distance, index = cKDTree(among).query(points, k=count, distance_upper_bound=reach, workers=2)
     return np.reshape(distance, (len(points), count)), np.reshape(index, (len(points), count))
 
