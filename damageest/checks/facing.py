@@ -22,6 +22,8 @@ DEEP = 0.25
 """Share of the points of a small cube that lie deeper than most noise, from which they may lie on another surface."""
 FLAT = 0.35
 """Largest thickness of a patch over its width: a patch across an edge has no clear normal."""
+CHUNK = 20_000
+"""Points whose neighbours are in memory at a time."""
 
 
 def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: float) -> Flags:
@@ -75,18 +77,25 @@ def _drop_single(aligned: Scan, asked: Ints, near: Flags, tolerance: float) -> I
 
 def _fit_normals(aligned: Scan, asked: Ints, tolerance: float) -> tuple[Floats, Flags]:
     """Unit normals (A,3) of the scan at some of its points, of either sign, and whether each is clear (A,)."""
+    from scipy.spatial import cKDTree
+
     density = (1.1 / aligned.spacing) ** 2
     count = int(np.clip(np.pi * tolerance**2 * density, *NEIGHBOURS))
     places = aligned.points[asked]
     around = find_nearby(aligned.points, places, 3 * max(tolerance, 2 * aligned.spacing))
     among = aligned.points[around]
-    _, index = find_neighbours(places, count, among)
-    patches = among[index] - places[:, None]
-    patches -= patches.mean(axis=1, keepdims=True)
-    spread, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", patches, patches))
-    width = np.sqrt(np.maximum(spread, 0))
-    clear = (width[:, 0] < FLAT * width[:, 1]) & (width[:, 1] > 0.2 * width[:, 2])
-    return np.asarray(axes[:, :, 0]), np.asarray(clear)
+    normals, clear = np.empty((len(places), 3)), np.empty(len(places), bool)
+    tree, count = cKDTree(among), min(count, len(among))
+    for start in range(0, len(places), CHUNK):
+        own = slice(start, start + CHUNK)
+        index = np.reshape(tree.query(places[own], k=count, workers=2)[1], (-1, count))
+        patches = among[index] - places[own, None]
+        patches -= patches.mean(axis=1, keepdims=True)
+        spread, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", patches, patches))
+        width = np.sqrt(np.maximum(spread, 0))
+        clear[own] = (width[:, 0] < FLAT * width[:, 1]) & (width[:, 1] > 0.2 * width[:, 2])
+        normals[own] = axes[:, :, 0]
+    return normals, clear
 
 
 def _is_buried(points: Floats, normals: Floats, part: Part, tolerance: float) -> Flags:

@@ -57,6 +57,8 @@ class PlacePicker:
         out = mesh.face_normals[mesh.face_adjacency[sharp]].sum(1)
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         rng = np.random.default_rng(5)
+        if not len(length):
+            raise LookupError("the part has no sharp edge for this kind of damage")
         k = rng.choice(len(length), 600, p=length / length.sum())
         points = ends[k, 0] + rng.random((600, 1)) * (ends[k, 1] - ends[k, 0])
         return np.asarray(points), np.asarray(out[k] / np.linalg.norm(out[k], axis=1, keepdims=True))

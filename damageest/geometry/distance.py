@@ -14,6 +14,10 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import list_used
+from damageest.isolation.foresee import FEWER_POINTS, require_memory
+
+BYTES_OF_POINT, BYTES_OF_TRIANGLE = 230, 480
+"""Memory of `signed_distance` for each point and each triangle, measured."""
 
 LARGE = 16.0
 """Longest edge of a triangle, in medians of all, from which it is a large one."""
@@ -137,6 +141,11 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
 
     if not len(points):
         return np.empty(0), np.empty(0, np.int64)
+    require_memory(
+        BYTES_OF_POINT * len(points) + BYTES_OF_TRIANGLE * len(mesh.faces),
+        f"the distances of {len(points):,} points to {len(mesh.faces):,} triangles",
+        FEWER_POINTS + "; or a part with fewer triangles",
+    )
     centre = mesh.bounds.mean(axis=0)
     vertices = mesh.vertices - centre
     query = points - centre

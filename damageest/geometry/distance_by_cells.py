@@ -13,8 +13,12 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid
+from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
 Exact = Callable[[Floats], tuple[Floats, Ints]]
+
+BYTES_OF_POINT, BYTES_OF_TRIANGLE = 170, 500
+"""Memory for each point and each triangle, beside that of ``exact``, measured."""
 
 PER_CELL = 16
 """About how many points on the surface lie in a cell."""
@@ -47,6 +51,8 @@ def signed_distance_by_cells(points: Floats, part: Mesh, near: float, exact: Exa
         exact: gives signed distance and nearest triangle of some of the points, as
             `damageest.geometry.distance.signed_distance` does with the part given.
     """
+    needed = BYTES_OF_POINT * len(points) + BYTES_OF_TRIANGLE * len(part.faces)
+    require_memory(needed, f"the distances of {len(points):,} points to the part", FEWER_POINTS)
     low, high = part.bounds
     size = max(2 * near, np.sqrt(PER_CELL * part.area / len(points)), float((high - low).max()) / MOST_ALONG)
     grid = VoxelGrid(low - PAD * size, size, np.ceil((high - low) / size).astype(np.int64) + 2 * PAD)

@@ -11,6 +11,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.neighbourhoods import find_neighbours, make_tree, query_neighbours
+from damageest.isolation.foresee import require_memory
 
 ROUNDS = 3
 """How often the planes are fitted again with the weights that the last normals give."""
@@ -18,6 +19,8 @@ SCALES = (32, 80, 200)
 """Numbers of neighbours among which the width of a fit is chosen."""
 KAPPA = 2.0
 """Standard deviations by which two fits of one point may differ because of noise."""
+BYTES_OF_NEIGHBOUR = 140
+"""Memory of a fit for each of its neighbours, measured."""
 CHUNK = 500
 """Points fitted at a time, so that their neighbours fit in the processor's cache."""
 
@@ -34,6 +37,7 @@ def smooth_points(points: Floats, noise: float, count: int = 32) -> tuple[Floats
         noise: standard deviation of the points from the surface.
         count: neighbours of each fit; its radius is the distance to the farthest.
     """
+    _require_memory(points, count)
     distance, index = find_neighbours(points, count)
     normals, weights = _fit_planes(points, index, distance, noise)
     move, tilted, _ = _fit_quadric(points, normals, points[index], weights, distance[:, -1])
@@ -54,6 +58,7 @@ def average_points(points: Floats, counts: Ints, noise: float, chosen: Ints) -> 
         noise: standard deviation of one scan point from the surface.
         chosen: (M,) indices of the points to move.
     """
+    _require_memory(points, SCALES[0])
     tree = make_tree(points)
     distance, index = query_neighbours(tree, points, min(SCALES[0], len(points)))
     normals, _ = _fit_planes(points, index, distance, noise)
@@ -62,6 +67,11 @@ def average_points(points: Floats, counts: Ints, noise: float, chosen: Ints) -> 
         own = slice(start, start + CHUNK)
         out[own], tilted[own] = _choose_widest(tree, points, counts, noise, normals, chosen[own])
     return out, tilted
+
+
+def _require_memory(points: Floats, count: int) -> None:
+    needed = BYTES_OF_NEIGHBOUR * count * len(points)
+    require_memory(needed, f"local fits at {len(points):,} points", "a larger tolerance, or more memory (--memory)")
 
 
 def _choose_widest(

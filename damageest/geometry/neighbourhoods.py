@@ -11,6 +11,10 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, number_cubes
+from damageest.isolation.foresee import FEWER_POINTS, require_memory
+
+BYTES_OF_PLACE = 60
+"""Memory of a search for each point, beside its neighbours, and for each point that may be one, measured."""
 
 MANY = 20_000
 """Points from which a tree and its queries are made for speed."""
@@ -78,7 +82,10 @@ def find_neighbours(
         reach: beyond this distance none is found: the distance is infinite and the index M.
     """
     among = points if among is None else among
-    return query_neighbours(make_tree(among), points, min(count, len(among)), reach)
+    count = min(count, len(among))
+    needed = (16 * count + BYTES_OF_PLACE) * len(points) + BYTES_OF_PLACE * len(among)
+    require_memory(needed, f"the {count} nearest neighbours of {len(points):,} points", FEWER_POINTS)
+    return query_neighbours(make_tree(among), points, count, reach)
 
 
 def make_tree(points: Floats) -> Any:
@@ -102,8 +109,10 @@ def query_neighbours(tree: Any, points: Floats, count: int, reach: float = np.in
     low, high = points[:, :3].min(axis=0), points[:, :3].max(axis=0)
     order = np.argsort(number_cubes(points[:, :3], max(float((high - low).max()) / ALONG, 1e-300))[1], kind="stable")
     distance, index = np.empty(shape), np.empty(shape, np.intp)
-    found = tree.query(points[order], k=count, distance_upper_bound=reach, workers=2)
-    distance[order], index[order] = np.reshape(found[0], shape), np.reshape(found[1], shape)
+    for start in range(0, len(order), CHUNK):
+        some = order[start : start + CHUNK]
+        found = tree.query(points[some], k=count, distance_upper_bound=reach, workers=2)
+        distance[some], index[some] = (np.reshape(of_some, (len(some), count)) for of_some in found)
     return distance, index
 
 

@@ -11,7 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.isolation.foresee import require_memory
 
+BYTES_OF_TRIANGLE = 150
+"""Memory of a mesh prepared for rays, for each triangle, measured."""
+BYTES_OF_FIRST = 140 * 10**6
+"""What Embree reserves with the first mesh. It does not survive where that is refused."""
 MOST_HITS = 64
 """Surfaces that are counted along a ray."""
 
@@ -27,6 +32,9 @@ class Crossings(NamedTuple):
     enters: np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 
+_started: list[bool] = []
+
+
 class RayCaster:
     """A mesh prepared for rays."""
 
@@ -34,6 +42,9 @@ class RayCaster:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
+        needed = BYTES_OF_TRIANGLE * len(mesh.faces) + BYTES_OF_FIRST * (not _started)
+        require_memory(needed, f"rays through {len(mesh.faces):,} triangles", "more memory (--memory)")
+        _started[:] = [True]
         self._centre = mesh.bounds.mean(axis=0)
         self._scale = mesh.diagonal
         self._scene = EmbreeScene()

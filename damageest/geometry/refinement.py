@@ -12,8 +12,10 @@ from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.duplicates import find_members
 from damageest.isolation.foresee import require_memory
 
-BYTES_OF_FACE = 600
+BYTES_OF_FACE = 450
 """Memory of one round of refinement, for each triangle before or after it."""
+BYTES_TO_LOOK = 320
+"""Memory of the search for long edges, for each triangle, measured."""
 MOST_ROUNDS = 60
 """Rounds of halving after which refinement stops, even if edges are still too long."""
 
@@ -63,6 +65,8 @@ def cut_into_cells(mesh: Mesh, edge: float, area: float = 0.0) -> tuple[Mesh, In
     Faces with less than ``area`` stay as they are, except where a neighbour is cut: a part has many long, thin
     triangles, and cutting all of them to this length would make ten times as many.
     """
+    needed = BYTES_TO_LOOK * len(mesh.faces)
+    require_memory(needed, f"a mesh of {len(mesh.faces):,} triangles that is cut", "a part with fewer triangles")
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
     origin = np.arange(len(faces))
     for _ in range(MOST_ROUNDS):

@@ -13,6 +13,7 @@ from damageest.artefacts import Floats, Ints, Mesh
 from damageest.errors import InputError
 from damageest.io.file_memory import require_memory_for
 from damageest.io.files import check_file, raise_environment_fault, shorten_error
+from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
 MESH_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf")
 
@@ -121,11 +122,20 @@ def write_ply(path: Path, mesh: Mesh, columns: Mapping[str, NDArray[Any]] | None
 def write_points(path: Path, columns: dict[str, NDArray[Any]]) -> None:
     """Writes points as binary little-endian PLY, with one property per column (N,), in the type of the column."""
     fields, listed = _describe_columns(columns)
-    table = np.empty(len(next(iter(columns.values()))), fields)
+    count = len(next(iter(columns.values())))
+    require_memory(2 * np.dtype(fields).itemsize * count, f"writing {count:,} points", FEWER_POINTS)
+    table = np.empty(count, fields)
     for name, values in columns.items():
         table[name] = values
     head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(table)}\n{listed}end_header\n"
-    path.write_bytes(head.encode() + table.tobytes())
+    _write(path, head.encode(), table)
+
+
+def _write(path: Path, head: bytes, table: NDArray[Any]) -> None:
+    """Writes without a copy of the table."""
+    with path.open("wb") as stream:
+        stream.write(head)
+        stream.write(table.view(np.uint8).data)
 
 
 def write_stl(path: Path, mesh: Mesh) -> None:
@@ -136,4 +146,4 @@ def write_stl(path: Path, mesh: Mesh) -> None:
     table = np.zeros(len(corners), STL_TRIANGLE)
     table["normal"] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     table["corners"] = corners
-    path.write_bytes(b"damageest".ljust(80, b"\0") + len(table).to_bytes(4, "little") + table.tobytes())
+    _write(path, b"damageest".ljust(80, b"\0") + len(table).to_bytes(4, "little"), table)

@@ -1,6 +1,7 @@
 """Calls in a process of their own, for native libraries that may crash, hang or take all memory."""
 
 from damageest.isolation.ends import ProcessError
+from damageest.isolation.foresee import require_memory
 from damageest.isolation.limits import Limits, format_bytes, limit_this_process, measure_free_memory, parse_memory
 from damageest.isolation.notes import at_work
 from damageest.isolation.worker import call_isolated, cpu_seconds, end_workers
@@ -16,4 +17,5 @@ __all__ = [
     "limit_this_process",
     "measure_free_memory",
     "parse_memory",
+    "require_memory",
 ]

@@ -8,8 +8,12 @@ from pathlib import Path
 from damageest.errors import StageError
 from damageest.isolation.limits import format_bytes, measure_free_memory
 
-WORTH_ASKING = 100 * 10**6
+WORTH_ASKING = 10 * 10**6
 """Bytes below which nothing is asked: the answer would take longer than it is worth."""
+
+
+FEWER_POINTS = "fewer scan points (scan.most_points), or more memory (--memory)"
+"""The remedy where the memory follows the number of scan points."""
 
 
 def require_memory(needed: float, what: str, remedy: str) -> None:

@@ -19,6 +19,8 @@ from typing import Any
 
 _ALIGNED = 64
 """Bytes to which the arrays are aligned."""
+LARGE = 1 << 24
+"""Bytes of a value from which on it is mapped and not copied."""
 
 
 def send(channel: socket.socket, value: Any) -> None:
@@ -41,9 +43,10 @@ def send(channel: socket.socket, value: Any) -> None:
 
 
 def receive(channel: socket.socket, copy: bool) -> Any:
-    """The next value. Its arrays lie in the shared memory, or with ``copy`` in this process' own.
+    """The next value. Its arrays lie in the shared memory, or with ``copy`` in this process' own; those of a large
+    value lie in a private map of the shared memory, which behaves alike.
 
-    An array in shared memory keeps a file open. Raises EOFError where the other process has ended.
+    A map keeps a file open until its arrays are gone. Raises EOFError where the other process has ended.
     """
     return load(receive_parts(channel, copy))
 
@@ -61,13 +64,14 @@ def receive_parts(channel: socket.socket, copy: bool) -> list[Any]:
         count = struct.unpack("<Q", os.pread(file, 8, 0))[0]
         sizes = struct.unpack(f"<{count}Q", os.pread(file, 8 * count, 8))
         starts = _place(sizes)
-        if copy:
+        if copy and starts[-1] < LARGE:
             parts: list[Any] = [bytearray(size) for size in sizes]
             for start, part in zip(starts, parts, strict=False):
                 _read(file, memoryview(part), start)
             return parts
-        flags = mmap.MAP_SHARED | getattr(mmap, "MAP_POPULATE", 0)
-        view = memoryview(mmap.mmap(file, 0, flags))
+        # a page of a private map is copied where it is written to; to populate it would copy all
+        flags = mmap.MAP_PRIVATE if copy else mmap.MAP_SHARED | getattr(mmap, "MAP_POPULATE", 0)
+        view = memoryview(mmap.mmap(file, 0, flags, mmap.PROT_READ | mmap.PROT_WRITE))
         return [view[start : start + size] for start, size in zip(starts, sizes, strict=False)]
     finally:
         os.close(file)

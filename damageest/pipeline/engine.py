@@ -24,6 +24,8 @@ from damageest.registry.registry import Implementation, Registry
 from damageest.result import StageRecord
 from damageest.stages import Stage
 
+MORE_MEMORY = "a larger tolerance, fewer scan points (scan.most_points), or a larger --memory"
+
 S = TypeVar("S", JobState, Candidate, FoundSite)
 
 
@@ -117,13 +119,22 @@ def follow(route: Sequence[Contract | Step], engine: Engine, work: Work) -> Work
     """
     for step in route:
         if not isinstance(step, type):
-            with at_work(step.__name__.replace("_", " ").strip(), engine.limits.seconds):
-                work = step(engine, work)
+            work = _take(step, engine, work)
         elif issubclass(step, Stage) and step.per_site:
             work = call_each(engine, step, work)
         else:
             work = replace(work, job=engine.call(step, work.job))
     return work
+
+
+def _take(step: Step, engine: Engine, work: Work) -> Work:
+    """The work after a step. Raises StageError where memory runs out in it."""
+    what = step.__name__.replace("_", " ").strip()
+    try:
+        with at_work(what, engine.limits.seconds):
+            return step(engine, work)
+    except MemoryError:
+        raise StageError(f"{what}: ran out of memory", MORE_MEMORY) from None
 
 
 def call_each(engine: Engine, contract: Contract, work: Work) -> Work:
@@ -203,7 +214,7 @@ def _explain(error: Exception, provider: str) -> StageError:
     """An error that a stage did not raise on purpose, in words for the user and the author."""
     first = str(error).splitlines()[0][:400] if str(error) else ""
     if isinstance(error, MemoryError):
-        return StageError("ran out of memory", "a larger tolerance, or fewer scan points")
+        return StageError("ran out of memory", MORE_MEMORY)
     if isinstance(error, ArtefactError):
         return StageError(
             f"gave a result that is not valid: {first}",

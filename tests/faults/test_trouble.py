@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import resource
-import signal
 import subprocess
 import sys
 import time
@@ -20,15 +19,7 @@ from damageest.errors import DamageestError, InputError, JobError
 from damageest.registry import Registry
 from damageest.registry.hookspecs import hookimpl
 from tests import damaged_box
-
-
-def strip(folder: Path) -> dict[str, bytes]:
-    """The content of an output folder, without the seconds that each stage took and without the kept stages."""
-    found = {name: data for name, data in damaged_box.content(folder).items() if not name.startswith("stages/")}
-    content = json.loads(found.pop("result.json"))
-    content.pop("stages")
-    found["result.json"] = json.dumps(content).encode()
-    return found
+from tests.faults.kill import kill_runs, strip
 
 
 @pytest.mark.parametrize("kilobytes", [0, 8, 300, 900])
@@ -126,34 +117,11 @@ def test_odd_names(name: str, tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == [name], "nothing is written elsewhere"
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(1800)
-def test_killed_at_random_moments(tmp_path: Path) -> None:
-    """100 runs end by SIGKILL at any moment: the earlier output is whole, and the next run gives the same bytes."""
-    path = damaged_box.write(tmp_path, damaged_box.JOB.replace("tolerance: 0.2", "tolerance: 0.4"))
-    start = time.monotonic()
-    damageest.run(path, output=True, cache=False)
-    length = time.monotonic() - start
-    out = tmp_path / "out/job"
-    right = strip(out)
-    rng = np.random.default_rng(0)
-    killed = 0
-    script = (
-        "import sys, damageest; from damageest.registry import Registry; import scipy.spatial, pyvista, igl, trimesh\n"
-        "registry = Registry.discover(); print('ready', flush=True)\n"
-        "damageest.run(sys.argv[1], output=True, cache=False, registry=registry)"
-    )
-    for moment in rng.uniform(0, 1.1 * length, 100):
-        child = subprocess.Popen([sys.executable, "-c", script, str(path)], stdout=subprocess.PIPE)
-        assert child.stdout
-        child.stdout.readline()
-        time.sleep(moment)
-        child.send_signal(signal.SIGKILL)
-        killed += child.wait() == -signal.SIGKILL
-        child.stdout.close()
-        held = out if out.is_dir() else tmp_path / "out/.job.old"  # between two renames
-        assert strip(held) == right
-        damageest.run(path, output=True)
-        assert strip(out) == right
-        assert [one.name for one in (tmp_path / "out").iterdir()] == ["job"]
-    assert killed > 60
+@pytest.mark.parametrize("count", [2, pytest.param(100, marks=[pytest.mark.slow, pytest.mark.timeout(3000)])])
+def test_killed_at_random_moments(count: int, tmp_path: Path) -> None:
+    """Runs end by SIGKILL at any moment: the earlier output is whole, and the next run gives the same bytes."""
+    found = kill_runs(tmp_path, count)
+    assert not found.spoiled
+    assert not found.other
+    assert found.hit > count / 2
+    assert found.hit + found.late == count

@@ -17,6 +17,7 @@ from damageest.artefacts import Solid
 from damageest.errors import InputError, StageError
 from damageest.isolation import Limits, call_isolated, end_workers, format_bytes, measure_free_memory, parse_memory
 from damageest.isolation.limits import own_memory
+from damageest.isolation.transfer import LARGE
 from tests import damaged_box
 from tests.isolation import faults
 
@@ -39,6 +40,22 @@ def test_arrays_pass_unchanged() -> None:
     first, second = np.arange(12.0).reshape(4, 3), np.asfortranarray(np.ones((4, 3)))
     np.testing.assert_array_equal(call(faults.add, first=first, second=second), first + 1)
     assert call(faults.add, first=np.empty((0, 3)), second=np.empty((0, 3))).shape == (0, 3)
+
+
+def test_a_large_array_passes_unchanged_and_can_be_edited() -> None:
+    """It is mapped, not copied; its map ends with it."""
+    large = np.arange(3_000_000.0)
+    assert large.nbytes > LARGE
+    call(faults.edit, first=np.zeros(3))
+    before = len(os.listdir("/proc/self/fd"))
+    back = call(faults.add, first=large, second=large[:1])
+    np.testing.assert_array_equal(back, large)
+    back[:] = 5
+    again = call(faults.add, first=back, second=large[1:2])
+    assert (back == 5).all()
+    assert (again == 6).all()
+    del back, again
+    assert len(os.listdir("/proc/self/fd")) == before
 
 
 def test_artefacts_pass_with_their_fields_and_stay_read_only() -> None:

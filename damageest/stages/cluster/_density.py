@@ -6,9 +6,15 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.voxels import number_cubes
+from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
 MAX_PAIRS = 20_000_000
-"""Largest number of pairs of neighbours in memory, 16 bytes each; with more, points are first averaged in a grid."""
+"""Largest number of pairs of neighbours in memory, see `PAIR_BYTES`; with more, points are first averaged in a grid."""
+
+
+PAIR_BYTES, POINT_BYTES = 66, 60
+"""Memory for each pair and each point, measured."""
+REMEDY = "a smaller cluster.eps, " + FEWER_POINTS
 
 
 def run_dbscan(points: Floats, eps: float, neighbours: int) -> Ints:
@@ -26,9 +32,13 @@ def run_dbscan(points: Floats, eps: float, neighbours: int) -> Ints:
     of = np.arange(len(points))
     weight = np.ones(len(points), np.int64)
     tree = cKDTree(points)
-    if len(points) > 1000 and tree.count_neighbors(tree, eps) / 2 > MAX_PAIRS:
+    expected = float(tree.count_neighbors(tree, eps)) / 2 if len(points) > 1000 else 0.0
+    if expected > MAX_PAIRS:
         points, of, weight = _gather_in_cells(points, eps / 4)
         tree = cKDTree(points)
+        expected = float(tree.count_neighbors(tree, eps)) / 2
+    needed = PAIR_BYTES * expected + POINT_BYTES * len(of)
+    require_memory(needed, f"{expected:,.0f} pairs of neighbours among {len(of):,} points on damage", REMEDY)
     pairs = tree.query_pairs(eps, output_type="ndarray")
     count = weight + np.bincount(pairs[:, 0], weight[pairs[:, 1]], len(points)).astype(np.int64)
     count += np.bincount(pairs[:, 1], weight[pairs[:, 0]], len(points)).astype(np.int64)

@@ -6,6 +6,10 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.voxels import number_cubes
+from damageest.isolation.foresee import require_memory
+
+SPREAD_BYTES, THIN_BYTES, TRIANGLE_BYTES = 170, 210, 260
+"""Memory to spread a point, to choose from it, and for each triangle, measured."""
 
 
 def spread_points(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats, Ints]:
@@ -36,6 +40,8 @@ def spread_points(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats,
     start = low / height[of] * apex[of]
     width = base[of] * (1 - low / height[of])
     columns = np.maximum(np.ceil(width / step).astype(np.int64), 1)
+    count = int(columns.sum())
+    _require_memory(SPREAD_BYTES * count + TRIANGLE_BYTES * len(chosen), count)
     row = np.repeat(np.arange(len(of)), columns)
     column = np.arange(len(row)) - np.repeat(np.cumsum(columns) - columns, columns)
     of, low, high = of[row], low[row], high[row]
@@ -60,6 +66,7 @@ def thin(points: Floats, apart: float, reach: float) -> Ints:
 
     if not len(points):
         return np.empty(0, np.int64)
+    _require_memory(THIN_BYTES * len(points), len(points))
     # First keep few points per disc: on very fine meshes the pairs of points would not fit in memory.
     todo = _pick_one_per_cell(points, 0.4 * apart)
     kept = np.empty(0, np.int64)
@@ -68,6 +75,11 @@ def thin(points: Floats, apart: float, reach: float) -> Ints:
         far, _ = cKDTree(points[kept]).query(points, workers=-1)
         todo = _pick_one_per_cell(points, 0.2 * apart, np.flatnonzero(far > reach))
     return np.sort(kept)
+
+
+def _require_memory(needed: float, count: int) -> None:
+    remedy = "a larger sample.spacing, a smaller sample.max_points, a larger tolerance, or more memory (--memory)"
+    require_memory(needed, f"{count:,} points on the part, of which samples are chosen", remedy)
 
 
 def _pick_one_per_cell(points: Floats, cell: float, among: Ints | None = None) -> Ints:

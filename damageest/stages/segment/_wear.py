@@ -14,6 +14,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.geometry.voxels import CHUNK, number_cubes, number_faced_cubes
+from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
 NEIGHBOURS = 48
 """Largest number of points that a mean is taken over."""
@@ -40,6 +41,10 @@ MIN_REGION = 100
 """Smallest number of points of a worn region."""
 
 
+BYTES_OF_POINT = 150
+"""Memory for each point near the skin, measured."""
+
+
 @dataclass(frozen=True, eq=False)
 class Wear:
     """``worn`` (N,): whether each point is worn; ``threshold``: depth of the mean from which it is; ``notes``."""
@@ -64,6 +69,7 @@ def find_wear(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance
     some = np.flatnonzero(np.abs(distance) < tolerance + 3 * aligned.noise)
     if not (aligned.noise and aligned.spacing) or len(some) < MIN_REGION:
         return Wear(none, tolerance)
+    require_memory(BYTES_OF_POINT * len(some), f"the search for wear among {len(some):,} points", FEWER_POINTS)
     points, depth = aligned.points[some], distance[some]
     normals = part.face_normals[face[some]]
     # Neighbours are searched along the surface: in a dense scan the nearest points in space have the same noise.

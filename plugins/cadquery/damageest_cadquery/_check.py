@@ -11,13 +11,16 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh, Part, Solid, Surface
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest_cadquery._read import explore
+from damageest_cadquery._shapes import subdivide
 from damageest_cadquery._split import Piece, find_corners, measure_volume
 
 VOLUME = 0.003
 """Largest relative difference of the volumes, beside what the triangles of the part cut off its curved faces."""
-LIMITS = {"shapes": (0.1, 2.0), "spline": (0.02, 1.5), "facets": (0.01, 1.0)}
+LIMITS = {"shapes": (0.1, 2.0), "planes": (0.1, 2.0), "spline": (0.02, 1.5), "facets": (0.01, 1.0)}
 """By form: the share of the inner surface that may be farther than a quarter of the tolerance, and how far it may be,
 in tolerances. Where recognised faces meet, the mesh rounds their edge; there the scan decides which is right."""
+STRAY = 0.01
+"""Share of the inner faces' area that the cut may have elsewhere in the part."""
 ON_CAD = 1e-6
 """Largest distance of outer corners from the CAD's surfaces, in diagonals of the part."""
 
@@ -40,6 +43,7 @@ class Measured:
 def check_pieces(
     form: str,
     pieces: Sequence[Piece],
+    cut_off: float,
     bodies: int,
     damage: Solid,
     surface: Surface,
@@ -50,7 +54,8 @@ def check_pieces(
 ) -> Measured:
     """Measures the pieces of a damage volume, all in the part's frame and the job's unit.
 
-    ``bodies``: how many solids are expected; ``points`` (N,3): the scan's points on the inner damage surface;
+    ``cut_off``: area of new faces on what is left of the part; ``bodies``: how many solids are expected; ``points``
+    (N,3): the scan's points on the inner damage surface;
     ``cad_faces``: the part's faces by number.
     """
     from OCP.BRep import BRep_Tool
@@ -70,6 +75,8 @@ def check_pieces(
         return refuse("not closed")
     if len(pieces) != bodies:
         return refuse(f"{len(pieces)} solids for {bodies} pieces")
+    if cut_off > (1 + STRAY) * measure_inner_area(pieces):
+        return refuse("it cuts into the part elsewhere too")
     faces = [
         (TopoDS.Face_s(face), origin)
         for piece in pieces
@@ -82,8 +89,6 @@ def check_pieces(
     if abs(volume - damage.volume) > room:
         return refuse(f"its volume differs by {volume / damage.volume - 1:+.2%}")
     inner = mesh_faces([face for face, (_, tool) in faces if tool >= 0])
-    from damageest_cadquery._smooth import subdivide
-
     there = np.minimum(distance_to_mesh(surface.vertices, inner), distance_to_mesh(surface.vertices, part))
     spread, areas = subdivide(inner.triangles, tolerance / 2)
     back = np.minimum(distance_to_mesh(spread, surface), distance_to_mesh(spread, part))
@@ -103,6 +108,18 @@ def check_pieces(
     if beyond > 0.01 and not _is_nearer(points, inner, surface, quarter):
         return refuse("the scan's points are nearer to the mesh", *numbers)
     return Measured(volume, "", *numbers)
+
+
+def measure_inner_area(pieces: Sequence[Piece]) -> float:
+    """The area of the faces that do not come from the part's CAD faces."""
+    from OCP.TopAbs import TopAbs_FACE
+
+    return sum(
+        _measure_area(face)
+        for piece in pieces
+        for face, (_, tool) in zip(explore(piece.shape, TopAbs_FACE), piece.origins, strict=True)
+        if tool >= 0
+    )
 
 
 def _is_nearer(points: Floats, inner: Mesh, surface: Surface, quarter: float) -> bool:

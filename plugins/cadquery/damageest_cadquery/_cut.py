@@ -13,15 +13,20 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Solid
-from damageest.geometry.distance import closest_on_mesh, signed_distance
+from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Solid, Surface
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, signed_distance
+from damageest.geometry.loops import trace_loops
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import concatenate_meshes
 
 RINGS = 3
 """Rings of triangles by which it reaches beyond the skin."""
+CLEAR = 0.4
+"""Least distance to the part, in tolerances, that a smoothed rim keeps."""
+HORNS = 0.05
+"""Largest share of triangles, of those that bound the damage volume, that are taken out as horns."""
 SPECK = 0.03
-"""Pieces of it with a smaller share of triangles than the largest are left out."""
+"""Pieces of it with a smaller share of triangles than the largest are left out where they are shallow."""
 ISLAND = 0.1
 """Triangles left out among those of the cut are taken in where they are fewer than this share of it."""
 
@@ -45,8 +50,9 @@ class Cut:
         return np.unique(self.mesh.faces[self.core])
 
 
-def make_cut(damage: Solid, part: Part, enclosures: Sequence[Solid]) -> Cut | None:
-    """The surface that cuts ``damage`` out of ``part``; None where no enclosure bounds it.
+def make_cut(damage: Solid, surface: Surface, part: Part, enclosures: Sequence[Solid], tolerance: float) -> Cut | None:
+    """The surface that cuts ``damage`` out of ``part``, with its inner damage ``surface``; None where no enclosure
+    bounds it.
 
     All are in one unit and the part's frame.
     """
@@ -68,14 +74,90 @@ def make_cut(damage: Solid, part: Part, enclosures: Sequence[Solid]) -> Cut | No
     chosen = _close_gaps(faces, chosen)
     rows, renumbered = np.unique(faces[chosen], return_inverse=True)
     mesh = Mesh(vertices[rows], renumbered.reshape(-1, 3))
-    return _drop_specks(Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen]))
+    cut = Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen])
+    return _smooth_outside(_drop_specks(_drop_horns(cut, surface, tolerance), tolerance), part, tolerance)
 
 
-def _drop_specks(cut: Cut) -> Cut:
-    """The cut without its smallest pieces: bubbles of a few triangles that noise left in the enclosure."""
-    pieces = split_cut(cut)
+def _smooth_outside(cut: Cut, part: Part, tolerance: float) -> Cut:
+    """The cut with a smoother rim outside the part, which takes fewer triangles; it comes no nearer to the part."""
+    faces, count = cut.mesh.faces, len(cut.mesh.vertices)
+    moving = np.ones(count, bool)
+    moving[faces[cut.core]] = False
+    moving &= cut.height > CLEAR * tolerance
+    rim = np.zeros(count, bool)
+    edges = _find_rim(faces)
+    rim[edges] = True
+    ends = np.concatenate([faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), edges[:, ::-1]])
+    used = moving[ends[:, 0]] & (~rim[ends[:, 0]] | rim[ends[:, 1]])  # along the rim only the rim counts
+    graph = coo_array((np.ones(used.sum()), ends[used].T), shape=(count, count)).tocsr()
+    total = np.asarray(graph.sum(axis=1)).ravel()
+    moving &= total > 1
+    vertices = cut.mesh.vertices.copy()
+    for _ in range(10):
+        vertices[moving] += 0.5 * ((graph @ vertices)[moving] / total[moving, None] - vertices[moving])
+    height = cut.height.copy()
+    height[moving] = signed_distance(vertices[moving], part)[0]
+    back = moving & (height < CLEAR * tolerance)
+    vertices[back], height[back] = cut.mesh.vertices[back], cut.height[back]
+    return Cut(Mesh(vertices, faces), height, cut.core)
+
+
+def _drop_horns(cut: Cut, surface: Surface, tolerance: float) -> Cut:
+    """The cut without what lies inside the part, but not at the inner damage surface: noise folds an enclosure into
+    small horns, which the damage volume does not have. The holes that they leave are closed."""
+    off = distance_to_mesh(cut.mesh.vertices, surface)
+    away = (cut.height < -tolerance / 4) & (off > tolerance / 2)
+    if not away.any():
+        return cut
+    faces, size = cut.mesh.faces, len(cut.mesh.vertices)
+    dropped = away[faces].any(axis=1)
+    if dropped.sum() > HORNS * cut.core.sum():
+        return cut
+    outer = np.zeros(size, bool)
+    outer[_find_rim(faces)[:, 0]] = True
+    for _ in range(8):  # a hole that touches another, or the rim, would pass a vertex twice
+        touched = np.zeros(size, bool)
+        touched[faces[dropped]] = True
+        if (touched & outer).any():
+            return cut
+        starts = np.bincount(_find_rim(faces[~dropped])[:, 0], minlength=size)
+        if not (starts > 1).any():
+            break
+        dropped |= (starts > 1)[faces].any(axis=1)
+    else:
+        return cut
+    left = faces[~dropped]
+    loops = [loop for loop in trace_loops(left) if not outer[loop].any()]
+    middles = [np.concatenate([cut.mesh.vertices[loop], cut.height[loop, None]], axis=1).mean(axis=0) for loop in loops]
+    filled, rim = [], set(map(tuple, _find_rim(left).tolist()))
+    for number, loop in enumerate(loops):
+        ends = np.column_stack([loop, np.roll(loop, -1)])
+        if (int(ends[0, 0]), int(ends[0, 1])) in rim:  # in the direction of the triangles: the new ones run against it
+            ends = ends[:, ::-1]
+        filled.append(np.column_stack([ends, np.full(len(loop), size + number)]))
+    more = np.array(middles).reshape(-1, 4)
+    mesh = Mesh(np.concatenate([cut.mesh.vertices, more[:, :3]]), np.concatenate([left, *filled]))
+    core = np.concatenate([cut.core[~dropped], np.ones(len(mesh.faces) - len(left), bool)])
+    return _take_used(Cut(mesh, np.concatenate([cut.height, more[:, 3]]), core))
+
+
+def _find_rim(faces: Ints) -> Ints:
+    """(E,2) the directed edges that one triangle has alone."""
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    size = int(faces.max()) + 1
+    return edges[~np.isin(edges @ [size, 1], edges @ [1, size])]
+
+
+def _take_used(cut: Cut) -> Cut:
+    used, renumbered = np.unique(cut.mesh.faces, return_inverse=True)
+    return Cut(Mesh(cut.mesh.vertices[used], renumbered.reshape(-1, 3)), cut.height[used], cut.core)
+
+
+def _drop_specks(cut: Cut, tolerance: float) -> Cut:
+    """The cut without its smallest shallow pieces: bubbles of a few triangles that noise left in the enclosure."""
+    pieces = _split_cut(cut)
     most = max(int(piece.core.sum()) for piece in pieces)
-    kept = [piece for piece in pieces if piece.core.sum() > SPECK * most]
+    kept = [piece for piece in pieces if piece.core.sum() > SPECK * most or piece.height.min() < -0.8 * tolerance]
     if len(kept) == len(pieces):
         return cut
     vertices, faces, _ = concatenate_meshes([piece.mesh for piece in kept])
@@ -101,9 +183,7 @@ def _close_gaps(faces: Ints, chosen: Flags) -> Flags:
         small = (count < ISLAND * chosen.sum()) & (count < count.max())
         chosen = chosen.copy()
         chosen[left[small[label]]] = True
-        edges = np.concatenate([faces[chosen][:, [0, 1]], faces[chosen][:, [1, 2]], faces[chosen][:, [2, 0]]])
-        codes, opposite = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
-        starts = np.bincount(edges[~np.isin(codes, opposite), 0], minlength=size)
+        starts = np.bincount(_find_rim(faces[chosen])[:, 0], minlength=size)
         pinched = starts > 1
         if not pinched.any():
             return chosen
@@ -111,58 +191,43 @@ def _close_gaps(faces: Ints, chosen: Flags) -> Flags:
     return chosen
 
 
-def split_cut(cut: Cut) -> list[Cut]:
-    """The connected pieces of a cut."""
-    count = len(cut.mesh.vertices)
-    ends = cut.mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    graph = coo_array((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(count, count))
-    pieces, label = connected_components(graph, directed=False)
-    if pieces == 1:
+def _split_cut(cut: Cut) -> list[Cut]:
+    """The connected pieces of a cut that bound the damage volume."""
+    label = _label_pieces(cut.mesh)
+    if label.max() == 0:
         return [cut]
-    found = []
-    for number in range(pieces):
-        own = label[cut.mesh.faces[:, 0]] == number
-        used, renumbered = np.unique(cut.mesh.faces[own], return_inverse=True)
-        mesh = Mesh(cut.mesh.vertices[used], renumbered.reshape(-1, 3))
-        found.append(Cut(mesh, cut.height[used], cut.core[own]))
+    rows = [np.flatnonzero(label[cut.mesh.faces[:, 0]] == number) for number in range(int(label.max()) + 1)]
+    found = [_take_used(Cut(Mesh(cut.mesh.vertices, cut.mesh.faces[own]), cut.height, cut.core[own])) for own in rows]
     return [each for each in found if each.core.any()]
 
 
-def decimate(cut: Cut, count: int) -> Mesh | None:
-    """The cut with about ``count`` triangles, fitted to its vertices; None where it cannot be made manifold."""
-    import pyvista as pv
-
-    mesh = cut.mesh
-    if len(mesh.faces) > count:
-        cells = np.column_stack([np.full(len(mesh.faces), 3), mesh.faces]).ravel()
-        poly = pv.PolyData(np.asarray(mesh.vertices, np.float64), cells)
-        less = poly.decimate(1 - count / len(mesh.faces), volume_preservation=False)
-        less = Mesh(np.asarray(less.points, np.float64), np.asarray(less.faces.reshape(-1, 4)[:, 1:], np.int64))
-    else:
-        less = mesh
-    return fit_vertices(less, mesh.vertices)
+def find_inner(cut: Cut) -> Ints:
+    """(N,) the rows of the triangles of a cut that lie inside the part."""
+    return np.flatnonzero(cut.core & (cut.height[cut.mesh.faces].mean(axis=1) < 0))
 
 
-def fit_vertices(mesh: Mesh, points: Floats, stiff: float = 1e-2) -> Mesh:
-    """Moves vertices along their normals so that triangles pass through ``points`` (N,3) by least squares: without it,
-    chords over a curved surface lie all on one side."""
-    from scipy.sparse import csr_array, eye_array, vstack
-    from scipy.sparse.linalg import lsqr
+def take_faces(mesh: Mesh, rows: Ints) -> Mesh:
+    """Some triangles of a mesh, as a mesh."""
+    used, renumbered = np.unique(mesh.faces[rows], return_inverse=True)
+    return Mesh(mesh.vertices[used], renumbered.reshape(-1, 3))
 
-    _, face, place = closest_on_mesh(points, mesh)
-    corners = mesh.triangles[face]
-    weights = barycentric(place, corners)
-    along = mesh.face_normals[face]
-    offset = np.einsum("ij,ij->i", points - place, along)
-    normal = mesh.vertex_normals
-    tilt = np.einsum("nkj,nj->nk", normal[mesh.faces[face]], along)
-    rows = np.repeat(np.arange(len(points)), 3)
-    A = csr_array(((weights * tilt).ravel(), (rows, mesh.faces[face].ravel())), shape=(len(points), len(mesh.vertices)))
-    size = np.sqrt(len(points) / len(mesh.vertices)) * stiff
-    A = vstack([A, size * eye_array(len(mesh.vertices))]).tocsr()
-    b = np.concatenate([offset, np.zeros(len(mesh.vertices))])
-    step = np.asarray(lsqr(A, b, atol=1e-8, btol=1e-8, iter_lim=200)[0])
-    return Mesh(mesh.vertices + step[:, None] * normal, mesh.faces)
+
+def split_mesh(mesh: Mesh) -> list[Mesh]:
+    """The connected pieces of a mesh."""
+    label = _label_pieces(mesh)
+    found = []
+    for number in range(int(label.max()) + 1):
+        used, renumbered = np.unique(mesh.faces[label[mesh.faces[:, 0]] == number], return_inverse=True)
+        found.append(Mesh(mesh.vertices[used], renumbered.reshape(-1, 3)))
+    return found
+
+
+def _label_pieces(mesh: Mesh) -> Ints:
+    """(V,) the connected piece of each vertex."""
+    count = len(mesh.vertices)
+    ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    graph = coo_array((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def barycentric(points: Floats, corners: Floats) -> Floats:
@@ -173,12 +238,3 @@ def barycentric(points: Floats, corners: Floats) -> Floats:
     det = np.maximum(uu * vv - uv * uv, 1e-300)
     s, t = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
     return np.stack([1 - s - t, s, t], axis=1)
-
-
-def count_bad_edges(faces: Ints) -> int:
-    """Edges with more than two triangles, or with two that run through them in the same direction."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    size = int(faces.max()) + 1
-    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(size, size)).tocsr()
-    graph.sum_duplicates()
-    return int((graph.data > 1).sum())

@@ -7,37 +7,53 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Part, Solid, Surface
+from damageest.artefacts import Floats, Mesh, Part, Solid, Surface
 from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
-from damageest_cadquery._check import Measured, check_pieces
-from damageest_cadquery._cut import Cut, count_bad_edges, decimate, make_cut, split_cut
-from damageest_cadquery._flatten import flatten
+from damageest_cadquery._check import LIMITS, Measured, check_pieces, measure_inner_area
+from damageest_cadquery._cut import Cut, find_inner, make_cut, take_faces
+from damageest_cadquery._flat_faces import Flat, find_flat_faces
+from damageest_cadquery._polyhedron import decimate, mark_planes, measure_miss, simplify, thin_points
 from damageest_cadquery._read import explore
-from damageest_cadquery._smooth import SPANS, build_shapes, build_splines, find_shapes, take_inner
+from damageest_cadquery._shapes import build_shapes, find_shapes
+from damageest_cadquery._spline import SPANS, Way, build_splines, drop_tails, find_charts
 from damageest_cadquery._split import (
     Piece,
     Tool,
-    build_facets,
+    build_flat,
     is_opencascade_error,
+    is_sound,
+    is_valid,
     measure_volume,
     split,
     triangulate,
 )
 
-FACETS = (250, 500, 1000, 2000, 4000)
+PLANES = (300, 800, 2000)
+FACETS = (150, 200, 270, 360, 480, 640, 850, 1150, 1550, 2100, 2900, 4000)
+"""Numbers of triangles that are tried; most are given up before a split, by a look at the distances."""
+NARROW = 0.8
+"""Share of the limit of a form within which a simplified surface must be before it is tried."""
 MOST_FACES = 5000
-MOST_SPLINES = 3
-"""Splines near enough that are tried, the coarsest first."""
+PROBES = 4000
+"""Points at which a simplified surface is measured before it is tried."""
+SOME, MOSTLY = 0.25, 0.6
+"""Share of the surface on planes from which these are faces of their own, and from which they come before splines."""
+MOST_SPLINES = 2
+"""Splines near enough that are tried, the coarsest first: each attempt takes a second or more."""
 SPECK = 1e-3
 """Share of the damage volume below which a body of it, or a piece that a split leaves over, is dropped."""
+
+
+Attempt = tuple[str, Callable[[], Tool | None], tuple[float, ...]]
+"""Name of a form, what builds its tool, and the fuzzy values to try it with, in millimetres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +99,12 @@ def find_exact(
 ) -> tuple[Exact | None, tuple[str, ...]]:
     """The exact damage volume of a site in ``solids``, which are in the job's unit, or None; and what was refused."""
     start, tried = time.process_time(), []
-    cut = make_cut(site.damage, part, site.enclosures)
+    cut = make_cut(site.damage, site.surface, part, site.enclosures, tolerance)
     if cut is None:
         return None, ("no surface is known that cuts it out of the part",)
+    inner_before = measure_inner_area(solids)
     bodies = sum(body.volume > SPECK * site.damage.volume for body in split_bodies(site.damage))
-    for form, make, fuzzies in _list_tools(cut, tolerance):
+    for form, make, fuzzies in _list_tools(cut, part, tolerance):
         tool = _call(make)
         for fuzzy in fuzzies if tool is not None else ():
             assert tool is not None
@@ -99,38 +116,74 @@ def find_exact(
             if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
                 tried.append(f"{form}: more than {MOST_FACES} faces")
                 break
+            cut_off = measure_inner_area(rest) - inner_before
             measured = check_pieces(
-                form.split()[0], pieces, bodies, site.damage, site.surface, part, site.points, tolerance, faces
+                form.split()[0], pieces, cut_off, bodies, site.damage, site.surface, part, site.points, tolerance, faces
             )
+            if not measured.reason and not is_sound([piece for piece in rest if piece not in solids]):
+                measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)
             if not measured.reason:
                 seconds = time.process_time() - start
                 return Exact(pieces, rest, form.split()[0], measured, seconds, tuple(tried)), tuple(tried)
             tried.append(f"{form}: {measured.reason}")
-            if np.isfinite(measured.farthest):
+            if np.isfinite(measured.farthest) or measured.reason.startswith("its volume"):
                 break  # it is sound but not near enough, and another fuzzy value does not change that
     return None, tuple(tried) or ("no surface could be built that cuts it out of the part",)
 
 
-def _list_tools(cut: Cut, tolerance: float) -> Iterator[tuple[str, Callable[[], Tool | None], tuple[float, ...]]]:
+def _list_tools(cut: Cut, part: Part, tolerance: float) -> Iterator[Attempt]:
     """Names of forms, what builds their tools, and the fuzzy values to try them with, in millimetres."""
-    inner = take_inner(cut)
+    rows = find_inner(cut)
+    inner = take_faces(cut.mesh, rows)
     found = find_shapes(inner, tolerance)
-    if found is not None:
+    if found.whole:
         for beyond in (2.0, 1.0, 4.0):
-            yield f"shapes {beyond:g}", partial(build_shapes, inner, *found, tolerance, beyond * tolerance), (1e-6,)
-    cuts = split_cut(cut)
-    places = [uv for uv in (flatten(each.mesh) for each in cuts) if uv is not None]
-    if len(places) == len(cuts):
-        near = 0
+            make = partial(build_shapes, inner, found.shapes, found.nearest, tolerance, beyond * tolerance)
+            yield f"shapes {beyond:g}", make, (1e-6,)
+    flat = [k for k, shape in enumerate(found.shapes) if shape.kind == "plane"]
+    area = np.linalg.norm(inner.cross, axis=1)
+    share = area[np.isin(found.label, flat)].sum() / area.sum()
+    if share < MOSTLY:
+        yield from _list_splines(inner, part, tolerance)
+    depth = cut.height[np.unique(cut.mesh.faces[rows])]
+    points = inner.vertices[depth < -tolerance / 4]
+    if share > SOME:
+        planes = mark_planes(cut, rows, found.label, found.shapes, tolerance)
+        yield from _list_flat(planes, cut, points, tolerance, PLANES)
+    if share >= MOSTLY:
+        yield from _list_splines(inner, part, tolerance)
+    yield from _list_flat(mark_planes(cut, rows, found.label, (), tolerance), cut, points, tolerance, FACETS)
+
+
+def _list_flat(flat: Flat, cut: Cut, points: Floats, tolerance: float, counts: Sequence[int]) -> Iterator[Attempt]:
+    flat = decimate(flat, max(counts))  # once, since it takes long for a fine surface
+    for count in counts:
+        less = simplify(flat, cut, count, tolerance)
+        form = "planes" if (less.label >= 0).any() else "facets"
+        if (
+            len(points)
+            and np.mean(measure_miss(less, thin_points(points, PROBES)) > tolerance / 4) > NARROW * LIMITS[form][0]
+        ):
+            continue
+        tool = build_flat(less.mesh.vertices, find_flat_faces(less))
+        if form == "facets" or is_valid(tool):
+            yield f"{form} {count}", partial(_give, tool), (1e-6, 1e-4)
+
+
+def _list_splines(inner: Mesh, part: Part, tolerance: float) -> Iterator[Attempt]:
+    wide, near = drop_tails(inner, 1.2 * tolerance), 0
+    ways: tuple[Way, ...] = ("seen", "disk")
+    for how in ways:
+        charts = find_charts(wide, how, part, tolerance)
+        if charts is None:
+            continue
         for spans in SPANS:
-            tool = _call(partial(build_splines, cuts, places, spans, tolerance))
-            near += tool is not None
-            if tool is not None and near <= MOST_SPLINES:
-                yield f"spline {spans}", partial(_give, tool), (1e-6, 1e-5)
-    for count in FACETS:
-        mesh = decimate(cut, count)
-        if mesh is not None and not count_bad_edges(mesh.faces):
-            yield f"facets {count}", partial(build_facets, mesh), (1e-6, 1e-5, 1e-4)
+            tool = _call(partial(build_splines, charts, part, spans, tolerance))
+            if tool is not None:
+                yield f"spline {spans}", partial(_give, tool), (1e-6,)
+                near += 1
+                if near == MOST_SPLINES:
+                    return
 
 
 def _give(tool: Tool) -> Tool:

@@ -54,7 +54,7 @@ def find_facets(solid: Solid) -> list[Facet]:
     label = _find_flat_regions(solid, other, tolerance)
     label = _split_ambiguous(label, edges, other, len(vertices))
     loops, owner = _trace_loops(label, edges, other, len(vertices))
-    loops = _straighten(loops, vertices, tolerance)
+    loops = straighten(loops, vertices, tolerance)
     normal = np.zeros((label.max() + 1, 3))
     np.add.at(normal, label, solid.cross)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
@@ -155,7 +155,7 @@ def _trace_loops(label: Ints, edges: Ints, other: Ints, count: int) -> tuple[lis
     return loops, np.array(owners, dtype=np.int64)
 
 
-def _straighten(loops: list[Ints], vertices: Floats, tolerance: float) -> list[Ints]:
+def straighten(loops: list[Ints], vertices: Floats, tolerance: float) -> list[Ints]:
     """The loops without vertices in the middle of a straight edge between two faces."""
     at = np.concatenate(loops)
     size = np.array([len(loop) for loop in loops])

@@ -19,7 +19,10 @@ Kind = Literal["plane", "cylinder", "sphere"]
 TRIES = 60
 MOST = 12
 """Largest number of recognised faces of one surface: a surface that takes more is not made of them."""
-NORMAL = np.cos(np.radians(25))
+ALIKE = np.cos(np.radians(25))
+"""Least cosine between the normals of a triangle and of its shape."""
+LARGE = 0.06
+"""Share of the surface from which a shape is worth looking for in any case."""
 LEAST = 0.004
 """Smallest share of the surface that is a face of its own."""
 
@@ -52,8 +55,12 @@ class _Samples:
     graph: coo_array
 
 
-def recognise(mesh: Mesh, close: float, seed: int = 1) -> tuple[list[Shape], Ints]:
-    """The shapes of a surface, and for each face (F,) the number of its shape, -1 where none lies within ``close``."""
+def recognise(mesh: Mesh, close: float, left: float = 0.0, seed: int = 1) -> tuple[list[Shape], Ints]:
+    """The shapes of a surface, and for each face (F,) the number of its shape, -1 where none lies within ``close``.
+
+    It ends early where further shapes of the last one's size would leave more than a share ``left`` of the surface, and
+    none of them is large: such a surface is not made of them.
+    """
     samples = _Samples(mesh.triangles.mean(1), mesh.face_normals, np.linalg.norm(mesh.cross, axis=1), _link(mesh.faces))
     rng = np.random.default_rng(seed)
     label = np.full(len(mesh.faces), -1, np.int64)
@@ -68,16 +75,23 @@ def recognise(mesh: Mesh, close: float, seed: int = 1) -> tuple[list[Shape], Int
             break
         label[found[1]] = len(shapes)
         shapes.append(found[0])
+        size = samples.areas[found[1]].sum()
+        if size < LARGE * total and samples.areas[label < 0].sum() - (MOST - len(shapes)) * size > left * total:
+            break
     return shapes, label
 
 
-def _link(faces: Ints) -> coo_array:
-    """Neighbours over edges."""
+def find_neighbours(faces: Ints) -> tuple[Ints, Ints]:
+    """Pairs of triangles (N,) and (N,) that share an edge."""
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort(edges.T)
     same = (edges[order][1:] == edges[order][:-1]).all(1)
-    one, two = owner[order][:-1][same], owner[order][1:][same]
+    return owner[order][:-1][same], owner[order][1:][same]
+
+
+def _link(faces: Ints) -> coo_array:
+    one, two = find_neighbours(faces)
     return coo_array((np.ones(len(one), bool), (one, two)), shape=(len(faces), len(faces)))
 
 
@@ -126,7 +140,7 @@ def _find_largest(samples: _Samples, free: Flags, close: float, rng: np.random.G
 def _fits(shape: Shape, samples: _Samples, rows: Ints, close: float) -> Flags:
     distance, normal = shape.measure(samples.points[rows])
     along = np.abs(np.einsum("ij,ij->i", normal, samples.normals[rows]))
-    return np.asarray((np.abs(distance) <= close) & (along >= NORMAL))
+    return np.asarray((np.abs(distance) <= close) & (along >= ALIKE))
 
 
 def _take_largest(inside: Flags, samples: _Samples) -> Flags:

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh, Solid
+from damageest.artefacts import Floats, Solid
+from damageest_cadquery._facets import Facet
 from damageest_cadquery._read import explore
+from damageest_cadquery._step import build_shell
 
 Origin = tuple[int, int]
 """Where a face comes from: (number of the part's CAD face, -1), or (-1, number of the tool's face)."""
@@ -36,51 +38,31 @@ class Piece:
     origins: tuple[Origin, ...]
 
 
-def build_facets(mesh: Mesh) -> Tool:
-    """An open shell of planar triangles, which share edges and corners."""
-    from OCP.BRep import BRep_Builder
-    from OCP.Geom import Geom_Line, Geom_Plane
-    from OCP.gp import gp_Dir, gp_Pnt
-    from OCP.TopAbs import TopAbs_REVERSED
-    from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shell, TopoDS_Vertex, TopoDS_Wire
+def build_flat(vertices: Floats, facets: Sequence[Facet]) -> Tool:
+    """An open shell of planar faces, which share edges and corners."""
+    from OCP.TopAbs import TopAbs_FACE
 
-    builder, close = BRep_Builder(), 1e-7
-    corners = []
-    for point in mesh.vertices.tolist():
-        vertex = TopoDS_Vertex()
-        builder.MakeVertex(vertex, gp_Pnt(*point), close)
-        corners.append(vertex)
-    edges: dict[tuple[int, int], Any] = {}
+    shell = build_shell(vertices, facets, closed=False)
+    return Tool(explore(shell, TopAbs_FACE), shell)
 
-    def edge(start: int, end: int) -> Any:
-        key = (min(start, end), max(start, end))
-        if key not in edges:
-            way = mesh.vertices[key[1]] - mesh.vertices[key[0]]
-            length = float(np.linalg.norm(way))
-            made = TopoDS_Edge()
-            builder.MakeEdge(
-                made, Geom_Line(gp_Pnt(*mesh.vertices[key[0]].tolist()), gp_Dir(*(way / length).tolist())), close
-            )
-            builder.Add(made, corners[key[0]])
-            builder.Add(made, corners[key[1]].Oriented(TopAbs_REVERSED))
-            builder.Range(made, 0.0, length)
-            edges[key] = made
-        return edges[key] if start < end else edges[key].Reversed()
 
-    shell = TopoDS_Shell()
-    builder.MakeShell(shell)
-    faces = []
-    for row, normal in zip(mesh.faces.tolist(), mesh.face_normals.tolist(), strict=True):
-        face, wire = TopoDS_Face(), TopoDS_Wire()
-        builder.MakeFace(face, Geom_Plane(gp_Pnt(*mesh.vertices[row[0]].tolist()), gp_Dir(*normal)), close)
-        builder.MakeWire(wire)
-        for start, end in zip(row, (*row[1:], row[0]), strict=True):
-            builder.Add(wire, edge(start, end))
-        wire.Closed(True)
-        builder.Add(face, wire)
-        builder.Add(shell, face)
-        faces.append(face)
-    return Tool(faces, shell)
+def is_sound(pieces: Sequence[Piece]) -> bool:
+    """Whether OpenCASCADE finds all of them valid, and no face hangs in them."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_INTERNAL
+
+    return all(
+        BRepCheck_Analyzer(piece.shape).IsValid()
+        and all(face.Orientation() != TopAbs_INTERNAL for face in explore(piece.shape, TopAbs_FACE))
+        for piece in pieces
+    )
+
+
+def is_valid(tool: Tool) -> bool:
+    """Whether each face of a tool is sound by itself."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    return all(BRepCheck_Analyzer(face).IsValid() for face in tool.faces)
 
 
 def split(solid: Any, owner: int, origins: Sequence[Origin], tool: Tool, fuzzy: float) -> list[Piece] | None:
@@ -110,10 +92,29 @@ def split(solid: Any, owner: int, origins: Sequence[Origin], tool: Tool, fuzzy: 
         _note(known, algorithm, face, origin)
     for number, face in enumerate(tool.faces):
         _note(known, algorithm, face, (-1, number))
-    return [
-        Piece(shape, owner, tuple(known.get(face, (-1, -1)) for face in explore(shape, TopAbs_FACE)))
-        for shape in explore(algorithm.Shape(), TopAbs_SOLID)
-    ]
+    return [_take_piece(shape, owner, known) for shape in explore(algorithm.Shape(), TopAbs_SOLID)]
+
+
+def _take_piece(shape: Any, owner: int, known: ShapeMap) -> Piece:
+    """A piece without the faces and edges that hang in it: where the tool's faces overlap beyond their common edge,
+    OpenCASCADE keeps what hangs over as faces inside the solid."""
+    from OCP.BRepTools import BRepTools_ReShape
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_INTERNAL
+
+    faces = explore(shape, TopAbs_FACE)
+    kept = [face for face in faces if face.Orientation() != TopAbs_INTERNAL]
+    origins = tuple(known.get(face, (-1, -1)) for face in kept)
+    hanging = [face for face in faces if face.Orientation() == TopAbs_INTERNAL]
+    hanging += [edge for face in kept for edge in explore(face, TopAbs_EDGE) if edge.Orientation() == TopAbs_INTERNAL]
+    if not hanging:
+        return Piece(shape, owner, origins)
+    change = BRepTools_ReShape()
+    for each in hanging:
+        change.Remove(each)
+    cleaned = change.Apply(shape)
+    if len(explore(cleaned, TopAbs_FACE)) != len(kept):
+        return Piece(shape, owner, tuple(known.get(face, (-1, -1)) for face in faces))
+    return Piece(cleaned, owner, origins)
 
 
 class ShapeMap:
@@ -133,9 +134,15 @@ class ShapeMap:
 
 
 def _note(known: ShapeMap, algorithm: Any, face: Any, origin: Origin) -> None:
-    made = list(algorithm.Modified(face))
-    for each in made or ([] if algorithm.IsDeleted(face) else [face]):
-        known.set(each, origin)
+    made = algorithm.Modified(face)
+    if made.Size() == 0:
+        if not algorithm.IsDeleted(face):
+            known.set(face, origin)
+    elif made.Size() == 1:
+        known.set(made.First(), origin)
+    else:
+        for each in made:
+            known.set(each, origin)
 
 
 def triangulate(shape: Any, chord: float, angle: float = 0.35) -> Solid:

@@ -107,7 +107,7 @@ def _build_shape(parts: list[list[tuple[Floats, list[Facet]]]], scale: float) ->
         solid = TopoDS_Solid()
         builder.MakeSolid(solid)
         for number, (vertices, planar) in enumerate(part):
-            shell = _build_shell(vertices * scale, planar)
+            shell = build_shell(vertices * scale, planar)
             builder.Add(solid, shell if number == 0 else shell.Reversed())
         made.append(solid)
     if len(made) == 1:
@@ -119,8 +119,8 @@ def _build_shape(parts: list[list[tuple[Floats, list[Facet]]]], scale: float) ->
     return compound
 
 
-def _build_shell(vertices: Floats, planar: list[Facet]) -> Any:
-    """A closed shell whose faces share their edges, and its edges their corners. Lengths in millimetres."""
+def build_shell(vertices: Floats, planar: Sequence[Facet], closed: bool = True) -> Any:
+    """A shell whose faces share their edges, and its edges their corners. Lengths in millimetres."""
     from OCP.BRep import BRep_Builder
     from OCP.Geom import Geom_Line, Geom_Plane
     from OCP.gp import gp_Dir, gp_Pnt
@@ -168,5 +168,5 @@ def _build_shell(vertices: Floats, planar: list[Facet]) -> Any:
             wire.Closed(True)
             builder.Add(face, wire)
         builder.Add(shell, face)
-    shell.Closed(True)
+    shell.Closed(closed)
     return shell

@@ -48,7 +48,8 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class CadFacts:
-    """``names`` and ``colours`` of the part's CAD faces by number, ``solids``: the names of its solids."""
+    """``names`` and ``colours`` of the part's CAD faces by number, ``solids``: the names of its solids. A face without
+    a name in the file is called by its number, as `damageest faces` lists it."""
 
     names: Sequence[str]
     colours: Sequence[Colour | None]
@@ -63,7 +64,9 @@ def main(path: Path) -> None:
     solids, faces = start_solids(shapes)
     originals = [face for solid in model.solids for face in _explore_faces(solid)]
     facts = CadFacts(
-        [model.name_of(face) for face in originals], read_colours(Path(part.path), len(originals)), model.solid_names
+        [model.name_of(face) or f"face {number}" for number, face in enumerate(originals)],
+        read_colours(Path(part.path), len(originals)),
+        model.solid_names,
     )
     rest, found = solids, {}
     reasons: dict[int, tuple[str, ...]] = {}

@@ -232,6 +232,6 @@ def test_a_wrong_volume_is_refused(done: Run) -> None:
     solids, faces = start_solids(read(Path(part.path), ".step").solids)
     site = done.result.sites[0]
     found = check_pieces(
-        "facets", solids, 1, site.damage, site.surface, part, np.empty((0, 3)), done.result.tolerance, faces
+        "facets", solids, 0.0, 1, site.damage, site.surface, part, np.empty((0, 3)), done.result.tolerance, faces
     )
     assert "volume differs" in found.reason

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from damageest.artefacts import Deviation, Enclosure, Enclosures, Part, Samples, Scan, Sites
 from damageest.errors import StageError
+from damageest.isolation import require_memory
 from damageest.stages.enclose import EncloseAll
 from damageest_octree.classify import LEAK, Cube, NodeFlags, classify_nodes
 
@@ -17,7 +18,7 @@ MARGIN = 8
 LEAVES_PER_CELL_AREA = 3.0
 """Finest nodes per cell area of skin, siblings included (2.3 to 2.9 measured)."""
 GIB = 2**30
-BYTES_PER_LEAF, BYTES_PER_CELL = 600, 80
+BYTES_PER_LEAF, BYTES_PER_CELL, BYTES_PER_POINT = 600, 80, 230
 """Largest memory use; measured: 440 to 590 for a leaf of the octree, 73 for a cell of the grid round a loss."""
 REACHES = (0, 1, 2, 3)
 """Cells by which the shell of damaged points is thickened, in the order in which they are tried."""
@@ -81,6 +82,8 @@ class Octree(EncloseAll):
                 f"{largest * BYTES_PER_CELL / GIB:.1f} GiB; enclose.memory is {self.memory:g}",
                 f"enclose.cell: {fits:.3g}, or a larger enclose.memory",
             )
+        remedy = "a larger enclose.cell, or more memory (--memory)"
+        require_memory(BYTES_PER_CELL * largest, f"the grid of {largest:,} cells round a loss", remedy)
         solids = [(close_loss(cube, flags, nodes), members) for nodes, members in losses]
         items = [Enclosure(solid, members, notes) for solid, members in solids if solid is not None]
         if not items:
@@ -107,6 +110,11 @@ class Octree(EncloseAll):
             )
         per_leaf = LEAVES_PER_CELL_AREA * part.area * BYTES_PER_LEAF / GIB
         fits = max(float(np.sqrt(per_leaf / self.memory)), span / (2**20 - 2 * MARGIN))
+        require_memory(
+            per_leaf / max(wanted, fits) ** 2 * GIB + BYTES_PER_POINT * len(aligned.points),
+            f"an octree with cells of {max(wanted, fits):.3g}",
+            "a smaller enclose.memory, which makes larger cells; a larger tolerance; or more memory (--memory)",
+        )
         if wanted >= fits:
             return _make_cube(part, wanted), ()
         if self.cell or self.depth:

@@ -1,4 +1,4 @@
-"""Smooth faces through an inner damage surface: planes, cylinders and spheres where it is made of them, or one spline.
+"""Faces of planes, cylinders and spheres through an inner damage surface that is made of them.
 
 Each face reaches a little beyond its share of the surface. Where several meet, they are intersected with one another,
 and what hangs over beyond their common edges is left out. Lengths are the mesh's.
@@ -7,52 +7,52 @@ and what hangs over beyond their common edges is left out. Lengths are the mesh'
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import NdBSpline
 
 from damageest.artefacts import Floats, Ints, Mesh
-from damageest.geometry.height_spline import DEGREE, fit_parametric_spline
-from damageest.stages.export import Patch
-from damageest_cadquery._cut import Cut
-from damageest_cadquery._patch import build_surface, build_wire
+from damageest.geometry.distance import closest_on_mesh
+from damageest_cadquery._outlines import trace_regions
 from damageest_cadquery._recognise import Shape, recognise
 from damageest_cadquery._split import Tool
 
 LEFT = 0.12
 """Largest share of the surface that may lie off all recognised faces, as the rounding of edges and rims does."""
-SPANS = (8, 14, 20, 28, 38, 50)
-RIM = 48
-"""Edges of a spline face's rim, which lies outside the part."""
+SLIVER = 0.03
+"""Share of the surface below which a recognised face is taken for a piece of a rounding."""
 _WRAP = 2 * np.pi
 
 
-def take_inner(cut: Cut) -> Mesh:
-    """The triangles of a cut that lie inside the part."""
-    inner = cut.core & (cut.height[cut.mesh.faces].mean(axis=1) < 0)
-    used, renumbered = np.unique(cut.mesh.faces[inner], return_inverse=True)
-    return Mesh(cut.mesh.vertices[used], renumbered.reshape(-1, 3))
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a surface is made of. ``label`` (F,): for each triangle the number of its shape in ``shapes``, -1 for none;
+    ``nearest`` (F,): of the nearest one. ``whole``: whether they explain all of it but the roundings of its edges."""
+
+    shapes: Sequence[Shape]
+    label: Ints
+    nearest: Ints
+    whole: bool
 
 
-def find_shapes(inner: Mesh, tolerance: float) -> tuple[list[Shape], Ints] | None:
-    """The shapes that a surface is made of, with the shape's number of each face (F,); None where it is not."""
-    shapes, label = recognise(inner, tolerance / 5)
+def find_shapes(inner: Mesh, tolerance: float) -> Found:
+    """The shapes that a surface is made of, wholly or in part."""
+    shapes, label = recognise(inner, tolerance / 5, LEFT)
     area = np.linalg.norm(inner.cross, axis=1)
-    if not shapes or area[label < 0].sum() > LEFT * area.sum():
-        return None
-    centres = inner.triangles.mean(axis=1)
-    off = np.abs(np.stack([shape.measure(centres)[0] for shape in shapes]))
+    area /= area.sum()
+    sizes = np.array([area[label == k].sum() for k in range(len(shapes))])
     # slivers of the roundings at edges and rims are recognised too: what a larger shape explains almost as well goes
-    sizes = np.array([area[label == k].sum() for k in range(len(shapes))]) / area.sum()
-    real = [k for k in range(len(shapes)) if sizes[k] > 0.03]
+    real = [k for k in range(len(shapes)) if sizes[k] > SLIVER]
     if not real:
-        return None
-    nearest = off[real].argmin(axis=0)
-    own = np.array(real)[nearest]
+        none = np.full(len(area), -1)
+        return Found((), none, none, False)
+    centres = inner.triangles.mean(axis=1)
+    off = np.abs(np.stack([shapes[k].measure(centres)[0] for k in real]))
     keep = (label >= 0) & np.isin(label, real)
-    own[keep] = label[keep]
-    return [shapes[k] for k in real], np.searchsorted(real, own)
+    nearest = np.where(keep, np.searchsorted(real, np.where(keep, label, real[0])), off.argmin(axis=0))
+    own = np.where(keep | (off.min(axis=0) <= tolerance / 2), nearest, -1)
+    return Found([shapes[k] for k in real], own, nearest, bool(area[label < 0].sum() < LEFT))
 
 
 def build_shapes(inner: Mesh, shapes: Sequence[Shape], label: Ints, tolerance: float, beyond: float) -> Tool | None:
@@ -65,44 +65,6 @@ def build_shapes(inner: Mesh, shapes: Sequence[Shape], label: Ints, tolerance: f
             return None
         faces.append(face)
     return Tool(faces, faces[0]) if len(faces) == 1 else _trim_by_others(faces, inner, label, tolerance)
-
-
-def build_splines(cuts: Sequence[Cut], places: Sequence[Floats], spans: int, tolerance: float) -> Tool | None:
-    """A spline through each connected piece of a cut, by its ``places`` (V,2) in the unit disk.
-
-    None where one of them is farther from it than the checks allow.
-    """
-    from OCP.BRep import BRep_Builder
-    from OCP.TopoDS import TopoDS_Compound
-
-    faces = []
-    for cut, uv in zip(cuts, places, strict=True):
-        vertices = cut.mesh.vertices
-        knots, poles = fit_parametric_spline(uv, vertices, spans)
-        bounding = np.zeros(len(vertices), bool)
-        bounding[cut.mesh.faces[cut.core]] = True
-        bounding &= cut.height < -tolerance / 4
-        fitted = np.stack([NdBSpline(knots, poles[..., k], DEGREE)(uv[bounding]) for k in range(3)], axis=-1)
-        off = np.abs(np.einsum("ij,ij->i", fitted - vertices[bounding], cut.mesh.vertex_normals[bounding]))
-        if len(off) and (np.quantile(off, 0.98) > tolerance / 4 or off.max() > tolerance):
-            return None
-        angle = np.linspace(0, _WRAP, RIM, endpoint=False)
-        circle = 0.998 * np.column_stack([np.cos(angle), np.sin(angle)])
-        surface = build_surface(Patch(DEGREE, knots, poles), 1.0)
-        faces.append(_trim(surface, circle))
-    if len(faces) == 1:
-        return Tool(faces, faces[0])
-    builder, shape = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(shape)
-    for face in faces:
-        builder.Add(shape, face)
-    return Tool(faces, shape)
-
-
-def _trim(surface: Any, rim: Floats) -> Any:
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
-
-    return BRepBuilderAPI_MakeFace(surface, build_wire(rim, surface), True).Face()
 
 
 def _build_shape(shape: Shape, corners: Floats, beyond: float) -> Any:
@@ -155,14 +117,8 @@ def _polygon(rim: Floats, origin: Floats, first: Floats, second: Floats) -> Any:
 
 
 def _trace_outline(triangles: Floats, beyond: float) -> list[Floats]:
-    """The outline (K,2) of triangles (F,3,2), moved outward by ``beyond``; small holes are closed."""
-    from manifold3d import CrossSection, FillRule, JoinType
-
-    area = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    turned = np.where((area < 0)[:, None, None], triangles[:, ::-1], triangles)
-    region = CrossSection(list(np.ascontiguousarray(turned)), FillRule.NonZero).simplify(beyond / 20)
-    region = region.offset(1.5 * beyond, JoinType.Round, 2.0, 16).offset(-0.5 * beyond, JoinType.Round, 2.0, 16)
-    loops = [np.asarray(loop, np.float64) for loop in region.simplify(beyond / 8).to_polygons()]
+    """The outlines (K,2) of all regions of triangles (F,3,2), moved outward by ``beyond``, the longest first."""
+    loops = [loop for region in trace_regions(triangles, beyond) for loop in region]
     return sorted(loops, key=lambda loop: -np.ptp(loop, axis=0).prod())
 
 
@@ -182,8 +138,6 @@ def _trim_by_others(faces: list[Any], inner: Mesh, label: Ints, tolerance: float
     algorithm.Build()
     if not algorithm.IsDone():
         return None
-    from damageest.geometry.distance import closest_on_mesh
-
     builder, shape = BRep_Builder(), TopoDS_Compound()
     builder.MakeCompound(shape)
     kept = []

@@ -1,0 +1,51 @@
+"""Outlines of triangles in a plane."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import Floats
+
+
+def trace_regions(triangles: Floats, size: float, beyond: float = 1.0) -> list[list[Floats]]:
+    """For each region of triangles (F,3,2) its outlines (K,2), the outer one first, moved outward by ``beyond`` times
+    ``size``; holes smaller than that are closed."""
+    from manifold3d import CrossSection, FillRule, JoinType
+
+    area = cross_plane(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    turned = np.where((area < 0)[:, None, None], triangles[:, ::-1], triangles)
+    whole = CrossSection(list(np.ascontiguousarray(turned)), FillRule.NonZero).simplify(size / 20)
+    whole = whole.offset((beyond + 0.5) * size, JoinType.Round, 2.0, 16).offset(-0.5 * size, JoinType.Round, 2.0, 16)
+    regions = []
+    for each in whole.simplify(size / 8).decompose():
+        loops = [np.asarray(loop, np.float64) for loop in each.to_polygons()]
+        regions.append(sorted(loops, key=lambda loop: -np.ptp(loop, axis=0).prod()))
+    return regions
+
+
+def cross_plane(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def covers_once(triangles: Floats, hidden: float) -> bool:
+    """Whether triangles (F,3,2) do not lie over one another, but for a share ``hidden`` of their area."""
+    from manifold3d import CrossSection, FillRule
+
+    area = cross_plane(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
+    turned = np.where((area < 0)[:, None, None], triangles[:, ::-1], triangles)
+    return bool(
+        CrossSection(list(np.ascontiguousarray(turned)), FillRule.NonZero).area() > (1 - hidden) * np.abs(area).sum()
+    )
+
+
+def walk_outline(loop: Floats, step: float) -> tuple[Floats, Floats]:
+    """Points (N,2) about ``step`` apart on a closed outline, and the unit normals (N,2) there, outward."""
+    ends = np.roll(loop, -1, axis=0) - loop
+    lengths = np.linalg.norm(ends, axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    places = np.linspace(0, along[-1], max(8, round(along[-1] / step)), endpoint=False)
+    closed = np.concatenate([loop, loop[:1]])
+    points = np.column_stack([np.interp(places, along, closed[:, k]) for k in range(2)])
+    way = np.roll(points, -2, axis=0) - np.roll(points, 2, axis=0)  # outer outlines run left about, holes right about
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+    return points, np.column_stack([way[:, 1], -way[:, 0]])
