@@ -7,6 +7,7 @@ import json
 import platform
 import re
 from collections.abc import Iterable, Mapping
+from email.parser import HeaderParser
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
@@ -81,8 +82,10 @@ def list_packages(names: Iterable[str]) -> dict[str, str]:
             package = distribution(name)
         except PackageNotFoundError:
             continue
-        found[name] = package.version
-        needed = [text for text in package.requires or [] if "extra ==" not in text]
+        # the head alone: to parse the description of a hundred packages takes half a second
+        head = HeaderParser().parsestr((package.read_text("METADATA") or "").split("\n\n", 1)[0])
+        found[name] = head["Version"] or package.version
+        needed = [text for text in head.get_all("Requires-Dist") or [] if "extra ==" not in text]
         open_names += [match[0] for text in needed if (match := re.match(r"[\w.-]+", text))]
     return dict(sorted(found.items()))
 

@@ -134,6 +134,18 @@ def test_a_tree_gives_the_same_places() -> None:
         assert one == pytest.approx(other)
 
 
+def test_small_and_large_triangles_of_one_mesh_are_both_found() -> None:
+    """A ball of small triangles over a plate of two large ones."""
+    ball, plate = trimesh.creation.icosphere(4, 1.0), trimesh.creation.box((400, 400, 2))
+    both = trimesh.util.concatenate([ball, plate.apply_translation([0, 0, -5])])
+    points = np.random.default_rng(0).uniform(-6, 6, (500, 3))
+    near = closest_on_mesh(points, Mesh(both.vertices, both.faces))
+    alone = [closest_on_mesh(points, Mesh(mesh.vertices, mesh.faces)).distance for mesh in (ball, plate)]
+    assert np.allclose(near.distance, np.minimum(*alone))
+    assert ((near.face < len(ball.faces)) == (alone[0] < alone[1])).all()
+    assert np.allclose(np.linalg.norm(points - near.place, axis=1), near.distance)
+
+
 def test_distance_to_the_edges_of_a_square() -> None:
     square = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     edges = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])

@@ -69,9 +69,11 @@ class Files(Export):
 
     def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles:
         """Writes into ``folder``; gives the paths relative to it. The same result gives the same bytes."""
-        from damageest.stages.export._spline import fit_spline
+        splines = {}
+        if self.spline:
+            from damageest.stages.export._spline import fit_spline
 
-        splines = {s.id: fit_spline(s.surface, result.tolerance) for s in result.sites} if self.spline else {}
+            splines = {site.id: fit_spline(site.surface, result.tolerance) for site in result.sites}
         detail = result.tolerance / 4 if self.detail is None else self.detail
         bodies, coarse = _collect_bodies(result), {}
         if detail and any(writers[name].simplify for name in self.format):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Enclosures, Sites
+from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import iou, to_manifold, to_solid, unite
 from damageest.stages.enclose.implicit import Implicit
 from tests.scenes import TOLERANCE, Scene, scene
@@ -70,6 +71,14 @@ def test_a_loss_too_large_for_its_grid_is_solved_coarsely_and_a_note_says_so() -
     assert "cells of" in item.notes[0]
     (piece,) = (to_solid(body) for body in (to_manifold(case.part) ^ to_manifold(item.solid)).decompose()[:1])
     assert iou(piece, case.truth) > 0.9
+
+
+def test_detail_spares_triangles_and_moves_the_surface_by_no_more() -> None:
+    case = scene("pit")
+    fine, coarse = (Implicit(detail=detail).run(**case.inputs()).items[0].solid for detail in (0.0, 0.1))
+    assert len(coarse.faces) < 0.5 * len(fine.faces)
+    assert np.quantile(distance_to_mesh(coarse.vertices, fine), 0.99) < 0.2 * TOLERANCE
+    assert np.quantile(distance_to_mesh(fine.vertices, coarse), 0.99) < 0.2 * TOLERANCE
 
 
 def test_no_site_no_enclosure() -> None:
