@@ -50,7 +50,8 @@ class ExactReport(JsonModel):
     """Whether the solid in STEP has the CAD's own faces."""
 
     form: str = Field(
-        description="of the inner surface: shapes (planes, cylinders, spheres), spline, facets; none: facets all over"
+        description="of the inner surface: shapes (planes, cylinders, spheres), spline, planes (beside facets), "
+        "facets; none: facets all over"
     )
     faces: int
     inner_faces: int = Field(description="faces inside the part")

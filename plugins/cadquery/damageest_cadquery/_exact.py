@@ -1,6 +1,7 @@
 """Finds the exact damage volume of a site: the part's CAD solids split by its inner damage surface.
 
-Tried in this order, and the first that passes the checks is taken: recognised shapes, one spline, few facets, more.
+Tried in this order, and the first that passes the checks is taken: recognised shapes, splines, planes beside facets,
+few facets, more. Where planes explain most of it, they come before splines.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ class SiteInput:
 
 @dataclass(frozen=True, eq=False)
 class Exact:
-    """``pieces``: the damage volume; ``rest``: what is left of the solids; ``form``: shapes, spline, facets or body;
+    """``pieces``: the damage volume; ``rest``: what is left of the solids; ``form``: shapes, spline, planes or facets;
     ``seconds``: of the processor; ``tried``: what was refused before, and why."""
 
     pieces: tuple[Piece, ...]

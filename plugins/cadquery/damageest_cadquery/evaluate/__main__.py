@@ -96,8 +96,8 @@ def _read_back(path: Path, mesh: Any, truth: Any, tolerance: float) -> dict[str,
     import cadquery as cq
 
     from damageest.geometry.solids import iou, to_manifold, to_solid
-    from damageest_cadquery._split import measure_volume
     from damageest_cadquery.brep import Brep
+    from damageest_cadquery.exact import measure_volume
 
     solids = cq.importers.importStep(str(path)).solids().vals()
     plain = sum(solid.Volume() for solid in solids)
