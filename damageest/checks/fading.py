@@ -7,7 +7,7 @@ leaves out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 
 import numpy as np
 
@@ -38,14 +38,14 @@ BESIDE = 2.5
 
 def measure_fading(
     damage: Solid, inner: Flags, skin: SkinView, noise: float, systematic: float, tolerance: float,
-    others: Iterable[Solid],
+    others: Callable[[], Flags],
 ) -> Fading | None:  # fmt: skip
     """The volumes of a shallow loss; None for a deeper one.
 
     Args:
         inner: (F,) which faces of ``damage`` are on its inner surface.
         systematic: how far intact skin deviates over whole areas: less is no loss.
-        others: damage volumes of other sites, whose skin is theirs.
+        others: gives the cells (C,) of the skin that other sites remove; it is asked for a shallow loss alone.
     """
     on_skin = np.flatnonzero(~inner & (np.linalg.norm(damage.cross, axis=1) > 0))
     if not len(on_skin) or not inner.any():
@@ -57,10 +57,7 @@ def measure_fading(
     depth = distance_to_mesh(places, bottom)
     if not depth.any():
         return None
-    taken = np.zeros(len(skin.cells.areas), bool)
-    for other in others:
-        taken |= find_removed_cells(other, skin)
-    beyond_depth, beyond_area = _find_beyond(damage, skin, noise, systematic, tolerance, taken)
+    beyond_depth, beyond_area = _find_beyond(damage, skin, noise, systematic, tolerance, others())
     inside = damage.volume / float(depth.sum())
 
     def count_from(least: float) -> float:

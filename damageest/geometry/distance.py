@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -21,6 +22,9 @@ BYTES_OF_POINT, BYTES_OF_TRIANGLE = 230, 480
 
 LARGE = 16.0
 """Longest edge of a triangle, in medians of all, from which it is a large one."""
+
+
+_faults: WeakKeyDictionary[Mesh, tuple[Flags, Flags]] = WeakKeyDictionary()
 
 
 class Closest(NamedTuple):
@@ -149,8 +153,7 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     centre = mesh.bounds.mean(axis=0)
     vertices = mesh.vertices - centre
     query = points - centre
-    scale = mesh.diagonal
-    flat = _find_flat(mesh, scale)
+    flat, unreliable = _find_faults(mesh)
     # Without the flat triangles the surface is the same set of points, and each triangle has a normal.
     used = np.flatnonzero(~flat)
     faces = mesh.faces[used]
@@ -167,7 +170,7 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     # face and not the pseudonormal of the edge: 4 of 70,000 points around a tube with a hole, millimetres from the
     # surface, had the wrong sign.
     doubtful = beside & (np.einsum("ij,ij->i", pseudo, normal) > (1 - 1e-9) * np.linalg.norm(pseudo, axis=1))
-    if (unreliable := _find_unreliable_vertices(mesh, flat, scale)).any():
+    if unreliable.any():
         doubtful |= beside & unreliable[faces[nearest]].any(axis=1)
     if doubtful.any():
         winding = np.asarray(igl.fast_winding_number(vertices, mesh.faces, query[doubtful])).ravel()
@@ -185,6 +188,14 @@ def run_libigl_pass(points: Floats, mesh: Mesh) -> Floats:
 
     kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
     return np.asarray(igl.signed_distance(points, mesh.vertices, mesh.faces, sign_type=kind)[0])
+
+
+def _find_faults(mesh: Mesh) -> tuple[Flags, Flags]:
+    """Flat triangles (F,) and unreliable vertices (V,) of a mesh, found once for each mesh."""
+    if (known := _faults.get(mesh)) is None:
+        flat = _find_flat(mesh, mesh.diagonal)
+        known = _faults[mesh] = flat, _find_unreliable_vertices(mesh, flat, mesh.diagonal)
+    return known
 
 
 def _find_flat(mesh: Mesh, scale: float) -> Flags:

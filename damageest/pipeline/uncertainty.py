@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats
+from damageest.artefacts import Flags, Floats, Ints
+from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.uncertainty import (
@@ -43,9 +45,9 @@ def measure_uncertainty(engine: Engine, work: Work) -> Work:
         return replace(work, job=state.with_value(JobState.volume_95, total, digest("no sites", bool(work.failures))))
     free = _list_free_motions(state)
     pose = measure_pose_error(state.part, state.aligned, state.deviation, state.tolerance, free)
-    sites, errors = [], []
+    sites, errors, taken = [], [], _TakenSkin(state, work.sites)
     for site in work.sites:
-        uncertainty, error = _measure_site(state, site, work.sites, pose)
+        uncertainty, error = _measure_site(state, site, taken, pose)
         sites.append(replace(site, uncertainty=uncertainty))
         if site.accepted:
             errors.append(error)
@@ -61,7 +63,7 @@ def measure_uncertainty(engine: Engine, work: Work) -> Work:
 
 
 def _measure_site(
-    state: JobState, site: FoundSite, every: tuple[FoundSite, ...], pose: PoseError
+    state: JobState, site: FoundSite, taken: _TakenSkin, pose: PoseError
 ) -> tuple[Uncertainty, SiteError | None]:
     """A site's uncertainty, and its errors, None where there is no interval."""
     if site.verdict.level == "doubtful":
@@ -76,7 +78,7 @@ def _measure_site(
     if error is None:
         return Uncertainty(None, None, reasons=("no interval, since no scan points lie on its inner surface",)), None
     reach = BESIDE * max(2 * state.tolerance, 1.5 * state.aligned.spacing)
-    fading = _measure_fading(state, site, inner, every, pose)
+    fading = _measure_fading(state, site, inner, taken, pose)
     error = replace(
         error,
         beside=limit_beside(state.coverage, site.damage, reach, error.depth),
@@ -126,11 +128,30 @@ def _list_free_motions(state: JobState) -> Floats | None:
 
 
 def _measure_fading(
-    state: JobState, site: FoundSite, inner: Flags, every: tuple[FoundSite, ...], pose: PoseError
+    state: JobState, site: FoundSite, inner: Flags, taken: _TakenSkin, pose: PoseError
 ) -> Fading | None:
-    others = [other.damage for other in every if other is not site]
     noise, tolerance = state.aligned.noise, state.tolerance
-    return measure_fading(site.damage, inner, state.skin, noise, pose.systematic, tolerance, others)
+    return measure_fading(
+        site.damage, inner, state.skin, noise, pose.systematic, tolerance, lambda: taken.find_others(site)
+    )
+
+
+class _TakenSkin:
+    """Which cells of the skin the sites remove. Each site is looked at once, when this is first asked."""
+
+    def __init__(self, state: JobState, sites: tuple[FoundSite, ...]) -> None:
+        self._state, self._sites = state, sites
+
+    @cached_property
+    def _counts(self) -> Ints:
+        counts = np.zeros(len(self._state.skin.cells.areas), np.int64)
+        for site in self._sites:
+            counts += find_removed_cells(site.damage, self._state.skin)
+        return counts
+
+    def find_others(self, site: FoundSite) -> Flags:
+        """(C,) the cells that other sites remove."""
+        return np.asarray(self._counts - find_removed_cells(site.damage, self._state.skin) > 0)
 
 
 def shift_interval(interval: Interval | None, more: float) -> Interval | None:

@@ -12,7 +12,7 @@ from damageest.report.deviation_json import DeviationReport, report_deviation
 from damageest.report.fit_json import FitReport, report_fit
 from damageest.report.free_json import FreeMotionReport, report_free_motion
 from damageest.report.provenance import ProvenanceReport
-from damageest.report.site_json import MaterialReport, SiteReport, report_site, sum_material
+from damageest.report.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
 from damageest.report.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
 from damageest.report.uncertainty_json import report_interval
 from damageest.result import Result
@@ -117,7 +117,8 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
     from importlib.metadata import version
 
     part, scan, pose = result.part, result.scan, result.pose
-    sites = [report_site(site, written) for site in result.sites]
+    files = index_files(written.files)
+    sites = [report_site(site, written, files) for site in result.sites]
     filled = Report(
         status=result.status,
         name=result.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Literal
 
 from pydantic import Field
@@ -49,7 +50,8 @@ class ExactReport(JsonModel):
     """Whether the solid in STEP has the CAD's own faces."""
 
     form: str = Field(
-        description="of the inner surface: shapes (planes, cylinders, spheres), spline, facets; none: facets all over"
+        description="of the inner surface: shapes (planes, cylinders, spheres), spline, planes (beside facets), "
+        "facets; none: facets all over"
     )
     faces: int
     inner_faces: int = Field(description="faces inside the part")
@@ -110,13 +112,19 @@ class SiteReport(JsonModel):
     warnings: list[str]
 
 
-def report_site(site: Site, written: ExportedFiles) -> SiteReport:
+def index_files(files: Iterable[str]) -> dict[str, list[str]]:
+    """The files by their path up to the first dot, in either frame."""
+    found: dict[str, list[str]] = {}
+    for name in files:
+        found.setdefault(name.removeprefix("scan_frame/").partition(".")[0], []).append(name)
+    return found
+
+
+def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str]]) -> SiteReport:
+    """``files``: as `index_files` gives them."""
     kinds = ("damage", "surface", "deposit")
     folders = dict(zip(kinds, kinds if site.accepted else ("doubtful", "doubtful/surface", "deposit"), strict=True))
-    own = {
-        kind: [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"{folder}/site-{site.id}.")]
-        for kind, folder in folders.items()
-    }
+    own = {kind: files.get(f"{folder}/site-{site.id}", []) for kind, folder in folders.items()}
     spline, exact = written.splines.get(site.id), written.exact.get(site.id)
 
     low, high = site.damage.bounds.tolist()

@@ -84,7 +84,7 @@ def run(job: Path, site: Site, *words: str) -> subprocess.CompletedProcess[str]:
 
 def test_each_fault_is_the_stages_own(site: Site, tmp_path: Path) -> None:
     """From Python: a worker process for each source of the plugin, so each fault has its own."""
-    path = damaged_box.write(tmp_path)
+    path = damaged_box.write_small(tmp_path)
     damageest.run(path, output=True)
     before = damaged_box.content(tmp_path / "out/job")
     for name, (body, text) in FAULTS.items():
@@ -102,7 +102,7 @@ def test_each_fault_is_the_stages_own(site: Site, tmp_path: Path) -> None:
 
 def test_a_hang_on_the_command_line(site: Site, tmp_path: Path) -> None:
     site.add("acme-bad", CLUSTER.replace("BODY", FAULTS["hang"][0]))
-    job = damaged_box.write(tmp_path, damaged_box.JOB + "cluster: faulty\n")
+    job = damaged_box.write_small(tmp_path, "cluster: faulty\n")
     done = run(job, site, "--stage-timeout", "1", "--memory", "4GB")
     assert done.returncode == 1
     assert "cluster: faulty: was ended: not finished after 1 s" in " ".join(done.stderr.split())
@@ -113,7 +113,7 @@ def test_a_hang_on_the_command_line(site: Site, tmp_path: Path) -> None:
 def test_sys_exit_in_a_stage_without_a_process_of_its_own(site: Site, tmp_path: Path) -> None:
     body = "return Solid(damage.vertices * self.factor, damage.faces)"
     site.add("acme-bad", GROWN.replace(body, "import sys; sys.exit(0)"))
-    result = damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n"))
+    result = damageest.run(damaged_box.write_small(tmp_path, "allowance: doubled\n"))
     assert any("allowance: doubled (site 1): called sys.exit(0)" in text for text in result.failures)
     assert "acme-bad 1.2" in " ".join(result.failures)
 
@@ -122,7 +122,7 @@ def test_method_auto_goes_on_after_a_crash(site: Site, tmp_path: Path, capfd: py
     """The site that is lost to the crash is found by the other method. What a worker prints goes to the error
     stream."""
     site.add("acme-once", ONCE)
-    path = damaged_box.write(tmp_path)
+    path = damaged_box.write_small(tmp_path)
     result = damageest.run(path, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"])
     assert (tmp_path / "crashed").exists()
     assert result.status == "ok"
@@ -136,7 +136,7 @@ def test_method_auto_goes_on_after_a_crash(site: Site, tmp_path: Path, capfd: py
 def test_the_same_result_as_without_isolation(site: Site, tmp_path: Path) -> None:
     site.add("acme-once", ONCE)
     (tmp_path / "crashed").touch()
-    path = damaged_box.write(tmp_path)
+    path = damaged_box.write_small(tmp_path)
     isolated = damageest.run(path, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"])
     own = damageest.run(path)
     assert isolated.sites[0].damage.vertices.tobytes() == own.sites[0].damage.vertices.tobytes()

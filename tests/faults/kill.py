@@ -22,7 +22,6 @@ import damageest
 from tests import damaged_box
 
 MAIN = [sys.executable, "-c", "from damageest.cli import main; main()"]
-JOB = damaged_box.JOB.replace("tolerance: 0.2", "tolerance: 0.4")
 
 
 @dataclass
@@ -50,7 +49,7 @@ def strip(folder: Path) -> dict[str, bytes]:
 def kill_runs(home: Path, count: int, seed: int = 0) -> Count:
     """Runs a job ``count`` times over an earlier output, each killed at a moment of its own. Every second time only the
     process is killed that the shell knows, else all of the run at once."""
-    path = damaged_box.write(home, JOB)
+    path = damaged_box.write_small(home)
     damageest.run(path, output=True, cache=False)  # what is imported once takes no time below
     start = time.monotonic()
     damageest.run(path, output=True, cache=False)

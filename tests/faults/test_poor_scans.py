@@ -34,8 +34,11 @@ def write(folder: Path, points: np.ndarray, job: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("tolerance", ["0.2", "auto"])
-@pytest.mark.parametrize("name", POOR)
+SLOW = pytest.mark.slow
+KINDS = [(name, "0.2") for name in POOR] + [pytest.param(name, "auto", marks=SLOW) for name in POOR]
+
+
+@pytest.mark.parametrize(("name", "tolerance"), KINDS)
 def test_no_damage_is_found_in_next_to_nothing(name: str, tolerance: str, tmp_path: Path) -> None:
     job = damaged_box.JOB.replace("tolerance: 0.2", f"tolerance: {tolerance}")
     done = CliRunner().invoke(app, ["run", str(write(tmp_path, POOR[name], job))])
@@ -48,7 +51,7 @@ def test_no_damage_is_found_in_next_to_nothing(name: str, tolerance: str, tmp_pa
     assert "that the scan shows" in done.stdout
 
 
-@pytest.mark.parametrize("align", ["none", "register"])
+@pytest.mark.parametrize("align", ["none", pytest.param("register", marks=SLOW)])
 def test_far_points_are_set_aside_counted_and_said(align: str, tmp_path: Path) -> None:
     """Twenty points a thousand diagonals away change nothing of what is found."""
     job = damaged_box.JOB.replace("align: none", f"align: {align}")

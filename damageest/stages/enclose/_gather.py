@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -50,6 +51,40 @@ class GatheredLosses:
     intact_normals: Floats
     intact_areas: Floats
 
+    @cached_property
+    def surface(self) -> tuple[_Sorted, Floats, Floats]:
+        """The points of all groups and of the intact skin, with normals (N,3) and areas (N,)."""
+        points = np.concatenate([*(group.points for group in self.groups), self.intact])
+        normals = np.concatenate([*(group.normals for group in self.groups), self.intact_normals])
+        return _Sorted(points), normals, np.concatenate([*(group.areas for group in self.groups), self.intact_areas])
+
+    @cached_property
+    def places(self) -> tuple[_Sorted, Ints]:
+        """The points and the lost skin of all groups, and the intact skin, with the number (N,) of the group, -1 for
+        intact skin."""
+        pieces = [points for group in self.groups for points in (group.points, group.lost)]
+        sizes = [len(group.points) + len(group.lost) for group in self.groups]
+        owner = np.repeat([*range(len(self.groups)), -1], [*sizes, len(self.intact)])
+        return _Sorted(np.concatenate([*pieces, self.intact])), owner
+
+
+class _Sorted:
+    """Points (N,3) of which those in a small box are found without a look at all of them."""
+
+    def __init__(self, points: Floats) -> None:
+        self.points = points
+        self._axis = int(np.ptp(points, axis=0).argmax()) if len(points) else 0
+        self._order = np.argsort(points[:, self._axis], kind="stable")
+        self._along = points[self._order, self._axis]
+
+    def find_in(self, grid: Grid) -> Ints:
+        """Ascending indices of the points in a grid."""
+        low = grid.origin[self._axis]
+        high = low + grid.cell * grid.shape[self._axis]
+        first, last = np.searchsorted(self._along, (low - grid.cell, high + grid.cell))
+        some = np.sort(self._order[first:last])
+        return np.asarray(some[grid.contains(self.points[some])])
+
 
 def gather_losses(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float,
@@ -74,11 +109,9 @@ def gather_losses(
 
 def select_in_grid(gathered: GatheredLosses, grid: Grid) -> tuple[Floats, Floats, Floats]:
     """Points (N,3), normals (N,3) toward the lost side or the void, and areas (N,), of all that lies in the grid."""
-    points = np.concatenate([*(group.points for group in gathered.groups), gathered.intact])
-    normals = np.concatenate([*(group.normals for group in gathered.groups), gathered.intact_normals])
-    areas = np.concatenate([*(group.areas for group in gathered.groups), gathered.intact_areas])
-    inside = grid.contains(points)
-    return points[inside], normals[inside], areas[inside]
+    every, normals, areas = gathered.surface
+    inside = every.find_in(grid)
+    return every.points[inside], normals[inside], areas[inside]
 
 
 def cut_beyond_reach(grid: Grid, field: GridValues, gathered: GatheredLosses, number: int, slack: float) -> GridValues:
@@ -90,14 +123,12 @@ def cut_beyond_reach(grid: Grid, field: GridValues, gathered: GatheredLosses, nu
     """
     from scipy.ndimage import distance_transform_edt
 
-    group = gathered.groups[number]
-    ours = np.concatenate([group.points, group.lost])
-    rest = [np.concatenate([other.points, other.lost]) for k, other in enumerate(gathered.groups) if k != number]
-    theirs = np.concatenate([gathered.intact, *rest])
     half = grid.coarsen()
+    every, owner = gathered.places
+    inside = every.find_in(half)
+    is_ours = owner[inside] == number
     distances = []
-    for points in (ours, theirs):
-        points = points[half.contains(points)]
+    for points in (every.points[inside[is_ours]], every.points[inside[~is_ours]]):
         if not len(points):
             return field
         free = np.ones(half.shape, bool)

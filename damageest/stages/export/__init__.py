@@ -48,12 +48,12 @@ class Spline:
 class ExactForm:
     """How a damage volume was written whose outer faces are the CAD's own.
 
-    ``form``: of its inner surface: ``shapes`` (planes, cylinders, spheres), ``spline``, ``facets``, or ``none`` where
-    the solid could not be made and is written with facets all over. ``faces`` and ``inner_faces``: how many faces it
-    has, and how many of them are inside the part. ``volume``. ``distance``: 95 % of its inner surface are as near to
-    the mesh's, both ways; ``farthest``: all of it; ``beyond``: the share of it that is farther than a quarter of the
-    tolerance. What lies less deep than that below the skin counts as near. ``seconds`` of the processor. ``tried``:
-    what was refused before it, and why.
+    ``form``: of its inner surface: ``shapes`` (planes, cylinders, spheres), ``spline``, ``planes`` (beside facets),
+    ``facets``, or ``none`` where the solid could not be made and is written with facets all over. ``faces`` and
+    ``inner_faces``: how many faces it has, and how many of them are inside the part. ``volume``. ``distance``: 95 % of
+    its inner surface are as near to the mesh's, both ways; ``farthest``: all of it; ``beyond``: the share of it that is
+    farther than a quarter of the tolerance. What lies less deep than that below the skin counts as near. ``seconds`` of
+    the processor. ``tried``: what was refused before it, and why.
     """
 
     form: str

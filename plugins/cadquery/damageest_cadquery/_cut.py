@@ -85,7 +85,7 @@ def _smooth_outside(cut: Cut, part: Part, tolerance: float) -> Cut:
     moving[faces[cut.core]] = False
     moving &= cut.height > CLEAR * tolerance
     rim = np.zeros(count, bool)
-    edges = _find_rim(faces)
+    edges = find_rim(faces)
     rim[edges] = True
     ends = np.concatenate([faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), edges[:, ::-1]])
     used = moving[ends[:, 0]] & (~rim[ends[:, 0]] | rim[ends[:, 1]])  # along the rim only the rim counts
@@ -114,13 +114,13 @@ def _drop_horns(cut: Cut, surface: Surface, tolerance: float) -> Cut:
     if dropped.sum() > HORNS * cut.core.sum():
         return cut
     outer = np.zeros(size, bool)
-    outer[_find_rim(faces)[:, 0]] = True
+    outer[find_rim(faces)[:, 0]] = True
     for _ in range(8):  # a hole that touches another, or the rim, would pass a vertex twice
         touched = np.zeros(size, bool)
         touched[faces[dropped]] = True
         if (touched & outer).any():
             return cut
-        starts = np.bincount(_find_rim(faces[~dropped])[:, 0], minlength=size)
+        starts = np.bincount(find_rim(faces[~dropped])[:, 0], minlength=size)
         if not (starts > 1).any():
             break
         dropped |= (starts > 1)[faces].any(axis=1)
@@ -129,7 +129,7 @@ def _drop_horns(cut: Cut, surface: Surface, tolerance: float) -> Cut:
     left = faces[~dropped]
     loops = [loop for loop in trace_loops(left) if not outer[loop].any()]
     middles = [np.concatenate([cut.mesh.vertices[loop], cut.height[loop, None]], axis=1).mean(axis=0) for loop in loops]
-    filled, rim = [], set(map(tuple, _find_rim(left).tolist()))
+    filled, rim = [], set(map(tuple, find_rim(left).tolist()))
     for number, loop in enumerate(loops):
         ends = np.column_stack([loop, np.roll(loop, -1)])
         if (int(ends[0, 0]), int(ends[0, 1])) in rim:  # in the direction of the triangles: the new ones run against it
@@ -141,7 +141,7 @@ def _drop_horns(cut: Cut, surface: Surface, tolerance: float) -> Cut:
     return _take_used(Cut(mesh, np.concatenate([cut.height, more[:, 3]]), core))
 
 
-def _find_rim(faces: Ints) -> Ints:
+def find_rim(faces: Ints) -> Ints:
     """(E,2) the directed edges that one triangle has alone."""
     edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = int(faces.max()) + 1
@@ -183,7 +183,7 @@ def _close_gaps(faces: Ints, chosen: Flags) -> Flags:
         small = (count < ISLAND * chosen.sum()) & (count < count.max())
         chosen = chosen.copy()
         chosen[left[small[label]]] = True
-        starts = np.bincount(_find_rim(faces[chosen])[:, 0], minlength=size)
+        starts = np.bincount(find_rim(faces[chosen])[:, 0], minlength=size)
         pinched = starts > 1
         if not pinched.any():
             return chosen

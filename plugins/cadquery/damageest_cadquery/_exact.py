@@ -1,6 +1,7 @@
 """Finds the exact damage volume of a site: the part's CAD solids split by its inner damage surface.
 
-Tried in this order, and the first that passes the checks is taken: recognised shapes, one spline, few facets, more.
+Tried in this order, and the first that passes the checks is taken: recognised shapes, splines, planes beside facets,
+few facets, more. Where planes explain most of it, they come before splines.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import LIMITS, Measured, check_pieces, measure_inner_area
 from damageest_cadquery._cut import Cut, find_inner, make_cut, take_faces
 from damageest_cadquery._flat_faces import Flat, find_flat_faces
-from damageest_cadquery._polyhedron import decimate, mark_planes, measure_miss, simplify, thin_points
+from damageest_cadquery._polyhedron import decimate, fit, mark_planes, measure_miss, thin_points
 from damageest_cadquery._read import explore
 from damageest_cadquery._shapes import build_shapes, find_shapes
 from damageest_cadquery._spline import SPANS, Way, build_splines, drop_tails, find_charts
@@ -70,7 +71,7 @@ class SiteInput:
 
 @dataclass(frozen=True, eq=False)
 class Exact:
-    """``pieces``: the damage volume; ``rest``: what is left of the solids; ``form``: shapes, spline, facets or body;
+    """``pieces``: the damage volume; ``rest``: what is left of the solids; ``form``: shapes, spline, planes or facets;
     ``seconds``: of the processor; ``tried``: what was refused before, and why."""
 
     pieces: tuple[Piece, ...]
@@ -104,7 +105,10 @@ def find_exact(
         return None, ("no surface is known that cuts it out of the part",)
     inner_before = measure_inner_area(solids)
     bodies = sum(body.volume > SPECK * site.damage.volume for body in split_bodies(site.damage))
+    refused = ""
     for form, make, fuzzies in _list_tools(cut, part, tolerance):
+        if form.split()[0] == refused:
+            continue  # another width of the same shapes
         tool = _call(make)
         for fuzzy in fuzzies if tool is not None else ():
             assert tool is not None
@@ -127,6 +131,7 @@ def find_exact(
                 return Exact(pieces, rest, form.split()[0], measured, seconds, tuple(tried)), tuple(tried)
             tried.append(f"{form}: {measured.reason}")
             if np.isfinite(measured.farthest) or measured.reason.startswith("its volume"):
+                refused = "shapes"
                 break  # it is sound but not near enough, and another fuzzy value does not change that
     return None, tuple(tried) or ("no surface could be built that cuts it out of the part",)
 
@@ -156,9 +161,12 @@ def _list_tools(cut: Cut, part: Part, tolerance: float) -> Iterator[Attempt]:
 
 
 def _list_flat(flat: Flat, cut: Cut, points: Floats, tolerance: float, counts: Sequence[int]) -> Iterator[Attempt]:
-    flat = decimate(flat, max(counts))  # once, since it takes long for a fine surface
-    for count in counts:
-        less = simplify(flat, cut, count, tolerance)
+    levels = []
+    for count in sorted(counts, reverse=True):  # each from the one before: the first step takes longest
+        flat = decimate(flat, count)
+        levels.append((count, flat))
+    for count, level in reversed(levels):
+        less = fit(level, cut, tolerance)
         form = "planes" if (less.label >= 0).any() else "facets"
         if (
             len(points)

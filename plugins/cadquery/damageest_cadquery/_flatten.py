@@ -6,6 +6,8 @@ weights, so that no triangle folds: W. T. Tutte, "How to draw a graph", 1963; M.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import spsolve
@@ -16,15 +18,37 @@ from damageest.geometry.loops import trace_loops
 
 
 def flatten(mesh: Mesh) -> Floats | None:
-    """(V,2) places in the unit disk; None where the surface is not one sheet with one rim."""
+    """(V,2) places in the unit disk; None where the surface is not one sheet. Of several rims, the longest is the
+    circle's."""
     try:
         loops = trace_loops(mesh.faces)
     except StageError:  # two of them touch
         return None
-    edges = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    if len(loops) != 1 or len(mesh.vertices) - len(edges) + len(mesh.faces) != 1:
+    if not loops:
         return None
-    rim = loops[0]
+    lengths = [float(np.linalg.norm(mesh.vertices[k] - mesh.vertices[np.roll(k, 1)], axis=1).sum()) for k in loops]
+    longest = int(np.argmax(lengths))
+    closed = _close_holes(mesh, [loop for k, loop in enumerate(loops) if k != longest])
+    edges = np.unique(np.sort(closed.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    if len(closed.vertices) - len(edges) + len(closed.faces) != 1:
+        return None
+    places = _flatten_disk(closed, loops[longest])
+    return None if places is None else places[: len(mesh.vertices)]
+
+
+def _close_holes(mesh: Mesh, loops: Sequence[Ints]) -> Mesh:
+    """The surface with a fan of triangles over each loop."""
+    if not loops:
+        return mesh
+    middles = np.array([mesh.vertices[loop].mean(axis=0) for loop in loops])
+    fans = [
+        np.column_stack([loop, np.roll(loop, -1), np.full(len(loop), len(mesh.vertices) + number)])
+        for number, loop in enumerate(loops)
+    ]
+    return Mesh(np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces, *fans]))
+
+
+def _flatten_disk(mesh: Mesh, rim: Ints) -> Floats | None:
     if len(np.unique(rim)) != len(rim):
         return None
     steps = np.linalg.norm(mesh.vertices[rim] - mesh.vertices[np.roll(rim, 1)], axis=1)

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from damageest.artefacts import Floats
 
 
-def trace_regions(triangles: Floats, size: float, beyond: float = 1.0) -> list[list[Floats]]:
-    """For each region of triangles (F,3,2) its outlines (K,2), the outer one first, moved outward by ``beyond`` times
-    ``size``; holes smaller than that are closed."""
-    from manifold3d import CrossSection, FillRule, JoinType
+def cover(triangles: Floats) -> tuple[list[Floats], float]:
+    """The outlines (K,2) of the region that triangles (F,3,2) cover, holes too; and the share of their area that lies
+    over others."""
+    from manifold3d import CrossSection, FillRule
 
     area = cross_plane(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     turned = np.where((area < 0)[:, None, None], triangles[:, ::-1], triangles)
-    whole = CrossSection(list(np.ascontiguousarray(turned)), FillRule.NonZero).simplify(size / 20)
+    whole = CrossSection(list(np.ascontiguousarray(turned)), FillRule.NonZero)
+    loops = [np.asarray(loop, np.float64) for loop in whole.to_polygons()]
+    return loops, 1 - 2 * whole.area() / max(float(np.abs(area).sum()), 1e-300)
+
+
+def trace_regions(outlines: Sequence[Floats], size: float, beyond: float = 1.0) -> list[list[Floats]]:
+    """For each region within ``outlines`` its outlines (K,2), the outer one first, moved outward by ``beyond`` times
+    ``size``; holes smaller than that are closed."""
+    from manifold3d import CrossSection, FillRule, JoinType
+
+    whole = CrossSection([np.ascontiguousarray(loop) for loop in outlines], FillRule.Positive).simplify(size / 20)
     whole = whole.offset((beyond + 0.5) * size, JoinType.Round, 2.0, 16).offset(-0.5 * size, JoinType.Round, 2.0, 16)
     regions = []
     for each in whole.simplify(size / 8).decompose():
@@ -25,17 +37,6 @@ def trace_regions(triangles: Floats, size: float, beyond: float = 1.0) -> list[l
 
 def cross_plane(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
-def covers_once(triangles: Floats, hidden: float) -> bool:
-    """Whether triangles (F,3,2) do not lie over one another, but for a share ``hidden`` of their area."""
-    from manifold3d import CrossSection, FillRule
-
-    area = cross_plane(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
-    turned = np.where((area < 0)[:, None, None], triangles[:, ::-1], triangles)
-    return bool(
-        CrossSection(list(np.ascontiguousarray(turned)), FillRule.NonZero).area() > (1 - hidden) * np.abs(area).sum()
-    )
 
 
 def walk_outline(loop: Floats, step: float) -> tuple[Floats, Floats]:

@@ -78,13 +78,12 @@ def _collapse(flat: Flat, count: int, apart: bool) -> Flat:
     return Flat(Mesh(np.asarray(V, np.float64), np.asarray(F, np.int64)), flat.label[np.asarray(birth)], flat.planes)
 
 
-def simplify(flat: Flat, cut: Cut, count: int, tolerance: float) -> Flat:
-    """The surface with about ``count`` triangles, fitted to vertices of the cut."""
-    less = decimate(flat, count)
-    mesh, label = less.mesh, less.label
+def fit(flat: Flat, cut: Cut, tolerance: float) -> Flat:
+    """A simplified surface fitted to vertices of the cut."""
+    mesh, label = flat.mesh, flat.label
     bounds = _find_bounds(mesh.faces, label, len(flat.planes), len(mesh.vertices))
     free = np.asarray(~bounds.any(axis=1))
-    mesh = _fit_vertices(mesh, free, thin_points(cut.mesh.vertices, PER_TRIANGLE * count), tolerance)
+    mesh = _fit_vertices(mesh, free, thin_points(cut.mesh.vertices, PER_TRIANGLE * len(mesh.faces)), tolerance)
     return _settle(Flat(mesh, label, flat.planes), tolerance)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.distance import closest_on_mesh
-from damageest_cadquery._outlines import trace_regions
+from damageest_cadquery._outlines import cover, trace_regions
 from damageest_cadquery._recognise import Shape, recognise
 from damageest_cadquery._split import Tool
 
@@ -118,7 +118,7 @@ def _polygon(rim: Floats, origin: Floats, first: Floats, second: Floats) -> Any:
 
 def _trace_outline(triangles: Floats, beyond: float) -> list[Floats]:
     """The outlines (K,2) of all regions of triangles (F,3,2), moved outward by ``beyond``, the longest first."""
-    loops = [loop for region in trace_regions(triangles, beyond) for loop in region]
+    loops = [loop for region in trace_regions(cover(triangles)[0], beyond) for loop in region]
     return sorted(loops, key=lambda loop: -np.ptp(loop, axis=0).prod())
 
 

@@ -19,21 +19,23 @@ from damageest.artefacts import Flags, Floats, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, signed_distance
 from damageest.geometry.height_spline import DEGREE, fit_height_plane, fit_parametric_spline
 from damageest.stages.export import Patch
-from damageest_cadquery._cut import split_mesh, take_faces
+from damageest_cadquery._cut import find_rim, split_mesh, take_faces
 from damageest_cadquery._flatten import flatten
-from damageest_cadquery._outlines import covers_once, trace_regions, walk_outline
+from damageest_cadquery._outlines import cover, trace_regions, walk_outline
 from damageest_cadquery._patch import build_surface, build_wire
 from damageest_cadquery._split import Tool
 
 SPANS = (8, 14, 20, 28, 38, 50)
 BIT = 2e-3
 """Share of the surface below which a connected piece of it gets no spline."""
-HIDDEN = 0.02
+HIDDEN = 0.04
 """Largest share of a surface that may face away where it is seen from one side; the fit then decides."""
-EXTENTS = (1.5, 2.5, 4.0, 6.0)
+EXTENTS = (1.5, 1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)
 """How far a spline reaches beyond the inner damage surface, in tolerances: the first at which it has left the part."""
 RISE = 0.5
 """Least slope against the part's skin with which a spline goes on beyond its rim."""
+OUTSIDE = 0.7
+"""Least height over the part, in tolerances, of points to which it goes on."""
 EVEN = 9
 """Places along the rim, a tolerance apart, over which the direction is averaged in which a spline goes on."""
 _WRAP = 2 * np.pi
@@ -46,18 +48,17 @@ Way = Literal["seen", "disk"]
 @dataclass(frozen=True, eq=False)
 class Chart:
     """``uv`` (V,2): places, in the plane, of the vertices of ``mesh``, about as far apart as in space; ``deep`` (V,):
-    whether they lie deeper than a quarter of the tolerance below the part's skin."""
+    whether they lie deeper than a quarter of the tolerance below the part's skin; ``outlines`` (K,2): of all places."""
 
     mesh: Mesh
     uv: Floats
     deep: Flags
+    outlines: Sequence[Floats]
 
 
 def drop_tails(inner: Mesh, width: float) -> Mesh:
     """The surface without what is narrower than twice the ``width``: noise draws it out along the skin."""
-    edges = inner.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    code, times = np.unique(np.sort(edges, axis=1) @ [len(inner.vertices), 1], return_counts=True)
-    rim = np.unique(np.concatenate(np.divmod(code[times == 1], len(inner.vertices))))
+    rim = np.unique(find_rim(inner.faces))
     points = inner.vertices
     wide = np.asarray(cKDTree(points[rim]).query(points)[0]) > width
     if not wide.any():
@@ -70,25 +71,39 @@ def find_charts(inner: Mesh, how: Way, part: Part, tolerance: float) -> list[Cha
     """Each connected piece of a surface spread over a plane: as seen from one side, or over a disk, also where it
     overhangs. None where one cannot be."""
     charts, whole = [], np.linalg.norm(inner.cross, axis=1).sum()
-    for piece in split_mesh(inner):
+    for piece in split_mesh(_drop_pinches(inner)):
         area = np.linalg.norm(piece.cross, axis=1).sum()
         if area < BIT * whole:
             continue
-        uv = _look_along(piece) if how == "seen" else flatten(piece)
+        if how == "seen":
+            uv = _look_along(piece)
+        else:
+            disk = flatten(piece)
+            uv = None if disk is None else disk * np.sqrt(area / _WRAP)
         if uv is None:
             return None
+        outlines, hidden = cover(uv[piece.faces])
+        if hidden > 2 * HIDDEN:
+            return None
         deep = distance_to_mesh(piece.vertices, part) > tolerance / 4
-        charts.append(Chart(piece, uv if how == "seen" else uv * np.sqrt(area / _WRAP), deep))
+        charts.append(Chart(piece, uv, deep, outlines))
     return charts
 
 
+def _drop_pinches(mesh: Mesh) -> Mesh:
+    """The surface without the triangles at vertices in which its rim touches itself."""
+    for _ in range(6):
+        starts = np.bincount(find_rim(mesh.faces)[:, 0], minlength=len(mesh.vertices))
+        if not (starts > 1).any():
+            break
+        mesh = take_faces(mesh, np.flatnonzero(~(starts > 1)[mesh.faces].any(axis=1)))
+    return mesh
+
+
 def _look_along(mesh: Mesh) -> Floats | None:
-    """(V,2) the vertices as seen from the side that shows all of the surface; None where there is none."""
+    """(V,2) the vertices as seen from the side that shows most of the surface; None where it hides too much."""
     axes, away = fit_height_plane(mesh)
-    if away > HIDDEN:
-        return None
-    uv = (mesh.vertices - mesh.bounds.mean(axis=0)) @ axes[:2].T
-    return uv if covers_once(uv[mesh.faces], 2 * HIDDEN) else None
+    return None if away > HIDDEN else (mesh.vertices - mesh.bounds.mean(axis=0)) @ axes[:2].T
 
 
 def build_splines(charts: Sequence[Chart], part: Part, spans: int, tolerance: float) -> Tool | None:
@@ -124,12 +139,16 @@ def _build_spline(chart: Chart, part: Part, spans: int, tolerance: float) -> lis
     fit = fit_parametric_spline(np.concatenate([chart.uv, uv]), np.concatenate([vertices, beyond]), spans, 0.02)
     if not _is_near(fit, chart, tolerance):
         return None
+    best, regions = tolerance / 20, None
     for extent in EXTENTS:
-        regions = trace_regions(chart.uv[chart.mesh.faces], extent * tolerance)
-        rim = np.concatenate([walk_outline(loop, tolerance / 2)[0] for loops in regions for loop in loops])
-        if signed_distance(_evaluate(fit, rim), part)[0].min() > tolerance / 5:
+        found = trace_regions(chart.outlines, extent * tolerance)
+        rim = np.concatenate([walk_outline(loop, tolerance / 2)[0] for loops in found for loop in loops])
+        height = float(signed_distance(_evaluate(fit, rim), part)[0].min())
+        if height > best:
+            best, regions = height, found
+        if best > tolerance / 4:
             break
-    else:
+    if regions is None:
         return None
     surface = build_surface(Patch(DEGREE, *fit), 1.0)
     return [_trim(surface, loops) for loops in regions]
@@ -138,14 +157,14 @@ def _build_spline(chart: Chart, part: Part, spans: int, tolerance: float) -> lis
 def _is_near(fit: Fit, chart: Chart, tolerance: float) -> bool:
     way = _evaluate(fit, chart.uv[chart.deep]) - chart.mesh.vertices[chart.deep]
     off = np.abs(np.einsum("ij,ij->i", way, chart.mesh.vertex_normals[chart.deep]))
-    return not len(off) or bool(np.quantile(off, 0.98) <= tolerance / 4 and off.max() <= 1.5 * tolerance)
+    return not len(off) or bool(np.quantile(off, 0.985) <= tolerance / 4 and off.max() <= 1.5 * tolerance)
 
 
 def _continue(chart: Chart, fit: Fit, part: Part, tolerance: float) -> tuple[Floats, Floats]:
     """Places (N,2) beyond the rim of a chart, and points (N,3) there: straight on, and away from the part."""
     places, points = [], []
     steps = np.arange(1.5, EXTENTS[-1] + 2.5, 1.5) * tolerance
-    for loop in (loop for region in trace_regions(chart.uv[chart.mesh.faces], tolerance, 0.0) for loop in region):
+    for loop in (loop for region in trace_regions(chart.outlines, tolerance, 0.0) for loop in region):
         at, out = walk_outline(loop, tolerance)
         inside = at - 0.7 * tolerance * out
         start, back = _evaluate(fit, inside), _evaluate(fit, inside - 1.5 * tolerance * out)
@@ -158,7 +177,11 @@ def _continue(chart: Chart, fit: Fit, part: Part, tolerance: float) -> tuple[Flo
         way += np.maximum(RISE - rise, 0.0) * size * skin
         places.append((inside[:, None] + steps[:, None] * out[:, None]).reshape(-1, 2))
         points.append((start[:, None] + steps[:, None] * way[:, None]).reshape(-1, 3))
-    return np.concatenate(places), np.concatenate(points)
+    uv, beyond = np.concatenate(places), np.concatenate(points)
+    low = np.flatnonzero(signed_distance(beyond, part)[0] < OUTSIDE * tolerance)  # as behind a concave edge
+    _, face, foot = closest_on_mesh(beyond[low], part)
+    beyond[low] = foot + OUTSIDE * tolerance * part.face_normals[face]
+    return uv, beyond
 
 
 def _evaluate(fit: Fit, uv: Floats) -> Floats:

@@ -25,6 +25,7 @@ from damageest.result import Result
 from damageest.stages.export import Body, ExactForm, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._read import read
+from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
 from damageest_cadquery._worker import Request
 
 LIMIT = 120.0

@@ -66,7 +66,7 @@ def run_case(path: Path, seed: int, output: Path) -> list[dict[str, Any]]:
         rough = Brep(path=path, chord=0.05).run(unit="mm", tolerance=None)
         tolerance = TOLERANCE * rough.diagonal
         kind = list(KINDS)[seed % len(KINDS)]
-        drawn = make_random_damage(rough, seed, (kind,), count=COUNT)
+        drawn = make_random_damage(rough, seed, (kind,), count=COUNT)  # another kind where the part has no place for it
         scan = {"use": "simulate", "points": POINTS, "noise": NOISE * rough.diagonal, "seed": seed}
         scan["damage"] = [tool.model_dump(mode="json") for tool in drawn.tools]
         job = {
@@ -97,13 +97,17 @@ def _read_back(path: Path, mesh: Any, truth: Any, tolerance: float) -> dict[str,
 
     from damageest.geometry.solids import iou, to_manifold, to_solid
     from damageest_cadquery.brep import Brep
+    from damageest_cadquery.exact import measure_volume
 
     solids = cq.importers.importStep(str(path)).solids().vals()
+    plain = sum(solid.Volume() for solid in solids)
+    gmsh = _read_with_gmsh(path)
     row: dict[str, Any] = {
-        "read_volume": sum(solid.Volume() for solid in solids),
+        "read_volume": sum(measure_volume(solid.wrapped) for solid in solids),
         "read_solids": len(solids),
         "read_valid": all(solid.isValid() for solid in solids),
-        "gmsh": _read_with_gmsh(path),
+        # gmsh integrates with a fixed number of points, as CadQuery does: the two are compared
+        "gmsh": None if gmsh is None else [gmsh[0] / plain - 1, gmsh[1]],
     }
     if truth is None:
         return row
@@ -157,7 +161,7 @@ def summarise(rows: Sequence[dict[str, Any]]) -> str:
     same = [abs(row["read_volume"] / row["volume"] - 1) < 1e-4 and row["read_valid"] for row in back]
     lines.append(f"read back by cadquery: {sum(same)} of {len(back)} with the same volume, valid")
     other = [row for row in back if row["gmsh"]]
-    same = [abs(row["gmsh"][0] / row["volume"] - 1) < 1e-4 and row["gmsh"][1] == row["read_solids"] for row in other]
+    same = [abs(row["gmsh"][0]) < 1e-4 and row["gmsh"][1] == row["read_solids"] for row in other]
     lines.append(f"read back by gmsh: {sum(same)} of {len(other)} with the same volume and number of solids")
     both = np.array([[row["iou_exact"], row["iou_mesh"]] for row in good if "iou_exact" in row])
     if len(both):
