@@ -73,9 +73,8 @@ class Implicit(EncloseAll):
             field = cut_beyond_reach(grid, field, gathered, number, 4 * tolerance)
             region = extract_region(grid, field)
             if region is not None:
-                region = thin_region(region, 0.5 * self.detail * tolerance)  # so that fewer vertices are fitted
                 region = refit_region(region, points, normals, 0.5 * tolerance)
-                region = thin_region(region, 0.5 * self.detail * tolerance)
+                region = thin_region(region, self.detail * tolerance)
                 items.append(Enclosure(region, group.sites, notes))
         if not items:
             raise StageError(
