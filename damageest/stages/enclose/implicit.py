@@ -37,7 +37,7 @@ class Implicit(EncloseAll):
         0.03,
         ge=0,
         le=1,
-        description="how far the surface may move for fewer triangles, in tolerances; 0: as the grid gives it",
+        description="about how far the surface may move for fewer triangles, in tolerances; 0: as the grid gives it",
     )
     most_cells: int = Field(
         4_000_000, ge=50_000, le=60_000_000, description="most grid cells for one loss; a larger loss gets larger cells"
