@@ -63,8 +63,8 @@ def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: floa
 def _drop_single(aligned: Scan, asked: Ints, near: Flags, tolerance: float) -> Ints:
     """Those of the points ``asked`` (A,) that noise alone does not explain: on another surface most points lie deep, on
     the skin a few. All where the scan is too sparse to tell."""
-    edge = 3 * aligned.spacing
-    if edge > 2 * tolerance or not len(asked):
+    edge = min(3 * aligned.spacing, 2 * tolerance)
+    if edge < 2 * aligned.spacing or not len(asked):
         return asked
     around = np.flatnonzero(near)
     cube = number_cubes(aligned.points[around], edge)[1]
