@@ -50,9 +50,9 @@ def kill_runs(home: Path, count: int, seed: int = 0) -> Count:
     """Runs a job ``count`` times over an earlier output, each killed at a moment of its own. Every second time only the
     process is killed that the shell knows, else all of the run at once."""
     path = damaged_box.write_small(home)
-    damageest.run(path, output=True, cache=False)  # what is imported once takes no time below
+    child, _ = _start(path)
     start = time.monotonic()
-    damageest.run(path, output=True, cache=False)
+    assert child.wait() == 0
     length = time.monotonic() - start
     out, result = home / "out/job", Count()
     right = strip(out)
@@ -68,18 +68,21 @@ def kill_runs(home: Path, count: int, seed: int = 0) -> Count:
     return result
 
 
-def _kill_one(path: Path, moment: float, whole: bool) -> tuple[int, str]:
-    """The exit status, and the stage that the run named last."""
-    child = subprocess.Popen(
-        [*MAIN, "run", str(path), "--no-cache"],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+def _start(path: Path) -> tuple[subprocess.Popen[bytes], bytes]:
+    """A run that has begun with its first stage, and what it has printed."""
+    command = [*MAIN, "run", str(path), "--no-cache"]
+    child = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True)
     assert child.stderr
     text = b""
-    while b"  part:" not in text:  # its imports are done
+    while b"  part:" not in text:
         text += os.read(child.stderr.fileno(), 1 << 12)
+    return child, text
+
+
+def _kill_one(path: Path, moment: float, whole: bool) -> tuple[int, str]:
+    """The exit status, and the stage that the run named last."""
+    child, text = _start(path)
+    assert child.stderr
     time.sleep(moment)
     if child.poll() is None:
         os.killpg(child.pid, signal.SIGKILL) if whole else child.kill()

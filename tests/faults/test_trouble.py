@@ -129,5 +129,5 @@ def test_killed_at_random_moments(count: int, tmp_path: Path) -> None:
     found = kill_runs(tmp_path, count)
     assert not found.spoiled
     assert not found.other
-    assert found.hit > count / 2
+    assert found.hit >= count / 2
     assert found.hit + found.late == count
