@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pty
 import re
+import select
 import signal
 import subprocess
 import sys
@@ -68,7 +69,10 @@ def test_on_a_terminal_sites_are_counted(monkeypatch: pytest.MonkeyPatch) -> Non
         progress.damageest_before_stage("export", "files", 0)
         progress.damageest_after_stage("export", 0, None, 0.1, True)
     sys.stderr.flush()
-    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", os.read(master, 1 << 16).decode())
+    shown = b""
+    while select.select([master], [], [], 1.0)[0]:  # the terminal hands on what was written in several pieces
+        shown += os.read(master, 1 << 16)
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
     assert "part [1/2]" in text
     assert re.search(r"cluster: dbscan +1\.50 s", text)
     assert re.search(r"boolean: manifold, 2 sites +0\.50 s", text)
