@@ -21,7 +21,7 @@ from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import LIMITS, Measured, check_pieces, measure_inner_area
 from damageest_cadquery._cut import Cut, find_inner, make_cut, take_faces
 from damageest_cadquery._flat_faces import Flat, find_flat_faces
-from damageest_cadquery._polyhedron import decimate, fit, mark_planes, measure_miss, thin_points
+from damageest_cadquery._polyhedron import Probes, decimate, fit, mark_planes
 from damageest_cadquery._read import explore
 from damageest_cadquery._shapes import build_shapes, find_shapes
 from damageest_cadquery._spline import SPANS, Way, build_splines, drop_tails, find_charts
@@ -37,14 +37,12 @@ from damageest_cadquery._split import (
     triangulate,
 )
 
-PLANES = (300, 800, 2000)
+PLANES = (300, 500, 800, 1200, 2000)
 FACETS = (150, 200, 270, 360, 480, 640, 850, 1150, 1550, 2100, 2900, 4000)
 """Numbers of triangles that are tried; most are given up before a split, by a look at the distances."""
 NARROW = 0.8
 """Share of the limit of a form within which a simplified surface must be before it is tried."""
 MOST_FACES = 5000
-PROBES = 4000
-"""Points at which a simplified surface is measured before it is tried."""
 SOME, MOSTLY = 0.25, 0.6
 """Share of the surface on planes from which these are faces of their own, and from which they come before splines."""
 MOST_SPLINES = 2
@@ -151,16 +149,17 @@ def _list_tools(cut: Cut, part: Part, tolerance: float) -> Iterator[Attempt]:
     if share < MOSTLY:
         yield from _list_splines(inner, part, tolerance)
     depth = cut.height[np.unique(cut.mesh.faces[rows])]
-    points = inner.vertices[depth < -tolerance / 4]
+    deep = depth < -tolerance / 4
+    probes = Probes(inner.vertices[deep], np.linalg.norm(inner.vertex_cross, axis=1)[deep])
     if share > SOME:
         planes = mark_planes(cut, rows, found.label, found.shapes, tolerance)
-        yield from _list_flat(planes, cut, points, tolerance, PLANES)
+        yield from _list_flat(planes, cut, probes, tolerance, PLANES)
     if share >= MOSTLY:
         yield from _list_splines(inner, part, tolerance)
-    yield from _list_flat(mark_planes(cut, rows, found.label, (), tolerance), cut, points, tolerance, FACETS)
+    yield from _list_flat(mark_planes(cut, rows, found.label, (), tolerance), cut, probes, tolerance, FACETS)
 
 
-def _list_flat(flat: Flat, cut: Cut, points: Floats, tolerance: float, counts: Sequence[int]) -> Iterator[Attempt]:
+def _list_flat(flat: Flat, cut: Cut, probes: Probes, tolerance: float, counts: Sequence[int]) -> Iterator[Attempt]:
     levels = []
     for count in sorted(counts, reverse=True):  # each from the one before: the first step takes longest
         flat = decimate(flat, count)
@@ -168,10 +167,7 @@ def _list_flat(flat: Flat, cut: Cut, points: Floats, tolerance: float, counts: S
     for count, level in reversed(levels):
         less = fit(level, cut, tolerance)
         form = "planes" if (less.label >= 0).any() else "facets"
-        if (
-            len(points)
-            and np.mean(measure_miss(less, thin_points(points, PROBES)) > tolerance / 4) > NARROW * LIMITS[form][0]
-        ):
+        if probes.measure_beyond(less, tolerance / 4) > NARROW * LIMITS[form][0]:
             continue
         tool = build_flat(less.mesh.vertices, find_flat_faces(less))
         if form == "facets" or is_valid(tool):

@@ -13,6 +13,9 @@ from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest_cadquery._facets import FLAT, Facet, straighten
 from damageest_cadquery._recognise import Shape, find_neighbours
 
+ROUNDS = 6
+"""How often triangles without area are joined to their neighbours while outlines are repaired."""
+
 
 @dataclass(frozen=True, eq=False)
 class Flat:
@@ -26,17 +29,23 @@ class Flat:
 def find_flat_faces(flat: Flat) -> list[Facet]:
     """The planes' regions and the single triangles, with their outlines. A region whose outline would cross itself, or
     pass a vertex twice, stays as triangles."""
-    region = _join_needles(flat.mesh, split_regions(flat.mesh.faces, flat.label))
-    while True:
-        loops, owners = _trace(region, flat.mesh.faces, len(flat.mesh.vertices))
-        lone = _find_pinched(flat.mesh, region, loops, owners)
+    mesh = flat.mesh
+    region = split_regions(mesh.faces, flat.label)
+    for number in range(2 * ROUNDS):
+        if number < ROUNDS:
+            region = _join_needles(mesh, region)
+        loops, owners = _trace(region, mesh.faces, len(mesh.vertices))
+        lone = _find_pinched(mesh, region, loops, owners)
         if not lone.any():
-            facets = _gather(flat, region, straighten(loops, flat.mesh.vertices, FLAT * flat.mesh.diagonal), owners)
-            lone = np.isin(region, [k for k, facet in facets.items() if not _is_simple(facet, flat.mesh.vertices)])
+            facets = _gather(flat, region, straighten(loops, mesh.vertices, FLAT * mesh.diagonal), owners)
+            lone = np.isin(region, [k for k, facet in facets.items() if not _is_simple(facet, mesh.vertices)])
             if not lone.any():
                 return list(facets.values())
         region = np.where(lone, region.max() + 1 + np.arange(len(region)), region)
-        region = _connect(flat.mesh.faces, region, region >= 0)
+        region = _connect(mesh.faces, region, region >= 0)
+    alone = np.arange(len(mesh.faces))
+    loops, owners = _trace(alone, mesh.faces, len(mesh.vertices))
+    return list(_gather(flat, alone, loops, owners).values())
 
 
 def _trace(region: Ints, faces: Ints, size: int) -> tuple[list[Ints], Ints]:

@@ -8,9 +8,12 @@ error metrics", 1997.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.spatial
+from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, eye_array, vstack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import lsqr
@@ -25,6 +28,8 @@ SMALL = 20
 """Triangles of a region of a plane below which it is not kept as a face of its own."""
 FINE = 10_000
 """Triangles down to which a surface is simplified without a check that they do not cross."""
+PROBES = 4000
+"""Points at which a simplified surface is measured before it is tried."""
 PER_TRIANGLE = 12
 """Points for each triangle to which the simplified surface is fitted."""
 _RANK = 0.05
@@ -158,14 +163,25 @@ def _relax(flat: Flat, rounds: int = 12) -> Mesh:
     return Mesh(_project(vertices, bounds, flat.planes), faces)
 
 
-def thin_points(points: Floats, most: int) -> Floats:
-    """At most so many of points (N,3), spread evenly over their order."""
+def thin_points(points: NDArray[Any], most: int) -> NDArray[Any]:
+    """At most so many of points (N,...), spread evenly over their order."""
     return points if len(points) <= most else points[np.linspace(0, len(points) - 1, most).astype(int)]
 
 
-def measure_miss(flat: Flat, points: Floats) -> Floats:
-    """(N,) how far the surface passes from points."""
-    return distance_to_mesh(points, flat.mesh)
+@dataclass(frozen=True, eq=False)
+class Probes:
+    """Points (N,3) of a surface, with the ``areas`` (N,) that they stand for."""
+
+    points: Floats
+    areas: Floats
+
+    def measure_beyond(self, flat: Flat, far: float) -> float:
+        """The share of the area that a simplified surface passes at more than ``far``."""
+        if not len(self.points):
+            return 0.0
+        some = thin_points(np.arange(len(self.points)), PROBES)
+        beyond = distance_to_mesh(self.points[some], flat.mesh) > far
+        return float(self.areas[some][beyond].sum() / self.areas[some].sum())
 
 
 def _smooth_labels(faces: Ints, label: Ints, allowed: Flags, least: int = 2) -> Ints:

@@ -155,9 +155,12 @@ def _build_spline(chart: Chart, part: Part, spans: int, tolerance: float) -> lis
 
 
 def _is_near(fit: Fit, chart: Chart, tolerance: float) -> bool:
+    if not chart.deep.any():
+        return True
     way = _evaluate(fit, chart.uv[chart.deep]) - chart.mesh.vertices[chart.deep]
     off = np.abs(np.einsum("ij,ij->i", way, chart.mesh.vertex_normals[chart.deep]))
-    return not len(off) or bool(np.quantile(off, 0.985) <= tolerance / 4 and off.max() <= 1.5 * tolerance)
+    area = np.linalg.norm(chart.mesh.vertex_cross, axis=1)[chart.deep]
+    return bool(area[off > tolerance / 4].sum() <= 0.015 * area.sum() and off.max() <= 1.5 * tolerance)
 
 
 def _continue(chart: Chart, fit: Fit, part: Part, tolerance: float) -> tuple[Floats, Floats]:

@@ -270,3 +270,18 @@ def test_a_wrong_volume_is_refused(done: Run) -> None:
         "facets", solids, 0.0, 1, site.damage, site.surface, part, np.empty((0, 3)), done.result.tolerance, faces
     )
     assert "volume differs" in found.reason
+
+
+@pytest.mark.slow
+def test_the_example_job_is_exact(tmp_path: Path) -> None:
+    """The ball mark is one sphere; no site is without an exact form."""
+    job = Path(__file__).parents[3] / "jobs" / "gear_exact.yaml"
+    damageest.run(job, output=tmp_path / "out", settings=("report=none",))
+    said = json.loads((tmp_path / "out/result.json").read_text())
+    forms = [site["exact"]["form"] for site in said["sites"]]
+    assert len(forms) == 3
+    assert "none" not in forms
+    assert all(site["exact"]["volume"] == pytest.approx(site["volume"], rel=3e-3) for site in said["sites"])
+    ball = next(site for site in said["sites"] if site["exact"]["form"] == "shapes")
+    (mark,) = take_solids(tmp_path / f"out/damage/site-{ball['id']}.step")
+    assert "SPHERE" in {face.geomType() for face in mark.Faces()}

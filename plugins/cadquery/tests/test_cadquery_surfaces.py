@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.distance import distance_to_mesh
 from tests.needs import import_for, needs_plugin
 
 pytestmark = needs_plugin("cadquery")
@@ -92,7 +93,7 @@ def test_two_planes_become_two_faces_with_a_sharp_edge() -> None:
 
 def test_facets_of_a_ball_are_as_near_as_they_are_many_and_cover_it_once() -> None:
     from damageest_cadquery._flat_faces import find_flat_faces
-    from damageest_cadquery._polyhedron import decimate, fit, mark_planes, measure_miss
+    from damageest_cadquery._polyhedron import decimate, fit, mark_planes
 
     cap = make_cap()
     cut = make_cut_of(cap)
@@ -100,7 +101,7 @@ def test_facets_of_a_ball_are_as_near_as_they_are_many_and_cover_it_once() -> No
     flat, far = mark_planes(cut, np.arange(len(cap.faces)), none, (), TOLERANCE), []
     for count in (100, 400):
         less = fit(decimate(flat, count), cut, TOLERANCE)
-        far.append(float(np.quantile(measure_miss(less, cap.vertices), 0.95)))
+        far.append(float(np.quantile(distance_to_mesh(cap.vertices, less.mesh), 0.95)))
         facets = find_flat_faces(less)
         assert abs(len(facets) - count) < 5
         edges = [

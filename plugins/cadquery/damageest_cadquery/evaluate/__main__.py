@@ -146,7 +146,9 @@ def summarise(rows: Sequence[dict[str, Any]]) -> str:
     good = [row for row in sites if row["form"] != "none"]
     if not good:
         return f"{len(sites)} sites, none exact"
-    forms = {form: sum(row["form"] == form for row in sites) for form in ("shapes", "spline", "facets", "none")}
+    forms = {
+        form: sum(row["form"] == form for row in sites) for form in ("shapes", "spline", "planes", "facets", "none")
+    }
     off = np.array([abs(row["volume"] / row["mesh"] - 1) for row in good])
     faces, seconds = np.array([row["faces"] for row in good]), np.array([row["seconds"] for row in good])
     lines = [
