@@ -165,6 +165,8 @@ def _list_flat(flat: Flat, cut: Cut, probes: Probes, tolerance: float, counts: S
         flat = decimate(flat, count)
         levels.append((count, flat))
     for count, level in reversed(levels):
+        if len(level.mesh.faces) > 2 * count:
+            continue
         less = fit(level, cut, tolerance)
         form = "planes" if (less.label >= 0).any() else "facets"
         if probes.measure_beyond(less, tolerance / 4) > NARROW * LIMITS[form][0]:

@@ -80,6 +80,8 @@ def _collapse(flat: Flat, count: int, apart: bool) -> Flat:
     V, F, birth, _ = igl.qslim(
         np.ascontiguousarray(flat.mesh.vertices), np.ascontiguousarray(flat.mesh.faces, np.int32), count, apart
     )
+    if not len(F):  # it refuses surfaces of which a vertex joins two sheets
+        return flat
     return Flat(Mesh(np.asarray(V, np.float64), np.asarray(F, np.int64)), flat.label[np.asarray(birth)], flat.planes)
 
 
