@@ -22,7 +22,9 @@ APART_FLAT, FLAT_CUBE, RIM = 1.5, 6.0, 4.0
 """The same where the surface is flat; edge of the cubes in which it has to be flat; depth up to which points count as
 near the rim. All in cells of the surface."""
 
-MOST_LOST = 2500
+FEWEST_IN_CUBE = 16
+"""Points of such a cube from which its flatness is known; in a sparse scan nothing is left out."""
+MOST_LOST = 5000
 """Samples of the lost skin that tell on which side of the points the lost metal is."""
 
 OrientedPoints = tuple[Floats, Floats, Floats]
@@ -222,7 +224,8 @@ def _thin_flat(points: Floats, chosen: Ints, depth: Floats, noise: float, cell: 
     off = points - mean[cube]
     moments = np.stack([np.bincount(cube, off[:, i] * off[:, j]) for i in range(3) for j in range(3)], axis=1)
     thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(moments.reshape(-1, 3, 3) / size[:, None, None])[:, 0], 0))
-    flat = (thickness < 1.2 * noise + 0.05 * cell)[cube[chosen]] & (depth[chosen] > RIM * cell)
+    plane = (size >= FEWEST_IN_CUBE) & (thickness < 1.2 * noise + 0.05 * cell)
+    flat = plane[cube[chosen]] & (depth[chosen] > RIM * cell)
     interior = chosen[flat]
     if not len(interior):
         return chosen
