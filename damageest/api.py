@@ -60,6 +60,7 @@ def run(
         work = follow(route_of(job.method), engine, start(job))
         state = work.job.with_value(JobState.folder, place.folder, digest(str(target)))
         state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
+        state = state.with_value(JobState.path_writers, registry.path_writers, digest(sorted(registry.path_writers)))
         written = follow(WRITE, engine, replace(work, job=state)).job.written
         if written.warnings:
             told = replace(state.result, warnings=(*state.result.warnings, *written.warnings))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import (
+    DepositPath,
     Deviation,
     Evidence,
     Floats,
@@ -36,7 +37,8 @@ class Site:
     the scan; ``max_depth``: the farthest of them below the nominal surface. ``accepted``: whether the site is part of
     `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
     unit of each motion of `Pose.free`. ``enclosures``: the closed surfaces that cut the DV out of the part; none where
-    the DV is an enlarged cavity or a whole body of the part.
+    the DV is an enlarged cavity or a whole body of the part. ``path``: the passes that build up the deposit; None where
+    the job asks for none, or none could be planned.
     """
 
     id: int
@@ -55,6 +57,7 @@ class Site:
     volume_rates: tuple[float, ...] = ()
     uncertainty: Uncertainty | None = None
     enclosures: tuple[Solid, ...] = ()
+    path: DepositPath | None = None
 
     @property
     def volume_95(self) -> Interval | None:

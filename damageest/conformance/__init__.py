@@ -16,13 +16,17 @@ except ImportError as error:
 
 # a check that fails then shows the values that it compared
 pytest.register_assert_rewrite(
-    *(f"{__name__}.{name}" for name in ("_base", "_contracts", "_enclose", "_files", "_points", "_report", "_surface"))
+    *(
+        f"{__name__}.{name}"
+        for name in ("_base", "_contracts", "_enclose", "_files", "_path", "_points", "_report", "_surface")
+    )
 )
 
 from damageest.conformance._base import StageContract  # noqa: E402
 from damageest.conformance._contracts import AllowanceContract, BooleanContract, RepairContract, SampleContract  # noqa: E402
 from damageest.conformance._enclose import EncloseAllContract, EncloseContract  # noqa: E402
 from damageest.conformance._files import ExportContract, PartContract, ScanContract  # noqa: E402
+from damageest.conformance._path import PathContract  # noqa: E402
 from damageest.conformance._points import NEAR, AlignContract, ClusterContract, SegmentContract  # noqa: E402
 from damageest.conformance._report import ReportContract  # noqa: E402
 from damageest.conformance._surface import BackgroundContract, BoundaryContract, ReconstructContract  # noqa: E402
@@ -39,6 +43,7 @@ __all__ = [
     "EncloseContract",
     "ExportContract",
     "PartContract",
+    "PathContract",
     "ReconstructContract",
     "RepairContract",
     "ReportContract",

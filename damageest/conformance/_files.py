@@ -161,7 +161,7 @@ class ExportContract(StageContract):
         self.count += 1
         self.folder = self.home / f"run {self.count}"
         self.folder.mkdir()
-        return super().call(stage, {**given, "folder": self.folder, "writers": _load_writers()})
+        return super().call(stage, {**given, "folder": self.folder, **_load_writers()})
 
     def write_files(self, **changes: Any) -> dict[str, bytes]:
         """Runs the export and gives the bytes of the files that it reports, by path."""
@@ -203,7 +203,8 @@ class ExportContract(StageContract):
 def _load_writers() -> Any:
     from damageest.registry import Registry
 
-    return Registry.discover().writers
+    registry = Registry.discover()
+    return {"writers": registry.writers, "path_writers": registry.path_writers}
 
 
 def make_result() -> Any:

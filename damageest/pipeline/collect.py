@@ -76,6 +76,9 @@ def _describe_site(found: FoundSite) -> Site:
     if isinstance(deposit, Deposit):
         damage = deposit.cavity or damage
         warnings += deposit.notes
+    path = found.path
+    if path is not None:
+        warnings += tuple(f"path: {note}" for note in path.notes)
     return Site(
         id=found.number,
         clusters=found.clusters,
@@ -89,6 +92,7 @@ def _describe_site(found: FoundSite) -> Site:
         uncertainty=shift_uncertainty(found.uncertainty, damage.volume - found.damage.volume),
         volume_rates=found.volume_rates,
         enclosures=found.enclosures if damage is found.damage else (),
+        path=path,
         method=found.method,
         evidence=evidence,
         max_depth=max(float(-found.job.deviation.distance[members].min(initial=0.0)), 0.0),

@@ -15,6 +15,7 @@ from damageest.pipeline.fit_model import correct_scan, fit_model, question_sites
 from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.large_scans import add_points_near_damage
 from damageest.pipeline.lost_bodies import add_lost_bodies
+from damageest.pipeline.paths import plan_paths
 from damageest.pipeline.prepare import (
     check_intact,
     crop_scan,
@@ -45,6 +46,7 @@ from damageest.stages.cluster import Cluster
 from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.export import Export
 from damageest.stages.part import ReadPart
+from damageest.stages.path import Path
 from damageest.stages.reconstruct import Reconstruct
 from damageest.stages.repair import Repair
 from damageest.stages.report import Report
@@ -63,7 +65,8 @@ BY_SITE: Route = (
 AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
 CLOSE: Route = (
     add_lost_bodies, set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus,
-    question_sites, judge_sites, make_deposits(Allowance), separate_deposits, measure_uncertainty, collect_result,
+    question_sites, judge_sites, make_deposits(Allowance), separate_deposits, plan_paths(Path), measure_uncertainty,
+    collect_result,
 )  # fmt: skip
 
 WRITE: Route = (Export,)

@@ -14,6 +14,7 @@ from typing import Any, Generic, Self, TypeVar, overload
 import numpy as np
 
 from damageest.artefacts import (
+    DepositPath,
     Deviation,
     Enclosures,
     Evidence,
@@ -36,7 +37,7 @@ from damageest.errors import StageError
 from damageest.findings import Coverage, Interval, Surplus, Uncertainty, Verdict
 from damageest.pipeline.cache import digest
 from damageest.result import Result
-from damageest.stages.export import ExportedFiles, Writer
+from damageest.stages.export import ExportedFiles, PathWriter, Writer
 from damageest.stages.report import ReportFiles
 
 T = TypeVar("T")
@@ -116,6 +117,7 @@ class JobState(State):
     result = Value[Result]()
     folder = Value[Path]()
     writers = Value[Mapping[str, Writer]]()
+    path_writers = Value[Mapping[str, PathWriter]]()
     written = Value[ExportedFiles]()
     content = Value[Mapping[str, Any]]()
     job_text = Value[str]()
@@ -185,6 +187,10 @@ class FoundSite(_SiteState):
     damage = Value[Solid]()
     others = Value[Solid | None]()
     deposit = Value[Solid | None]()
+    body = Value[Solid]()
+    left = Value[Solid | None]()
+    built = Value[Solid | None]()
+    path = Value[DepositPath | None]()
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from damageest.pipeline.cache import Cache, describe_unwritable
 
 _OURS = re.compile(
     r"result\.json|report\.html|job\.yaml|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|(scan_frame/)?"
-    r"((scan|skin|unseen)\.ply|(doubtful/)?result\.3mf|(damage|undamaged|((doubtful/)?(damage|surface)|doubtful|deposit|"
+    r"(path/site-\d+\.(csv|apt|ngc)|(scan|skin|unseen)\.ply|(doubtful/)?result\.3mf|(damage|undamaged|((doubtful/)?(damage|surface)|doubtful|deposit|"
     r"surplus)/site-\d+)\.(stl|ply|step))"
 )
 """What a run writes, by its path in the output folder. Other files are the user's and stay, unless the

@@ -9,7 +9,7 @@ from damageest.registry.hookspecs import hookimpl
 
 if TYPE_CHECKING:
     from damageest.stages import Stage
-    from damageest.stages.export import Writer
+    from damageest.stages.export import PathWriter, Writer
 
 
 @hookimpl
@@ -38,6 +38,8 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.export.files import Files
     from damageest.stages.part.file import PartFile
     from damageest.stages.part.reconstruct import PartFromScan
+    from damageest.stages.path.layers import Layers
+    from damageest.stages.path.none import NoPath as NoPath
     from damageest.stages.reconstruct.pyvista import PyVista
     from damageest.stages.reconstruct.signed_distance import SignedDistance
     from damageest.stages.repair.none import NoRepair as NoRepair
@@ -54,8 +56,8 @@ def damageest_stages() -> list[type[Stage]]:
         PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, Points, MeshDistance, Dbscan, PyVista,
         LargestLoop, AllLoops, Offset, BoundingBox, Capsule, CylinderBackground, Minkowski, BuildVolume, ShortestPath,
         Adaptive, Implicit,
-        NoRepair, Manifold, NoAllowance, Milling, Files, Uniform, CloudDistance, SignedDistance, PartFromScan,
-        Html, NoReport,
+        NoRepair, Manifold, NoAllowance, Milling, NoPath, Layers, Files, Uniform, CloudDistance, SignedDistance,
+        PartFromScan, Html, NoReport,
     ]  # fmt: skip
 
 
@@ -70,4 +72,19 @@ def damageest_writers() -> Mapping[str, Writer]:
         "stl": Writer(write_stl_bodies, single=True),
         "ply": Writer(write_ply_bodies),
         "3mf": Writer(write_threemf, one_file=True, single=True),
+    }
+
+
+@hookimpl
+def damageest_path_writers() -> Mapping[str, PathWriter]:
+    """The formats of paths that need no plugin."""
+    from damageest.stages.export import PathWriter
+    from damageest.stages.export.path_apt import write_apt
+    from damageest.stages.export.path_csv import write_csv
+    from damageest.stages.export.rs274 import write_rs274
+
+    return {
+        "csv": PathWriter(write_csv, "csv"),
+        "apt": PathWriter(write_apt, "apt"),
+        "rs274": PathWriter(write_rs274, "ngc"),
     }

@@ -12,6 +12,7 @@ from damageest.stages.cluster import Cluster
 from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.export import Export
 from damageest.stages.part import ReadPart
+from damageest.stages.path import Path
 from damageest.stages.reconstruct import Reconstruct
 from damageest.stages.repair import Repair
 from damageest.stages.report import Report
@@ -36,6 +37,7 @@ DEFAULTS: dict[Contract, str] = {
     Repair: "none",
     Boolean: "manifold",
     Allowance: "none",
+    Path: "none",
     Export: "files",
     Report: "html",
 }

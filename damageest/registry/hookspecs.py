@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement: three that add, three that only observe.
+"""The hooks a plugin may implement: four that add, three that only observe.
 
 What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
 what they return is ignored.
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import typer
 
     from damageest.stages import Stage
-    from damageest.stages.export import Writer
+    from damageest.stages.export import PathWriter, Writer
 
 hookspec = pluggy.HookspecMarker("damageest")
 hookimpl = pluggy.HookimplMarker("damageest")
@@ -30,6 +30,12 @@ def damageest_stages() -> Sequence[type[Stage]]:  # type: ignore[empty-body]
 def damageest_writers() -> Mapping[str, Writer]:  # type: ignore[empty-body]
     """Gives the file formats that this plugin can write, by the name, which is also the suffix, that a job's
     `export: {format: ...}` calls them by."""
+
+
+@hookspec
+def damageest_path_writers() -> Mapping[str, PathWriter]:  # type: ignore[empty-body]
+    """Gives the formats of deposition paths that this plugin can write, by the name that a job's
+    `export: {paths: ...}` calls them by."""
 
 
 @hookspec

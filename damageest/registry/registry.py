@@ -8,7 +8,7 @@ from __future__ import annotations
 import typing
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import pluggy
 from pydantic import ValidationError
@@ -18,7 +18,9 @@ from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contrac
 from damageest.registry.loading import Broken, Provider, describe_broken, ignore_shadow_warnings, load
 from damageest.stages import Stage
 from damageest.stages.enclose import EncloseAll
-from damageest.stages.export import Writer
+from damageest.stages.export import PathWriter, Writer
+
+Kind = TypeVar("Kind", Writer, PathWriter)
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ class Implementation:
 @dataclass(frozen=True)
 class Registry:
     """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them.
-    ``writers``: the formats that `export` can write, by name; ``formats``: the provider of each."""
+    ``writers``: the formats that `export` can write, by name; ``formats``: the provider of each. ``path_writers``:
+    the formats of paths, by name."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]
@@ -51,6 +54,7 @@ class Registry:
     hooks: pluggy.PluginManager = field(repr=False)
     writers: Mapping[str, Writer] = field(default_factory=dict, compare=False)
     formats: Mapping[str, Provider] = field(default_factory=dict, compare=False)
+    path_writers: Mapping[str, PathWriter] = field(default_factory=dict, compare=False)
 
     @classmethod
     def discover(cls, observers: Iterable[object] = ()) -> Registry:
@@ -58,16 +62,19 @@ class Registry:
         manager, loaded, broken = load(observers)
         found: list[Implementation] = []
         writers: dict[str, Writer] = {}
+        path_writers: dict[str, PathWriter] = {}
         formats: dict[str, Provider] = {}
         for plugin, provider in loaded:
             try:
                 with ignore_shadow_warnings():
                     classes = _read_offered(plugin)
-                    added = _read_writers(plugin, writers)
+                    added = _read_writers(plugin, "damageest_writers", Writer, writers)
+                    added_paths = _read_writers(plugin, "damageest_path_writers", PathWriter, path_writers)
             except (Exception, SystemExit) as error:
                 broken.append(describe_broken(error, provider))
                 continue
             writers |= added
+            path_writers |= added_paths
             formats |= dict.fromkeys(added, provider)
             for stage in classes:
                 try:
@@ -81,7 +88,7 @@ class Registry:
         single = tuple(group[0] for group in groups.values() if len(group) == 1)
         clashes = tuple(group for group in groups.values() if len(group) > 1)
         providers = tuple(dict.fromkeys([p for _, p in loaded] + [b.provider for b in broken]))
-        return cls(single, providers, tuple(broken), clashes, manager, writers, formats)
+        return cls(single, providers, tuple(broken), clashes, manager, writers, formats, path_writers)
 
     def of(self, stage: str) -> tuple[Implementation, ...]:
         """The implementations of a stage, defaults first, then by name."""
@@ -158,11 +165,11 @@ def _read_offered(plugin: Any) -> list[Any]:
     return list(classes)
 
 
-def _read_writers(plugin: Any, known: Mapping[str, Writer]) -> dict[str, Writer]:
+def _read_writers(plugin: Any, hook: str, kind: type[Kind], known: Mapping[str, Kind]) -> dict[str, Kind]:
     """The formats that a plugin can write. Raises PluginError for what is no writer, or of a format known already."""
-    found = plugin.damageest_writers() if hasattr(plugin, "damageest_writers") else {}
-    if not isinstance(found, Mapping) or not all(isinstance(writer, Writer) for writer in found.values()):
-        raise PluginError("its hook damageest_writers did not give a mapping of format names to Writers")
+    found = getattr(plugin, hook)() if hasattr(plugin, hook) else {}
+    if not isinstance(found, Mapping) or not all(isinstance(writer, kind) for writer in found.values()):
+        raise PluginError(f"its hook {hook} did not give a mapping of format names to {kind.__name__}s")
     if twice := sorted(found.keys() & known.keys()):
         raise PluginError(f"writes {', '.join(twice)}, which another package writes already; uninstall one of them")
     return dict(found)

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from damageest.artefacts import Deposit, Vector
 from damageest.report.base import JsonModel
+from damageest.report.path_json import PathReport, report_path
 from damageest.report.uncertainty_json import UncertaintyReport, report_interval, report_uncertainty
 from damageest.result import Site
 from damageest.stages.export import ExportedFiles
@@ -106,6 +107,7 @@ class SiteReport(JsonModel):
     deposit: DepositReport | None = Field(
         description="null where the stage allowance refused the site, or it is not accepted"
     )
+    path: PathReport | None = Field(description="null where the job asks for none, or none could be planned")
     files: FilesReport
     spline: SplineReport | None = Field(description="null where the job asks for none")
     exact: ExactReport | None = Field(description="null where no STEP is asked for, or the part has no CAD faces")
@@ -143,6 +145,7 @@ def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str
         bounds=(tuple(low), tuple(high)),
         method=site.method,
         deposit=_report_deposit(site),
+        path=report_path(site, written),
         evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
         verdict=VerdictReport(level=site.verdict.level, reasons=list(site.verdict.reasons)),
         accepted=site.accepted,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from damageest import conformance
-from damageest.artefacts import Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
+from damageest.artefacts import DepositPath, Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
 from damageest.conformance import _scene
 from damageest.conformance._base import PlacementContract, StageContract
 from damageest.io.meshes import write_stl
@@ -27,6 +27,7 @@ from damageest.stages.enclose.implicit import Implicit
 from damageest.stages.export import ExportedFiles
 from damageest.stages.export.files import Files
 from damageest.stages.part.file import PartFile
+from damageest.stages.path.layers import Layers, Nozzle
 from damageest.stages.reconstruct.signed_distance import SignedDistance
 from damageest.stages.repair.none import NoRepair as NoRepair
 from damageest.stages.report import ReportFiles
@@ -35,6 +36,9 @@ from damageest.stages.sample.uniform import Uniform
 from damageest.stages.scan.simulate import Simulate
 from damageest.stages.segment.mesh_distance import MeshDistance
 
+BEADS = Layers(
+    height=0.25, width=0.4, feed=60, nozzle=Nozzle(tip_radius=0.2, length=20, body_radius=2), standoff=1, simulate=False
+)
 GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
     "Part": (PartFile(path=Path("prism.stl")), {"volume": _scene.make_prism().volume}),
     "Scan": (Simulate(points=5000), {}),
@@ -50,6 +54,7 @@ GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
     "Repair": (NoRepair(), {}),
     "Boolean": (Manifold(), {}),
     "Allowance": (NoAllowance(), {}),
+    "Path": (BEADS, {}),
     "Export": (Files(), {}),
     "Report": (Html(), {}),
 }
@@ -68,6 +73,7 @@ MEANING = {
     "Repair": "test_what_is_closed_keeps_its_volume",
     "Boolean": "test_gives_what_lies_in_the_part",
     "Allowance": "test_deposit_holds_the_damage",
+    "Path": "test_beads_lie_at_the_deposit",
     "Export": "test_writes_the_files_it_names",
     "Report": "test_writes_the_files_it_names",
 }
@@ -109,6 +115,8 @@ def spoil(value: Any, by: float) -> Any:
             return Enclosures(tuple(replace(item, solid=spoil(item.solid, by)) for item in value.items))
         case ExportedFiles() | ReportFiles():
             return replace(value, files=(*value.files, f"{by}.txt"))
+        case DepositPath():
+            return replace(value, points=value.points + by)
         case None:
             return Solid(*(getattr(_scene.make_box(np.zeros(3), np.full(3, by), 9), n) for n in ("vertices", "faces")))
         case _:

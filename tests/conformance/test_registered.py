@@ -45,6 +45,15 @@ WITH: dict[str, dict[str, Any]] = {
         "exceptions": {"test_moves_along": "the picked points stay where they are, and the part is elsewhere then"},
     },
     "allowance milling": {"options": {"outer": 0.3}, "lengths": ("outer",)},
+    "path layers": {
+        "options": {
+            "height": 0.25,
+            "width": 0.4,
+            "feed": 60,
+            "standoff": 1.0,
+            "nozzle": {"tip_radius": 0.2, "length": 20, "body_radius": 2},
+        }
+    },
     "background build_volume": {
         "options": {"size": (60.0, 60.0, 60.0)},
         "lengths": ("size",),

@@ -143,7 +143,7 @@ class Observer:
 
     @hookimpl
     def damageest_after_stage(self, stage: str, output: object) -> None:
-        assert output is not None or stage == "allowance"
+        assert output is not None or stage in ("allowance", "path")
         self.seen.append(("after", stage))
 
     @hookimpl

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
-from damageest.artefacts import Floats, Solid
+from damageest.artefacts import DepositPath, Floats, Solid
 from damageest.result import Result
 from damageest.stages import Stage, asked_by_name
 
@@ -126,6 +126,29 @@ class Writer:
     single: bool = False
 
 
+@dataclass(frozen=True)
+class PathSettings:
+    """How a path is written. ``unit``: of its lengths, one of um, mm, cm, m, in, ft. ``title``: of job and site.
+    ``header``, ``footer``: templates of the first and last lines, None for the writer's own. ``options``: what else the
+    job says for the writer, by name."""
+
+    unit: str
+    title: str
+    header: str | None = None
+    footer: str | None = None
+    options: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class PathWriter:
+    """How a deposition path is written. ``write``: a function of ``file, path, settings``, a file to create, the
+    path in the frame asked for, and a `PathSettings`; the same path gives the same bytes. It raises StageError for a
+    path that the format cannot hold. ``suffix``: of the file, without the dot."""
+
+    write: Callable[[Path, DepositPath, PathSettings], None]
+    suffix: str
+
+
 class Export(Stage, ABC):
     """Writes the result to files (end of paper 3.2).
 
@@ -133,6 +156,7 @@ class Export(Stage, ABC):
         result: all that was computed, in the part's frame and in ``result.units``.
         folder: an existing, empty folder. The engine moves it to its final place when all files are written.
         writers: the writers of file formats, of damageest and of the plugins, by the format's name.
+        path_writers: the writers of deposition paths, likewise.
 
     Returns:
         The paths of all files written, relative to ``folder`` and with forward slashes; the same result gives the same
@@ -163,4 +187,10 @@ class Export(Stage, ABC):
 
     @asked_by_name
     @abstractmethod
-    def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles: ...
+    def run(
+        self,
+        result: Result,
+        folder: Path,
+        writers: Mapping[str, Writer],
+        path_writers: Mapping[str, PathWriter],
+    ) -> ExportedFiles: ...

@@ -23,6 +23,16 @@ def _check_known(name: str, info: ValidationInfo) -> str:
     raise _make_error(f"no format '{name}'{suggest(name, names)}; there are: {', '.join(names)}{registry.missing()}")
 
 
+def _check_known_path(name: str, info: ValidationInfo) -> str:
+    registry = (info.context or {}).get("registry")
+    if registry is None or name in registry.path_writers:
+        return name
+    names = sorted(registry.path_writers)
+    raise _make_error(
+        f"no format of paths '{name}'{suggest(name, names)}; there are: {', '.join(names)}{registry.missing()}"
+    )
+
+
 def _make_error(text: str) -> PydanticCustomError:
     return PydanticCustomError("format", "{text}", {"text": text})
 
@@ -46,3 +56,14 @@ Formats = Annotated[
     Field(min_length=1),
 ]
 """One format or a list of formats, without duplicates."""
+
+PathFormat = Annotated[str, AfterValidator(_check_known_path), Field(examples=["csv", "apt", "rs274"])]
+PathFormats = Annotated[
+    tuple[PathFormat, ...],
+    BeforeValidator(
+        lambda value: (value,) if isinstance(value, str) else value,
+        json_schema_input_type=PathFormat | list[PathFormat],
+    ),
+    AfterValidator(lambda names: tuple(dict.fromkeys(names))),
+]
+"""Formats of deposition paths, without duplicates; none is allowed."""

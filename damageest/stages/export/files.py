@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
@@ -16,9 +17,11 @@ from damageest.geometry.simplification import simplify_within
 from damageest.geometry.touching import ROUNDS, separate_touching
 from damageest.geometry.transforms import invert_pose, move_mesh, move_points
 from damageest.io.meshes import write_ply, write_points
-from damageest.stages.export import Body, Export, ExportedFiles, Patch, Writer
+from damageest.stages import JobPath
+from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathWriter, Writer
 from damageest.stages.export._coverage import write_coverage
-from damageest.stages.export._options import Formats, check_spline_writer
+from damageest.stages.export._options import Formats, PathFormats, check_spline_writer
+from damageest.stages.export._paths import write_paths
 
 if TYPE_CHECKING:
     from damageest.result import Result
@@ -67,7 +70,25 @@ class Files(Export):
         "(plugin cadquery)",
     )
 
-    def run(self, result: Result, folder: Path, writers: Mapping[str, Writer]) -> ExportedFiles:
+    paths: PathFormats = Field(
+        ("csv", "apt", "rs274"),
+        description="formats of deposition paths, where the job plans them: csv, apt (CLDATA), rs274 (G-code)",
+    )
+    path_header: JobPath | None = Field(None, description="file with the first lines of G-code; $title and $units work")
+    path_footer: JobPath | None = Field(None, description="file with the last lines of G-code")
+    path_options: Mapping[str, str] = Field(
+        {},
+        description="for the writers of paths; rs274: on, off (default M3, M5), tcpm_on, tcpm_off (G43.4 H1, G49), "
+        "rotary (AC, BC, none, auto)",
+    )
+
+    def run(
+        self,
+        result: Result,
+        folder: Path,
+        writers: Mapping[str, Writer],
+        path_writers: Mapping[str, PathWriter] = MappingProxyType({}),
+    ) -> ExportedFiles:
         """Writes into ``folder``; gives the paths relative to it. The same result gives the same bytes."""
         splines = {}
         if self.spline:
@@ -93,6 +114,8 @@ class Files(Export):
                 left = {stem: body for stem, body in chosen.items() if f"{place}{stem}.{name}" not in ready.files}
                 done += _write_solids(writers[name], folder, place, left, T, result.units)
             done += self._write_surfaces(result, folder, place, T)
+            told = (_read_text(self.path_header), _read_text(self.path_footer), self.path_options)
+            done.append(write_paths(result, folder, place, T, self.paths, path_writers, *told))
             if splines:
                 patches = {number: patch for number, (patch, _) in splines.items() if patch}
                 done += _write_patches(writers, folder, place, patches, T, result.units)
@@ -148,6 +171,10 @@ class Files(Export):
         name = "ply" if "ply" in self.format else "stl"
         done = _write(writers[name], folder, "truth/damage", [body], result.units)
         return ExportedFiles((*done.files, "truth/pose.json"), done.notes)
+
+
+def _read_text(path: Path | None) -> str | None:
+    return None if path is None else path.read_text(encoding="utf-8")
 
 
 def _collect_bodies(result: Result) -> dict[str, Body]:

@@ -33,8 +33,8 @@ def result():
     body = sphere(3)
     flat = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]) / 3, np.array([[0, 1, 2]]))
     sites = (
-        SimpleNamespace(id=1, damage=body, surface=flat, deposit=sphere(3.5), accepted=True),
-        SimpleNamespace(id=2, damage=sphere(2, (20, 0, 0)), surface=flat, deposit=None, accepted=True),
+        SimpleNamespace(id=1, damage=body, surface=flat, deposit=sphere(3.5), accepted=True, path=None),
+        SimpleNamespace(id=2, damage=sphere(2, (20, 0, 0)), surface=flat, deposit=None, accepted=True, path=None),
     )
     return SimpleNamespace(
         units="mm",

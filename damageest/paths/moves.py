@@ -1,0 +1,147 @@
+"""Puts passes in a sequence, with the moves between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Ints
+from damageest.paths.clearance import Clearance
+from damageest.paths.process import Pass, resample
+
+
+@dataclass(frozen=True)
+class Travel:
+    """``hop``: how far the tool is lifted along its axis between passes. ``safe``: a distance from ``centre`` (3,) at
+    which the nozzle is clear of everything. ``gap``: distance to keep. ``feed``, ``fast``: speeds of deposition and of
+    travel, in lengths a minute."""
+
+    hop: float
+    safe: float
+    centre: Floats
+    gap: float
+    feed: float
+    fast: float
+
+
+class Moves(NamedTuple):
+    """Points (N,3), tool axes (N,3), normals (N,3), speed (N,), whether the move that ends there deposits (N,), layer
+    (N,), pass (N,) and part (N,). ``gap``: least distance of the nozzle during travel; ``blocked``: travels for which
+    no clear way was found."""
+
+    points: Floats
+    axes: Floats
+    normals: Floats
+    feed: Floats
+    on: Flags
+    layer: Ints
+    number: Ints
+    part: Ints
+    gap: float
+    blocked: int
+
+
+def join_passes(groups: Sequence[tuple[Sequence[Pass], Clearance]], travel: Travel) -> Moves:
+    """One sequence of moves through passes in the part's frame.
+
+    ``groups``: the passes of each part of the deposit, and the clearance to what is there then. Between two passes the
+    tool is lifted by the hop, or by as much more as a clear straight way needs, up to the safe distance.
+    """
+    rows: list[tuple[Floats, Floats, Floats, float, bool, int, int, int]] = []
+    gap, number, blocked = np.inf, 0, 0
+    before: Pass | None = None
+    for part, (passes, clearance) in enumerate(groups, 1):
+        for one in passes:
+            number += 1
+            way, way_axes, found = _find_way(before, one, clearance, travel)
+            blocked += found < travel.gap / 2
+            gap = min(gap, found)
+            for point, axis in zip(way, way_axes, strict=True):
+                rows.append((point, axis, one.normals[0], travel.fast, False, one.layer + 1, number, part))
+            first = (one.points[0], one.axes[0], one.normals[0], travel.fast, False, one.layer + 1, number, part)
+            rows.append(first)
+            for k in range(1, len(one.points)):
+                values = (one.points[k], one.axes[k], one.normals[k], travel.feed, True)
+                rows.append((*values, one.layer + 1, number, part))
+            before = one
+    if before is not None:
+        end = _lift(before.points[-1], before.axes[-1], travel)
+        rows.append((end, before.axes[-1], before.normals[-1], travel.fast, False, rows[-1][5], number, rows[-1][7]))
+    columns: list[Any] = list(zip(*rows, strict=True)) or [()] * 8
+    points, axes, normals = (np.array(column, float).reshape(-1, 3) for column in columns[:3])
+    layer, numbers, parts = (np.array(column, np.int64) for column in columns[5:])
+    feed, on = np.array(columns[3], float), np.array(columns[4], bool)
+    return Moves(points, axes, normals, feed, on, layer, numbers, parts, gap, blocked)
+
+
+def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
+    """The point (3,) at the safe distance from the centre, straight up the axis."""
+    away = point - travel.centre
+    along = float(away @ axis)
+    root = np.sqrt(max(along**2 - float(away @ away) + travel.safe**2, 0.0))
+    return np.asarray(point + max(root - along, travel.hop) * axis)
+
+
+def _find_way(before: Pass | None, one: Pass, clearance: Clearance, travel: Travel) -> tuple[Floats, Floats, float]:
+    """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
+    stop, axis = one.points[0], one.axes[0]
+    above = _lift(stop, axis, travel)
+    if before is None:
+        return above[None], axis[None], _measure_way(np.array([above, stop]), np.array([axis, axis]), clearance, travel)
+    start, old = before.points[-1], before.axes[-1]
+    if np.linalg.norm(stop - start) < 1e-9 and np.allclose(axis, old):
+        return np.empty((0, 3)), np.empty((0, 3)), np.inf
+    if np.allclose(axis, old, atol=1e-6):
+        for factor in (1, 4, 16):
+            lifts = factor * travel.hop * axis
+            # both ends at the height of the higher one
+            rise = float((stop - start) @ axis)
+            way = np.array([start + max(rise, 0.0) * axis + lifts, stop + max(-rise, 0.0) * axis + lifts])
+            axes = np.array([old, axis])
+            points = np.concatenate([start[None], way, stop[None]])
+            gap = _measure_way(points, np.tile(axis, (4, 1)), clearance, travel)
+            if gap >= travel.gap / 2:
+                return way, axes, gap
+    way = np.array([_lift(start, old, travel), above])
+    axes = np.array([old, axis])
+    way, axes = _round_the_sphere(way, axes, travel)
+    points = np.concatenate([start[None], way, stop[None]])
+    gap = _measure_way(points, np.concatenate([old[None], axes, axis[None]]), clearance, travel)
+    return way, axes, gap
+
+
+def _round_the_sphere(way: Floats, axes: Floats, travel: Travel) -> tuple[Floats, Floats]:
+    """The way between two points at the safe distance, along the sphere, with the axis turning evenly."""
+    first, last = way - travel.centre
+    far = max(float(np.linalg.norm(first)), float(np.linalg.norm(last)))
+    angle = float(np.arccos(np.clip(first @ last / (np.linalg.norm(first) * np.linalg.norm(last)), -1, 1)))
+    turn = float(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
+    count = int(np.ceil(max(angle, turn) / np.radians(10.0)))
+    if count < 2:
+        return way, axes
+    share = np.linspace(0, 1, count + 1)[:, None]
+    inner = (1 - share) * first + share * last
+    inner *= far / np.maximum(np.linalg.norm(inner, axis=1), 1e-9 * far)[:, None]
+    inner[0], inner[-1] = first, last
+    turned = (1 - share) * axes[0] + share * axes[1]
+    turned /= np.maximum(np.linalg.norm(turned, axis=1), 1e-9)[:, None]
+    return travel.centre + inner, turned
+
+
+def _measure_way(points: Floats, axes: Floats, clearance: Clearance, travel: Travel) -> float:
+    """The least distance along a way, as a lower bound between the poses that are measured."""
+    dense, corner = resample(points, travel.gap)
+    place = np.cumsum(corner >= 0) - 1
+    share = np.zeros(len(dense))
+    for k in range(len(points) - 1):
+        own = np.flatnonzero(place == k)
+        share[own] = np.arange(len(own)) / max(len(own), 1)
+    following = np.minimum(place + 1, len(points) - 1)
+    turned = (1 - share)[:, None] * axes[place] + share[:, None] * axes[following]
+    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    moves = np.linalg.norm(np.diff(dense, axis=0), axis=1) + clearance.bound_turns(turned)
+    found = clearance.measure_along(dense, turned, travel.gap)
+    return float(min(found.min(), np.min((found[1:] + found[:-1] - moves) / 2, initial=np.inf)))

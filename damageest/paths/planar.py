@@ -1,0 +1,197 @@
+"""Plans layers that are planes across the build direction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Mesh
+from damageest.geometry.solids import to_arrays
+from damageest.paths.axes import choose_axes, list_axes
+from damageest.paths.clearance import Clearance, Obstacle
+from damageest.paths.fill import fill_region
+from damageest.paths.frames import Frame
+from damageest.paths.process import Pass, Plan, Process, order_passes, resample
+from damageest.paths.regions import cover, make_region, measure_length, shift_border, unite_regions
+
+UNSUPPORTED, COLLIDES, SHORT = (
+    "stands on nothing within the permitted overhang",
+    "the nozzle would come too near to something",
+    "shorter than the shortest pass",
+)
+Z = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What the nozzle must not touch, relative to the frame's origin. ``metal``: a Manifold of what is left of the part
+    and stands already. ``others``: meshes. ``nozzle``: see `Clearance`."""
+
+    metal: Any
+    others: Sequence[Mesh]
+    clearance: Clearance
+
+
+def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process) -> Plan:
+    """Passes that build up a body, a Manifold relative to the frame's origin, layer by layer.
+
+    All layers have one height, at most the process's, so that the last ends with the body. A layer is made where metal
+    or the layer below is near enough. Passes, or pieces of passes, at which the nozzle comes too near to metal, other
+    meshes or the layers below are left out.
+    """
+    local, metal = frame.move(body), frame.move(around.metal)
+    low, high = local.bounding_box()[2], local.bounding_box()[5]
+    count = max(1, int(np.ceil((high - low) / process.height - 1e-6)))
+    height = (high - low) / count
+    near = _crop(metal, local, height + process.bead.width)
+    meshes = [Mesh(*to_arrays(metal))] if not metal.is_empty() else []
+    meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
+    done = make_region([])
+    passes: list[Pass] = []
+    missing: list[Any] = []
+    reasons: dict[str, float] = {}
+    choice = _AxisChoice(process, around.clearance)
+    for number in range(count):
+        floor, top = low + number * height, low + (number + 1) * height
+        slab = _cut_slab(local, floor, top)
+        wanted = _cast_shadow(slab, process)
+        ground = _cast_shadow(_cut_slab(near, floor - height / 4, top), process)
+        held = wanted ^ shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
+        lines = fill_region(held, process.pattern, process.bead, process.angle + number * process.turn)
+        long = [line for line in lines if measure_length(line) >= process.shortest]
+        short = [line for line in lines if measure_length(line) < process.shortest]
+        obstacles = [Obstacle(mesh) for mesh in _take_above(meshes, top)]
+        made, dropped = choice.place(long, top, obstacles, number)
+        made = order_passes(made, passes[-1].points[-1] if passes else None)
+        done = cover([one.points[:, :2] for one in made], process.bead.width)
+        left = {
+            UNSUPPORTED: wanted - held,
+            COLLIDES: (cover(dropped, process.bead.width) ^ held) - done,
+            SHORT: (cover(short, process.bead.width) ^ held) - done - cover(dropped, process.bead.width),
+        }
+        for why, region in left.items():
+            if region.is_empty():
+                continue
+            piece = slab ^ region.extrude(top - floor).translate((0, 0, floor))
+            if piece.volume() > 0:
+                missing.append(piece)
+                reasons[why] = reasons.get(why, 0.0) + piece.volume()
+        passes += made
+    return Plan(frame, height, tuple(passes), _gather(missing), reasons)
+
+
+def _gather(pieces: list[Any]) -> Any:
+    from manifold3d import Manifold, OpType
+
+    return Manifold.batch_boolean(pieces, OpType.Add) if pieces else None
+
+
+def _crop(metal: Any, body: Any, margin: float) -> Any:
+    """What lies of the metal in the box round the body."""
+    from manifold3d import Manifold
+
+    low, high = np.array(body.bounding_box()[:3]) - margin, np.array(body.bounding_box()[3:]) + margin
+    return metal ^ Manifold.cube(tuple(high - low)).translate(tuple(low))
+
+
+def _cut_slab(body: Any, floor: float, top: float) -> Any:
+    return body.trim_by_plane((0, 0, 1), floor).trim_by_plane((0, 0, -1), -top)
+
+
+def _cast_shadow(slab: Any, process: Process) -> Any:
+    """The outline of a slab, seen from above."""
+    if slab.is_empty():
+        return make_region([])
+    return make_region(slab.project().to_polygons()).simplify(process.bead.width / 200)
+
+
+def _take_above(meshes: Sequence[Mesh], height: float) -> list[Mesh]:
+    """The triangles of meshes that reach above a height."""
+    found = []
+    for mesh in meshes:
+        above = mesh.vertices[mesh.faces, 2].max(axis=1) > height
+        if above.any():
+            used, number = np.unique(mesh.faces[above], return_inverse=True)
+            found.append(Mesh(mesh.vertices[used], number.reshape(-1, 3)))
+    return found
+
+
+class _AxisChoice:
+    """Places the lines of a layer with tool axes. It remembers which axis served last."""
+
+    def __init__(self, process: Process, clearance: Clearance) -> None:
+        self.process, self.clearance = process, clearance
+        axes = list_axes(process.tilt if process.axes == 5 else 0.0)
+        # everything up to the top of the layer stays below the nozzle's lowest point
+        self.lowest = np.array([_find_lowest(clearance, axis) for axis in axes])
+        self.axes = axes[self.lowest >= process.gap * (1 - 1e-9)]
+        self.lowest = self.lowest[self.lowest >= process.gap * (1 - 1e-9)]
+        self.last = 0
+
+    def place(
+        self, lines: Sequence[Floats], top: float, obstacles: Sequence[Obstacle], layer: int
+    ) -> tuple[list[Pass], list[Floats]]:
+        """Passes along the lines (K,2) at a height, and the pieces of lines (K,2) that the nozzle does not reach."""
+        clearance, needed = self.clearance.with_obstacles(obstacles), self.process.gap
+        made: list[Pass] = []
+        dropped: list[Floats] = []
+        if not len(self.axes):
+            return made, list(lines)
+        for line in lines:
+            line = _extend(line, *self.process.extend)
+            points, corner = resample(np.column_stack([line, np.full(len(line), top)]), self.process.step)
+            order = np.concatenate([[self.last], np.delete(np.arange(len(self.axes)), self.last)])
+            least = int(np.ceil(self.process.shortest / self.process.step)) + 2
+            pieces = choose_axes(points, self.axes[order], clearance, needed, min(least, len(points)))
+            at = 0
+            for piece in pieces:
+                if piece.start > at:
+                    dropped.append(points[at : piece.start, :2])
+                at = piece.stop
+                made.append(self._make_pass(points, corner, piece, layer))
+            if at < len(points):
+                dropped.append(points[at:, :2])
+            if pieces:
+                self.last = int(np.argmax(self.axes @ pieces[-1].axis))
+        return made, dropped
+
+    def _make_pass(self, points: Floats, corner: Floats, piece: tuple[int, int, Floats, Floats], layer: int) -> Pass:
+        start, stop, axis, gaps = piece
+        chosen = [k for k in range(start, stop) if corner[k] >= 0 or k in (start, stop - 1)]
+        if len(chosen) == 1:
+            chosen *= 2
+        lowest = float(self.lowest[int(np.argmax(self.axes @ axis))])
+        tightest = int(np.argmin(gaps))
+        return Pass(
+            points[chosen],
+            np.tile(axis, (len(chosen), 1)),
+            np.tile(Z, (len(chosen), 1)),
+            layer,
+            min(lowest, float(gaps.min()) - self.process.step / 2),
+            (points[start + tightest], axis),
+        )
+
+
+def _find_lowest(clearance: Clearance, axis: Floats) -> float:
+    """Height of the nozzle's lowest point above the point that it works on."""
+    from damageest.paths.nozzle import turn_to_axis
+
+    return float((clearance.nozzle.vertices @ turn_to_axis(axis).T)[:, 2].min() + clearance.standoff * axis[2])
+
+
+def _extend(line: Floats, before: float, after: float) -> Floats:
+    """A line that begins earlier and ends later; a closed one overlaps its own start."""
+    if not before and not after:
+        return line
+    if np.allclose(line[0], line[-1]):
+        at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        stop = min(before + after, at[-1] / 2)
+        end = np.array([np.interp(stop, at, line[:, k]) for k in range(2)])
+        return np.concatenate([line, line[1:][at[1:] < stop], end[None]])
+    first, last = line[0] - line[1], line[-1] - line[-2]
+    start = line[0] + before * first / max(float(np.linalg.norm(first)), 1e-300)
+    end = line[-1] + after * last / max(float(np.linalg.norm(last)), 1e-300)
+    return np.concatenate([start[None], line[1:-1], end[None]])

@@ -1,0 +1,139 @@
+"""Files of deposition paths, read by others: G-code by pygcode, APT by a small parser."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from damageest.artefacts import DepositPath, Floats
+from damageest.errors import StageError
+from damageest.stages.export import PathSettings
+from damageest.stages.export.path_apt import write_apt
+from damageest.stages.export.path_csv import HEAD, write_csv
+from damageest.stages.export.rs274 import write_rs274
+from tests.paths.shapes import corner, dent, plan
+
+SETTINGS = PathSettings("mm", "block site 1")
+
+
+@cache
+def make_path(tilted: bool) -> DepositPath:
+    if tilted:
+        return plan(corner(), simulate=False, direction=(0.6, 0.48, 0.64))
+    return plan(dent(), simulate=False, direction=(0.0, 0.0, 1.0))
+
+
+def read_csv(file: Path) -> Floats:
+    lines = file.read_text().splitlines()
+    assert lines[0] == HEAD
+    return np.array([[float(word) for word in line.split(",")] for line in lines[1:]])
+
+
+def read_apt(text: str) -> Floats:
+    """x, y, z, i, j, k, feed and on of every GOTO."""
+    rows, feed, on = [], 0.0, 0.0
+    for line in text.splitlines():
+        word, _, rest = line.partition("/")
+        if word == "FEDRAT":
+            feed = float(rest.split(",")[0])
+        elif line.startswith("INSERT/DEPOSIT"):
+            on = float(line.endswith("ON"))
+        elif word == "GOTO":
+            rows.append([*map(float, rest.split(",")), feed, on])
+    return np.array(rows)
+
+
+def read_blocks(text: str) -> Floats:
+    """x, y, z, A, C, feed and on of every G1, by pygcode; words are kept until they change."""
+    from pygcode import Line
+
+    state = dict.fromkeys("XYZACF", 0.0)
+    on, rows = 0.0, []
+    for source in text.splitlines():
+        if source.startswith("G43.4"):  # the control's own code, which RS-274 leaves to the maker
+            continue
+        line = Line(source)
+        for code in line.block.gcodes:
+            state |= {letter: float(value) for letter, value in code.get_param_dict().items() if letter in state}
+            if str(code.word) == "M03":
+                on = 1.0
+            elif str(code.word) == "M05":
+                on = 0.0
+            elif code.word_letter == "F":
+                state["F"] = float(code.word.value)
+        if any(str(code.word) == "G01" for code in line.block.gcodes):
+            rows.append([*(state[letter] for letter in "XYZACF"), on])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("tilted", [False, True])
+def test_the_apt_gives_the_points_of_the_csv(tilted: bool, tmp_path: Path) -> None:
+    path = make_path(tilted)
+    write_csv(tmp_path / "a.csv", path, SETTINGS)
+    write_apt(tmp_path / "a.apt", path, SETTINGS)
+    table, text = read_csv(tmp_path / "a.csv"), (tmp_path / "a.apt").read_text()
+    assert np.abs(read_apt(text) - table[:, :8]).max() < 1e-6
+    assert np.abs(table[:, :3] - path.points).max() < 1e-6
+    assert text.startswith("PARTNO/BLOCK SITE 1\nUNITS/MM\n")
+    assert "LOADTL/1" in text
+    assert text.endswith("FINI\n")
+
+
+@pytest.mark.parametrize("tilted", [False, True])
+def test_the_gcode_gives_the_points_of_the_csv(tilted: bool, tmp_path: Path) -> None:
+    path = make_path(tilted)
+    write_csv(tmp_path / "a.csv", path, SETTINGS)
+    write_rs274(tmp_path / "a.ngc", path, SETTINGS)
+    table, text = read_csv(tmp_path / "a.csv"), (tmp_path / "a.ngc").read_text()
+    found = read_blocks(text)
+    assert np.abs(found[:, :3] - table[:, :3]).max() < 2e-5
+    assert found[:, 5] == pytest.approx(table[:, 6], rel=1e-4)
+    assert (found[:, 6] == table[:, 7]).all()
+    a, c = np.radians(found[:, 3]), np.radians(found[:, 4])
+    axes = np.column_stack([np.sin(a) * np.sin(c), -np.sin(a) * np.cos(c), np.cos(a)])
+    assert np.abs(axes - table[:, 3:6]).max() < 2e-6
+    assert ("G43.4" in text) == tilted
+    assert "G21" in text
+    assert text.endswith("M2\n")
+
+
+def test_inches_and_metres(tmp_path: Path) -> None:
+    path = make_path(False)
+    write_rs274(tmp_path / "in.ngc", path, replace(SETTINGS, unit="in"))
+    assert "G20" in (tmp_path / "in.ngc").read_text()
+    write_rs274(tmp_path / "m.ngc", path, replace(SETTINGS, unit="m"))
+    assert np.abs(read_blocks((tmp_path / "m.ngc").read_text())[:, :3] - 1000 * path.points).max() < 2e-5
+    write_apt(tmp_path / "ft.apt", path, replace(SETTINGS, unit="ft"))
+    text = (tmp_path / "ft.apt").read_text()
+    assert "UNITS/INCHES" in text
+    assert np.abs(read_apt(text)[:, :3] - 12 * path.points).max() < 2e-6
+
+
+def test_templates_and_options(tmp_path: Path) -> None:
+    told = replace(SETTINGS, header="(begin $title)\n$units G54", footer="M30", options={"on": "M100", "off": "M101"})
+    write_rs274(tmp_path / "a.ngc", make_path(False), told)
+    lines = (tmp_path / "a.ngc").read_text().splitlines()
+    assert lines[1:3] == ["(begin block site 1)", "G21 G54"]
+    assert lines[-1] == "M30"
+    assert lines.count("M100") == lines.count("M101") == make_path(False).passes
+
+
+def test_rotary_axes_b_and_c(tmp_path: Path) -> None:
+    path = make_path(True)
+    write_rs274(tmp_path / "a.ngc", path, replace(SETTINGS, options={"rotary": "BC"}))
+    pairs = re.findall(r"B([-\d.]+) C([-\d.]+)", (tmp_path / "a.ngc").read_text())
+    b, c = np.radians(np.array(pairs, float)).T
+    axes = np.column_stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
+    assert np.abs(axes - path.axes).max() < 2e-6
+
+
+def test_a_tilted_tool_without_rotary_axes_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StageError, match="not along z"):
+        write_rs274(tmp_path / "a.ngc", make_path(True), replace(SETTINGS, options={"rotary": "none"}))
+    with pytest.raises(StageError, match="no option colour"):
+        write_rs274(tmp_path / "a.ngc", make_path(True), replace(SETTINGS, options={"colour": "red"}))
