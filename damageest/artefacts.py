@@ -163,7 +163,8 @@ class Deposit(Solid):
     ``cut_back_volume`` the volume that this removes in addition. ``stock_volume``: what is above the nominal surface;
     ``thickness``: its least, mean and largest height over the skin where stock was asked for, None where none was;
     ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`, empty where the part has
-    none. ``notes`` are warnings.
+    none. ``heights``: of the damage's CAD faces by number, how high the job wants the stock on it, -1 where that is not
+    the same all over it; ``overlap``: how far the stock covers the intact skin. ``notes`` are warnings.
     """
 
     cavity: Solid | None = None
@@ -171,6 +172,8 @@ class Deposit(Solid):
     cut_back_volume: float = 0.0
     thickness: tuple[float, float, float] | None = None
     touched: tuple[int, ...] = ()
+    heights: tuple[tuple[int, float], ...] = ()
+    overlap: float = 0.0
     notes: tuple[str, ...] = ()
 
 

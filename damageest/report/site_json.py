@@ -12,7 +12,7 @@ from damageest.report.base import JsonModel
 from damageest.report.path_json import PathReport, report_path
 from damageest.report.uncertainty_json import UncertaintyReport, report_interval, report_uncertainty
 from damageest.result import Site
-from damageest.stages.export import ExportedFiles
+from damageest.stages.export import ExactForm, ExportedFiles
 
 
 class EvidenceReport(JsonModel):
@@ -47,6 +47,21 @@ class SplineReport(JsonModel):
     reason: str = Field(description="why none was written; empty where one was")
 
 
+class ExactDepositReport(JsonModel):
+    """Whether the deposit in STEP has the CAD's own faces and their offsets."""
+
+    faces: int
+    offsets: int = Field(description="faces that are offsets of CAD faces, at the height of the stock")
+    volume: float | None
+    distance: float | None = Field(
+        description="95 % of the stock's surface, but for that within 1.5 tolerances of the damage's outline, are as "
+        "near to the mesh's, both ways, with stock as high as the mesh's"
+    )
+    farthest: float | None = Field(description="largest distance between them, both ways")
+    seconds: float = Field(description="of the processor")
+    reason: str = Field(description="why it has facets; empty where it has CAD faces")
+
+
 class ExactReport(JsonModel):
     """Whether the solid in STEP has the CAD's own faces."""
 
@@ -62,6 +77,7 @@ class ExactReport(JsonModel):
     beyond: float | None = Field(description="share of the inner surface farther than a quarter of the tolerance")
     seconds: float = Field(description="of the processor")
     tried: list[str] = Field(description="what was refused before, and why")
+    deposit: ExactDepositReport | None = Field(description="null where there is none beside the damage volume")
 
 
 class ThicknessReport(JsonModel):
@@ -153,9 +169,14 @@ def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str
             **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
         ),
         spline=SplineReport(**vars(spline)) if spline else None,
-        exact=ExactReport(**{**vars(exact), "tried": list(exact.tried)}) if exact else None,
+        exact=_report_exact(exact) if exact else None,
         warnings=list(site.warnings),
     )
+
+
+def _report_exact(exact: ExactForm) -> ExactReport:
+    deposit = ExactDepositReport(**vars(exact.deposit)) if exact.deposit else None
+    return ExactReport(**{**vars(exact), "tried": list(exact.tried), "deposit": deposit})
 
 
 def _report_deposit(site: Site) -> DepositReport | None:

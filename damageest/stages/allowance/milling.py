@@ -14,6 +14,8 @@ from damageest.stages.allowance._selectors import KeepOut, StockPlan, StockTarge
 
 MAX_DUST = 1e-6
 """Share of the stock's volume up to which an overlap is left: it is a rounding error."""
+SLIVERS = 1e-6
+"""Share of the damage's skin on a CAD face that may have another height of stock: slivers of cuts."""
 
 
 class Milling(Allowance):
@@ -112,6 +114,8 @@ class Milling(Allowance):
             cut_back_volume=max(cavity.volume - damage.volume, 0.0),
             thickness=thickness,
             touched=() if part.faces_brep is None else _find_touched(part, skins),
+            heights=() if part.faces_brep is None else _find_heights(part, skin),
+            overlap=0.0 if band is None else self.overlap,
             notes=tuple(notes),
         )
 
@@ -134,3 +138,16 @@ def _find_touched(part: Part, skins: list[Any]) -> tuple[int, ...]:
     assert part.faces_brep is not None
     parents = np.concatenate([skin.parent[skin.height > 0] for skin in skins])
     return tuple(np.unique(part.faces_brep[parents]).tolist())
+
+
+def _find_heights(part: Part, skin: Any) -> tuple[tuple[int, float], ...]:
+    """The height of the stock on each CAD face of the damage's skin; -1 where it is not the same all over it."""
+    assert part.faces_brep is not None
+    owner, areas = part.faces_brep[skin.parent], skin.areas
+    found = []
+    for number in np.unique(owner).tolist():
+        own = owner == number
+        values, which = np.unique(skin.height[own], return_inverse=True)
+        shares = np.bincount(which.reshape(-1), weights=areas[own]) / max(float(areas[own].sum()), 1e-300)
+        found.append((int(number), float(values[shares.argmax()]) if shares.max() > 1 - SLIVERS else -1.0))
+    return tuple(found)

@@ -53,7 +53,8 @@ class ExactForm:
     ``inner_faces``: how many faces it has, and how many of them are inside the part. ``volume``. ``distance``: 95 % of
     its inner surface are as near to the mesh's, both ways; ``farthest``: all of it; ``beyond``: the share of it that is
     farther than a quarter of the tolerance. What lies less deep than that below the skin counts as near. ``seconds`` of
-    the processor. ``tried``: what was refused before it, and why.
+    the processor. ``tried``: what was refused before it, and why. ``deposit``: how the deposit was written; None where
+    there is none beside the damage volume.
     """
 
     form: str
@@ -65,6 +66,26 @@ class ExactForm:
     beyond: float | None = None
     seconds: float = 0.0
     tried: tuple[str, ...] = ()
+    deposit: DepositForm | None = None
+
+
+@dataclass(frozen=True)
+class DepositForm:
+    """How a deposit was written whose stock is the offset of the part's CAD faces.
+
+    ``faces``: how many; ``offsets``: how many of them are offsets of CAD faces. ``volume``. ``distance``: 95 % of the
+    stock's surface, but for that within 1.5 tolerances of the damage's outline, are as near to the mesh's, both ways;
+    ``farthest``: all of it; both with stock as high as the mesh's. ``seconds`` of the processor. ``reason``: why it has
+    facets; empty where it has CAD faces.
+    """
+
+    faces: int = 0
+    offsets: int = 0
+    volume: float | None = None
+    distance: float | None = None
+    farthest: float | None = None
+    seconds: float = 0.0
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)

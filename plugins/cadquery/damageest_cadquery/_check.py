@@ -84,7 +84,7 @@ def check_pieces(
     ]
     if any(origin == (-1, -1) for _, origin in faces):
         return refuse("faces of unknown origin")
-    curved = sum(_measure_area(face) for face, (number, _) in faces if number >= 0 and not _is_plane(face))
+    curved = sum(measure_area(face) for face, (number, _) in faces if number >= 0 and not is_plane(face))
     room = VOLUME * damage.volume + part.tessellation_error * curved
     if abs(volume - damage.volume) > room:
         return refuse(f"its volume differs by {volume / damage.volume - 1:+.2%}")
@@ -115,7 +115,7 @@ def measure_inner_area(pieces: Sequence[Piece]) -> float:
     from OCP.TopAbs import TopAbs_FACE
 
     return sum(
-        _measure_area(face)
+        measure_area(face)
         for piece in pieces
         for face, (_, tool) in zip(explore(piece.shape, TopAbs_FACE), piece.origins, strict=True)
         if tool >= 0
@@ -156,14 +156,16 @@ def mesh_faces(faces: Sequence[Any]) -> Mesh:
     return Mesh(np.concatenate(points), np.concatenate(triangles))
 
 
-def _is_plane(face: Any) -> bool:
+def is_plane(face: Any) -> bool:
+    """Whether a face is flat by its kind."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_Plane
 
     return bool(BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane)
 
 
-def _measure_area(face: Any) -> float:
+def measure_area(face: Any) -> float:
+    """The area of a face."""
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
 

@@ -65,6 +65,7 @@ class SiteInput:
     enclosures: tuple[Solid, ...]
     points: Floats
     accepted: bool
+    deposit: Solid | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,9 +89,9 @@ def split(solid: Any, owner: int, origins: Sequence[Origin], tool: Tool, fuzzy: 
         return None
     known = ShapeMap()
     for face, origin in zip(explore(solid, TopAbs_FACE), origins, strict=True):
-        _note(known, algorithm, face, origin)
+        note_images(known, algorithm, face, origin)
     for number, face in enumerate(tool.faces):
-        _note(known, algorithm, face, (-1, number))
+        note_images(known, algorithm, face, (-1, number))
     return [_take_piece(shape, owner, known) for shape in explore(algorithm.Shape(), TopAbs_SOLID)]
 
 
@@ -133,7 +133,8 @@ class ShapeMap:
         return self._values.get(self._index.FindIndex(shape), default)
 
 
-def _note(known: ShapeMap, algorithm: Any, face: Any, origin: Origin) -> None:
+def note_images(known: ShapeMap, algorithm: Any, face: Any, origin: Origin) -> None:
+    """Notes the origin of the faces that a Boolean operation made of a face."""
     made = algorithm.Modified(face)
     if made.Size() == 0:
         if not algorithm.IsDeleted(face):

@@ -15,14 +15,18 @@ from pathlib import Path
 from typing import Any
 
 from damageest.artefacts import Floats, Part
-from damageest.stages.export import Body, ExactForm
+from damageest.stages.export import Body, DepositForm, ExactForm
 from damageest_cadquery._assembly import Colour, NamedShape, write_assembly
 from damageest_cadquery._colours import read_colours
+from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit
 from damageest_cadquery._exact import Exact, SiteInput, find_exact, scale_shape, start_solids
 from damageest_cadquery._read import explore, read
+from damageest_cadquery._solids import StockError
 from damageest_cadquery._split import Piece, join_pieces
 
 INNER: Colour = (215, 50, 40)
+TOP: Colour = (40, 130, 205)
+SIDE: Colour = (140, 185, 225)
 PLAIN: Colour = (150, 155, 165)
 
 
@@ -69,7 +73,9 @@ def main(path: Path) -> None:
         model.solid_names,
     )
     rest, found = solids, {}
+    deposits: dict[int, ExactDeposit] = {}
     reasons: dict[int, tuple[str, ...]] = {}
+    forms: dict[int, DepositForm | None] = {}
     for site in request.sites:
         _tell(start=site.number)
         if site.number in request.skipped:
@@ -80,13 +86,20 @@ def main(path: Path) -> None:
         if exact is not None:
             found[site.number] = exact
             rest = exact.rest if site.accepted else rest
+        forms[site.number] = describe_missing(site)
+        if exact is not None and site.deposit is not None:
+            try:
+                made = find_deposit(site.deposit, site.damage, exact.pieces, exact.rest, faces, part, request.tolerance)
+                deposits[site.number], forms[site.number] = made, _describe_deposit(made)
+            except StockError as error:
+                forms[site.number] = DepositForm(reason=str(error))
         _tell(done=site.number)
     _tell(start=0)
     complete = all(site.number in found for site in request.sites if site.accepted)
-    files = _write(request, found, rest if complete else None, facts)
-    forms = {number: asdict(ExactForm("none", tried=tried)) for number, tried in reasons.items()}
-    forms |= {number: asdict(_describe(exact)) for number, exact in found.items()}
-    _tell(files=files, forms=forms)
+    files = _write(request, found, deposits, rest if complete else None, facts)
+    said = {number: ExactForm("none", tried=tried) for number, tried in reasons.items()}
+    said |= {number: _describe(exact) for number, exact in found.items()}
+    _tell(files=files, forms={number: asdict(replace(form, deposit=forms[number])) for number, form in said.items()})
 
 
 def _explore_faces(solid: Any) -> list[Any]:
@@ -104,7 +117,26 @@ def _describe(exact: Exact) -> ExactForm:
     )  # fmt: skip
 
 
-def _write(request: Request, found: Mapping[int, Exact], rest: Sequence[Piece] | None, facts: CadFacts) -> list[str]:
+def describe_missing(site: SiteInput) -> DepositForm | None:
+    """What to say of a deposit whose damage volume has no exact form; None where there is no deposit."""
+    return None if site.deposit is None else DepositForm(reason="its damage volume has facets too")
+
+
+def _describe_deposit(deposit: ExactDeposit) -> DepositForm:
+    origins = [origin for piece in deposit.pieces for origin in piece.origins]
+    offsets = sum(number >= 0 and kind == STOCK for number, kind in origins)
+    return DepositForm(
+        len(origins), offsets, deposit.volume, deposit.distance, deposit.farthest, round(deposit.seconds, 3)
+    )
+
+
+def _write(
+    request: Request,
+    found: Mapping[int, Exact],
+    deposits: Mapping[int, ExactDeposit],
+    rest: Sequence[Piece] | None,
+    facts: CadFacts,
+) -> list[str]:
     """Writes the exact solids, and the assembly of all; gives the paths relative to the folder."""
     shapes: dict[str, NamedShape] = {}
     for number, exact in found.items():
@@ -114,6 +146,9 @@ def _write(request: Request, found: Mapping[int, Exact], rest: Sequence[Piece] |
             stem, name = f"doubtful/site-{number}", f"doubtful site-{number}"
         shapes[stem] = _name(exact.pieces, name, request.bodies[stem].colour, facts, name)
     union = [shape for stem, shape in shapes.items() if stem.startswith("damage/")]
+    for number, deposit in deposits.items():
+        stem, name = f"deposit/site-{number}", f"deposit site-{number}"
+        shapes[stem] = _name(deposit.pieces, name, request.bodies[stem].colour, facts, f"damage site-{number}")
     if rest is not None and union:
         shapes["damage"] = join_named("damage", union, request.bodies["damage"].colour)
         shapes |= _name_rest(rest, request.bodies, facts)
@@ -163,6 +198,10 @@ def _name(pieces: Sequence[Piece], name: str, colour: Colour, facts: CadFacts, i
     names, colours = [], []
     for piece in pieces:
         for number, tool in piece.origins:
+            if tool == STOCK:
+                names.append(f"stock on {facts.names[number]}" if number >= 0 else "side of the stock")
+                colours.append(TOP if number >= 0 else SIDE)
+                continue
             names.append(facts.names[number] if number >= 0 else f"{inner} inner {tool + 1}")
             colours.append((facts.colours[number] or PLAIN) if number >= 0 else INNER)
     return NamedShape(name, join_pieces(pieces), colour, names, colours)

@@ -18,15 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh
+from damageest.artefacts import Deposit, Floats, Mesh, Solid
 from damageest.errors import InputError
 from damageest.geometry.units import MILLIMETRES
 from damageest.result import Result
-from damageest.stages.export import Body, ExactForm, ExportedFiles
+from damageest.stages.export import Body, DepositForm, ExactForm, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._read import read
 from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
-from damageest_cadquery._worker import Request
+from damageest_cadquery._worker import Request, describe_missing
 
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
@@ -61,7 +61,7 @@ def write_exact(
     forms = {int(number): _read_form(form) for number, form in said.get("forms", {}).items()}
     for site_input in request.sites:
         why = (request.skipped.get(site_input.number, "the process for exact solids stopped"),)
-        forms.setdefault(site_input.number, ExactForm("none", tried=why))
+        forms.setdefault(site_input.number, ExactForm("none", tried=why, deposit=describe_missing(site_input)))
     notes = tuple(
         f"site-{number}.step has facets, not the faces of the CAD file: {form.tried[-1] if form.tried else 'unknown'}"
         for number, form in sorted(forms.items())
@@ -69,6 +69,11 @@ def write_exact(
     )
     if notes:
         notes = (*notes, "damage.step and undamaged.step have facets too")
+    notes += tuple(
+        f"deposit/site-{number}.step has facets, not offsets of the CAD's faces: {form.deposit.reason}"
+        for number, form in sorted(forms.items())
+        if form.deposit is not None and form.deposit.reason
+    )
     files = tuple(said.get("files", ()))
     return ExportedFiles(files, notes, exact=dict(sorted(forms.items())), warnings=notes)
 
@@ -104,7 +109,17 @@ def _take_site(result: Result, index: int, factor: float) -> SiteInput:
         enclosures=tuple(_scale(solid, factor) for solid in site.enclosures),
         points=np.asarray(result.aligned.points[site.points]) * factor,
         accepted=site.accepted,
+        deposit=None if site.deposit is None else _scale_deposit(site.deposit, factor),
     )
+
+
+def _scale_deposit(deposit: Solid, factor: float) -> Solid:
+    scaled: Solid = _scale(deposit, factor)
+    if not isinstance(scaled, Deposit):
+        return scaled
+    heights = tuple((number, height * factor if height > 0 else height) for number, height in scaled.heights)
+    volume, overlap = scaled.stock_volume * factor**3, scaled.overlap * factor
+    return replace(scaled, cavity=None, heights=heights, stock_volume=volume, overlap=overlap)
 
 
 def _scale(mesh: Any, factor: float) -> Any:
@@ -119,7 +134,8 @@ def _scale_shift(T: Floats, factor: float) -> Floats:
 
 
 def _read_form(values: dict[str, Any]) -> ExactForm:
-    return ExactForm(**{**values, "tried": tuple(values["tried"])})
+    deposit = None if values["deposit"] is None else DepositForm(**values["deposit"])
+    return ExactForm(**{**values, "tried": tuple(values["tried"]), "deposit": deposit})
 
 
 def _run(request: Request, seconds: float) -> tuple[dict[str, Any], int, str]:
@@ -205,14 +221,18 @@ class _Clock:
 def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
     """A ``cadquery.Shape`` with the CAD's own faces, in the part's frame and the result's unit.
 
-    ``what``: part, undamaged, or damage of a ``site``. It is made in a process of its own, as for files. Raises
+    ``what``: part, undamaged, or damage or deposit of a ``site``; where no allowance adds to it, the deposit is the
+    damage volume. It is made in a process of its own, as for files. Raises
     ValueError for another name or site, InputError where the part has no CAD faces or no exact form passes the checks.
     """
-    if what not in ("part", "undamaged", "damage"):
-        raise ValueError(f"no '{what}' as CadQuery; there are: part, undamaged, damage")
-    known = [each.id for each in result.sites]
-    if what == "damage" and site not in known:
+    if what not in ("part", "undamaged", "damage", "deposit"):
+        raise ValueError(f"no '{what}' as CadQuery; there are: part, undamaged, damage, deposit")
+    known = {each.id: each for each in result.sites}
+    if what in ("damage", "deposit") and site not in known:
         raise ValueError(f"there is no site {site}; there are: {', '.join(map(str, known)) or 'none'}")
+    if what == "deposit" and site is not None:
+        known[site].mesh("deposit")  # raises where it was refused
+        what = "damage" if known[site].deposit is None else what
     if not result.part.cad_scale:
         raise InputError("the part is a mesh: only a part from STEP, IGES or BREP has CAD faces")
     if what == "part" or (what == "undamaged" and not result.sites):
@@ -223,11 +243,14 @@ def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
         for each in chosen.sites:
             stem = f"damage/site-{each.id}" if each.accepted else f"doubtful/site-{each.id}"
             bodies[stem] = Body(stem, each.damage, (0, 0, 0))
+            if each.deposit is not None:
+                bodies[f"deposit/site-{each.id}"] = Body("deposit", each.deposit, (0, 0, 0))
         if result.undamaged is not None and result.damage is not None:
             bodies["undamaged"] = Body("undamaged", result.undamaged, (0, 0, 0))
             bodies["damage"] = Body("damage", result.damage, (0, 0, 0))
         done = write_exact(Path(place), chosen, bodies, {"": None}, LIMIT)
-        wanted = [name for name in done.files if ("/" in name if what == "damage" else name == "undamaged.step")]
+        folders = {"damage": ("damage/", "doubtful/"), "deposit": ("deposit/",), "undamaged": ("undamaged.step",)}
+        wanted = [name for name in done.files if name.startswith(folders[what])]
         if not wanted:
             raise InputError(f"{what} has no exact form; take as_trimesh ({'; '.join(done.notes)})")
         return _take_shape(Path(place) / wanted[0], 1 / MILLIMETRES[result.units])

@@ -19,6 +19,10 @@ NOISE, TOLERANCE = 0.00075, 0.003
 """Of the scan and of the job, in diagonals of the part."""
 COUNT = 3
 """Damages of a case, where the part has room for them."""
+STOCK = 2.0
+"""Height of the stock on the deposits, in tolerances."""
+FINE = 1 / 64
+"""Chord, in tolerances, of triangles that stand for CAD faces where these are compared with the part's triangles."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -72,6 +76,7 @@ def run_case(path: Path, seed: int, output: Path) -> list[dict[str, Any]]:
         job = {
             "version": 1, "units": "mm", "tolerance": tolerance, "part": str(path), "align": "none", "scan": scan,
             "accept": "all", "export": {"format": ["step"], "solids": "exact"}, "report": "none",
+            "allowance": {"use": "milling", "outer": STOCK * tolerance},
         }  # fmt: skip
         result = damageest.run(job, output=output, cache=False)
     except (LookupError, DamageestError) as error:
@@ -79,11 +84,15 @@ def run_case(path: Path, seed: int, output: Path) -> list[dict[str, Any]]:
     said = json.loads((output / "result.json").read_text())
     rows = []
     truth = result.scan.truth.damage if result.scan.truth else None
+    chords = Chords(path, result.part, tolerance)
     for site, report in zip(result.sites, said["sites"], strict=True):
         exact = report["exact"]
         row = base | {"kinds": list(drawn.kinds), "site": site.id, "mesh": site.damage.volume} | exact
         if exact["form"] != "none":
-            row |= _read_back(output / f"damage/site-{site.id}.step", site.damage, truth, tolerance)
+            row |= _read_back(output / f"damage/site-{site.id}.step", site.damage, truth, tolerance, chords)
+        if exact["deposit"] and not exact["deposit"]["reason"]:
+            mesh = {"mesh": site.deposit.volume if site.deposit else None}
+            row["deposit"] |= mesh | _read_file(output / f"deposit/site-{site.id}.step")
         rows.append(row)
     if not rows:
         return [base | {"error": "no site"}]
@@ -91,24 +100,54 @@ def run_case(path: Path, seed: int, output: Path) -> list[dict[str, Any]]:
     return [row | {"export_seconds": seconds} for row in rows]
 
 
-def _read_back(path: Path, mesh: Any, truth: Any, tolerance: float) -> dict[str, Any]:
-    """What cadquery and gmsh find in the file, and IoU of exact form and mesh with the truth around the site."""
+class Chords:
+    """What the part's triangles cut off its curved faces, or add to them."""
+
+    def __init__(self, path: Path, part: Any, tolerance: float) -> None:
+        from damageest.geometry.solids import to_manifold
+        from damageest_cadquery.brep import Brep
+
+        self.fine = Brep(path=path, chord=FINE * tolerance).run(unit="mm", tolerance=None)
+        self.origin = part.bounds.mean(axis=0)
+        self.meshed, self.cad = (to_manifold(solid, self.origin) for solid in (part, self.fine))
+
+    def measure(self, exact: Any, mesh: Any) -> float:
+        """How much larger an exact damage volume is than a mesh because of the triangles' chords alone."""
+        from damageest.geometry.solids import to_manifold
+
+        first, second = to_manifold(exact, self.origin), to_manifold(mesh, self.origin)
+        return float((first - self.meshed).volume() - (second - self.cad).volume())
+
+
+def _read_file(path: Path) -> dict[str, Any]:
+    """What cadquery and gmsh find in a file."""
     import cadquery as cq
 
-    from damageest.geometry.solids import iou, to_manifold, to_solid
-    from damageest_cadquery.brep import Brep
     from damageest_cadquery.exact import measure_volume
 
     solids = cq.importers.importStep(str(path)).solids().vals()
     plain = sum(solid.Volume() for solid in solids)
     gmsh = _read_with_gmsh(path)
-    row: dict[str, Any] = {
+    return {
         "read_volume": sum(measure_volume(solid.wrapped) for solid in solids),
         "read_solids": len(solids),
         "read_valid": all(solid.isValid() for solid in solids),
         # gmsh integrates with a fixed number of points, as CadQuery does: the two are compared
         "gmsh": None if gmsh is None else [gmsh[0] / plain - 1, gmsh[1]],
     }
+
+
+def _read_back(path: Path, mesh: Any, truth: Any, tolerance: float, chords: Chords) -> dict[str, Any]:
+    """What is in the file, what chords make of its volume, and IoU of exact form and mesh with the truth around it."""
+    from damageest.geometry.solids import iou, to_manifold, to_solid
+    from damageest_cadquery.brep import Brep
+
+    row = _read_file(path)
+    try:
+        row["chords"] = chords.measure(Brep(path=path, chord=FINE * tolerance).run(unit="mm", tolerance=None), mesh)
+        exact = Brep(path=path, chord=tolerance / 16).run(unit="mm", tolerance=None)
+    except Exception as error:
+        return row | {"iou_error": str(error)[:200]}
     if truth is None:
         return row
     origin = mesh.bounds.mean(axis=0)
@@ -117,11 +156,7 @@ def _read_back(path: Path, mesh: Any, truth: Any, tolerance: float) -> dict[str,
 
     box = Manifold.cube(tuple(size.tolist()), True)
     near = to_solid(to_manifold(truth, origin) ^ box, origin)
-    try:
-        exact = Brep(path=path, chord=tolerance / 16).run(unit="mm", tolerance=None)
-    except Exception as error:
-        return row | {"iou_error": str(error)[:200]}
-    return row | {"iou_mesh": iou(near, mesh), "iou_exact": iou(near, exact)}
+    return row | {"iou_mesh": iou(near, mesh), "iou_exact": iou(near, exact), "truth": near.volume}
 
 
 def _read_with_gmsh(path: Path) -> list[float] | None:
@@ -149,22 +184,15 @@ def summarise(rows: Sequence[dict[str, Any]]) -> str:
     forms = {
         form: sum(row["form"] == form for row in sites) for form in ("shapes", "spline", "planes", "facets", "none")
     }
-    off = np.array([abs(row["volume"] / row["mesh"] - 1) for row in good])
     faces, seconds = np.array([row["faces"] for row in good]), np.array([row["seconds"] for row in good])
     lines = [
         f"{len(rows)} damages on {len({row['part'] for row in rows})} parts, {len(sites)} sites; "
         f"exact {len(good) / len(sites):.1%}: {forms}",
         f"seconds a site: median {np.median(seconds):.1f}, 95 % {np.quantile(seconds, 0.95):.1f}",
         f"faces a site: median {np.median(faces):g}, 95 % {np.quantile(faces, 0.95):g}, most {faces.max()}",
-        f"volume against the mesh: median {np.median(off):.3%}, 95 % {np.quantile(off, 0.95):.3%}, "
-        f"most {off.max():.3%}",
+        *_compare_volumes(good),
+        *_count_reads("damage", [row for row in good if "read_volume" in row]),
     ]
-    back = [row for row in good if "read_volume" in row]
-    same = [abs(row["read_volume"] / row["volume"] - 1) < 1e-4 and row["read_valid"] for row in back]
-    lines.append(f"read back by cadquery: {sum(same)} of {len(back)} with the same volume, valid")
-    other = [row for row in back if row["gmsh"]]
-    same = [abs(row["gmsh"][0]) < 1e-4 and row["gmsh"][1] == row["read_solids"] for row in other]
-    lines.append(f"read back by gmsh: {sum(same)} of {len(other)} with the same volume and number of solids")
     both = np.array([[row["iou_exact"], row["iou_mesh"]] for row in good if "iou_exact" in row])
     if len(both):
         lines.append(
@@ -172,7 +200,59 @@ def summarise(rows: Sequence[dict[str, Any]]) -> str:
             f"exact at least as good in {(both[:, 0] >= both[:, 1]).mean():.0%}, "
             f"worst difference {(both[:, 0] - both[:, 1]).min():+.4f}"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, *_summarise_deposits([row["deposit"] for row in good if row["deposit"]])])
+
+
+def _compare_volumes(good: Sequence[dict[str, Any]]) -> list[str]:
+    """Volumes against those of the meshes, as they are and without what chords of the part's triangles do; by form."""
+
+    def tell(what: str, off: Any) -> str:
+        size = np.abs(off)
+        return (
+            f"{what}: median {np.median(size):.3%}, 95 % {np.quantile(size, 0.95):.3%}, most {size.max():.3%}; "
+            f"with its sign {np.median(off):+.3%}"
+        )
+
+    lines = [tell("volume against the mesh", np.array([row["volume"] / row["mesh"] - 1 for row in good]))]
+    known = [row for row in good if "chords" in row]
+    own = {id(row): (row["volume"] - row["chords"]) / row["mesh"] - 1 for row in known}
+    if known:
+        lines.append(tell("without the chords of the part's triangles", np.array(list(own.values()))))
+    for form in ("shapes", "spline", "planes", "facets"):
+        mine = [own[id(row)] for row in known if row["form"] == form]
+        if mine:
+            lines.append(tell(f"  {form}, {len(mine)} sites", np.array(mine)))
+    real = [row for row in known if "truth" in row]
+    if real:
+        exact = np.array([(row["volume"] - row["chords"]) / row["truth"] - 1 for row in real])
+        mesh = np.array([row["mesh"] / row["truth"] - 1 for row in real])
+        lines.append(
+            f"volume against the truth, whose skin is the part's triangles: exact, without chords, median "
+            f"{np.median(np.abs(exact)):.3%}, mesh {np.median(np.abs(mesh)):.3%}"
+        )
+    return lines
+
+
+def _count_reads(what: str, back: Sequence[dict[str, Any]]) -> list[str]:
+    same = [abs(row["read_volume"] / row["volume"] - 1) < 1e-4 and row["read_valid"] for row in back]
+    lines = [f"{what} read back by cadquery: {sum(same)} of {len(back)} with the same volume, valid"]
+    other = [row for row in back if row["gmsh"]]
+    same = [abs(row["gmsh"][0]) < 1e-4 and row["gmsh"][1] == row["read_solids"] for row in other]
+    return [*lines, f"{what} read back by gmsh: {sum(same)} of {len(other)} with the same volume and number of solids"]
+
+
+def _summarise_deposits(deposits: Sequence[dict[str, Any]]) -> list[str]:
+    good = [deposit for deposit in deposits if not deposit["reason"]]
+    if not good:
+        return [f"{len(deposits)} deposits, none exact"]
+    seconds, faces = (np.array([deposit[name] for deposit in good]) for name in ("seconds", "faces"))
+    reasons = sorted(deposit["reason"] for deposit in deposits if deposit["reason"])
+    return [
+        f"{len(deposits)} deposits on exact damage volumes, exact {len(good) / len(deposits):.1%}; others: {reasons}",
+        f"deposits: seconds median {np.median(seconds):.1f}, 95 % {np.quantile(seconds, 0.95):.1f}; "
+        f"faces median {np.median(faces):g}",
+        *_count_reads("deposit", good),
+    ]
 
 
 if __name__ == "__main__":

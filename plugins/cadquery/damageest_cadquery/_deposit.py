@@ -1,0 +1,242 @@
+"""Finds the exact deposit of a site: its exact damage volume, with stock that is the offset of its CAD faces.
+
+The mesh's stock is a quarter of the tolerance higher than the job asks for, so that facets are nowhere lower. So stock
+of that height is built too, and compared with the mesh; what is written has the height that the job asks for.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from damageest.artefacts import Deposit, Floats, Ints, Mesh, Part, Solid
+from damageest.errors import InputError
+from damageest.geometry.bodies import split_bodies
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, signed_distance
+from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.solids import concatenate_meshes, to_manifold
+from damageest_cadquery._check import ON_CAD, VOLUME, is_plane, measure_area
+from damageest_cadquery._cut import find_rim
+from damageest_cadquery._read import explore
+from damageest_cadquery._solids import SAME, StockError, combine, explore_faces, sew
+from damageest_cadquery._split import (
+    Origin,
+    Piece,
+    ShapeMap,
+    find_corners,
+    is_opencascade_error,
+    is_sound,
+    measure_volume,
+    note_images,
+    triangulate,
+)
+from damageest_cadquery._stock import Base, build_stock, take_bases
+
+STOCK = -2
+"""In origins: (number, STOCK) is the offset of a CAD face, (-1, STOCK) a side of the stock."""
+BEYOND = 0.02
+"""Largest share of the stock's surface that may be farther than a quarter tolerance from the mesh's."""
+OUTLINE, FARTHEST = 1.5, 4.0
+"""Nearer than the first to the outline of the damage, in tolerances, only the second counts: sides stand on the outline
+of the exact damage volume, which the mesh rounds, or draws out where the loss fades."""
+SAMPLES = 6000
+SPECK = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class ExactDeposit:
+    """``volume``; ``distance``: 95 % of the stock's surface, but for that near the damage's outline, are as near to
+    the mesh's, both ways; ``farthest``: all; ``difference``: of the stock's volumes, as a share of the mesh deposit.
+
+    The latter three are those of stock as high as the mesh's.
+    """
+
+    pieces: tuple[Piece, ...]
+    volume: float
+    distance: float
+    farthest: float
+    difference: float
+    seconds: float
+
+
+def find_deposit(
+    deposit: Solid,
+    lost: Solid,
+    damage: Sequence[Piece],
+    rest: Sequence[Piece],
+    faces: Sequence[Any],
+    part: Part,
+    tolerance: float,
+) -> ExactDeposit:
+    """The exact form of ``deposit``, on the exact ``damage`` volume of the mesh ``lost``.
+
+    Raises StockError where there is none that passes the checks.
+    """
+    start = time.process_time()
+    if not isinstance(deposit, Deposit) or (deposit.stock_volume > 0 and not deposit.heights):
+        raise StockError("the allowance does not say how high the stock on each CAD face is")
+    if deposit.overlap:
+        raise StockError("the stock overlaps the intact skin around the damage")
+    try:
+        bases = [base for piece in damage for base in take_bases(piece, dict(deposit.heights))]
+        higher = [replace(base, height=base.height + tolerance / 4) for base in bases]
+        tall = _build(higher, damage, rest, part, tolerance, deposit)
+        figures = _compare(tall, higher, deposit, lost, part, tolerance)
+        stock = _build(bases, damage, rest, part, tolerance, deposit)
+        pieces = _join(damage, stock, bases, faces, part) if stock else tuple(damage)
+    except Exception as error:
+        if is_opencascade_error(error) or isinstance(error, (InputError, ValueError)):
+            raise StockError(f"OpenCASCADE cannot build it ({str(error)[:80] or type(error).__name__})") from None
+        raise
+    volume = sum(measure_volume(piece.shape) for piece in pieces)
+    parts = sum(measure_volume(shape) for shape in (*(piece.shape for piece in damage), *stock))
+    if abs(volume / parts - 1) > SAME:
+        raise StockError(f"its volume differs by {volume / parts - 1:+.2%} from damage and stock")
+    bodies = sum(body.volume > SPECK * deposit.volume for body in split_bodies(deposit))
+    if len(pieces) != bodies:
+        raise StockError(f"{len(pieces)} solids for {bodies} pieces")
+    if not is_sound(pieces):
+        raise StockError("not valid (BRepCheck)")
+    return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
+
+
+def _build(
+    bases: Sequence[Base], damage: Sequence[Piece], rest: Sequence[Piece], part: Part, tolerance: float, deposit: Solid
+) -> list[Any]:
+    """The stock, without what would lie in the metal that is left."""
+    if not bases:
+        return []
+    stock = build_stock(bases)
+    origin = deposit.bounds.mean(axis=0)
+    whole, entered = to_manifold(part, origin), 0.0
+    for solid in stock:
+        entered += (to_manifold(triangulate(solid, tolerance / 16), origin) ^ whole).volume()
+    curved = sum(measure_area(base.face) for base in bases if not is_plane(base.face))
+    if entered <= SAME * deposit.volume + part.tessellation_error * curved:
+        return stock
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+    from OCP.TopAbs import TopAbs_SOLID
+
+    metal = [piece.shape for piece in (*rest, *damage)]
+    cut = explore(combine(BRepAlgoAPI_Cut(), stock, metal), TopAbs_SOLID)
+    return [solid for solid in cut if measure_volume(solid) > 1e-6 * deposit.volume]
+
+
+def _compare(
+    stock: Sequence[Any], bases: Sequence[Base], deposit: Deposit, lost: Solid, part: Part, tolerance: float
+) -> tuple[float, float, float]:
+    """Distance, largest distance and difference of volumes between stock, as high as the mesh's, and the mesh's."""
+    volume = sum(measure_volume(solid) for solid in stock)
+    difference = (volume - deposit.stock_volume) / deposit.volume
+    outside = np.flatnonzero(~find_inner_faces(lost, part))
+    wider = _compare_outlines(bases, lost, outside, part) / deposit.volume
+    curved = sum(measure_area(face) for solid in stock for face in explore_faces(solid) if not is_plane(face))
+    if abs(difference - wider) > VOLUME + part.tessellation_error * curved / deposit.volume:
+        raise StockError(
+            f"the volume of its stock differs by {difference:+.2%} of the deposit, of which the outline of the damage "
+            f"explains {wider:+.2%}"
+        )
+    if not stock:
+        return 0.0, 0.0, difference
+    vertices, faces, _ = concatenate_meshes([triangulate(solid, tolerance / 16) for solid in stock])
+    made = Mesh(vertices, faces)
+    rim = cKDTree(lost.vertices[np.unique(find_rim(lost.faces[outside]))])
+    far, off = [], []
+    for one, other in ((made, deposit), (deposit, made)):
+        points, foot = _sample_above(one, part, tolerance)
+        off.append(distance_to_mesh(points, other))
+        far.append(np.asarray(rim.query(foot)[0]) > OUTLINE * tolerance)
+    farthest = float(max(each.max(initial=0.0) for each in off))
+    beyond = max(
+        float((each[away] > tolerance / 4).mean()) if away.any() else 0.0 for each, away in zip(off, far, strict=True)
+    )
+    if beyond > BEYOND or farthest > FARTHEST * tolerance:
+        raise StockError(f"its stock is up to {farthest:.3g} from the mesh, {beyond:.1%} more than a quarter tolerance")
+    inside = [each[away] for each, away in zip(off, far, strict=True)]
+    return float(max(np.quantile(each, 0.95) if len(each) else 0.0 for each in inside)), farthest, difference
+
+
+def _compare_outlines(bases: Sequence[Base], lost: Solid, outside: Ints, part: Part) -> float:
+    """By how much stock is larger because the exact damage volume has more skin than the mesh."""
+    assert part.faces_brep is not None
+    corners = lost.triangles[outside]
+    number = part.faces_brep[closest_on_mesh(corners.mean(axis=1), part)[1]]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    heights = {base.number: base.height for base in bases}
+    more = sum(base.height * measure_area(base.face) for base in bases)
+    return more - sum(height * float(areas[number == face].sum()) for face, height in heights.items())
+
+
+def _sample_above(mesh: Mesh, part: Part, tolerance: float) -> tuple[Floats, Floats]:
+    """(N,3) places on a mesh, evenly by area, that lie above the part's skin, and (N,3) the nearest places on it."""
+    rng = np.random.default_rng(31)
+    total = np.cumsum(np.linalg.norm(mesh.cross, axis=1))
+    face = np.minimum(np.searchsorted(total, rng.random(SAMPLES) * total[-1], side="right"), len(total) - 1)
+    u, v = np.sqrt(rng.random((SAMPLES, 1))), rng.random((SAMPLES, 1))
+    a, b, c = np.moveaxis(mesh.triangles[face], 1, 0)
+    points = np.asarray(a * (1 - u) + b * u * (1 - v) + c * u * v)
+    points = points[signed_distance(points, part)[0] > tolerance / 8]
+    return points, closest_on_mesh(points, part)[2] if len(points) else points
+
+
+def _join(
+    damage: Sequence[Piece], stock: Sequence[Any], bases: Sequence[Base], faces: Sequence[Any], part: Part
+) -> tuple[Piece, ...]:
+    """Damage volume and stock as one, with the origins of their faces."""
+    solids, known = _unite(damage, stock)
+    heights = {base.number: base.height for base in bases}
+    pieces = []
+    for solid in solids:
+        mine = explore_faces(solid)
+        origins = [known.get(face) or _find_top(face, heights, faces, ON_CAD * part.diagonal) for face in mine]
+        pieces.append(Piece(solid, damage[0].owner, tuple(origins)))
+    # in a concave corner the stock of one face can cover that of another
+    if not any(number >= 0 and kind == STOCK for piece in pieces for number, kind in piece.origins):
+        raise StockError("no face lies at the height of the stock over a face of the part")
+    return tuple(pieces)
+
+
+def _unite(damage: Sequence[Piece], stock: Sequence[Any]) -> tuple[list[Any], ShapeMap]:
+    """The solids, and the origins of the faces that come from the damage volume."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
+    from OCP.TopAbs import TopAbs_SOLID
+
+    known, shapes = ShapeMap(), [piece.shape for piece in damage]
+    found = sew([*shapes, *stock])
+    if found is not None:
+        solids, rows = found
+        for face in (face for solid in solids for face in explore_faces(solid)):
+            number, k = rows.get(face, (len(damage), 0))
+            if number < len(damage):
+                known.set(face, damage[number].origins[k])
+        return solids, known
+    algorithm = BRepAlgoAPI_Fuse()
+    shape = combine(algorithm, shapes, list(stock))
+    for piece in damage:
+        for face, origin in zip(explore_faces(piece.shape), piece.origins, strict=True):
+            note_images(known, algorithm, face, origin)
+    return explore(shape, TopAbs_SOLID), known
+
+
+def _find_top(face: Any, heights: Mapping[int, float], faces: Sequence[Any], near: float) -> Origin:
+    """The CAD face of which a face is the offset: all its corners lie at the height of the stock over it."""
+    from OCP.BRep import BRep_Tool
+    from OCP.gp import gp_Pnt
+    from OCP.ShapeAnalysis import ShapeAnalysis_Surface
+    from OCP.TopoDS import TopoDS
+
+    corners = [gp_Pnt(*point) for point in find_corners(face).tolist()]
+    for number, height in heights.items():
+        analysis = ShapeAnalysis_Surface(BRep_Tool.Surface_s(TopoDS.Face_s(faces[number])))
+        for corner in corners:
+            analysis.ValueOfUV(corner, 1e-7)
+            if abs(analysis.Gap() - height) > near:
+                break
+        else:
+            return number, STOCK
+    return -1, STOCK

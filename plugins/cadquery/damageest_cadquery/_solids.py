@@ -1,0 +1,140 @@
+"""Solids of stock: turned outward, joined, and what cannot be made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats
+from damageest_cadquery._read import explore
+from damageest_cadquery._split import ShapeMap, measure_volume
+
+SEWN = 2e-5
+"""Distance in millimetres within which edges of faces are one edge."""
+SAME = 1e-4
+"""Largest relative difference between the volume of solids and of what they are joined from."""
+
+
+class StockError(Exception):
+    """The stock cannot be made of offsets of CAD faces; the message says why."""
+
+
+def orient_solid(shape: Any) -> Any:
+    """The one solid of a shape with its faces outward. Raises StockError where it is not sound."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepLib import BRepLib
+    from OCP.TopAbs import TopAbs_SOLID
+    from OCP.TopoDS import TopoDS
+
+    solids = explore(_place_faces(shape), TopAbs_SOLID)
+    if len(solids) != 1:
+        raise StockError("the offset of a face is not one solid")
+    solid = TopoDS.Solid_s(solids[0])
+    BRepLib.OrientClosedSolid_s(solid)
+    if not BRepCheck_Analyzer(solid).IsValid() or measure_volume(solid) <= 0:
+        raise StockError("the offset of a face folds")
+    return solid
+
+
+def _place_faces(shape: Any) -> Any:
+    """The shape with faces in their own place: faces that are others moved, as in a prism, have no names in STEP."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing, BRepBuilderAPI_Transform
+    from OCP.TopAbs import TopAbs_SHELL
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    faces = explore_faces(shape)
+    if all(face.Location().IsIdentity() for face in faces):
+        return shape
+    sewing = BRepBuilderAPI_Sewing(SEWN)
+    for face in faces:
+        if not face.Location().IsIdentity():
+            move = face.Location().Transformation()
+            face = BRepBuilderAPI_Transform(face.Located(TopLoc_Location()), move, True).Shape()
+        sewing.Add(face)
+    sewing.Perform()
+    shells = explore(sewing.SewedShape(), TopAbs_SHELL)
+    return BRepBuilderAPI_MakeSolid(TopoDS.Shell_s(shells[0])).Solid() if len(shells) == 1 else shape
+
+
+def combine(algorithm: Any, arguments: Sequence[Any], tools: Sequence[Any], fuzzy: float = 1e-6) -> Any:
+    """The shape that a Boolean operation gives. Raises StockError where OpenCASCADE reports an error."""
+    from OCP.TopTools import TopTools_ListOfShape
+
+    lists = TopTools_ListOfShape(), TopTools_ListOfShape()
+    for chosen, shapes in zip(lists, (arguments, tools), strict=True):
+        for shape in shapes:
+            chosen.Append(shape)
+    algorithm.SetArguments(lists[0])
+    algorithm.SetTools(lists[1])
+    algorithm.SetRunParallel(False)
+    algorithm.SetNonDestructive(True)
+    algorithm.SetFuzzyValue(fuzzy)
+    algorithm.Build()
+    if not algorithm.IsDone():
+        raise StockError("OpenCASCADE cannot join the stock")
+    return algorithm.Shape()
+
+
+def explore_faces(shape: Any) -> list[Any]:
+    """The faces of a shape."""
+    from OCP.TopAbs import TopAbs_FACE
+    from OCP.TopoDS import TopoDS
+
+    return [TopoDS.Face_s(face) for face in explore(shape, TopAbs_FACE)]
+
+
+def sew(solids: Sequence[Any]) -> tuple[list[Any], ShapeMap] | None:
+    """Solids that touch on whole faces, joined without these; and for each new face the solid and the face that it was.
+
+    None where the rest does not close, or where its volume is not that of all solids: then they share volume.
+    """
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
+    from OCP.TopAbs import TopAbs_SHELL
+    from OCP.TopoDS import TopoDS
+
+    faces = [(number, k, face) for number, solid in enumerate(solids) for k, face in enumerate(explore_faces(solid))]
+    inside = _find_twins([face for _, _, face in faces], [number for number, _, _ in faces])
+    sewing = BRepBuilderAPI_Sewing(SEWN)
+    outer = [each for each, twin in zip(faces, inside.tolist(), strict=True) if not twin]
+    for _, _, face in outer:
+        sewing.Add(face)
+    sewing.Perform()
+    joined = []
+    for shell in explore(sewing.SewedShape(), TopAbs_SHELL):
+        if not BRep_Tool.IsClosed_s(TopoDS.Shell_s(shell)):
+            return None
+        joined.append(BRepBuilderAPI_MakeSolid(TopoDS.Shell_s(shell)).Solid())
+    try:
+        joined = [orient_solid(solid) for solid in joined]
+    except StockError:
+        return None
+    before, after = (sum(measure_volume(solid) for solid in each) for each in (solids, joined))
+    if not joined or abs(after / before - 1) > SAME:
+        return None
+    known = ShapeMap()
+    for number, k, face in outer:
+        known.set(sewing.Modified(face) if sewing.IsModified(face) else face, (number, k))
+    return joined, known
+
+
+def _find_twins(faces: Sequence[Any], owners: Sequence[int]) -> Any:
+    """(F,) whether another solid has the same face, by its centre and area."""
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+    from scipy.spatial import cKDTree
+
+    rows = []
+    for face in faces:
+        sizes = GProp_GProps()
+        BRepGProp.SurfaceProperties_s(face, sizes, 1e-7)
+        rows.append((*sizes.CentreOfMass().Coord(), np.sqrt(max(sizes.Mass(), 0.0))))
+    values: Floats = np.array(rows)
+    twins = np.zeros(len(faces), bool)
+    for one, two in cKDTree(values).query_pairs(5 * SEWN):
+        if owners[one] != owners[two]:
+            twins[[one, two]] = True
+    return twins

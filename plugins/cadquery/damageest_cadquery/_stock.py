@@ -1,0 +1,181 @@
+"""Stock on CAD faces: each face's own offset, with straight walls along its normal at the border.
+
+Over smooth edges the offsets of neighbouring faces meet. A sharp convex edge gets a mitre, whose sides continue the
+offsets; it is blunt where the edge is sharper than a right angle. The shape is that of the stage `allowance: milling`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
+
+from damageest.artefacts import Floats
+from damageest_cadquery._edges import Edge, find_edges
+from damageest_cadquery._mitre import build_mitre, find_heads
+from damageest_cadquery._read import explore
+from damageest_cadquery._solids import StockError, combine, orient_solid, sew
+from damageest_cadquery._split import Piece, measure_volume
+
+FLAT = 1e-6
+"""Volume of a corner, in cubes of the height, below which there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """A face under stock: its ``number`` in the CAD file and the ``height`` of the stock."""
+
+    face: Any
+    number: int
+    height: float
+
+
+def take_bases(piece: Piece, heights: Mapping[int, float]) -> list[Base]:
+    """The outer faces of a damage volume that get stock. Raises StockError where a face has no height of its own."""
+    from OCP.TopAbs import TopAbs_FACE
+    from OCP.TopoDS import TopoDS
+
+    bases = []
+    for face, (number, _) in zip(explore(piece.shape, TopAbs_FACE), piece.origins, strict=True):
+        if number < 0:
+            continue
+        height = heights.get(number, 0.0)  # a sliver that the mesh does not have gets none
+        if height < 0:
+            raise StockError(f"the height of the stock is not the same all over face {number}")
+        if height > 0:
+            bases.append(Base(TopoDS.Face_s(face), number, height))
+    return bases
+
+
+def build_stock(bases: Sequence[Base]) -> list[Any]:
+    """The solids of the stock; they share no volume. Raises StockError where OpenCASCADE cannot make them."""
+    edges = find_edges([base.face for base in bases])
+    heights = [base.height for base in bases]
+    if any(edge.kind == "mixed" for edge in edges):
+        raise StockError("an edge is convex and concave by turns")
+    joined = [edge for edge in edges if edge.kind == "smooth" and heights[edge.first] == heights[edge.second]]
+    rows = ([edge.first for edge in joined], [edge.second for edge in joined])
+    graph = coo_array((np.ones(len(joined), bool), rows), shape=(len(bases),) * 2)
+    label = connected_components(graph, directed=False)[1]
+    solids = []
+    for number in range(int(label.max()) + 1):
+        mine = [bases[k] for k in np.flatnonzero(label == number).tolist()]
+        solids.append(_thicken([base.face for base in mine], mine[0].height))
+    sharp = [edge for edge in edges if edge.kind == "convex"]
+    solids += [build_mitre(edge, heights[edge.first], heights[edge.second]) for edge in sharp]
+    solids += _build_corners(sharp, heights)
+    if len(solids) == 1:
+        return solids
+    apart = all(edge.kind in ("smooth", "convex") for edge in edges)
+    found = sew(solids) if apart else None
+    return _merge(_fuse(solids) if found is None else found[0], bases)
+
+
+def _thicken(faces: Sequence[Any], height: float) -> Any:
+    """The solid between faces that are smooth together and their offset."""
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.BRepOffset import BRepOffset_MakeSimpleOffset
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
+    from OCP.GeomAbs import GeomAbs_Plane
+    from OCP.gp import gp_Vec
+    from OCP.TopAbs import TopAbs_REVERSED
+    from OCP.TopoDS import TopoDS_Shell
+
+    shape: Any = faces[0]
+    builder, shell = BRep_Builder(), TopoDS_Shell()
+    builder.MakeShell(shell)
+    for face in faces:
+        builder.Add(shell, face)
+    if len(faces) > 1:
+        shape = shell
+    adaptor = BRepAdaptor_Surface(faces[0])
+    if all(BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane for face in faces):
+        plane = adaptor.Plane()
+        normal = gp_Vec(plane.Axis().Direction())
+        if plane.Direct() == (faces[0].Orientation() == TopAbs_REVERSED):
+            normal.Reverse()
+        return orient_solid(BRepPrimAPI_MakePrism(shape, normal.Multiplied(height)).Shape())
+    maker = BRepOffset_MakeSimpleOffset(shell, height)
+    maker.SetBuildSolidFlag(True)
+    maker.Perform()
+    if not maker.IsDone():
+        raise StockError("OpenCASCADE finds no offset of a face")
+    return orient_solid(maker.GetResultShape())
+
+
+def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]:
+    """The pieces where mitres meet: hulls of the vertex and the upper points of the mitres there."""
+    from OCP.TopTools import TopTools_IndexedMapOfShape
+
+    index = TopTools_IndexedMapOfShape()
+    clouds: dict[int, list[Floats]] = {}
+    places: dict[int, Floats] = {}
+    for edge in sharp:
+        for end in (0, -1):
+            vertex = edge.vertices[end]
+            key = index.Add(vertex)
+            place = edge.points[end]
+            places.setdefault(key, place)
+            clouds.setdefault(key, []).append(place + find_heads(edge, end, heights[edge.first], heights[edge.second]))
+    solids = []
+    for key, cloud in clouds.items():
+        if len(cloud) < 2:
+            continue
+        points = np.concatenate([places[key][None], *cloud])
+        size = float(np.ptp(points, axis=0).max())
+        flat = np.linalg.svd((points - points.mean(axis=0)) / size, compute_uv=False)[2]
+        if flat < 1e-3:
+            continue  # an edge that goes straight on
+        hull = ConvexHull(points)
+        if hull.volume < FLAT * size**3:
+            continue
+        solids.append(_build_hull(hull))
+    return solids
+
+
+def _build_hull(hull: ConvexHull) -> Any:
+    """A convex polyhedron with one face for each plane."""
+    from damageest.artefacts import Solid
+    from damageest_cadquery._step import build_solid
+
+    used, faces = np.unique(hull.simplices, return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    points = hull.points[used]
+    corners = points[faces]
+    turned = np.einsum("ij,ij->i", np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),
+                       hull.equations[:, :3]) < 0  # fmt: skip
+    faces[turned] = faces[turned][:, ::-1]
+    return orient_solid(build_solid(Solid(points, faces))[0])
+
+
+def _fuse(solids: Sequence[Any]) -> list[Any]:
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
+    from OCP.TopAbs import TopAbs_SOLID
+
+    return explore(combine(BRepAlgoAPI_Fuse(), solids[:1], solids[1:]), TopAbs_SOLID)
+
+
+def _merge(solids: Sequence[Any], bases: Sequence[Base]) -> list[Any]:
+    """The solids with the sides of mitres joined to the offsets that they continue."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
+
+    merged = []
+    for solid in solids:
+        unify = ShapeUpgrade_UnifySameDomain(solid, False, True, False)
+        for base in bases:
+            for edge in explore(base.face, TopAbs_EDGE):
+                unify.KeepShape(edge)
+        unify.Build()
+        (found,) = explore(unify.Shape(), TopAbs_SOLID) or (None,)
+        sound = found is not None and BRepCheck_Analyzer(found).IsValid()
+        same = sound and abs(measure_volume(found) / measure_volume(solid) - 1) < 1e-6
+        merged.append(found if same else solid)
+    return merged
