@@ -13,8 +13,6 @@ from damageest_cadquery._split import ShapeMap, measure_volume
 
 SEWN = 2e-5
 """Distance in millimetres within which edges of faces are one edge."""
-SAME = 1e-4
-"""Largest relative difference between the volume of solids and of what they are joined from."""
 
 
 class StockError(Exception):
@@ -89,7 +87,7 @@ def explore_faces(shape: Any) -> list[Any]:
 def sew(solids: Sequence[Any]) -> tuple[list[Any], ShapeMap] | None:
     """Solids that touch on whole faces, joined without these; and for each new face the solid and the face that it was.
 
-    None where the rest does not close, or where its volume is not that of all solids: then they share volume.
+    None where the rest does not close.
     """
     from OCP.BRep import BRep_Tool
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
@@ -112,8 +110,7 @@ def sew(solids: Sequence[Any]) -> tuple[list[Any], ShapeMap] | None:
         joined = [orient_solid(solid) for solid in joined]
     except StockError:
         return None
-    before, after = (sum(measure_volume(solid) for solid in each) for each in (solids, joined))
-    if not joined or abs(after / before - 1) > SAME:
+    if not joined:
         return None
     known = ShapeMap()
     for number, k, face in outer:

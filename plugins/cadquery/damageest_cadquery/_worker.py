@@ -1,7 +1,8 @@
 """Finds the exact forms of all sites and writes them, in a process of its own: OpenCASCADE can crash or hang.
 
 ``python -m damageest_cadquery._worker REQUEST`` reads a pickled `Request` and writes the files. On its standard output
-it says where it is: a line of JSON at the start and at the end of each site, and one at the end with what it wrote.
+it says where it is: a line of JSON at the start and at the end of each site, with the negative of its number where its
+deposit begins, and one at the end with what it wrote.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class Request:
 
     ``folder``: where to write; ``places``: prefixes of the files with the transform (4,4) to their frame; ``unit``: of
     the files; ``bodies``: what has no exact form, by the stem of its file, for the assembly; ``skipped``: sites that
-    stopped this process before, and why.
+    stopped this process before, and why; their deposits by the negative of the number.
     """
 
     part: Part
@@ -88,7 +89,10 @@ def main(path: Path) -> None:
             rest = exact.rest if site.accepted else rest
         forms[site.number] = describe_missing(site)
         if exact is not None and site.deposit is not None:
+            _tell(start=-site.number)
             try:
+                if -site.number in request.skipped:
+                    raise StockError(request.skipped[-site.number])
                 made = find_deposit(site.deposit, site.damage, exact.pieces, exact.rest, faces, part, request.tolerance)
                 deposits[site.number], forms[site.number] = made, _describe_deposit(made)
             except StockError as error:

@@ -140,7 +140,7 @@ def _read_form(values: dict[str, Any]) -> ExactForm:
 
 def _run(request: Request, seconds: float) -> tuple[dict[str, Any], int, str]:
     """Starts the process once. Gives what it said at its end; or the number of the site, 0 for none, at which it
-    stopped, and why."""
+    stopped, the negative of it for its deposit, and why."""
     with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
         path = Path(place) / "request.pkl"
         path.write_bytes(pickle.dumps(request))

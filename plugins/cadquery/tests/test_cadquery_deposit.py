@@ -54,10 +54,6 @@ def test_a_pit_in_a_plane_gets_a_cylinder_of_stock() -> None:
     assert find_corners(stock)[:, 2].max() == pytest.approx(6 + HIGH, abs=1e-9)
 
 
-def radius(points: np.ndarray) -> np.ndarray:
-    return np.hypot(points[:, 0], points[:, 1])
-
-
 @pytest.mark.parametrize(("hollow", "outer"), [(False, 10 + HIGH), (True, 6 - HIGH)])
 def test_stock_on_a_shaft_and_in_a_bore_is_a_cylinder(hollow: bool, outer: float) -> None:
     from OCP.BRepAdaptor import BRepAdaptor_Surface
