@@ -212,9 +212,7 @@ def _join(
 
 def _unite(damage: Sequence[Piece], stock: Sequence[Any]) -> tuple[list[Any], ShapeMap]:
     """The solids, and the origins of the faces that come from the damage volume."""
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
-    from OCP.GeomAbs import GeomAbs_OffsetSurface
     from OCP.TopAbs import TopAbs_SOLID
 
     known, shapes = ShapeMap(), [piece.shape for piece in damage]
@@ -226,10 +224,6 @@ def _unite(damage: Sequence[Piece], stock: Sequence[Any]) -> tuple[list[Any], Sh
             if number < len(damage):
                 known.set(face, damage[number].origins[k])
         return solids, known
-    if any(
-        BRepAdaptor_Surface(face).GetType() == GeomAbs_OffsetSurface for solid in stock for face in explore_faces(solid)
-    ):
-        raise StockError("the offset of a spline and the damage volume do not close")  # a Boolean takes a minute
     algorithm = BRepAlgoAPI_Fuse()
     shape = combine(algorithm, shapes, list(stock))
     for piece in damage:

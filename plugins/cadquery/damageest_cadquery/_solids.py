@@ -58,8 +58,15 @@ def _place_faces(shape: Any) -> Any:
 
 
 def combine(algorithm: Any, arguments: Sequence[Any], tools: Sequence[Any], fuzzy: float = 1e-6) -> Any:
-    """The shape that a Boolean operation gives. Raises StockError where OpenCASCADE reports an error."""
+    """The shape that a Boolean operation gives. Raises StockError where OpenCASCADE reports an error, and for offsets of
+    splines, with which it takes a minute."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_OffsetSurface
     from OCP.TopTools import TopTools_ListOfShape
+
+    kinds = {BRepAdaptor_Surface(face).GetType() for shape in (*arguments, *tools) for face in explore_faces(shape)}
+    if GeomAbs_OffsetSurface in kinds:
+        raise StockError("the offset of a spline meets other stock, or metal that is left")
 
     lists = TopTools_ListOfShape(), TopTools_ListOfShape()
     for chosen, shapes in zip(lists, (arguments, tools), strict=True):
