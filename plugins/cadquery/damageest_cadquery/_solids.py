@@ -58,8 +58,8 @@ def _place_faces(shape: Any) -> Any:
 
 
 def combine(algorithm: Any, arguments: Sequence[Any], tools: Sequence[Any], fuzzy: float = 1e-6) -> Any:
-    """The shape that a Boolean operation gives. Raises StockError where OpenCASCADE reports an error, and for offsets of
-    splines, with which it takes a minute."""
+    """The shape that a Boolean operation gives. Raises StockError where OpenCASCADE reports an error, and for offsets
+    of splines, with which it takes a minute."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_OffsetSurface
     from OCP.TopTools import TopTools_ListOfShape
