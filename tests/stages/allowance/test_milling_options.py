@@ -283,6 +283,17 @@ def test_cad_faces_by_number_and_name(where: dict[str, Any]) -> None:
     assert deposit.touched == (5,)
 
 
+def test_heights_of_cad_faces() -> None:
+    deposit = run(block(), CHIP, part=named(block()), outer=0.5, targets=[{"faces": [5], "outer": 1}])
+    heights = dict(deposit.heights)
+    assert heights.pop(5) == 1
+    assert set(heights.values()) == {0.5}
+    assert len(heights) == 2
+    half = {"half_space": {"point": [3, 0, 0], "normal": [-1, 0, 0]}, "outer": 1}
+    assert dict(run(block(), CHIP, part=named(block()), targets=[half]).heights)[5] == -1
+    assert run(block(), CHIP, part=named(block()), outer=1, overlap=0.5).overlap == 0.5
+
+
 def test_kinds_of_surface() -> None:
     tool = Manifold.cube((6, 6, 4)).translate((18, 7, 9))
     deposit = run(bored(), tool, part=named(bored()), targets=[{"kind": "cylinder", "outer": 0.5}])
