@@ -203,7 +203,7 @@ def summarise(rows: Sequence[dict[str, Any]]) -> str:
             f"exact at least as good in {(both[:, 0] >= both[:, 1]).mean():.0%}, "
             f"worst difference {(both[:, 0] - both[:, 1]).min():+.4f}"
         )
-    return "\n".join([*lines, *_summarise_deposits([row["deposit"] for row in good if row["deposit"]])])
+    return "\n".join([*lines, *_summarise_deposits([row["deposit"] for row in good if row.get("deposit")])])
 
 
 def _compare_volumes(good: Sequence[dict[str, Any]]) -> list[str]:
