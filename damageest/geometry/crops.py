@@ -24,7 +24,7 @@ DEFAULT_GAP = 10.0
 class Crop(BaseModel, ABC):
     """Base of the crops: ``keep`` removes the points outside the shape, ``drop`` those inside."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
     keep: str | None
 
     @abstractmethod

@@ -6,4 +6,4 @@ from pydantic import BaseModel, ConfigDict
 
 
 class JsonModel(BaseModel):
-    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", populate_by_name=True, defer_build=True)

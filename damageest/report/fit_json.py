@@ -11,7 +11,7 @@ from damageest.findings import ModelFit
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", defer_build=True)
 
 
 class PatchReport(_Model):

@@ -10,7 +10,7 @@ from damageest.artefacts import FreeMotion, Vector
 class FreeMotionReport(BaseModel):
     """One motion of the scan after which it fits as well."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", defer_build=True)
 
     direction: Vector = Field(description="of a shift, or of the axis of a turn; unit vector in the part's frame")
     point: Vector | None = Field(description="on the axis of a turn; null for a shift")

@@ -55,7 +55,7 @@ class Stage(BaseModel):
     this stage. Its class has to be in a module that can be imported.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings", defer_build=True)
     stage: ClassVar[str] = ""
     gives: ClassVar[str] = ""
     per_site: ClassVar[bool] = False

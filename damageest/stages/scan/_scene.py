@@ -20,7 +20,7 @@ from damageest.stages.scan.tools import AnyTool, CylinderTool, Direction, SolidT
 class DetachedPiece(BaseModel):
     """A piece of the part that is moved rather than removed: a displaced fragment."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
     piece: AnyTool = Field(description="the piece: what of the part lies within this tool")
     shift: Vector = Field((0.0, 0.0, 0.0), description="how far the piece is moved along x, y and z, in the job's unit")
     rotation: Vector = Field(
@@ -33,7 +33,7 @@ class DetachedPiece(BaseModel):
 class Table(BaseModel):
     """A plane plate that the part stands on. Only its upper side has points."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
     direction: Direction = Field(
         (0.0, 0.0, -1.0), description="direction from the part to the table; its length does not matter"
     )

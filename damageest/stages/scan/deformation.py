@@ -18,7 +18,7 @@ class Deformation(BaseModel):
     """How a part is deformed. Amounts are the largest displacement of its skin beyond the nearest rigid motion (least
     squares over the skin), in the job's unit."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
     bend: FiniteFloat = Field(0.0, description="amount by which its axis is bent to an arc")
     twist: FiniteFloat = Field(0.0, description="amount by which its cross-sections are turned about its axis")
     along: Direction | None = Field(None, description="direction of the axis; default: the longest edge of its box")

@@ -22,7 +22,7 @@ Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 class ViewFile(BaseModel):
     """One file of several, with the position of its scanner."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
     path: JobPath = Field(description="the file, relative to the job's folder")
     viewpoint: Vector | None = Field(
         None,

@@ -21,7 +21,7 @@ from damageest.stages.scan.tools import AnyTool, Direction, RigidMatrix, SolidTo
 class UnseenRegion(BaseModel):
     """A region of the surface that the virtual scanner does not see."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
     direction: Direction = Field(description="direction in the part's frame; its length does not matter")
     angle: float = Field(
         60.0,

@@ -44,7 +44,7 @@ Seed = Annotated[int, Field(ge=0, description="seed of the random shape; the sam
 class Tool(BaseModel, ABC):
     """Base of the tools."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
     tool: str
 
     @abstractmethod
