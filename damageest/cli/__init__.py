@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import traceback
 from typing import NoReturn
@@ -13,6 +14,10 @@ from damageest.errors import DamageestError, describe_missing_library, is_interr
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells give it."""
+
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Threads of linear algebra. The matrices are small: more threads take a tenth more processor time and no less time on
+the clock, and their number decides the last bits of a result."""
 
 app = typer.Typer(
     name="damageest",
@@ -67,6 +72,8 @@ def main() -> None:
     from damageest.cli import _process
 
     _process.is_command = True
+    for name in ONE_THREAD:
+        os.environ.setdefault(name, "1")
     built_in = {command.name for command in app.registered_commands} | {group.name for group in app.registered_groups}
     word = next((argument for argument in sys.argv[1:] if not argument.startswith("-")), "")
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import platform
@@ -72,6 +73,11 @@ def seal(content: Mapping[str, Any]) -> str:
 def list_packages(names: Iterable[str]) -> dict[str, str]:
     """Versions of the named packages and of all that they need, directly or not, by name. What an installation leaves
     out, such as extras, is not listed."""
+    return dict(_list_once(tuple(sorted(names))))
+
+
+@functools.cache
+def _list_once(names: tuple[str, ...]) -> dict[str, str]:
     found: dict[str, str] = {}
     open_names = list(names)
     while open_names:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from damageest.artefacts import Floats
@@ -11,7 +13,10 @@ from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, PoseCheck, ch
 from damageest.stages.align._choose import COARSE
 from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._fine import Fit, fit
-from damageest.stages.align._points import orient_surface
+from damageest.stages.align._pairs import propose_poses
+from damageest.stages.align._points import OrientedPoints, orient_surface
+from damageest.stages.align._prepare_part import PreparedPart
+from damageest.stages.align._search import search
 
 POINTS = 6000
 """Number of scan points that mirrored poses are compared with."""
@@ -30,7 +35,7 @@ SUSPECT = 0.82
 """Share of the points near the part on its surface below which a mirrored scan is searched for from the beginning."""
 
 MIN_GAIN = 0.015
-"""Least such share in any case."""
+"""Least such share in any case. Where less of the scan is off the part, it is not searched for mirrored."""
 
 SYMMETRIC, NEAR = 0.005, 0.004
 """Share of the part's surface that a reflection may take off it, by more than the second, for the part to be symmetric:
@@ -55,6 +60,20 @@ def fit_reflections(target: PartSurface, field: PlaneGrid, points: Floats, best:
         one = fit(target, move_points(at, mirrors[k]), np.eye(4), 3 * COARSE, noise, 30)
         fits.append(Fit(one.pose @ mirrors[k] @ best.pose, one.band, one.residue))
     return max(fits, key=lambda one: _measure_share_on(target, points[:POINTS], one.pose, best.band))
+
+
+def search_mirrored(
+    part: PreparedPart, scan: OrientedPoints, points: Floats, noise: float, trials: int, rng: np.random.Generator
+) -> Fit:
+    """The best fit of the mirrored scan, searched for from the beginning. The ``pose`` of the result mirrors.
+
+    ``scan``: oriented points of it; ``points`` (N,3): for the fit; ``trials``: number of candidate poses.
+    """
+    flip = np.array([1.0, 1.0, -1.0])
+    mirrored = OrientedPoints(scan.points * flip, scan.normals * flip, scan.signed)
+    pose = search(propose_poses(mirrored, part.pairs, trials, rng), mirrored, part.grid, rng)[0]
+    found = fit(part.surface, points * flip, pose, COARSE, noise, 30)
+    return replace(found, pose=found.pose @ np.diag([*flip, 1.0]))
 
 
 def _make_reflections() -> Floats:

@@ -8,6 +8,8 @@ determine a pose. The invariants of the part's pairs are hashed once (Drost et a
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,24 +23,41 @@ BINS = (26, 18, 18, 24)
 """Number of bins of the distance (0 to 1 diagonal), of the two angles with the line, of the angle about the line."""
 
 
-def propose_poses(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: np.random.Generator) -> Floats:
+@dataclass(frozen=True)
+class PairTable:
+    """Pairs of points on a part, in the order of their hashes.
+
+    ``points``: the oriented points; ``i``, ``j`` (P,): the two of each pair; ``key`` (P,): its hash, ascending.
+    """
+
+    points: OrientedPoints
+    i: Ints
+    j: Ints
+    key: Ints
+
+    @classmethod
+    def build(cls, part: OrientedPoints, rng: np.random.Generator) -> PairTable:
+        """Draws pairs from the points of a part."""
+        points = draw_by_direction(part, MODEL_POINTS, rng)
+        i, j = rng.integers(0, len(points.points), (2, MODEL_PAIRS))
+        key, good = _hash_pairs(points, i, j)
+        i, j, key = i[good], j[good], key[good]
+        # sorted together with its number, which is much faster than sorting numbers by key
+        order = np.sort(key * MODEL_PAIRS + np.arange(len(key))) % MODEL_PAIRS
+        return cls(points, i[order], j[order], key[order])
+
+
+def propose_poses(scan: OrientedPoints, part: PairTable, wanted: int, rng: np.random.Generator) -> Floats:
     """About ``wanted`` poses (H,4,4) from scan to part; a few of them are near the true pose.
 
     Where the sign of the scan's normals is unknown, each pair is tried with both signs at both points.
     """
-    part_points = draw_by_direction(part, MODEL_POINTS, rng)
+    part_points, i, j, key = part.points, part.i, part.j, part.key
     scan_points = draw_by_direction(scan, SCAN_POINTS, rng)
-    i, j = rng.integers(0, len(part_points.points), (2, MODEL_PAIRS))
-    key, good = _hash_pairs(part_points, i, j, np.ones(MODEL_PAIRS), np.ones(MODEL_PAIRS))
-    i, j, key = i[good], j[good], key[good]
-    # sorted together with its number, which is much faster than sorting numbers by key
-    order = np.sort(key * MODEL_PAIRS + np.arange(len(key))) % MODEL_PAIRS
-    i, j, key = i[order], j[order], key[order]
-
     p, q = rng.integers(0, len(scan_points.points), (2, SCAN_PAIRS))
-    ones = np.ones(SCAN_PAIRS)
     signs = [(1, 1)] if scan.signed else [(1, 1), (1, -1), (-1, 1), (-1, -1)]
-    tried = [(p, q, ones * a, ones * b, *_hash_pairs(scan_points, p, q, ones * a, ones * b)) for a, b in signs]
+    ones = np.ones(SCAN_PAIRS)
+    tried = [(p, q, ones * a, ones * b, *_hash_pairs(scan_points, p, q, a, b)) for a, b in signs]
     p, q, a, b, target_key, good = (np.concatenate(column) for column in zip(*tried, strict=True))
     first, last = np.searchsorted(key, target_key, "left"), np.searchsorted(key, target_key, "right")
     count = np.where(good, last - first, 0)
@@ -63,16 +82,16 @@ def propose_poses(scan: OrientedPoints, part: OrientedPoints, wanted: int, rng: 
     return poses
 
 
-def _hash_pairs(cloud: OrientedPoints, i: Ints, j: Ints, a: Floats, b: Floats) -> tuple[Ints, NDArray[np.bool_]]:
+def _hash_pairs(cloud: OrientedPoints, i: Ints, j: Ints, a: int = 1, b: int = 1) -> tuple[Ints, NDArray[np.bool_]]:
     """The hash (M,) of each pair's four invariants, and whether these are well defined (M,).
 
-    ``i``, ``j`` (M,): the points of each pair; ``a``, ``b`` (M,): signs of their normals.
+    ``i``, ``j`` (M,): the points of each pair; ``a``, ``b``: signs of their normals.
     """
     points, normals = cloud.points.astype(np.float32), cloud.normals.astype(np.float32)
     line = points[j] - points[i]
     length = np.linalg.norm(line, axis=1)
     line /= np.maximum(length, np.float32(1e-12))[:, None]
-    n, m = normals[i] * a[:, None].astype(np.float32), normals[j] * b[:, None].astype(np.float32)
+    n, m = (np.float32(a) * normals)[i], (np.float32(b) * normals)[j]
     along, beside = np.einsum("ij,ij->i", n, line), np.einsum("ij,ij->i", m, line)
     # Normals along the line do not fix the angle about it.
     good = (length > SHORTEST) & (np.abs(along) < 0.94) & (np.abs(beside) < 0.94)

@@ -97,7 +97,8 @@ def _look_up(
 
 def search(poses: Floats, scan: OrientedPoints, field: PlaneGrid, rng: np.random.Generator) -> Floats:
     """Refines and selects: at most 80 poses (K,4,4), best first, from the rough ``poses`` (H,4,4)."""
-    few, some, many = (draw_by_direction(scan, count, rng) for count in (100, 250, 600))
+    fewest, few, some, many = (draw_by_direction(scan, count, rng) for count in (30, 100, 250, 600))
+    poses = poses[np.argsort(-score(poses, fewest, field, 0.05), kind="stable")[:12_000]]
     poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:3000]]
     poses = refine(poses, few, field, np.array([0.06, 0.05, 0.04, 0.03]))
     poses = poses[select_distinct(poses, score(poses, some, field, 0.03), 0.03, 400)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -47,20 +46,20 @@ class Register(Align):
             note_free_motion,
         )
         from damageest.stages.align._datum import DatumSkin
-        from damageest.stages.align._field import PlaneGrid
         from damageest.stages.align._fine import fit
         from damageest.stages.align._finish import finish_pose
         from damageest.stages.align._frame import MIN_POINTS, Frame
         from damageest.stages.align._largest_piece import prefer_largest_piece
-        from damageest.stages.align._mirror import SUSPECT, fit_reflections, refuse_mirrored
-        from damageest.stages.align._pairs import propose_poses
-        from damageest.stages.align._points import (
-            OrientedPoints,
-            draw_evenly,
-            draw_stratified,
-            orient_scan,
-            orient_surface,
+        from damageest.stages.align._mirror import (
+            MIN_GAIN,
+            SUSPECT,
+            fit_reflections,
+            refuse_mirrored,
+            search_mirrored,
         )
+        from damageest.stages.align._pairs import propose_poses
+        from damageest.stages.align._points import draw_evenly, draw_stratified, orient_scan
+        from damageest.stages.align._prepare_part import prepare_part
         from damageest.stages.align._refine_pose import refine_pose
         from damageest.stages.align._search import search
 
@@ -75,8 +74,9 @@ class Register(Align):
                 "needed): it is too sparse or too noisy",
                 "give a denser scan; where the pose is known, give it to align: none",
             )
-        field = PlaneGrid.build(target)
-        rough = propose_poses(oriented, orient_surface(target.mesh, 20_000, rng), self.trials, rng)
+        prepared = prepare_part(target, self.seed)
+        target, field = prepared.surface, prepared.grid
+        rough = propose_poses(oriented, prepared.pairs, self.trials, rng)
         few = oriented.take(draw_stratified(len(oriented.points), 1500, rng))
         fine = rng.permutation(dense[draw_evenly(dense, weights, self.points, rng)])
         choice = choose_pose(search(rough, oriented, field, rng), target, field, few, fine, noise)
@@ -85,15 +85,13 @@ class Register(Align):
         finish = finish_pose(frame, fine, best, noise, tolerance / frame.size, part.unit, datum)
         best = finish.fit
         check = check_with_wear(target, best, fine, dense, tolerance / frame.size, finish.worn_depth)
-        mirrored = fit_reflections(target, field, fine, best, noise)
-        if check.agreement < SUSPECT:
-            flip = np.array([1.0, 1.0, -1.0])
-            other = OrientedPoints(oriented.points * flip, oriented.normals * flip, oriented.signed)
-            rough = propose_poses(other, orient_surface(target.mesh, 20_000, rng), self.trials, rng)
-            pose = search(rough, other, field, rng)[0]
-            found = fit(target, fine * flip, pose, COARSE, noise, 30)
-            mirrored = replace(found, pose=found.pose @ np.diag([*flip, 1.0]))
-        refuse_mirrored(target, fine, dense, best.pose, check, mirrored, tolerance / frame.size)
+        if check.agreement < 1 - MIN_GAIN:  # else no mirrored pose can be that much better
+            mirrored = (
+                search_mirrored(prepared, oriented, fine, noise, self.trials, rng)
+                if check.agreement < SUSPECT
+                else fit_reflections(target, field, fine, best, noise)
+            )
+            refuse_mirrored(target, fine, dense, best.pose, check, mirrored, tolerance / frame.size)
         if not check.is_acceptable:
             raise check.build_error(_advise(scan))
         others = None
