@@ -7,7 +7,7 @@ import numpy as np
 from damageest.artefacts import INTACT, Deviation, Flags, Floats, Ints, Part, Scan
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.duplicates import find_members, list_distinct
-from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
+from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, make_tree, query_neighbours
 from damageest.geometry.voxels import number_cubes
 
 STEP = 1.25
@@ -77,21 +77,19 @@ def _drop_single(aligned: Scan, asked: Ints, near: Flags, tolerance: float) -> I
 
 def _fit_normals(aligned: Scan, asked: Ints, tolerance: float) -> tuple[Floats, Flags]:
     """Unit normals (A,3) of the scan at some of its points, of either sign, and whether each is clear (A,)."""
-    from scipy.spatial import cKDTree
-
     density = (1.1 / aligned.spacing) ** 2
     count = int(np.clip(np.pi * tolerance**2 * density, *NEIGHBOURS))
     places = aligned.points[asked]
     around = find_nearby(aligned.points, places, 3 * max(tolerance, 2 * aligned.spacing))
     among = aligned.points[around]
     normals, clear = np.empty((len(places), 3)), np.empty(len(places), bool)
-    tree, count = cKDTree(among), min(count, len(among))
+    tree, count = make_tree(among), min(count, len(among))
     for start in range(0, len(places), CHUNK):
         own = slice(start, start + CHUNK)
-        index = np.reshape(tree.query(places[own], k=count, workers=2)[1], (-1, count))
-        patches = among[index] - places[own, None]
+        index = query_neighbours(tree, places[own], count)[1]
+        patches = (among[index] - places[own, None]).astype(np.float32)
         patches -= patches.mean(axis=1, keepdims=True)
-        spread, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", patches, patches))
+        spread, axes = np.linalg.eigh(np.matmul(patches.transpose(0, 2, 1), patches).astype(np.float64))
         width = np.sqrt(np.maximum(spread, 0))
         clear[own] = (width[:, 0] < FLAT * width[:, 1]) & (width[:, 1] > 0.2 * width[:, 2])
         normals[own] = axes[:, :, 0]
