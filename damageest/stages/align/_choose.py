@@ -53,34 +53,40 @@ def choose_pose(
     lookups in the grid. Lengths in diagonals of the part.
     """
     poses, axis = _add_counterparts(poses, field, scan)
+    if axis is not None:
+        band = fit(target, _keep_near(field, points[:FIRST_POINTS], poses[0]), poses[0], COARSE, noise, 12).band
+        if _is_continuous(axis, poses[0], target, field, points[:SECOND_POINTS], noise, COARSE, band):
+            # poses that differ by a turn fit alike: one of each set is enough, if all points agree in the end
+            heads = poses[group_turns(poses, axis, 8)]
+            found = _compare(heads, axis, target, field, points, noise)
+            if found.axis is not None:
+                return found
+    return _compare(poses, axis, target, field, points, noise)
+
+
+def _compare(
+    poses: Floats, axis: Axis | None, target: PartSurface, field: PlaneGrid, points: Floats, noise: float
+) -> Choice:
+    """The best of the poses (H,4,4), each fitted to the triangles, and the others that fit as well."""
     fits = [fit(target, _keep_near(field, points[:FIRST_POINTS], pose), pose, COARSE, noise, 12) for pose in poses]
     poses = np.array([one.pose for one in fits])
     distances = [_measure_distance(target, field, points[:FIRST_POINTS], pose) for pose in poses]
     band = fits[int(np.argmin([robust_cost(distance, 0.75 * COARSE).sum() for distance in distances]))].band
-    poses = poses[_select_equal([robust_cost(distance, band) for distance in distances])]
-    poses = poses[
-        _select_equal(
-            [robust_cost(_measure_distance(target, field, points[:SECOND_POINTS], pose), band) for pose in poses]
-        )
-    ]
-    poses = poses[select_distinct(poses, np.zeros(len(poses)), 0.25 * COARSE, MAX_POSES)]
-
-    costs = [robust_cost(_measure_distance(target, field, points, pose), band) for pose in poses]
+    costs = [robust_cost(distance, band) for distance in distances]
+    first = select_distinct(poses, -np.array([cost.sum() for cost in costs]), 0.25 * COARSE, MAX_POSES)
+    poses, costs = poses[first], [costs[k] for k in first]
+    for start, stop in ((FIRST_POINTS, SECOND_POINTS), (SECOND_POINTS, len(points))):
+        kept = np.flatnonzero(_select_equal(costs))
+        poses, more = poses[kept], points[start:stop]
+        added = [robust_cost(_measure_distance(target, field, more, pose), band) for pose in poses]
+        costs = [np.concatenate([costs[k], cost]) for k, cost in zip(kept, added, strict=True)]
     best = int(np.argmin([cost.sum() for cost in costs]))
     equal = np.array([not is_worse(cost, costs[best]) for cost in costs])
     pose, others = poses[best], poses[equal]
     order = np.array([cost.sum() for cost, same in zip(costs, equal, strict=True) if same])
     others = others[select_distinct(others, -order, max(APART, 6 * band), MAX_POSES)][1:]
-    if axis is not None:
-        # Fitted again: the axis is only as exact as the poses that it was computed from.
-        turned = axis.make_turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose
-        turned = np.array(
-            [fit(target, _keep_near(field, points[:FIRST_POINTS], one), one, 2 * band, noise, 6).pose for one in turned]
-        )
-        if any(
-            is_worse(robust_cost(_measure_distance(target, field, points, one), band), costs[best]) for one in turned
-        ):
-            axis = None
+    if axis is not None and not _is_continuous(axis, pose, target, field, points, noise, 2 * band, band):
+        axis = None
     if axis is not None:
         # The number of poses is infinite: of each set of poses that differ by a turn, list one and its quarter turns.
         candidates = np.concatenate([pose[None], others])
@@ -88,6 +94,34 @@ def choose_pose(
         quarter = axis.make_turns(np.radians([0, 90.0, 180.0, 270.0]))
         others = (quarter[:, None] @ heads[None]).reshape(-1, 4, 4)[1:]
     return Choice(pose, others, axis, band)
+
+
+def _is_continuous(
+    axis: Axis,
+    pose: Floats,
+    target: PartSurface,
+    field: PlaneGrid,
+    points: Floats,
+    noise: float,
+    start: float,
+    band: float,
+) -> bool:
+    """Whether the points (N,3) fit as well when ``pose`` (4,4) is turned about an axis, by any angle.
+
+    The turned poses are fitted, with a kernel that is ``start`` wide at first: the axis is only as exact as the poses
+    that it was computed from.
+    """
+    few = points[:FIRST_POINTS]
+
+    def measure(one: Floats) -> Floats:
+        return robust_cost(_measure_distance(target, field, points, one), band)
+
+    here = fit(target, _keep_near(field, few, pose), pose, start, noise, 6).pose if start > 2 * band else pose
+    best = measure(here)
+    for turned in axis.make_turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ here:
+        if is_worse(measure(fit(target, _keep_near(field, few, turned), turned, start, noise, 6).pose), best):
+            return False
+    return True
 
 
 def _keep_near(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:

@@ -13,7 +13,7 @@ from damageest.stages.align._field import PartSurface
 REACH = 3.5
 """Half-width of the kernel, in standard deviations of the points' distances to the surface."""
 
-MAX_DRIFT = 0.1
+MAX_DRIFT = 0.25
 """How far the points may move, in bands, before their closest points are searched again; until then their planes are
 used."""
 
