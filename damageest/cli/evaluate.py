@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from damageest.cli import honesty, speed
+from damageest.cli import evaluate_path, honesty, speed
 from damageest.cli.intervals import run_intervals
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 app = typer.Typer(no_args_is_help=True, help="Measure accuracy and cost against known truth.")
 app.command("honesty")(honesty.command)
 app.command("speed")(speed.command)
+app.command("path")(evaluate_path.command)
 
 Vary = Annotated[
     list[str] | None,

@@ -11,9 +11,10 @@ import numpy as np
 from damageest.artefacts import BeadFill, DepositPath, Floats, Mesh, Solid, Unreached
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.paths.beads import SHARE, Beads, simulate_beads
-from damageest.paths.clearance import Clearance, Obstacle
+from damageest.paths.clearance import Clearance, Obstacles
 from damageest.paths.directions import Planner, gather_missing, list_directions, plan_parts
 from damageest.paths.moves import Moves, Travel, join_passes
+from damageest.paths.nozzle import Nozzle
 from damageest.paths.planar import Surroundings
 from damageest.paths.process import Pass, Plan, Process
 
@@ -45,7 +46,7 @@ class Speeds:
 
 def plan_path(
     task: Task,
-    nozzle: Mesh,
+    nozzle: Nozzle,
     standoff: float,
     process: Process,
     speeds: Speeds,
@@ -54,12 +55,12 @@ def plan_path(
 ) -> DepositPath:
     """The path that builds up a deposit.
 
-    ``nozzle``: closed mesh, tip at 0, axis along z. ``direction`` (3,): of the build; None: chosen.
+    ``direction`` (3,): of the build; None: chosen.
     """
     origin: Floats = task.body.bounds.mean(axis=0)
     detail = DETAIL * min(process.bead.width, process.height)
     body = _simplify(task.body, origin, detail)
-    clearance = Clearance(nozzle, standoff, (), detail)
+    clearance = Clearance(nozzle, standoff, None, detail)
     around = Surroundings(_simplify(task.left, origin, detail), _shift(task.others, origin), clearance)
     directions = list_directions(task.body, task.left, task.tolerance) if direction is None else [direction]
     plans = plan_parts(body, origin, directions, around, process, planner)
@@ -67,7 +68,9 @@ def plan_path(
     for plan in plans:
         meshes = [*_shift(task.others, origin), *([] if standing.is_empty() else [Mesh(*to_arrays(standing))])]
         passes = [_to_relative(one, plan) for one in plan.passes]
-        groups.append((passes, clearance.with_obstacles([Obstacle(mesh) for mesh in meshes])))
+        low, high = task.body.bounds - origin
+        near = Obstacles(meshes, low, high, process.bead.width)
+        groups.append((passes, clearance.with_obstacles(near)))
         if plan is not plans[-1]:
             standing = around.metal + (body - _to_relative_body(plan))
     moves = join_passes(groups, _choose_travel(task, clearance, speeds, process, origin))
@@ -83,7 +86,7 @@ def plan_path(
         section=np.array([plan.height * process.bead.step for plan in plans]),
         standoff=standoff,
         deposit_volume=task.body.volume,
-        nozzle=nozzle,
+        nozzle=nozzle.mesh,
         clearance=np.inf if tightest is None else tightest.gap,
         travel_clearance=moves.gap,
         tightest=_find_tightest(tightest, origin),

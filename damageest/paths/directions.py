@@ -16,7 +16,7 @@ from damageest.paths.process import Plan, Process
 
 ENOUGH = 1e-3
 """Share of a body's volume below which what is missing is not worth another direction."""
-MOST_PARTS = 4
+MOST_PARTS, MOST_DIRECTIONS = 4, 6
 COARSE = 2.0
 """Factor of layer height and bead width for the trials of directions."""
 ROUGH = 0.1
@@ -54,7 +54,7 @@ def list_directions(deposit: Mesh, metal: Mesh | None, tolerance: float) -> list
         unit = make_unit(one)
         if all(unit @ other < ALIKE for other in found):
             found.append(unit)
-    return found
+    return found[:MOST_DIRECTIONS]
 
 
 def choose_direction(

@@ -10,7 +10,12 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.paths.clearance import Clearance
-from damageest.paths.process import Pass, resample
+from damageest.paths.process import Pass
+
+LIFTS = (1, 3, 9)
+"""Multiples of the hop that are tried."""
+MOST_POSES = 2000
+"""Poses at which one leg of a travel is checked at most."""
 
 
 @dataclass(frozen=True)
@@ -94,17 +99,18 @@ def _find_way(before: Pass | None, one: Pass, clearance: Clearance, travel: Trav
     start, old = before.points[-1], before.axes[-1]
     if np.linalg.norm(stop - start) < 1e-9 and np.allclose(axis, old):
         return np.empty((0, 3)), np.empty((0, 3)), np.inf
-    if np.allclose(axis, old, atol=1e-6):
-        for factor in (1, 4, 16):
-            lifts = factor * travel.hop * axis
-            # both ends at the height of the higher one
-            rise = float((stop - start) @ axis)
-            way = np.array([start + max(rise, 0.0) * axis + lifts, stop + max(-rise, 0.0) * axis + lifts])
-            axes = np.array([old, axis])
-            points = np.concatenate([start[None], way, stop[None]])
-            gap = _measure_way(points, np.tile(axis, (4, 1)), clearance, travel)
-            if gap >= travel.gap / 2:
-                return way, axes, gap
+    for factor in LIFTS:
+        lift = factor * travel.hop
+        if np.linalg.norm(stop - travel.centre) + lift > travel.safe:
+            break
+        # both ends at the height of the higher one
+        rise = float((stop - start) @ one.normals[0])
+        way = np.array([start + (max(rise, 0.0) + lift) * old, stop + (max(-rise, 0.0) + lift) * axis])
+        axes = np.array([old, axis])
+        points, turned = np.concatenate([start[None], way, stop[None]]), np.array([old, old, axis, axis])
+        gap = _measure_way(points, turned, clearance, travel)
+        if gap >= travel.gap / 2:
+            return way, axes, gap
     way = np.array([_lift(start, old, travel), above])
     axes = np.array([old, axis])
     way, axes = _round_the_sphere(way, axes, travel)
@@ -133,15 +139,14 @@ def _round_the_sphere(way: Floats, axes: Floats, travel: Travel) -> tuple[Floats
 
 def _measure_way(points: Floats, axes: Floats, clearance: Clearance, travel: Travel) -> float:
     """The least distance along a way, as a lower bound between the poses that are measured."""
-    dense, corner = resample(points, travel.gap)
-    place = np.cumsum(corner >= 0) - 1
-    share = np.zeros(len(dense))
-    for k in range(len(points) - 1):
-        own = np.flatnonzero(place == k)
-        share[own] = np.arange(len(own)) / max(len(own), 1)
-    following = np.minimum(place + 1, len(points) - 1)
-    turned = (1 - share)[:, None] * axes[place] + share[:, None] * axes[following]
+    far = np.linalg.norm(np.diff(points, axis=0), axis=1) + clearance.bound_turns(axes)
+    counts = np.clip(np.ceil(far / travel.gap - 1e-9).astype(int), 1, MOST_POSES)
+    share = np.concatenate([*(np.arange(count) / count for count in counts), [0.0]])
+    place = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
+    share[-1] = 1.0
+    dense = points[place] + share[:, None] * (points[place + 1] - points[place])
+    turned = (1 - share)[:, None] * axes[place] + share[:, None] * axes[place + 1]
     turned /= np.linalg.norm(turned, axis=1)[:, None]
     moves = np.linalg.norm(np.diff(dense, axis=0), axis=1) + clearance.bound_turns(turned)
-    found = clearance.measure_along(dense, turned, travel.gap)
+    found = clearance.measure_poses(dense, turned, travel.gap)
     return float(min(found.min(), np.min((found[1:] + found[:-1] - moves) / 2, initial=np.inf)))

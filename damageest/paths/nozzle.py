@@ -1,8 +1,10 @@
-"""The nozzle as a solid of revolution, and as a mesh."""
+"""The nozzle as a solid of revolution, and as a mesh for distances."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +33,34 @@ class Cone:
         if rise >= self.length:
             return np.array([[0, self.tip_radius], [self.length, self.tip_radius + self.length * np.tan(self.angle)]])
         return np.array([[0, self.tip_radius], [rise, self.body_radius], [self.length, self.body_radius]])
+
+
+@dataclass(frozen=True, eq=False)
+class Nozzle:
+    """``mesh``: closed, tip at 0, axis along z. ``profile`` (K,2): height and radius of a solid of revolution that
+    holds it, None for another mesh."""
+
+    mesh: Mesh
+    profile: Floats | None = None
+
+    @cached_property
+    def object(self) -> Any:
+        """The mesh as FCL's object, which is moved from pose to pose."""
+        import fcl
+
+        tree = fcl.BVHModel()
+        tree.beginModel(len(self.mesh.vertices), len(self.mesh.faces))
+        tree.addSubModel(np.ascontiguousarray(self.mesh.vertices), np.ascontiguousarray(self.mesh.faces))
+        tree.endModel()
+        return fcl.CollisionObject(tree, fcl.Transform())
+
+
+def make_nozzle(cone: Cone) -> Nozzle:
+    """The nozzle of a cone. Its profile has the radius of the mesh's corners, so that it holds the mesh."""
+    profile = cone.draw_profile()
+    if len(profile) == 3 and profile[1, 0] <= 1e-9 * cone.length:  # no cone: the tip is as wide as the body
+        profile = np.array([[0.0, cone.body_radius], [cone.length, cone.body_radius]])
+    return Nozzle(make_nozzle_mesh(cone), profile * [1.0, 1 / np.cos(np.pi / SIDES)])
 
 
 def make_nozzle_mesh(cone: Cone) -> Mesh:

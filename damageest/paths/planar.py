@@ -11,7 +11,7 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
 from damageest.paths.axes import choose_axes, list_axes
-from damageest.paths.clearance import Clearance, Obstacle
+from damageest.paths.clearance import Clearance, Obstacles
 from damageest.paths.fill import fill_region
 from damageest.paths.frames import Frame
 from damageest.paths.process import Pass, Plan, Process, order_passes, resample
@@ -49,11 +49,13 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     near = _crop(metal, local, height + process.bead.width)
     meshes = [Mesh(*to_arrays(metal))] if not metal.is_empty() else []
     meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
+    corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
+    clearance = around.clearance.with_obstacles(Obstacles(meshes, corners[0], corners[1], process.bead.width))
     done = make_region([])
     passes: list[Pass] = []
     missing: list[Any] = []
     reasons: dict[str, float] = {}
-    choice = _AxisChoice(process, around.clearance)
+    choice = _AxisChoice(process, clearance)
     for number in range(count):
         floor, top = low + number * height, low + (number + 1) * height
         slab = _cut_slab(local, floor, top)
@@ -63,8 +65,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         lines = fill_region(held, process.pattern, process.bead, process.angle + number * process.turn)
         long = [line for line in lines if measure_length(line) >= process.shortest]
         short = [line for line in lines if measure_length(line) < process.shortest]
-        obstacles = [Obstacle(mesh) for mesh in _take_above(meshes, top)]
-        made, dropped = choice.place(long, top, obstacles, number)
+        made, dropped = choice.place(long, top, number)
         made = order_passes(made, passes[-1].points[-1] if passes else None)
         done = cover([one.points[:, :2] for one in made], process.bead.width)
         left = {
@@ -108,34 +109,22 @@ def _cast_shadow(slab: Any, process: Process) -> Any:
     return make_region(slab.project().to_polygons()).simplify(process.bead.width / 200)
 
 
-def _take_above(meshes: Sequence[Mesh], height: float) -> list[Mesh]:
-    """The triangles of meshes that reach above a height."""
-    found = []
-    for mesh in meshes:
-        above = mesh.vertices[mesh.faces, 2].max(axis=1) > height
-        if above.any():
-            used, number = np.unique(mesh.faces[above], return_inverse=True)
-            found.append(Mesh(mesh.vertices[used], number.reshape(-1, 3)))
-    return found
-
-
 class _AxisChoice:
     """Places the lines of a layer with tool axes. It remembers which axis served last."""
 
     def __init__(self, process: Process, clearance: Clearance) -> None:
         self.process, self.clearance = process, clearance
-        axes = list_axes(process.tilt if process.axes == 5 else 0.0)
+        tilt = process.tilt if process.axes == 5 else 0.0
+        axes = list_axes(tilt, np.radians(30.0), 6) if process.is_trial else list_axes(tilt)
         # everything up to the top of the layer stays below the nozzle's lowest point
         self.lowest = np.array([_find_lowest(clearance, axis) for axis in axes])
         self.axes = axes[self.lowest >= process.gap * (1 - 1e-9)]
         self.lowest = self.lowest[self.lowest >= process.gap * (1 - 1e-9)]
         self.last = 0
 
-    def place(
-        self, lines: Sequence[Floats], top: float, obstacles: Sequence[Obstacle], layer: int
-    ) -> tuple[list[Pass], list[Floats]]:
+    def place(self, lines: Sequence[Floats], top: float, layer: int) -> tuple[list[Pass], list[Floats]]:
         """Passes along the lines (K,2) at a height, and the pieces of lines (K,2) that the nozzle does not reach."""
-        clearance, needed = self.clearance.with_obstacles(obstacles), self.process.gap
+        clearance, needed = self.clearance.above(top), self.process.gap
         made: list[Pass] = []
         dropped: list[Floats] = []
         if not len(self.axes):
@@ -143,9 +132,8 @@ class _AxisChoice:
         for line in lines:
             line = _extend(line, *self.process.extend)
             points, corner = resample(np.column_stack([line, np.full(len(line), top)]), self.process.step)
-            order = np.concatenate([[self.last], np.delete(np.arange(len(self.axes)), self.last)])
             least = int(np.ceil(self.process.shortest / self.process.step)) + 2
-            pieces = choose_axes(points, self.axes[order], clearance, needed, min(least, len(points)))
+            pieces = choose_axes(points, self.axes, self.last, clearance, needed, min(least, len(points)))
             at = 0
             for piece in pieces:
                 if piece.start > at:
@@ -179,7 +167,7 @@ def _find_lowest(clearance: Clearance, axis: Floats) -> float:
     """Height of the nozzle's lowest point above the point that it works on."""
     from damageest.paths.nozzle import turn_to_axis
 
-    return float((clearance.nozzle.vertices @ turn_to_axis(axis).T)[:, 2].min() + clearance.standoff * axis[2])
+    return float((clearance.nozzle.mesh.vertices @ turn_to_axis(axis).T)[:, 2].min() + clearance.standoff * axis[2])
 
 
 def _extend(line: Floats, before: float, after: float) -> Floats:

@@ -23,7 +23,7 @@ class Process:
     ``height``: largest of a layer. ``turn``: of the rows from layer to layer. ``overhang``: largest angle between the
     build direction and an overhanging side. ``shortest``: least length of a pass. ``gap``: distance that the nozzle has
     to keep. ``tilt``: largest of the tool axis against the build direction. ``extend``: how far a pass begins before
-    its start and goes on beyond its end.
+    its start and goes on beyond its end. ``is_trial``: few axes are tried.
     """
 
     height: float
@@ -37,6 +37,7 @@ class Process:
     axes: Axes
     tilt: float
     extend: tuple[float, float] = (0.0, 0.0)
+    is_trial: bool = False
 
     @property
     def step(self) -> float:
@@ -46,7 +47,7 @@ class Process:
     def coarsen(self, factor: float) -> Process:
         """The same with larger layers and beads, for a quick trial."""
         bead = Bead(factor * self.bead.width, factor * self.bead.step)
-        return replace(self, height=factor * self.height, bead=bead, pattern="zigzag", extend=(0.0, 0.0))
+        return replace(self, height=factor * self.height, bead=bead, pattern="zigzag", extend=(0.0, 0.0), is_trial=True)
 
 
 @dataclass(frozen=True, eq=False)

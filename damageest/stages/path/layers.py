@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -168,17 +168,17 @@ class Layers(Path):
             plan_planar,
         )
 
-    def _make_nozzle(self) -> Mesh:
-        from damageest.paths.nozzle import Cone, make_nozzle_mesh
+    def _make_nozzle(self) -> Any:
+        from damageest.paths import nozzle
 
         shape = self.nozzle
         if shape.mesh is not None:
-            return _read_mesh(shape.mesh, "nozzle", True)
+            return nozzle.Nozzle(_read_mesh(shape.mesh, "nozzle", True))
         assert shape.tip_radius is not None
         assert shape.body_radius is not None
         assert shape.length is not None
         angle = float(np.radians(shape.cone_angle))
-        return make_nozzle_mesh(Cone(shape.tip_radius, shape.body_radius, shape.length, angle))
+        return nozzle.make_nozzle(nozzle.Cone(shape.tip_radius, shape.body_radius, shape.length, angle))
 
 
 def _read_mesh(path: JobPath, what: str, is_closed: bool) -> Mesh:
