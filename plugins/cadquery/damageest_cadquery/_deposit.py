@@ -82,11 +82,15 @@ def find_deposit(
 
     Raises StockError where there is none that passes the checks.
     """
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+
     start = time.process_time()
     if not isinstance(deposit, Deposit) or (deposit.stock_volume > 0 and not deposit.heights):
         raise StockError("the allowance does not say how high the stock on each CAD face is")
     if deposit.overlap:
         raise StockError("the stock overlaps the intact skin around the damage")
+    # OpenCASCADE adds curves to the edges that it works with, which what is left of the part shares
+    damage = [replace(piece, shape=BRepBuilderAPI_Copy(piece.shape).Shape()) for piece in damage]
     try:
         bases = [base for piece in damage for base in take_bases(piece, dict(deposit.heights))]
         higher = [replace(base, height=base.height + tolerance / 4) for base in bases]

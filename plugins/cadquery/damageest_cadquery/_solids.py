@@ -38,23 +38,36 @@ def orient_solid(shape: Any) -> Any:
 
 def _place_faces(shape: Any) -> Any:
     """The shape with faces in their own place: faces that are others moved, as in a prism, have no names in STEP."""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing, BRepBuilderAPI_Transform
-    from OCP.TopAbs import TopAbs_SHELL
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
     from OCP.TopLoc import TopLoc_Location
-    from OCP.TopoDS import TopoDS
 
     faces = explore_faces(shape)
     if all(face.Location().IsIdentity() for face in faces):
         return shape
-    sewing = BRepBuilderAPI_Sewing(SEWN)
+    placed = []
     for face in faces:
         if not face.Location().IsIdentity():
             move = face.Location().Transformation()
             face = BRepBuilderAPI_Transform(face.Located(TopLoc_Location()), move, True).Shape()
+        placed.append(face)
+    return close(placed)
+
+
+def close(faces: Sequence[Any]) -> Any:
+    """The solid that faces bound. Raises StockError where they leave a gap."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
+    from OCP.TopAbs import TopAbs_SHELL
+    from OCP.TopoDS import TopoDS
+
+    sewing = BRepBuilderAPI_Sewing(SEWN)
+    for face in faces:
         sewing.Add(face)
     sewing.Perform()
-    shells = explore(sewing.SewedShape(), TopAbs_SHELL)
-    return BRepBuilderAPI_MakeSolid(TopoDS.Shell_s(shells[0])).Solid() if len(shells) == 1 else shape
+    shells = [TopoDS.Shell_s(shell) for shell in explore(sewing.SewedShape(), TopAbs_SHELL)]
+    if len(shells) != 1 or not BRep_Tool.IsClosed_s(shells[0]):
+        raise StockError("the offset of a face and its sides do not close")
+    return BRepBuilderAPI_MakeSolid(shells[0]).Solid()
 
 
 def combine(algorithm: Any, arguments: Sequence[Any], tools: Sequence[Any], fuzzy: float = 1e-6) -> Any:

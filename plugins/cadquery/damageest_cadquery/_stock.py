@@ -19,7 +19,7 @@ from damageest.artefacts import Floats
 from damageest_cadquery._edges import Edge, find_edges
 from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
-from damageest_cadquery._solids import StockError, combine, orient_solid, sew
+from damageest_cadquery._solids import StockError, close, combine, explore_faces, orient_solid, sew
 from damageest_cadquery._split import Piece, measure_volume
 
 FLAT = 1e-6
@@ -80,12 +80,13 @@ def _thicken(faces: Sequence[Any], height: float) -> Any:
     """The solid between faces that are smooth together and their offset."""
     from OCP.BRep import BRep_Builder
     from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.BRepFill import BRepFill
     from OCP.BRepOffset import BRepOffset_MakeSimpleOffset
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
     from OCP.GeomAbs import GeomAbs_Plane
     from OCP.gp import gp_Vec
     from OCP.TopAbs import TopAbs_REVERSED
-    from OCP.TopoDS import TopoDS_Shell
+    from OCP.TopoDS import TopoDS, TopoDS_Shell
 
     shape: Any = faces[0]
     builder, shell = BRep_Builder(), TopoDS_Shell()
@@ -102,11 +103,28 @@ def _thicken(faces: Sequence[Any], height: float) -> Any:
             normal.Reverse()
         return orient_solid(BRepPrimAPI_MakePrism(shape, normal.Multiplied(height)).Shape())
     maker = BRepOffset_MakeSimpleOffset(shell, height)
-    maker.SetBuildSolidFlag(True)
     maker.Perform()
     if not maker.IsDone():
         raise StockError("OpenCASCADE finds no offset of a face")
-    return orient_solid(maker.GetResultShape())
+    walls = [BRepFill.Face_s(edge, TopoDS.Edge_s(maker.Generated(edge))) for edge in _find_border(faces)]
+    return orient_solid(close([*faces, *explore_faces(maker.GetResultShape()), *walls]))
+
+
+def _find_border(faces: Sequence[Any]) -> list[Any]:
+    """The edges that one of the faces has alone."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD
+    from OCP.TopoDS import TopoDS
+    from OCP.TopTools import TopTools_IndexedMapOfShape
+
+    index, edges, times = TopTools_IndexedMapOfShape(), {}, {}
+    for face in faces:
+        for edge in explore(face, TopAbs_EDGE):
+            if not BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)):
+                key = index.Add(edge)
+                edges[key] = TopoDS.Edge_s(edge.Oriented(TopAbs_FORWARD))
+                times[key] = times.get(key, 0) + 1
+    return [edge for key, edge in edges.items() if times[key] == 1]
 
 
 def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]:
