@@ -117,7 +117,9 @@ def _find_border(faces: Sequence[Any]) -> list[Any]:
     from OCP.TopoDS import TopoDS
     from OCP.TopTools import TopTools_IndexedMapOfShape
 
-    index, edges, times = TopTools_IndexedMapOfShape(), {}, {}
+    index = TopTools_IndexedMapOfShape()
+    edges: dict[int, Any] = {}
+    times: dict[int, int] = {}
     for face in faces:
         for edge in explore(face, TopAbs_EDGE):
             if not BRep_Tool.Degenerated_s(TopoDS.Edge_s(edge)):

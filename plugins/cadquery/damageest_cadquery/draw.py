@@ -29,7 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def draw(models: Sequence[Model], output: Path, size: tuple[int, int], view: Sequence[float]) -> None:
-    """Writes a picture of each model; red to yellow are faces inside the part, by their name."""
+    """Writes a picture of each model; red to yellow are faces inside the part, blue is stock, by
+    their names."""
     import pyvista as pv
 
     plotter = pv.Plotter(shape=(1, len(models)), off_screen=True, window_size=[size[0] * len(models), size[1]])
@@ -55,6 +56,8 @@ def draw(models: Sequence[Model], output: Path, size: tuple[int, int], view: Seq
 def _choose_colour(face: int, name: str) -> tuple[int, int, int]:
     turn = 0.09 * (face * 0.618 % 1)
     hue, light, strength = (INNER + turn, 0.55, 0.75) if " inner " in name else (0.36 + 3 * turn, 0.68, 0.4)
+    if name.startswith(("stock on ", "side of the stock")):
+        hue, light, strength = 0.57 + turn / 3, 0.55 if name.startswith("stock") else 0.85, 0.65
     red, green, blue = colorsys.hls_to_rgb(hue % 1, light, strength)
     return round(255 * red), round(255 * green), round(255 * blue)
 
