@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import INTACT, Deviation, Flags, Floats, Ints, Part, Scan
 from damageest.geometry.distance import signed_distance
-from damageest.geometry.duplicates import find_members, list_distinct
+from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, make_tree, query_neighbours
 from damageest.geometry.voxels import number_cubes
 
@@ -68,10 +68,11 @@ def _drop_single(aligned: Scan, asked: Ints, near: Flags, tolerance: float) -> I
         return asked
     around = np.flatnonzero(near)
     cube = number_cubes(aligned.points[around], edge)[1]
-    cubes = list_distinct(cube)
-    place = np.searchsorted(cubes, cube)
-    deep = find_members(around, asked)
-    share = np.bincount(place[deep], minlength=len(cubes)) / np.bincount(place, minlength=len(cubes))
+    place, count = group_integers(cube)[1:]
+    deep = np.zeros(len(near), bool)
+    deep[asked] = True
+    deep = deep[around]
+    share = np.bincount(place[deep], minlength=len(count)) / count
     return np.asarray(around[deep & (share[place] >= DEEP)])
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.checks.form_fields import Field, FieldFrame
 from damageest.geometry.distance import SurfaceTree
+from damageest.geometry.duplicates import group_integers
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.geometry.voxels import number_faced_cubes
 
@@ -133,7 +134,7 @@ def find_feet(skin: Skin, form: Form, points: Floats, edge: float, reach: float,
     if not kept.any():
         return Feet(points[kept], places[kept], normals[kept], np.empty(0, np.int64))
     number = number_faced_cubes(places[kept], normals[kept], edge)[1]
-    return Feet(points[kept], places[kept], normals[kept], np.unique(number, return_inverse=True)[1])
+    return Feet(points[kept], places[kept], normals[kept], group_integers(number)[1])
 
 
 def weigh(offset: Floats, width: float, is_one_sided: bool = False) -> Floats:

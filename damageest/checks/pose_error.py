@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import INTACT, Deviation, Flags, Floats, Part, Scan
+from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_faced_cubes
 
 PATCH = 1 / 15
@@ -125,7 +126,7 @@ def _average_patches(
     normals = part.face_normals[deviation.face[index]]
     places = aligned.points[index] - centre
     _, number = number_faced_cubes(places, normals, edge)
-    _, group, count = np.unique(number, return_inverse=True, return_counts=True)
+    _, group, count = group_integers(number)
     rows = _make_rows(places, normals)
     mean = np.bincount(group, weights=deviation.distance[index]) / count
     mean_rows = np.stack([np.bincount(group, weights=row) for row in rows.T], axis=1) / count[:, None]

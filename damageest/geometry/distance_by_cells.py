@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.duplicates import order_integers
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid
 from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
@@ -97,7 +98,7 @@ def _find_creases(part: Mesh, slope: float) -> tuple[Ints, Ints]:
     than a thousandth of ``slope`` (radians) but is not sharp."""
     edges = np.sort(part.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     code = edges[:, 0] * len(part.vertices) + edges[:, 1]
-    order = np.argsort(code, kind="stable")
+    order = order_integers(code)
     start = np.flatnonzero(np.diff(code[order], prepend=-1))
     pair = np.diff(start, append=len(order)) == 2
     length = np.linalg.norm(part.cross, axis=1)

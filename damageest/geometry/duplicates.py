@@ -23,6 +23,30 @@ def list_distinct(values: np.ndarray[Any, np.dtype[N]]) -> np.ndarray[tuple[int]
     return ordered[first]
 
 
+def order_integers(values: Ints) -> Ints:
+    """The order (N,) that sorts integers; equal ones stay in their order."""
+    if not len(values):
+        return np.empty(0, np.int64)
+    low, count = int(values.min()), len(values)
+    if (int(values.max()) - low + 1) * count >= 2**62:
+        return np.argsort(values, kind="stable")
+    # each together with its place, which is much faster to sort than places by values
+    return np.sort((values - low) * count + np.arange(count)) % count
+
+
+def group_integers(values: Ints) -> tuple[Ints, Ints, Ints]:
+    """Groups of equal integers, ascending: the index (G,) of the first of each, the group (N,) of each integer, and how
+    many each group has (G,)."""
+    order = order_integers(values)
+    ordered = values[order]
+    begins = np.ones(len(order), bool)
+    begins[1:] = ordered[1:] != ordered[:-1]
+    start = np.flatnonzero(begins)
+    group = np.empty(len(order), np.int64)
+    group[order] = np.cumsum(begins) - 1
+    return order[start], group, np.diff(start, append=len(order))
+
+
 def find_members(values: Ints, others: Ints) -> Flags:
     """Whether each of the integers ``values`` (N,) is one of the ``others`` (M,)."""
     if not len(others):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Flags, Floats
+from damageest.geometry.voxels import measure_bounds
 
 FEWEST = 0.01
 """Share of the points of the largest group below which a group is set aside."""
@@ -20,7 +21,7 @@ def find_far(points: Floats, size: float) -> Flags:
     each direction, so that points of it are in one group, whatever its pose.
     """
     none = np.zeros(len(points), bool)
-    if not len(points) or np.ptp(points, axis=0).max() <= 2 * size:
+    if not len(points) or np.ptp(measure_bounds(points), axis=0).max() <= 2 * size:
         return none
     cube = np.floor((points - np.median(points, axis=0)) / size)
     cube = np.clip(cube, -(2.0**20), 2.0**20 - 1).astype(np.int64) + 2**20

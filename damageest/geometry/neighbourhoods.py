@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, number_cubes
+from damageest.geometry.duplicates import group_integers, order_integers
+from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, measure_bounds, number_cubes
 from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
 BYTES_OF_PLACE = 60
@@ -30,7 +31,7 @@ def find_nearby(points: Floats, places: Floats, reach: float) -> Ints:
     """
     if not len(places) or not len(points):
         return np.empty(0, np.int64)
-    low, high = places.min(axis=0), places.max(axis=0)
+    low, high = measure_bounds(places)
     size = max(reach * (1 + 1e-9), float((high - low).max()) / MOST_ALONG, 1e-300)
     # two empty layers on every side: one for the cubes next to the places, one for all points farther away
     low = low - 2 * size
@@ -58,16 +59,14 @@ def thin_points(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
     Returns:
         The means (M,3), how many points each is the mean of (M,), and the index (M,) of the first of these points.
     """
-    _, first, group, counts = np.unique(
-        number_cubes(points, cell)[1], return_index=True, return_inverse=True, return_counts=True
-    )
+    first, group, counts = group_integers(number_cubes(points, cell)[1])
     sums = np.stack([np.bincount(group, points[:, axis]) for axis in range(3)], axis=1)
-    return sums / counts[:, None], counts.astype(np.int64), first
+    return sums / counts[:, None], counts, first
 
 
 def pick_one_per_cube(points: Floats, cell: float) -> Ints:
     """Ascending indices (M,) of the first of the points (N,3) in each cube of edge ``cell``."""
-    return np.sort(np.unique(number_cubes(points, cell)[1], return_index=True)[1])
+    return np.sort(group_integers(number_cubes(points, cell)[1])[0])
 
 
 def find_neighbours(
@@ -106,8 +105,8 @@ def query_neighbours(tree: Any, points: Floats, count: int, reach: float = np.in
         distance, index = tree.query(points, k=count, distance_upper_bound=reach, workers=2)
         return np.reshape(distance, shape), np.reshape(index, shape)
     # places that lie near one another are asked one after the other: the nodes that they need are in the cache then
-    low, high = points[:, :3].min(axis=0), points[:, :3].max(axis=0)
-    order = np.argsort(number_cubes(points[:, :3], max(float((high - low).max()) / ALONG, 1e-300))[1], kind="stable")
+    low, high = measure_bounds(points[:, :3])
+    order = order_integers(number_cubes(points[:, :3], max(float((high - low).max()) / ALONG, 1e-300))[1])
     distance, index = np.empty(shape), np.empty(shape, np.intp)
     for start in range(0, len(order), CHUNK):
         some = order[start : start + CHUNK]

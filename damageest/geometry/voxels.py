@@ -19,6 +19,14 @@ CHUNK = 1 << 18
 """Points looked up in a `VoxelGrid` at a time, so that intermediate arrays fit in the processor's cache."""
 
 
+def measure_bounds(points: Floats) -> Floats:
+    """The lowest and the highest corner (2,3) of points (N,3), at least one.
+
+    Column by column: numpy takes six times as long for all columns at once.
+    """
+    return np.array([[column.min() for column in points.T], [column.max() for column in points.T]])
+
+
 class VoxelGrid(NamedTuple):
     """Cubes of edge ``size`` from the lowest corner ``low`` (3,), as many along x, y and z as ``shape`` (3,) tells.
 
@@ -63,9 +71,13 @@ def number_cubes(points: Floats, edge: float, low: Floats | None = None) -> tupl
     ``low`` (3,) is a corner of the grid, at or below all points; by default the lowest corner of their bounds. At least
     one point is needed.
     """
-    cell = np.floor((points - (points.min(axis=0) if low is None else low)) / edge).astype(np.int64)
-    size = cell.max(axis=0) + 1
-    return cell, (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
+    cell = np.empty((3, len(points)), np.int64)
+    number = np.zeros(len(points), np.int64)
+    for axis, along in enumerate(points.T):
+        cell[axis] = np.floor((along - (along.min() if low is None else low[axis])) / edge)
+        number *= cell[axis].max() + 1
+        number += cell[axis]
+    return cell.T, number
 
 
 def measure_area(points: Floats, edge: float, fewest: int = 1) -> float:

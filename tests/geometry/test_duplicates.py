@@ -5,8 +5,17 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
 
-from damageest.geometry.duplicates import find_duplicates, find_members, list_distinct, list_used
+from damageest.geometry.duplicates import (
+    find_duplicates,
+    find_members,
+    group_integers,
+    list_distinct,
+    list_used,
+    order_integers,
+)
 
 
 @given(st.integers(0, 10_000), st.integers(0, 60), st.integers(1, 4), st.sampled_from([0.0, 1e5, 1e-300]))
@@ -62,3 +71,13 @@ def test_sorting_finds_what_numpy_finds(one: list[int], two: list[int]) -> None:
 
 def test_vertices_that_no_face_uses_are_left_out() -> None:
     assert list_used(np.array([[4, 1, 7], [1, 7, 2]])).tolist() == [1, 2, 4, 7]
+
+
+@given(arrays(np.int64, st.integers(0, 60), elements=st.one_of(st.integers(-5, 5), st.integers(-(2**60), 2**60))))
+def test_groups_are_those_that_numpy_finds(values: NDArray[np.int64]) -> None:
+    """Also where differences are too large to sort a number together with its place."""
+    first, group, count = group_integers(values)
+    _, *expected = np.unique(values, return_index=True, return_inverse=True, return_counts=True)
+    for found, right in zip((first, group, count), expected, strict=True):
+        assert np.array_equal(found, right)
+    assert np.array_equal(order_integers(values), np.argsort(values, kind="stable"))

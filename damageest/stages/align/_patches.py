@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
+from damageest.geometry.duplicates import group_integers
 from damageest.geometry.transforms import move_points
 from damageest.geometry.voxels import number_faced_cubes
 from damageest.stages.align._field import PartSurface
@@ -67,7 +68,7 @@ def measure_patches(target: PartSurface, points: Floats, pose: Floats, noise: fl
     normals = target.normals[face]
     edge = EDGE * float(np.sqrt(target.mesh.area / len(points)))
     key = number_faced_cubes(foot, normals, edge)[1]
-    _, first, group, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
+    first, group, count = group_integers(key)
     many = count >= MIN_POINTS
 
     def average(values: Floats) -> Floats:

@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.voxels import measure_bounds
 
 MAX_DENSE = 120_000
 """Number of scan points that density and normals are measured on; more only cost time."""
@@ -43,8 +44,8 @@ def draw_evenly(points: Floats, weights: Floats, wanted: int, rng: np.random.Gen
     """
     if wanted >= len(points):
         return np.arange(len(points))
-    low = points.min(0)
-    cells = ((points - low) / max(float(np.ptp(points, axis=0).max()), 1e-300) * 1023).astype(np.int64)
+    low, high = measure_bounds(points)
+    cells = ((points - low) / max(float((high - low).max()), 1e-300) * 1023).astype(np.int64)
     code = np.zeros(len(points), np.int64)
     for bit in range(10):
         for axis in range(3):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_cubes
 from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
@@ -70,7 +71,6 @@ def measure_neighbour_distances(points: Floats, neighbours: int) -> Floats:
 def _gather_in_cells(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
     """Averages points in cells of a grid: the mean points, the cell of each point, the number of points of each
     cell."""
-    _, of, count = np.unique(number_cubes(points, cell)[1], return_inverse=True, return_counts=True)
-    of = of.ravel()
+    _, of, count = group_integers(number_cubes(points, cell)[1])
     means = np.stack([np.bincount(of, points[:, axis]) for axis in range(3)], axis=1) / count[:, None]
     return means, of, count

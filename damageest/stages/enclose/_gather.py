@@ -8,11 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Samples, Scan, Sites
+from damageest.geometry.duplicates import group_integers
 from damageest.geometry.local_fits import average_points
 from damageest.geometry.neighbourhoods import find_neighbours, measure_local_areas, pick_one_per_cube, thin_points
 from damageest.geometry.orientation import turn_toward_void
 from damageest.geometry.poisson import Grid, GridValues, refine_field
-from damageest.geometry.voxels import number_cubes
+from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.stages.enclose._skin import SkinSamples, push_outward, sample_skin_near
 
 APART = 0.75
@@ -75,7 +76,7 @@ class _Sorted:
 
     def __init__(self, points: Floats) -> None:
         self.points = points
-        self._axis = int(np.ptp(points, axis=0).argmax()) if len(points) else 0
+        self._axis = int(np.ptp(measure_bounds(points), axis=0).argmax()) if len(points) else 0
         self._order = np.argsort(points[:, self._axis], kind="stable")
         self._along = points[self._order, self._axis]
 
@@ -190,7 +191,7 @@ def _group_losses(
     bare = np.flatnonzero(skin.bare)
     all_points = np.concatenate([points, skin.points[bare]])
     cell, number = number_cubes(all_points, link / 2)
-    _, first, cube = np.unique(number, return_index=True, return_inverse=True)
+    first, cube, _ = group_integers(number)
     pairs = cKDTree(cell[first]).query_pairs(2.5, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     _, component = connected_components(links, directed=False)
@@ -218,8 +219,7 @@ def _thin_flat(points: Floats, chosen: Ints, depth: Floats, noise: float, cell: 
 
     Flat are cubes of `FLAT_CUBE` cells in which the points (N,3) lie on a plane within their noise.
     """
-    cubes, cube = np.unique(number_cubes(points, FLAT_CUBE * cell)[1], return_inverse=True)
-    size = np.bincount(cube, minlength=len(cubes))
+    _, cube, size = group_integers(number_cubes(points, FLAT_CUBE * cell)[1])
     mean = np.stack([np.bincount(cube, points[:, axis]) for axis in range(3)], axis=1) / size[:, None]
     off = points - mean[cube]
     moments = np.stack([np.bincount(cube, off[:, i] * off[:, j]) for i in range(3) for j in range(3)], axis=1)

@@ -9,6 +9,7 @@ import numpy as np
 from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Part, Samples, Scan, Sites
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.voxels import VoxelGrid, measure_bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,11 +71,11 @@ def _select_cubes(scan: Floats, damaged: Flags, intact: Flags, skin: Floats, siz
     """
     from scipy.ndimage import binary_dilation, label
 
-    low = np.minimum(scan.min(axis=0), skin.min(axis=0)) - 2 * size
-    shape = np.ceil((np.maximum(scan.max(axis=0), skin.max(axis=0)) - low) / size).astype(int) + 3
-    flat = [
-        np.ravel_multi_index(tuple(np.floor((p - low) / size).astype(np.int64).T), tuple(shape)) for p in (scan, skin)
-    ]
+    low, high = measure_bounds(np.concatenate([measure_bounds(scan), measure_bounds(skin)]))
+    low = low - 2 * size
+    shape = np.ceil((high - low) / size).astype(np.int64) + 3
+    grid = VoxelGrid(low, size, shape)
+    flat = [grid.number_cells(points) for points in (scan, skin)]
     total = int(np.prod(shape))
     seen = np.bincount(flat[0][intact], minlength=total)
     expected = np.bincount(flat[1], minlength=total)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.voxels import number_cubes
+from damageest.geometry.duplicates import group_integers
+from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.isolation.foresee import require_memory
 
 SPREAD_BYTES, THIN_BYTES, TRIANGLE_BYTES = 170, 210, 260
@@ -87,7 +88,7 @@ def _pick_one_per_cell(points: Floats, cell: float, among: Ints | None = None) -
     among = np.arange(len(points)) if among is None else among
     if not len(among):
         return among
-    _, first = np.unique(number_cubes(points[among], cell, points.min(axis=0))[1], return_index=True)
+    first = group_integers(number_cubes(points[among], cell, measure_bounds(points)[0])[1])[0]
     return among[np.sort(first)]
 
 

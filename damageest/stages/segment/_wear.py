@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part, Scan
+from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import CHUNK, number_cubes, number_faced_cubes
 from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
@@ -113,7 +114,7 @@ def _average_cubes(points: Floats, normals: Floats, depth: Floats, edge: float) 
         (C,) of its points.
     """
     cell, key = number_faced_cubes(points, normals, edge)
-    _, first, group, count = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
+    first, group, count = group_integers(key)
     return cell[first], group, np.bincount(group, weights=depth) / count, count
 
 
@@ -166,7 +167,7 @@ def _is_in_region(points: Floats, link: float) -> Flags:
     if len(points) < MIN_REGION:
         return np.zeros(len(points), bool)
     cell, key = number_cubes(points, link)
-    _, first, group = np.unique(key, return_index=True, return_inverse=True)
+    first, group, _ = group_integers(key)
     pairs = cKDTree(cell[first]).query_pairs(1.9, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     region = connected_components(links, directed=False)[1][group]
