@@ -26,7 +26,8 @@ def command(
 ) -> None:
     """Plan deposition paths for deposits of known shape, and check what they fill and whether the nozzle touches.
 
-    Bead and nozzle fit each deposit. The check of the nozzle is libigl's, ten times finer than the planner's.
+    Bead and nozzle fit each deposit. The check of the nozzle uses another library, and is
+    ten times finer than the planner's.
     """
     from damageest.evaluate.paths.run import make_table, run_scenes
     from damageest.evaluate.paths.scenes import make_scenes

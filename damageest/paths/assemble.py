@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import BeadFill, DepositPath, Floats, Mesh, Solid, Unreached
+from damageest.geometry.simplification import simplify_within
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.paths.beads import SHARE, Beads, simulate_beads
 from damageest.paths.clearance import Clearance, Obstacles
@@ -20,7 +21,7 @@ from damageest.paths.process import Pass, Plan, Process
 
 MUCH_TRAVEL = 0.2
 DETAIL = 0.01
-"""Share of the bead's height or width by which the planner's bodies may differ from the deposit and the metal left."""
+"""Share of the bead's height or width by which the body that is sliced may differ from the deposit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +60,9 @@ def plan_path(
     """
     origin: Floats = task.body.bounds.mean(axis=0)
     detail = DETAIL * min(process.bead.width, process.height)
-    body = _simplify(task.body, origin, detail)
+    body = to_manifold(simplify_within(task.body, detail), origin)
     clearance = Clearance(nozzle, standoff, None, detail)
-    around = Surroundings(_simplify(task.left, origin, detail), _shift(task.others, origin), clearance)
+    around = Surroundings(_take_metal(task.left, origin), _shift(task.others, origin), clearance)
     directions = list_directions(task.body, task.left, task.tolerance) if direction is None else [direction]
     plans = plan_parts(body, origin, directions, around, process, planner)
     groups, standing = [], around.metal
@@ -97,11 +98,11 @@ def plan_path(
     return _add_notes(path, moves, process)
 
 
-def _simplify(solid: Solid | None, origin: Floats, detail: float) -> Any:
-    """A solid as a Manifold with fewer triangles, that lies within ``detail`` of it; empty for None."""
+def _take_metal(left: Solid | None, origin: Floats) -> Any:
+    """What is left of the part as a Manifold, empty for None. It is not simplified: the nozzle must not touch it."""
     from manifold3d import Manifold
 
-    return Manifold() if solid is None else to_manifold(solid, origin).simplify(detail)
+    return Manifold() if left is None else to_manifold(left, origin)
 
 
 def _shift(meshes: Sequence[Mesh], origin: Floats) -> list[Mesh]:

@@ -9,13 +9,13 @@ import numpy as np
 from damageest.artefacts import Flags, Floats
 from damageest.paths.clearance import Clearance
 
-RING, AROUND = np.radians(15.0), 12
+RING, AROUND = np.radians(20.0), 8
 """Difference of tilt between the rings of axes that are tried, and their number round the build direction."""
-SPARSE = 8
+SPARSE = 5
 """Points of a pass at which all axes are tried first."""
 ROOM = 1.5
 """Multiple of the distance needed that counts as room to spare."""
-BEST = 4
+BEST = 3
 """Axes with which the pieces of a pass are looked for where none is free all along."""
 
 

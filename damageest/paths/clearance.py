@@ -184,7 +184,7 @@ class Clearance:
         return groups[away - near.radius[groups] - extent < ENOUGH * needed]
 
     def _bound_some(self, tips: Floats, axes: Floats, groups: Ints, needed: float) -> tuple[Floats, Floats]:
-        """As `bound`, from tips (N,3): first for whole groups of points and one of each, then for those that are near."""
+        """As `bound`, from tips (N,3): first for groups of points and one of each, then for the points of near ones."""
         near, profile = self.obstacles, self.nozzle.profile
         assert near is not None
         assert profile is not None

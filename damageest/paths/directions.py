@@ -20,7 +20,7 @@ MOST_PARTS, MOST_DIRECTIONS = 4, 6
 COARSE = 2.0
 """Factor of layer height and bead width for the trials of directions."""
 ROUGH = 0.1
-"""Share of the layer height by which body and metal may be simplified for these trials."""
+"""Share of the layer height within which the body is simplified for these trials."""
 ALIKE = np.cos(np.radians(5.0))
 Planner = Callable[[Any, Frame, Surroundings, Process], Plan]
 
@@ -68,8 +68,7 @@ def choose_direction(
         return first
     coarse = process.coarsen(COARSE)
     rough = body.simplify(ROUGH * process.height)
-    nearby = replace(around, metal=around.metal.simplify(ROUGH * process.height))
-    trials = [planner(rough, make_frame(one, origin), nearby, coarse).missing_volume for one in directions]
+    trials = [planner(rough, make_frame(one, origin), around, coarse).missing_volume for one in directions]
     order = np.argsort(np.round(np.array(trials) / volume, 3), kind="stable")
     if order[0] == 0:
         return first

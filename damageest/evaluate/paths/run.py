@@ -8,21 +8,21 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from damageest.artefacts import DepositPath, Mesh
+from damageest.artefacts import DepositPath, Solid
 from damageest.evaluate.paths.check import count_crossings, measure_nozzle
 from damageest.evaluate.paths.scenes import Scene
 from damageest.stages.path.layers import Layers
 
 BEADS = 250.0
-"""Volume of a deposit in cubes of the bead's width; less wide where the deposit is thin."""
+"""The volume of a deposit in cubes of the bead's width; it is less wide where the deposit is thin."""
 SUFFICES = 0.01
 """Share of a deposit that may be out of reach where a number of axes suffices."""
 
 
 @dataclass(frozen=True)
 class PathRow:
-    """One deposit. Lengths in the part's unit; ``gap``: least distance of the nozzle by the independent check, negative
-    where it touches; ``bound``: what is proven below it. Shares of the deposit: ``unreached_3``, ``unreached_5``; of the
+    """One deposit. Lengths in the part's unit; ``gap``: least distance of the nozzle by the independent check;
+    ``claimed``: by the planner. Both in bead widths. Shares of the deposit: ``unreached_3``, ``unreached_5``; of the
     reachable: ``filled``. ``seconds_3``, ``seconds_5``: of the processor."""
 
     kind: str
@@ -37,7 +37,6 @@ class PathRow:
     void: float
     largest_gap: float
     gap: float
-    bound: float
     claimed: float
     crossings: int
     passes: int
@@ -67,7 +66,7 @@ def evaluate_scene(scene: Scene) -> PathRow:
         assert path is not None
         paths.append(path)
     plain, path = paths
-    gap, bound = _check(path, scene.left)
+    gap = _check(path, scene.left)
     fill, width, height = path.fill, path.width, float(path.heights.min())
     return PathRow(
         kind=scene.kind,
@@ -82,7 +81,6 @@ def evaluate_scene(scene: Scene) -> PathRow:
         void=fill.void / min(width, height) if fill else np.nan,
         largest_gap=fill.largest_gap / (width**2 * height) if fill else np.nan,
         gap=gap / width,
-        bound=bound / width,
         claimed=min(path.clearance, path.travel_clearance) / width,
         crossings=count_crossings(path),
         passes=path.passes,
@@ -93,11 +91,9 @@ def evaluate_scene(scene: Scene) -> PathRow:
     )
 
 
-def _check(path: DepositPath, left: Mesh) -> tuple[float, float]:
-    """Distances of the nozzle from what is left of the part, ten times finer than the planner looks."""
-    if not path.on.any():
-        return np.inf, np.inf
-    return measure_nozzle(path, left, path.width / 4 / 10)
+def _check(path: DepositPath, left: Solid) -> float:
+    """Distance of the nozzle from what is left of the part, ten times finer than the planner looks."""
+    return measure_nozzle(path, left, path.width / 4 / 10) if path.on.any() else np.inf
 
 
 def run_scenes(scenes: Sequence[Scene], tell: Callable[[str], None]) -> list[PathRow]:
