@@ -19,7 +19,7 @@ from damageest.stages.enclose._skin import SkinSamples, push_outward, sample_ski
 APART = 0.75
 """Edge of the cubes with one averaged point each, in cells of the surface."""
 
-APART_FLAT, FLAT_CUBE, RIM = 1.5, 6.0, 4.0
+APART_FLAT, FLAT_CUBE, RIM = 2.5, 6.0, 4.0
 """The same where the surface is flat; edge of the cubes in which it has to be flat; depth up to which points count as
 near the rim. All in cells of the surface."""
 
