@@ -156,12 +156,13 @@ def build_shell(vertices: Floats, planar: Sequence[Facet], closed: bool = True) 
     builder.MakeShell(shell)
     for facet in planar:
         face = TopoDS_Face()
-        at = vertices[facet.loops[0]].mean(0)
-        builder.MakeFace(face, Geom_Plane(gp_Pnt(*at.tolist()), gp_Dir(*facet.normal.tolist())), close)
-        for loop in facet.loops:
+        loops = [loop.tolist() for loop in facet.loops]
+        corners_here = [places[index] for index in loops[0]]
+        at = (sum(values) / len(corners_here) for values in zip(*corners_here, strict=True))
+        builder.MakeFace(face, Geom_Plane(gp_Pnt(*at), gp_Dir(*facet.normal.tolist())), close)
+        for indices in loops:
             wire = TopoDS_Wire()
             builder.MakeWire(wire)
-            indices = loop.tolist()
             for start, end in zip(indices, indices[1:] + indices[:1], strict=True):
                 if places[start] != places[end]:  # no length, no direction
                     builder.Add(wire, edge(start, end))
