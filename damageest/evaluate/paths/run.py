@@ -13,7 +13,7 @@ from damageest.evaluate.paths.check import count_crossings, measure_nozzle
 from damageest.evaluate.paths.scenes import Scene
 from damageest.stages.path.layers import Layers
 
-BEADS = 250.0
+BEADS = 100.0
 """The volume of a deposit in cubes of the bead's width; it is less wide where the deposit is thin."""
 SUFFICES = 0.01
 """Share of a deposit that may be out of reach where a number of axes suffices."""

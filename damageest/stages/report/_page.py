@@ -67,6 +67,7 @@ def fill_page(
         r=content,
         sites=sites,
         drawn=MOST_DRAWN,
+        heights=max((item["height"] for item in scene.objects), default=0),
         verdict=describe_run(result),
         tone=choose_tone(result),
         total=f"{style.format_number(result.damage_volume)} {result.units}³",

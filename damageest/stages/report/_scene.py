@@ -10,6 +10,7 @@ import numpy as np
 
 from damageest.artefacts import DAMAGE, INTACT, Floats, Mesh
 from damageest.io import colours
+from damageest.paths.nozzle import turn_to_axis
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._thin import find_sharp_edges, thin_mesh, thin_points
@@ -21,6 +22,8 @@ LAYERS = {
     "damage": ("Damage volumes", True),
     "surface": ("Inner damage surfaces", False),
     "deposit": ("Deposits", False),
+    "path": ("Deposition passes, by layer", True),
+    "nozzle": ("Nozzle where it is tightest", False),
     "surplus": ("Surplus", True),
     "unseen": ("Skin that the scan does not show", True),
 }
@@ -29,10 +32,11 @@ LAYERS = {
 
 @dataclass
 class Scene:
-    """``snapshot``: k3d's binary snapshot in base64. ``objects``: for each object of it its number, layer and site (0:
-    none). ``views``: for each site, by number, centre, radius and viewing direction. ``origin`` (3,): what was
-    subtracted from all coordinates. ``size`` (3,): half of the part's extents. ``limit``: the deviation at the ends of
-    the colour bar. ``shown``, ``points``: how many scan points are shown, of how many."""
+    """``snapshot``: k3d's binary snapshot in base64. ``objects``: for each object of it its number, layer, site (0:
+    none) and, for passes, the number of the deposit's layer that they belong to, counted over its parts (else 0).
+    ``views``: for each site, by number, centre, radius and viewing direction. ``origin`` (3,): what was subtracted from
+    all coordinates. ``size`` (3,): half of the part's extents. ``limit``: the deviation at the ends of the colour bar.
+    ``shown``, ``points``: how many scan points are shown, of how many."""
 
     snapshot: str
     objects: list[dict[str, Any]]
@@ -55,10 +59,10 @@ class _Stage:
     def place(self, points: Floats) -> Any:
         return (np.round((points - self.origin) / self.step) * self.step).astype(np.float32)
 
-    def add(self, item: Any, layer: str, site: int = 0) -> None:
+    def add(self, item: Any, layer: str, site: int = 0, height: int = 0) -> None:
         item.id = len(self.made) + 1  # k3d's own numbers are addresses in memory, and differ from run to run
         self.made.append(item)
-        self.objects.append({"id": item.id, "layer": layer, "site": site})
+        self.objects.append({"id": item.id, "layer": layer, "site": site, "height": height})
 
     def add_mesh(self, mesh: Mesh, layer: str, colour: str, site: int = 0, opacity: float = 1.0) -> None:
         import k3d
@@ -188,6 +192,35 @@ def _add_site(stage: _Stage, result: Result, site: Site, share: int, most_points
     stage.add_mesh(thin_mesh(site.surface, share), "surface", colour, site.id)
     if site.deposit is not None:
         stage.add_mesh(thin_mesh(site.deposit, share), "deposit", colours.DEPOSIT, site.id, opacity=0.75)
+    _add_path(stage, site)
+
+
+def _add_path(stage: _Stage, site: Site) -> None:
+    """Adds the passes of a site, each layer of the deposit an object, and the nozzle where it is tightest."""
+    import k3d
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    path = site.path
+    if path is None or not path.on.any():
+        return
+    ends = np.flatnonzero(path.on)
+    kinds, number = np.unique(np.stack([path.part[ends], path.layer[ends]]), axis=1, return_inverse=True)
+    count = kinds.shape[1]
+    for k in range(count):
+        own = ends[number.ravel() == k]
+        points = np.concatenate([path.points[own - 1], path.points[own]])
+        pairs = np.stack([np.arange(len(own)), np.arange(len(own)) + len(own)], axis=1).astype(np.uint32)
+        colour = to_hex(colormaps["viridis"](k / max(count - 1, 1)))
+        lines = k3d.lines(
+            stage.place(points), pairs, indices_type="segment", shader="simple", color=style.to_number(colour),
+            width=0.02, name="path",
+        )  # fmt: skip
+        stage.add(lines, "path", site.id, k + 1)
+    if path.tightest is not None and len(path.nozzle.faces):
+        point, axis = path.tightest
+        places = path.nozzle.vertices @ turn_to_axis(axis).T + point + path.standoff * axis
+        stage.add_mesh(Mesh(places, path.nozzle.faces), "nozzle", "#c9a227", site.id, opacity=0.5)
 
 
 def _add_unseen(stage: _Stage, result: Result, share: int) -> None:

@@ -19,7 +19,7 @@ from damageest.stages.report import _style as style
 from damageest.stages.report._drawing import draw
 from damageest.stages.report._section import choose_plane, draw_section, take_paper
 from damageest.stages.report._thin import thin_mesh
-from damageest.stages.report._values import show_interval, show_site_interval
+from damageest.stages.report._values import list_path, show_interval, show_site_interval
 
 PICTURE, SMALLER, THUMBNAIL = (320, 240), (240, 180), (104, 78)
 THUMBNAIL_TRIANGLES = 4000
@@ -49,6 +49,7 @@ class Shown:
     method: str
     faces: str
     deposit: list[tuple[str, str]]
+    path: list[tuple[str, str]]
     files: list[tuple[str, str, str]] = field(default_factory=list)
     picture: str = ""
     section: str = ""
@@ -131,6 +132,7 @@ def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
         method=site.method,
         faces=name_faces(result.part, site.damage, result.tolerance),
         deposit=rows,
+        path=list_path(site, unit),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from damageest.findings import Interval
 from damageest.result import Result, Site
-from damageest.stages.report._style import THIN, format_number
+from damageest.stages.report._style import THIN, format_number, format_share
 
 
 def show_interval(interval: Interval | None, unit: str) -> str:
@@ -43,3 +43,21 @@ def list_fit(result: Result) -> list[tuple[str, str]]:
 def list_freedom(result: Result) -> list[tuple[str, str]]:
     """Motions of the part that the scan does not fix, in words."""
     return [("", motion.text) for motion in result.pose.free]
+
+
+def list_path(site: Site, unit: str) -> list[tuple[str, str]]:
+    """The figures of a site's deposition path: names and values; empty where there is none."""
+    path = site.path
+    if path is None:
+        return []
+    share = path.unreached_volume / path.deposit_volume
+    rows = [
+        ("passes", f"{path.passes} in {path.layers} layers, {format_number(path.length)} {unit}"),
+        ("time of the passes", f"{format_number(path.minutes, 3)} min, travel included"),
+        ("not reached", f"{format_number(path.unreached_volume, 3)} {unit}³, {format_share(share)} of the deposit"),
+    ]
+    if path.clearance < float("inf"):
+        rows.append(("nozzle stays clear by", f"{format_number(path.clearance, 2)} {unit}"))
+    if path.fill is not None:
+        rows.append(("filled of the rest", f"{path.fill.filled:.2%}"))
+    return rows

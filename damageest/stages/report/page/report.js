@@ -11,10 +11,15 @@
     return !box || box.checked;
   };
 
+  const isBelow = (height) => {
+    const slider = document.getElementById("height");
+    return !slider || !height || height <= Number(slider.value);
+  };
+
   function showObjects() {
     for (const item of scene.objects) {
       const object = view3d.getObjectById(item.id);
-      if (object) object.visible = isChecked("layer", item.layer) && (!item.site || isChecked("site", item.site));
+      if (object) object.visible = isChecked("layer", item.layer) && (!item.site || isChecked("site", item.site)) && isBelow(item.height);
     }
     document.getElementById("scale").hidden = !isChecked("layer", "scan") || !document.querySelector("[data-layer=scan]");
     view3d.render();
@@ -86,6 +91,13 @@
   function listen() {
     for (const box of find("input.layer, input.site")) box.addEventListener("change", showObjects);
     for (const id of ["clip-axis", "clip-flip", "clip-at"]) document.getElementById(id).addEventListener("input", clip);
+    const slider = document.getElementById("height");
+    if (slider) {
+      slider.addEventListener("input", () => {
+        document.getElementById("height-text").textContent = `1 to ${slider.value} of ${slider.max}`;
+        showObjects();
+      });
+    }
     document.getElementById("fit").addEventListener("click", () => { chooseRow(0); flyTo(viewFrom("iso")); });
     for (const button of find("button.from")) button.addEventListener("click", () => flyTo(viewFrom(button.dataset.from)));
     const siteOf = Object.fromEntries(scene.objects.filter((item) => item.site).map((item) => [item.id, item.site]));
