@@ -10,6 +10,8 @@ from damageest.geometry.solids import to_manifold, to_solid
 
 NEIGHBOURS = 12
 """Points that each vertex is fitted to."""
+SAME_VOLUME = 0.003
+"""Share by which the volume may change where triangles are joined."""
 
 
 def refit_region(region: Solid, points: Floats, normals: Floats, most: float) -> Solid:
@@ -50,12 +52,16 @@ def refit_region(region: Solid, points: Floats, normals: Floats, most: float) ->
 
 
 def thin_region(region: Solid, most: float) -> Solid:
-    """The region with fewer triangles: its surface moves by less than ``most``. A grid gives triangles of one size,
-    also where the surface is flat. The same where ``most`` is 0, or where no closed surface comes out."""
+    """The region with fewer triangles: its surface moves by less than ``most``, but flakes thinner than that may go. A
+    grid gives triangles of one size, also where the surface is flat.
+
+    The same where ``most`` is 0, where no closed surface comes out, or where the volume changes.
+    """
     if not most:
         return region
     origin = region.bounds.mean(axis=0)
     try:
-        return to_solid(to_manifold(region, origin).simplify(most), origin) or region
+        less = to_solid(to_manifold(region, origin).simplify(most), origin)
     except ValueError:
         return region
+    return less if less is not None and abs(less.volume / region.volume - 1) < SAME_VOLUME else region
