@@ -90,6 +90,10 @@ def make_settings(item: Implementation, scene: MatrixJob) -> dict[str, Any] | st
         options |= {"size": extent.tolist(), "corner": (middle - extent / 2).tolist()}
     elif use == "points":
         options["pairs"] = _pick_pairs(scene)
+    elif stage == "path" and use == "layers":
+        width = float(np.linalg.norm(np.ptp(scene.bounds, axis=0))) / 40
+        nozzle = {"tip_radius": width / 2, "length": 20 * width, "body_radius": 3 * width}
+        options |= {"width": width, "height": width / 2, "feed": 600.0, "nozzle": nozzle}
     elif stage == "align" and use != "register":
         moved = _make_small_motion(scene) @ scene.pose if use == "icp" else scene.pose
     missing = [name for name, field in item.cls.model_fields.items() if field.is_required() and name not in options]

@@ -12,7 +12,9 @@ import trimesh
 
 from damageest import artefacts
 from damageest.artefacts import (
+    BeadFill,
     Deposit,
+    DepositPath,
     Deviation,
     Enclosure,
     Enclosures,
@@ -28,6 +30,7 @@ from damageest.artefacts import (
     Solid,
     Surface,
     Truth,
+    Unreached,
 )
 from damageest.pipeline.cache import Cache, digest
 
@@ -36,7 +39,20 @@ SOLID = Solid(BOX.vertices + 1 / 3, BOX.faces)
 POINTS = np.random.default_rng(0).normal(size=(7, 3))
 TURN = np.array([[0.0, -1, 0, 1 / 3], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]])
 FREE = FreeMotion((0.0, 0.6, 0.8), -0.1, 1 / 3, (1.0, 2.0, 3.0), 0.02, "a turn")
+UP = np.tile([0.0, 0.6, 0.8], (7, 1))
+UNREACHED = Unreached(1 / 3, "unsupported")
+FILL = BeadFill(0.1, 0.99, 1 / 3, 0.2, 0.3, 0.4, 0.5, 0.6)
+PATH = DepositPath(
+    POINTS, UP, -UP, np.arange(7) + 1 / 3, np.arange(7) > 2, np.arange(7), np.arange(7), np.ones(7, np.int64),
+    UP[:1], POINTS[0, :1], 2.0, POINTS[:, 1], 1 / 3, 10.0, SOLID, 0.1, np.inf,
+)  # fmt: skip
 ARTEFACTS: list[Any] = [
+    UNREACHED,
+    FILL,
+    PATH,
+    dataclasses.replace(
+        PATH, tightest=POINTS[:2], unreached=(UNREACHED, UNREACHED), missing=SOLID, fill=FILL, notes=("much travel",)
+    ),
     FREE,
     Mesh(BOX.vertices, BOX.faces),
     SOLID,
