@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.duplicates import order_integers
 from damageest.geometry.voxels import number_cubes
 
 
@@ -22,7 +23,7 @@ def number_pieces(points: Floats, gap: float) -> Ints:
     from scipy.spatial.distance import cdist
 
     cell, number = number_cubes(points, gap / np.sqrt(3) * (1 - 1e-9))
-    order = np.argsort(number, kind="stable")
+    order = order_integers(number)
     cubes, first, cube = np.unique(number[order], return_index=True, return_inverse=True)
     ends = np.append(first[1:], len(order))
     place = cell[order[first]]

@@ -147,8 +147,7 @@ def _simulate(
         np.full(len(ends), process.bead.width), heights,
     )  # fmt: skip
     edge = min(process.bead.width, float(heights.min())) / SHARE
-    found = simulate_beads(beads, task.body, missing, task.left, plans[0].frame, edge)
-    return BeadFill(**vars(found))
+    return simulate_beads(beads, task.body, missing, task.left, plans[0].frame, edge)
 
 
 def _list_unreached(plans: Sequence[Plan]) -> tuple[Unreached, ...]:

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Flags, Floats, Mesh
+from damageest.artefacts import BeadFill, Flags, Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.voxels import measure_bounds
 from damageest.paths.frames import Frame
 
 SHARE = 4
@@ -34,26 +35,9 @@ class Beads:
     height: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Simulated:
-    """``voxel``: edge. ``filled``: share of the reachable deposit that is filled. ``gap``: volume of the reachable
-    deposit that is not. ``void``: diameter of the largest ball in it; ``largest_gap``: volume of its largest connected
-    piece. ``spill``: volume of beads outside the deposit and the metal; ``spill_distance``: how far it reaches from the
-    deposit. ``sunk``: volume of beads where metal is already."""
-
-    voxel: float
-    filled: float
-    gap: float
-    void: float
-    largest_gap: float
-    spill: float
-    spill_distance: float
-    sunk: float
-
-
 def simulate_beads(
     beads: Beads, deposit: Mesh, missing: Mesh | None, metal: Mesh | None, frame: Frame, edge: float
-) -> Simulated:
+) -> BeadFill:
     """Compares the union of beads with the deposit, on voxels of an ``edge`` along the axes of a frame.
 
     ``missing``: what of the deposit is known to be out of reach. The edge is larger where the voxels would be too many.
@@ -81,7 +65,7 @@ def simulate_beads(
     rim = spilled & ~ndimage.binary_dilation(wanted, np.ones((3, 3, 3), bool))
     places = low + (np.argwhere(rim) + 0.5) * edge
     far = float(distance_to_mesh(places, local).max()) if len(places) else 0.0
-    return Simulated(
+    return BeadFill(
         edge,
         1.0 - gaps.sum() / max(int(reachable.sum()), 1),
         float(gaps.sum() * cell),
@@ -98,7 +82,7 @@ def _choose_grid(local: Mesh, beads: Beads, frame: Frame, edge: float) -> tuple[
     corners = [local.bounds]
     if len(beads.start):
         ends = frame.to_local(np.concatenate([beads.start, beads.stop]))
-        corners.append(np.array([ends.min(axis=0), ends.max(axis=0)]))
+        corners.append(measure_bounds(ends))
     reach = float(max(beads.width.max(initial=0.0), beads.height.max(initial=0.0)))
     low = np.min([each[0] for each in corners], axis=0) - reach - 2 * edge
     high = np.max([each[1] for each in corners], axis=0) + reach + 2 * edge
@@ -114,7 +98,7 @@ def _fill_solid(mesh: Mesh, low: Floats, size: tuple[int, int, int], edge: float
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkImagingStencil import vtkImageStencilToImage, vtkPolyDataToImageStencil
 
-    surface = pv.PolyData(mesh.vertices, np.column_stack([np.full(len(mesh.faces), 3), mesh.faces]))
+    surface = pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
     stencil = vtkPolyDataToImageStencil()
     stencil.SetInputData(surface)
     stencil.SetOutputOrigin(*(low + edge / 2))

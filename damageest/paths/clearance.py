@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.duplicates import order_integers
 from damageest.geometry.voxels import number_cubes
 from damageest.paths.nozzle import Nozzle, turn_to_axis
 
@@ -69,7 +70,7 @@ def _group_points(points: Floats, edge: float) -> tuple[Ints, Ints]:
     if not len(points):
         return np.empty(0, np.int64), np.empty(0, np.int64)
     cube = number_cubes(points, edge)[1]
-    order = np.argsort(cube, kind="stable")
+    order = order_integers(cube)
     return order, np.flatnonzero(np.concatenate([[True], np.diff(cube[order]) != 0]))
 
 

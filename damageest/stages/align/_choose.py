@@ -54,8 +54,10 @@ def choose_pose(
     """
     poses, axis = _add_counterparts(poses, field, scan)
     if axis is not None:
-        band = fit(target, _keep_near(field, points[:FIRST_POINTS], poses[0]), poses[0], COARSE, noise, 12).band
-        if _is_continuous(axis, poses[0], target, field, points[:SECOND_POINTS], noise, COARSE, band):
+        some = points[:SECOND_POINTS]
+        head = fit(target, _keep_near(field, points[:FIRST_POINTS], poses[0]), poses[0], COARSE, noise, 12)
+        cost = robust_cost(_measure_distance(target, field, some, head.pose), head.band)
+        if _is_continuous(axis, head.pose, cost, target, field, some, noise, COARSE, head.band):
             # poses that differ by a turn fit alike: one of each set is enough, if all points agree in the end
             heads = poses[group_turns(poses, axis, 8)]
             found = _compare(heads, axis, target, field, points, noise)
@@ -85,7 +87,7 @@ def _compare(
     pose, others = poses[best], poses[equal]
     order = np.array([cost.sum() for cost, same in zip(costs, equal, strict=True) if same])
     others = others[select_distinct(others, -order, max(APART, 6 * band), MAX_POSES)][1:]
-    if axis is not None and not _is_continuous(axis, pose, target, field, points, noise, 2 * band, band):
+    if axis is not None and not _is_continuous(axis, pose, costs[best], target, field, points, noise, 2 * band, band):
         axis = None
     if axis is not None:
         # The number of poses is infinite: of each set of poses that differ by a turn, list one and its quarter turns.
@@ -99,6 +101,7 @@ def _compare(
 def _is_continuous(
     axis: Axis,
     pose: Floats,
+    cost: Floats,
     target: PartSurface,
     field: PlaneGrid,
     points: Floats,
@@ -106,20 +109,15 @@ def _is_continuous(
     start: float,
     band: float,
 ) -> bool:
-    """Whether the points (N,3) fit as well when ``pose`` (4,4) is turned about an axis, by any angle.
+    """Whether the points (N,3), of this cost (N,) in ``pose`` (4,4), fit as well turned about an axis by any angle.
 
     The turned poses are fitted, with a kernel that is ``start`` wide at first: the axis is only as exact as the poses
     that it was computed from.
     """
     few = points[:FIRST_POINTS]
-
-    def measure(one: Floats) -> Floats:
-        return robust_cost(_measure_distance(target, field, points, one), band)
-
-    here = fit(target, _keep_near(field, few, pose), pose, start, noise, 6).pose if start > 2 * band else pose
-    best = measure(here)
-    for turned in axis.make_turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ here:
-        if is_worse(measure(fit(target, _keep_near(field, few, turned), turned, start, noise, 6).pose), best):
+    for turned in axis.make_turns(np.radians([1.3, 7.1, 17.9, 41.0, 97.0, 180.0, 263.0])) @ pose:
+        fitted = fit(target, _keep_near(field, few, turned), turned, start, noise, 6).pose
+        if is_worse(robust_cost(_measure_distance(target, field, points, fitted), band), cost):
             return False
     return True
 

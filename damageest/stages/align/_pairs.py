@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.duplicates import order_integers
 from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
 MODEL_POINTS, MODEL_PAIRS = 1600, 1_600_000
@@ -42,8 +43,7 @@ class PairTable:
         i, j = rng.integers(0, len(points.points), (2, MODEL_PAIRS))
         key, good = _hash_pairs(points, i, j)
         i, j, key = i[good], j[good], key[good]
-        # sorted together with its number, which is much faster than sorting numbers by key
-        order = np.sort(key * MODEL_PAIRS + np.arange(len(key))) % MODEL_PAIRS
+        order = order_integers(key)
         return cls(points, i[order], j[order], key[order])
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.duplicates import order_integers
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.voxels import measure_bounds
 
@@ -50,7 +51,7 @@ def draw_evenly(points: Floats, weights: Floats, wanted: int, rng: np.random.Gen
     for bit in range(10):
         for axis in range(3):
             code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
-    order = np.argsort(code, kind="stable")
+    order = order_integers(code)
     total = np.cumsum(weights[order])
     at = (np.arange(wanted) + rng.random(wanted)) / wanted * total[-1]
     return np.unique(order[np.minimum(np.searchsorted(total, at), len(order) - 1)])
