@@ -12,10 +12,11 @@ from damageest.artefacts import BeadFill, DepositPath, Floats, Mesh, Solid, Unre
 from damageest.geometry.simplification import simplify_within
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.paths.beads import SHARE, Beads, simulate_beads
-from damageest.paths.clearance import Clearance, Obstacles
+from damageest.paths.clearance import Clearance
 from damageest.paths.directions import Planner, gather_missing, list_directions, plan_parts
 from damageest.paths.moves import Moves, Travel, join_passes
 from damageest.paths.nozzle import Nozzle
+from damageest.paths.obstacles import Obstacles
 from damageest.paths.planar import Surroundings
 from damageest.paths.process import Pass, Plan, Process
 

@@ -7,100 +7,20 @@ once. Where the bounds do not decide, the FCL library gives the exact distance b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Mesh
-from damageest.geometry.duplicates import order_integers
-from damageest.geometry.voxels import number_cubes
+from damageest.artefacts import Flags, Floats, Ints
 from damageest.paths.nozzle import Nozzle, turn_to_axis
+from damageest.paths.obstacles import MEMBERS, Obstacles
 
-CHUNK = 400_000
-"""Distances that are computed at once, so that intermediate arrays fit in the processor's cache."""
+CHUNK = 1024
+"""Poses that are bounded at once, so that intermediate arrays fit in the processor's cache."""
 STRIDES = (16, 4, 1)
 """Of the poses of a pass, each sixteenth is measured first, then those in between for which it does not decide."""
-CELL = 2.0
-"""Edge of the cubes whose points are one group, in bead widths."""
 ENOUGH = 1.5
 """Multiple of the needed distance from which a distance need not be known well."""
-FINE, GROWTH = 0.4, 0.4
-"""Longest edge of the obstacles' triangles, whose middles are the points: in bead widths near the deposit, and as a
-share of the distance from it."""
-
-
-class Obstacles:
-    """Meshes prepared for distances to the nozzle, in coordinates near the origin.
-
-    ``points`` (K,3) on them; each stands for the surface within ``reach`` (K,) of it.
-    """
-
-    def __init__(self, meshes: Sequence[Mesh], low: Floats, high: Floats, width: float) -> None:
-        """``low``, ``high`` (3,): the box round the deposit, near which the points are dense; ``width`` of a bead."""
-        import fcl
-
-        self.objects = [fcl.CollisionObject(make_tree(mesh), fcl.Transform()) for mesh in meshes]
-        parts = [_cut_triangles(mesh.triangles, low, high, width) for mesh in meshes]
-        triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
-        points = triangles.mean(axis=1)
-        order, self.start = _group_points(points, CELL * width)
-        self.points: Floats = points[order]
-        self.reach: Floats = np.linalg.norm(triangles[order] - self.points[:, None], axis=2).max(axis=1, initial=0.0)
-        self.count: Ints = np.diff(np.append(self.start, len(points)))
-        middles, radii, tops = [np.empty((0, 3))], list[float](), list[float]()
-        for first, many in zip(self.start, self.count, strict=True):
-            own = self.points[first : first + many]
-            middle = (own.min(axis=0) + own.max(axis=0)) / 2
-            middles.append(middle[None])
-            away = np.linalg.norm(own - middle, axis=1)
-            radii.append(float((away + self.reach[first : first + many]).max()))
-            tops.append(float((own[:, 2] + self.reach[first : first + many]).max()))
-        self.middle: Floats = np.concatenate(middles)
-        whose = np.repeat(np.arange(len(self.start)), self.count)
-        off = np.linalg.norm(self.points - self.middle[whose], axis=1)
-        self.sample: Ints = np.lexsort([off, whose])[self.start]
-        self.radius: Floats = np.array(radii)
-        self.top: Floats = np.array(tops)
-
-
-def _group_points(points: Floats, edge: float) -> tuple[Ints, Ints]:
-    """An order (K,) of points (K,3) in which those of one cube follow each other, and where each cube (C,) begins."""
-    if not len(points):
-        return np.empty(0, np.int64), np.empty(0, np.int64)
-    cube = number_cubes(points, edge)[1]
-    order = order_integers(cube)
-    return order, np.flatnonzero(np.concatenate([[True], np.diff(cube[order]) != 0]))
-
-
-def make_tree(mesh: Mesh) -> Any:
-    """FCL's tree of boxes over the triangles of a mesh."""
-    import fcl
-
-    tree = fcl.BVHModel()
-    tree.beginModel(len(mesh.vertices), len(mesh.faces))
-    tree.addSubModel(np.ascontiguousarray(mesh.vertices), np.ascontiguousarray(mesh.faces))
-    tree.endModel()
-    return tree
-
-
-def _cut_triangles(triangles: Floats, low: Floats, high: Floats, width: float) -> Floats:
-    """Triangles (F,3,3), halved at their longest edges until they are small enough for their distance from a box."""
-    done = []
-    while len(triangles):
-        away = triangles.mean(axis=1)
-        away = np.linalg.norm(np.maximum(np.maximum(low - away, away - high), 0), axis=1)
-        sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
-        longest = sides.argmax(axis=1)
-        large = sides.max(axis=1) > np.maximum(FINE * width, GROWTH * away)
-        done.append(triangles[~large])
-        cut = triangles[large]
-        order = (longest[large, None] + np.arange(3)) % 3
-        a, b, c = np.moveaxis(np.take_along_axis(cut, order[..., None], axis=1), 1, 0)
-        middle = (a + b) / 2
-        triangles = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-    return np.concatenate(done) if done else triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,78 +73,45 @@ class Clearance:
         They are only as near to each other as it takes to see whether the nozzle keeps the distance ``needed``.
         """
         low, high = np.full(len(points), np.inf), np.full(len(points), np.inf)
-        near = self.obstacles
-        if near is None or not len(near.points):
+        if self.obstacles is None or not self.obstacles.levels:
             return low, high
         if self.nozzle.profile is None:
             return np.zeros(len(points)), high
-        groups = np.flatnonzero(near.top > self.floor)
-        if not len(groups):
-            return low, high
         tips = points + self.standoff * axes
-        groups = self._choose_groups(tips, axes, groups, needed + self.detail)
-        if not len(groups):
-            return np.full(len(points), needed), high
-        step = max(CHUNK // len(groups), 1)
-        for start in range(0, len(points), step):
-            own = slice(start, start + step)
-            low[own], high[own] = self._bound_some(tips[own], axes[own], groups, needed + self.detail)
+        for start in range(0, len(points), CHUNK):
+            own = slice(start, start + CHUNK)
+            low[own], high[own] = self._bound_some(tips[own], axes[own], needed + self.detail)
         return np.maximum(low - self.detail, 0.0), np.maximum(high - self.detail, 0.0)
 
-    def _choose_groups(self, tips: Floats, axes: Floats, groups: Ints, needed: float) -> Ints:
-        """Those of the groups of points that can matter for poses (N,) of one axis; all where there are several."""
-        near, profile = self.obstacles, self.nozzle.profile
-        assert near is not None
-        assert profile is not None
-        if len(tips) < 4 or np.abs(axes - axes[0]).max() > 1e-12:
-            return groups
-        middle = (tips.min(axis=0) + tips.max(axis=0)) / 2
-        extent = float(np.linalg.norm(tips - middle, axis=1).max())
-        count = len(groups)
-        away = _measure_points(near.middle[groups], np.tile(middle, (count, 1)), np.tile(axes[0], (count, 1)), profile)
-        return groups[away - near.radius[groups] - extent < ENOUGH * needed]
-
-    def _bound_some(self, tips: Floats, axes: Floats, groups: Ints, needed: float) -> tuple[Floats, Floats]:
-        """As `bound`, from tips (N,3): first for groups of points and one of each, then for the points of near ones."""
-        near, profile = self.obstacles, self.nozzle.profile
-        assert near is not None
-        assert profile is not None
-        middle = near.middle[groups]
-        height = axes @ middle.T - np.einsum("ij,ij->i", axes, tips)[:, None]
-        squares = np.einsum("ij,ij->i", middle, middle)
-        away = squares + np.einsum("ij,ij->i", tips, tips)[:, None] - 2 * (tips @ middle.T)
-        radius = np.sqrt(np.maximum(away - height**2, 0.0))
-        lower = _measure_to_profile(height, radius, profile) - near.radius[groups]
-        close = lower < ENOUGH * needed
-        low = np.where(close, np.inf, lower).min(axis=1)
-        high = np.full(len(tips), np.inf)
-        pose, group = np.nonzero(close)
-        if not len(pose):
-            return low, high
-        one = near.sample[groups[group]]
-        found = _measure_points(near.points[one], tips[pose], axes[pose], profile)
-        found[near.points[one, 2] <= self.floor] = np.inf
-        np.minimum.at(high, pose, found)
-        hit = high < needed
-        low[hit] = 0.0
-        going = ~hit[pose]
-        pose, group = pose[going], group[going]
-        if not len(pose):
-            return low, high
-        count = near.count[groups[group]]
-        ends = np.cumsum(count)
-        for first, last in _split(ends, 4 * CHUNK):
-            own = slice(first, last)
-            many = count[own]
-            shift = near.start[groups[group[own]]] - (np.cumsum(many) - many)
-            number = np.repeat(shift, many) + np.arange(int(many.sum()))
-            whose = np.repeat(pose[own], many)
-            found = _measure_points(near.points[number], tips[whose], axes[whose], profile)
-            found[near.points[number, 2] + near.reach[number] <= self.floor] = np.inf
-            starts = np.flatnonzero(np.concatenate([[True], np.diff(whose) != 0]))
-            held = whose[starts]
-            high[held] = np.minimum(high[held], np.minimum.reduceat(found, starts))
-            low[held] = np.minimum(low[held], np.minimum.reduceat(found - near.reach[number], starts))
+    def _bound_some(self, tips: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats]:
+        """As `bound`, from tips (N,3): down the tree, only where a ball is near and the pose is not ruled out yet."""
+        assert self.obstacles is not None
+        assert self.nozzle.profile is not None
+        levels, profile = self.obstacles.levels, self.nozzle.profile
+        low, high = np.full(len(tips), np.inf), np.full(len(tips), np.inf)
+        ball = np.flatnonzero(levels[0].top > self.floor)
+        pose = np.repeat(np.arange(len(tips)), len(ball))
+        ball = np.tile(ball, len(tips))
+        for number, level in enumerate(levels):
+            if not len(ball):
+                break
+            found = _measure_points(level.middle.take(ball, 0), tips.take(pose, 0), axes.take(pose, 0), profile)
+            radius = level.radius.take(ball)
+            if number == len(levels) - 1:
+                _take_least(high, pose, np.maximum(found, 0.0))
+                _take_least(low, pose, found - radius)
+                break
+            _take_least(high, pose, np.maximum(found + radius, 0.0))
+            lower = found - radius
+            near = lower < ENOUGH * needed
+            _take_least(low, pose[~near], lower[~near])
+            going = near & (high.take(pose) >= needed)
+            pose, ball = pose[going], ball[going]
+            pose = np.repeat(pose, MEMBERS)
+            ball = (MEMBERS * ball[:, None] + np.arange(MEMBERS)).ravel()
+            kept = np.flatnonzero(levels[number + 1].top.take(ball) > self.floor)
+            pose, ball = pose[kept], ball[kept]
+        low[high < needed] = 0.0
         return low, high
 
     def measure_poses(self, points: Floats, axes: Floats, needed: float) -> Floats:
@@ -263,10 +150,12 @@ class Clearance:
         return np.asarray(2 * np.arcsin(np.clip(chord / 2, 0, 1)) * self.reach)
 
 
-def _split(ends: Ints, most: int) -> list[tuple[int, int]]:
-    """Ranges of items, ``ends`` (N,) being the sums of their sizes, of about ``most`` in size each."""
-    cuts = np.unique(np.concatenate([[0], np.searchsorted(ends, np.arange(most, ends[-1], most)), [len(ends)]]))
-    return list(zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True))
+def _take_least(least: Floats, pose: Ints, found: Floats) -> None:
+    """Lowers each of ``least`` (N,) to the values ``found`` (M,) of its ``pose`` (M,), which ascends."""
+    if len(pose):
+        starts = np.flatnonzero(np.concatenate([[True], pose[1:] != pose[:-1]]))
+        own = pose[starts]
+        least[own] = np.minimum(least[own], np.minimum.reduceat(found, starts))
 
 
 def _measure_points(points: Floats, tips: Floats, axes: Floats, profile: Floats) -> Floats:
@@ -286,18 +175,19 @@ def _carry_over(found: Floats, far: Floats, known: Ints, needed: float) -> Float
 
 
 def _measure_to_profile(height: Floats, radius: Floats, profile: Floats) -> Floats:
-    """Distances of points to a solid of revolution whose ``profile`` (K,2) has height and radius; 0 inside.
+    """Distances of points to the surface of a solid of revolution whose ``profile`` (K,2) has height and radius;
+    negative inside.
 
     The profile is that of `Cone`: from the tip upward, never narrower. The body goes on above its last height.
     """
     tip, last = profile[0, 1], profile[-1, 1]
     rise = profile[1, 0]
     side = np.array([rise - profile[0, 0], profile[1, 1] - tip])
-    length = float(np.linalg.norm(side))
-    along = np.clip((height * side[0] + (radius - tip) * side[1]) / length**2, 0, 1)
-    found = np.hypot(height - along * side[0], radius - tip - along * side[1])
-    np.minimum(found, np.hypot(height, np.maximum(radius - tip, 0)), out=found)
-    np.minimum(found, np.hypot(np.maximum(rise - height, 0), radius - last), out=found)
-    inside: Flags = (height > 0) & (radius < last) & ((radius - tip) * side[0] < height * side[1])
-    found[inside] = 0.0
-    return np.asarray(found)
+    out = radius - tip
+    along = np.clip((height * side[0] + out * side[1]) / (side @ side), 0, 1)
+    found = (height - along * side[0]) ** 2 + (out - along * side[1]) ** 2
+    np.minimum(found, height**2 + np.maximum(out, 0) ** 2, out=found)
+    np.minimum(found, np.maximum(rise - height, 0) ** 2 + (radius - last) ** 2, out=found)
+    np.sqrt(found, out=found)
+    inside: Flags = (height > 0) & (radius < last) & (out * side[0] < height * side[1])
+    return np.where(inside, -found, found)

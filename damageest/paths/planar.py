@@ -11,9 +11,10 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
 from damageest.paths.axes import choose_axes, list_axes
-from damageest.paths.clearance import Clearance, Obstacles
+from damageest.paths.clearance import Clearance
 from damageest.paths.fill import fill_region
 from damageest.paths.frames import Frame
+from damageest.paths.obstacles import Obstacles
 from damageest.paths.process import Pass, Plan, Process, order_passes, resample
 from damageest.paths.regions import cover, make_region, measure_length, shift_border, unite_regions
 
