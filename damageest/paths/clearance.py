@@ -19,6 +19,8 @@ CHUNK = 1024
 """Poses that are bounded at once, so that intermediate arrays fit in the processor's cache."""
 STRIDES = (16, 4, 1)
 """Of the poses of a pass, each sixteenth is measured first, then those in between for which it does not decide."""
+BEAM = 12
+"""Balls of each level that are followed straight down the tree."""
 ENOUGH = 1.5
 """Multiple of the needed distance from which a distance need not be known well."""
 
@@ -84,35 +86,63 @@ class Clearance:
         return np.maximum(low - self.detail, 0.0), np.maximum(high - self.detail, 0.0)
 
     def _bound_some(self, tips: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats]:
-        """As `bound`, from tips (N,3): down the tree, only where a ball is near and the pose is not ruled out yet."""
+        """As `bound`, from tips (N,3). Most poses that are not free are found on the way straight down the tree; the
+        others go down it wherever a ball is near."""
         assert self.obstacles is not None
-        assert self.nozzle.profile is not None
-        levels, profile = self.obstacles.levels, self.nozzle.profile
+        levels = self.obstacles.levels
         low, high = np.full(len(tips), np.inf), np.full(len(tips), np.inf)
         ball = np.flatnonzero(levels[0].top > self.floor)
-        pose = np.repeat(np.arange(len(tips)), len(ball))
-        ball = np.tile(ball, len(tips))
+        if not len(ball):
+            return low, high
+        self._dive(ball, tips, axes, needed, high)
+        pose = np.repeat(np.flatnonzero(high >= needed), len(ball))
+        ball = np.tile(ball, len(tips))[: len(pose)]
         for number, level in enumerate(levels):
+            going = high.take(pose) >= needed
+            pose, ball = pose[going], ball[going]
             if not len(ball):
                 break
-            found = _measure_points(level.middle.take(ball, 0), tips.take(pose, 0), axes.take(pose, 0), profile)
+            own = self._measure_from(level.middle.take(ball, 0), pose, tips, axes)
             radius = level.radius.take(ball)
             if number == len(levels) - 1:
-                _take_least(high, pose, np.maximum(found, 0.0))
-                _take_least(low, pose, found - radius)
+                _take_least(high, pose, np.maximum(own, 0.0))
+                _take_least(low, pose, own - radius)
                 break
-            _take_least(high, pose, np.maximum(found + radius, 0.0))
-            lower = found - radius
+            _take_least(high, pose, np.maximum(own + radius, 0.0))
+            lower = own - radius
             near = lower < ENOUGH * needed
             _take_least(low, pose[~near], lower[~near])
-            going = near & (high.take(pose) >= needed)
-            pose, ball = pose[going], ball[going]
-            pose = np.repeat(pose, MEMBERS)
-            ball = (MEMBERS * ball[:, None] + np.arange(MEMBERS)).ravel()
+            pose, ball = np.repeat(pose[near], MEMBERS), _list_members(ball[near]).ravel()
             kept = np.flatnonzero(levels[number + 1].top.take(ball) > self.floor)
             pose, ball = pose[kept], ball[kept]
         low[high < needed] = 0.0
         return low, high
+
+    def _measure_from(self, points: Floats, pose: Ints, tips: Floats, axes: Floats) -> Floats:
+        """Distances (M,) of points (M,3) from the nozzle at a ``pose`` (M,) each; negative inside."""
+        assert self.nozzle.profile is not None
+        return _measure_points(points, tips.take(pose, 0), axes.take(pose, 0), self.nozzle.profile)
+
+    def _dive(self, roots: Ints, tips: Floats, axes: Floats, needed: float, high: Floats) -> None:
+        """Lowers ``high`` (N,) straight down the tree: from the nearest of the balls ``roots`` (K,) to the nearest that
+        they hold, and so on, by a point on the surface in each."""
+        assert self.obstacles is not None
+        pose = np.arange(len(tips))
+        ball = np.tile(roots, (len(tips), 1))
+        for number, level in enumerate(self.obstacles.levels):
+            flat, count = ball.ravel(), ball.shape[1]
+            own = self._measure_from(level.one.take(flat, 0), np.repeat(pose, count), tips, axes)
+            own[level.top.take(flat) <= self.floor] = np.inf
+            found = own.reshape(-1, count)
+            most = min(BEAM, count - 1)
+            nearest = np.argpartition(found, most, axis=1)[:, : most + 1]
+            value = found.min(axis=1)
+            high[pose] = np.minimum(high[pose], np.maximum(value, 0.0))
+            going = value >= needed
+            pose, ball = pose[going], np.take_along_axis(ball, nearest, axis=1)[going]
+            if not len(pose) or number == len(self.obstacles.levels) - 1:
+                break
+            ball = _list_members(ball.ravel()).reshape(len(pose), -1)
 
     def measure_poses(self, points: Floats, axes: Floats, needed: float) -> Floats:
         """For each pose (N,) a distance that the nozzle keeps at least; below ``needed`` only where it really is.
@@ -148,6 +178,11 @@ class Clearance:
         next about the point it works on."""
         chord = np.linalg.norm(np.diff(axes, axis=0), axis=1)
         return np.asarray(2 * np.arcsin(np.clip(chord / 2, 0, 1)) * self.reach)
+
+
+def _list_members(ball: Ints) -> Ints:
+    """The balls (K,MEMBERS) of the next level that balls (K,) hold."""
+    return np.asarray(MEMBERS * ball[:, None] + np.arange(MEMBERS))
 
 
 def _take_least(least: Floats, pose: Ints, found: Floats) -> None:
@@ -190,4 +225,4 @@ def _measure_to_profile(height: Floats, radius: Floats, profile: Floats) -> Floa
     np.minimum(found, np.maximum(rise - height, 0) ** 2 + (radius - last) ** 2, out=found)
     np.sqrt(found, out=found)
     inside: Flags = (height > 0) & (radius < last) & (out * side[0] < height * side[1])
-    return np.where(inside, -found, found)
+    return np.asarray(np.where(inside, -found, found))

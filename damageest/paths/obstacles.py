@@ -17,7 +17,7 @@ FINE, GROWTH = 0.4, 0.4
 share of the distance from it."""
 MEMBERS = 8
 """Balls of one level of the tree, or points, that a ball of the next level holds."""
-ROOTS = 64
+ROOTS = 16
 """Balls of the first level at most."""
 BITS = 14
 """Digits of a point's place along each axis by which neighbours are found."""
@@ -25,11 +25,13 @@ BITS = 14
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Balls: ``middle`` (K,3), ``radius`` (K,), and ``top`` (K,): the largest height of what they hold."""
+    """Balls: ``middle`` (K,3), ``radius`` (K,), ``top`` (K,): the largest height of what they hold, and ``one`` (K,3):
+    a point on the surface that they hold, near the middle."""
 
     middle: Floats
     radius: Floats
     top: Floats
+    one: Floats
 
 
 class Obstacles:
@@ -60,7 +62,7 @@ class Obstacles:
         found.trees, found._turn = self.trees, turn @ self._turn
         for level in self.levels:
             middle = level.middle @ turn.T
-            found.levels.append(Level(middle, level.radius, middle[:, 2] + level.radius))
+            found.levels.append(Level(middle, level.radius, middle[:, 2] + level.radius, level.one @ turn.T))
         return found
 
 
@@ -85,12 +87,15 @@ def _make_levels(triangles: Floats) -> list[Level]:
     order = np.append(order, np.repeat(order[-1:], -len(order) % MEMBERS**depth))
     points = points[order]
     radius = np.sqrt(((triangles[order] - points[:, None]) ** 2).sum(axis=2).max(axis=1))
-    levels = [Level(points, radius, triangles[order, :, 2].max(axis=1))]
+    levels = [Level(points, radius, triangles[order, :, 2].max(axis=1), points)]
     for _ in range(depth):
         own, reach = levels[0].middle.reshape(-1, MEMBERS, 3), levels[0].radius.reshape(-1, MEMBERS)
         middle = (own.min(axis=1) + own.max(axis=1)) / 2
         away = np.sqrt(((own - middle[:, None]) ** 2).sum(axis=2)) + reach
-        levels.insert(0, Level(middle, away.max(axis=1), levels[0].top.reshape(-1, MEMBERS).max(axis=1)))
+        ones = levels[0].one.reshape(-1, MEMBERS, 3)
+        best = ((ones - middle[:, None]) ** 2).sum(axis=2).argmin(axis=1)
+        top = levels[0].top.reshape(-1, MEMBERS).max(axis=1)
+        levels.insert(0, Level(middle, away.max(axis=1), top, ones[np.arange(len(ones)), best]))
     return levels
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
-from damageest.paths.axes import choose_axes, list_axes
+from damageest.paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest.paths.clearance import Clearance
 from damageest.paths.fill import fill_region
 from damageest.paths.frames import Frame
@@ -128,13 +128,17 @@ class _AxisChoice:
         clearance, needed = self.clearance.above(top), self.process.gap
         made: list[Pass] = []
         dropped: list[Floats] = []
-        if not len(self.axes):
+        if not len(self.axes) or not lines:
             return made, list(lines)
+        process = self.process
+        least = int(np.ceil(process.shortest / process.step)) + 2
+        limits = Limits(needed, process.step, process.turn_rate, least)
+        sampled = []
         for line in lines:
-            line = _extend(line, *self.process.extend)
-            points, corner = resample(np.column_stack([line, np.full(len(line), top)]), self.process.step)
-            least = int(np.ceil(self.process.shortest / self.process.step)) + 2
-            pieces = choose_axes(points, self.axes, self.last, clearance, needed, min(least, len(points)))
+            line = _extend(line, *process.extend)
+            sampled.append(resample(np.column_stack([line, np.full(len(line), top)]), process.step))
+        chosen = choose_axes([points for points, _ in sampled], self.axes, self.last, clearance, limits)
+        for (points, corner), pieces in zip(sampled, chosen, strict=True):
             at = 0
             for piece in pieces:
                 if piece.start > at:
@@ -144,23 +148,27 @@ class _AxisChoice:
             if at < len(points):
                 dropped.append(points[at:, :2])
             if pieces:
-                self.last = int(np.argmax(self.axes @ pieces[-1].axis))
+                self.last = int(np.argmax(self.axes @ pieces[-1].axes[-1]))
         return made, dropped
 
-    def _make_pass(self, points: Floats, corner: Floats, piece: tuple[int, int, Floats, Floats], layer: int) -> Pass:
-        start, stop, axis, gaps = piece
-        chosen = [k for k in range(start, stop) if corner[k] >= 0 or k in (start, stop - 1)]
+    def _make_pass(self, points: Floats, corner: Floats, piece: Piece, layer: int) -> Pass:
+        start, stop, axes, gaps = piece
+        turns = np.zeros(stop - start, bool)
+        turns[1:] = np.abs(np.diff(axes, axis=0)).max(axis=1) > 1e-9
+        turns[:-1] |= turns[1:]
+        chosen = np.flatnonzero((corner[start:stop] >= 0) | turns)
+        chosen = np.unique(np.concatenate([[0], chosen, [stop - start - 1]]))
         if len(chosen) == 1:
-            chosen *= 2
-        lowest = float(self.lowest[int(np.argmax(self.axes @ axis))])
+            chosen = np.repeat(chosen, 2)
         tightest = int(np.argmin(gaps))
+        lowest = min(_find_lowest(self.clearance, axis) for axis in np.unique(axes, axis=0))
         return Pass(
-            points[chosen],
-            np.tile(axis, (len(chosen), 1)),
+            points[start + chosen],
+            axes[chosen],
             np.tile(Z, (len(chosen), 1)),
             layer,
             min(lowest, float(gaps.min()) - self.process.step / 2),
-            (points[start + tightest], axis),
+            (points[start + tightest], axes[tightest]),
         )
 
 

@@ -23,7 +23,8 @@ class Process:
     ``height``: largest of a layer. ``turn``: of the rows from layer to layer. ``overhang``: largest angle between the
     build direction and an overhanging side. ``shortest``: least length of a pass. ``gap``: distance that the nozzle has
     to keep. ``tilt``: largest of the tool axis against the build direction. ``extend``: how far a pass begins before
-    its start and goes on beyond its end. ``is_trial``: few axes are tried.
+    its start and goes on beyond its end. ``turn_rate``: largest turn of the tool axis per length along a pass.
+    ``is_trial``: few axes are tried.
     """
 
     height: float
@@ -37,6 +38,7 @@ class Process:
     axes: Axes
     tilt: float
     extend: tuple[float, float] = (0.0, 0.0)
+    turn_rate: float = 0.0
     is_trial: bool = False
 
     @property
@@ -94,6 +96,11 @@ def resample(line: Floats, longest: float) -> tuple[Floats, Floats]:
     points = np.repeat(line[:-1], counts, axis=0) + share[:, None] * np.repeat(sides, counts, axis=0)
     corner = np.where(share == 0, np.repeat(np.arange(len(sides)), counts), -1)
     return np.concatenate([points, line[-1:]]), np.append(corner, len(line) - 1)
+
+
+def measure_along(points: Floats) -> Floats:
+    """The way (N,) along a polyline to each of its points (N,K)."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
 def order_passes(passes: Sequence[Pass], start: Floats | None) -> list[Pass]:

@@ -50,6 +50,12 @@ class Machine(BaseModel):
     tilt: float = Field(
         60.0, ge=0, lt=90, description="largest angle between tool axis and build direction, in degrees"
     )
+    turn: float = Field(
+        20.0,
+        ge=0,
+        allow_inf_nan=False,
+        description="largest turn of the tool axis along a pass with 5 axes, in degrees per bead width; 0: none",
+    )
 
 
 class Layers(Path):
@@ -147,6 +153,7 @@ class Layers(Path):
             axes=self.axes,
             tilt=float(np.radians(self.machine.tilt)),
             extend=(self.start_overlap, self.stop_overlap),
+            turn_rate=float(np.radians(self.machine.turn)) / self.width,
         )
         direction: Floats | None = None
         if self.direction == "normal":
