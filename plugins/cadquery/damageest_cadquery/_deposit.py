@@ -31,6 +31,7 @@ from damageest_cadquery._split import (
     find_corners,
     is_opencascade_error,
     is_sound,
+    is_watertight,
     measure_volume,
     note_images,
     triangulate,
@@ -97,7 +98,7 @@ def find_deposit(
         tall = _build(higher, damage, rest, part, tolerance, deposit)
         figures = _compare(tall, higher, deposit, lost, part, tolerance)
         stock = _build(bases, damage, rest, part, tolerance, deposit)
-        pieces = _join(damage, stock, bases, faces, part) if stock else tuple(damage)
+        pieces = _join(damage, stock, bases, faces, part, tolerance) if stock else tuple(damage)
         whole, parts = (
             sum(triangulate(shape, tolerance / 16).volume for shape in shapes)
             for shapes in ([piece.shape for piece in pieces], [*(piece.shape for piece in damage), *stock])
@@ -198,10 +199,15 @@ def _sample_above(mesh: Mesh, part: Part, tolerance: float) -> tuple[Floats, Flo
 
 
 def _join(
-    damage: Sequence[Piece], stock: Sequence[Any], bases: Sequence[Base], faces: Sequence[Any], part: Part
+    damage: Sequence[Piece],
+    stock: Sequence[Any],
+    bases: Sequence[Base],
+    faces: Sequence[Any],
+    part: Part,
+    tolerance: float,
 ) -> tuple[Piece, ...]:
     """Damage volume and stock as one, with the origins of their faces."""
-    solids, known = _unite(damage, stock)
+    solids, known = _unite(damage, stock, tolerance / 16)
     heights = {base.number: base.height for base in bases}
     pieces = []
     for solid in solids:
@@ -214,15 +220,19 @@ def _join(
     return tuple(pieces)
 
 
-def _unite(damage: Sequence[Piece], stock: Sequence[Any]) -> tuple[list[Any], ShapeMap]:
-    """The solids, and the origins of the faces that come from the damage volume."""
+def _unite(damage: Sequence[Piece], stock: Sequence[Any], chord: float) -> tuple[list[Any], ShapeMap]:
+    """The solids but for specks, and the origins of the faces that come from the damage volume. Solids that only touch
+    are sewn; where more solids than the damage has are left, or their triangles do not close within ``chord``, all are
+    fused."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
     from OCP.TopAbs import TopAbs_SOLID
 
     known, shapes = ShapeMap(), [piece.shape for piece in damage]
     found = sew([*shapes, *stock])
-    if found is not None:
-        solids, rows = found
+    least = SPECK * sum(measure_volume(shape) for shape in stock)
+    solids, rows = found or ([], ShapeMap())
+    solids = [solid for solid in solids if measure_volume(solid) > least]
+    if 0 < len(solids) <= len(damage) and all(is_watertight(solid, chord) for solid in solids):
         for face in (face for solid in solids for face in explore_faces(solid)):
             number, k = rows.get(face, (len(damage), 0))
             if number < len(damage):
@@ -233,7 +243,7 @@ def _unite(damage: Sequence[Piece], stock: Sequence[Any]) -> tuple[list[Any], Sh
     for piece in damage:
         for face, origin in zip(explore_faces(piece.shape), piece.origins, strict=True):
             note_images(known, algorithm, face, origin)
-    return explore(shape, TopAbs_SOLID), known
+    return [solid for solid in explore(shape, TopAbs_SOLID) if measure_volume(solid) > least], known
 
 
 def _find_top(face: Any, heights: Mapping[int, float], faces: Sequence[Any], near: float) -> Origin:

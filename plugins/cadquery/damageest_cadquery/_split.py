@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Solid
+from damageest.errors import InputError
 from damageest_cadquery._facets import Facet
 from damageest_cadquery._read import explore
 from damageest_cadquery._step import build_shell
@@ -152,6 +153,14 @@ def triangulate(shape: Any, chord: float, angle: float = 0.35) -> Solid:
 
     mesh = tessellate([shape], chord, np.degrees(angle), lambda face: "")
     return Solid(mesh.vertices, mesh.faces)
+
+
+def is_watertight(shape: Any, chord: float) -> bool:
+    """Whether triangles of a solid close; those of some solids that BRepCheck finds valid do not."""
+    try:
+        return triangulate(shape, chord).volume > 0
+    except (InputError, ValueError):
+        return False
 
 
 def measure_volume(shape: Any) -> float:

@@ -20,10 +20,12 @@ from damageest_cadquery._edges import Edge, find_edges
 from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, close, combine, explore_faces, orient_solid, sew
-from damageest_cadquery._split import Piece, measure_volume
+from damageest_cadquery._split import Piece, is_watertight, measure_volume
 
 FLAT = 1e-6
 """Volume of a corner, in cubes of the height, below which there is none."""
+CHORDS = 16
+"""Chords of triangles in a height of the stock, where it is tried whether triangles of a solid close."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,12 +185,14 @@ def _fuse(solids: Sequence[Any]) -> list[Any]:
 
 def _merge(solids: Sequence[Any], bases: Sequence[Base]) -> list[Any]:
     """The solids with the sides of mitres joined to the offsets that they continue."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_SOLID
 
     merged = []
     for solid in solids:
+        spare = BRepBuilderAPI_Copy(solid).Shape()  # OpenCASCADE changes edges of the solid that it is given
         unify = ShapeUpgrade_UnifySameDomain(solid, False, True, False)
         for base in bases:
             for edge in explore(base.face, TopAbs_EDGE):
@@ -197,5 +201,5 @@ def _merge(solids: Sequence[Any], bases: Sequence[Base]) -> list[Any]:
         (found,) = explore(unify.Shape(), TopAbs_SOLID) or (None,)
         sound = found is not None and BRepCheck_Analyzer(found).IsValid()
         same = sound and abs(measure_volume(found) / measure_volume(solid) - 1) < 1e-6
-        merged.append(found if same else solid)
+        merged.append(found if same and is_watertight(found, bases[0].height / CHORDS) else spare)
     return merged
