@@ -1,0 +1,59 @@
+"""The values that stages give to each other.
+
+All are frozen and their arrays are read-only: a stage gives a new value, it never edits one. Lengths are in the job's
+unit, coordinates float64 (N,3), faces int64 (F,3). Frames: a `Scan` as read is in the scanner's frame; everything
+after `align` is in the part's. ``T_part_scan`` takes a point from the scanner's frame to the part's.
+"""
+
+from __future__ import annotations
+
+from damageest.artefacts.arrays import ArtefactError, Flags, Floats, Ints, Vector
+from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, EvidenceCause, Rims
+from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
+from damageest.artefacts.paths import BeadFill, DepositPath, Unreached
+from damageest.artefacts.scans import (
+    ADDED,
+    DAMAGE,
+    INTACT,
+    OUTLIER,
+    Deviation,
+    FreeMotion,
+    Pose,
+    Samples,
+    Scan,
+    Sites,
+    Truth,
+)
+
+__all__ = [
+    "ADDED",
+    "DAMAGE",
+    "INTACT",
+    "OUTLIER",
+    "ArtefactError",
+    "BeadFill",
+    "Deposit",
+    "DepositPath",
+    "Deviation",
+    "Enclosure",
+    "Enclosures",
+    "Evidence",
+    "EvidenceCause",
+    "Flags",
+    "Floats",
+    "FreeMotion",
+    "Ints",
+    "Mesh",
+    "Part",
+    "Pose",
+    "Rims",
+    "Samples",
+    "Scan",
+    "Sites",
+    "Solid",
+    "Surface",
+    "Truth",
+    "Unreached",
+    "Vector",
+    "open_edges",
+]

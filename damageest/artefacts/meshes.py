@@ -1,0 +1,167 @@
+"""Surfaces and solids: meshes of triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from damageest.artefacts.arrays import Arrays, ArtefactError, Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(Arrays):
+    """A triangle mesh: ``vertices`` (V,3) float64, ``faces`` (F,3) int64, counter-clockwise from outside."""
+
+    vertices: Floats
+    faces: Ints
+    _dtypes: ClassVar[dict[str, Any]] = {"vertices": np.float64, "faces": np.int64}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.vertices.ndim != 2 or self.vertices.shape[1] != 3:
+            raise ArtefactError(f"vertices: expected (V,3), got {self.vertices.shape}")
+        if self.faces.ndim != 2 or self.faces.shape[1] != 3:
+            raise ArtefactError(f"faces: expected (F,3), got {self.faces.shape}")
+        if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= len(self.vertices)):
+            raise ArtefactError(f"faces: index outside the {len(self.vertices)} vertices")
+        if not np.isfinite(self.vertices).all():
+            raise ArtefactError("vertices: not all finite")
+
+    @property
+    def triangles(self) -> Floats:
+        """(F,3,3) corner coordinates."""
+        return self.vertices[self.faces]
+
+    @cached_property
+    def cross(self) -> Floats:
+        """(F,3) face normals scaled by twice the area."""
+        a, b, c = np.moveaxis(self.triangles, 1, 0)
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def face_normals(self) -> Floats:
+        """(F,3) unit normals of the faces; 0 where a face has no area."""
+        return np.asarray(self.cross / np.maximum(np.linalg.norm(self.cross, axis=1), 1e-300)[:, None])
+
+    @cached_property
+    def vertex_cross(self) -> Floats:
+        """(V,3) sum of the faces' `cross` at each vertex: a normal weighted by area, of no unit length."""
+        total = np.zeros_like(self.vertices)
+        for corner in range(3):
+            np.add.at(total, self.faces[:, corner], self.cross)
+        return total
+
+    @property
+    def vertex_normals(self) -> Floats:
+        """(V,3) unit normals of the vertices; 0 where there is none."""
+        length = np.linalg.norm(self.vertex_cross, axis=1)
+        return np.asarray(self.vertex_cross / np.maximum(length, 1e-300)[:, None])
+
+    @property
+    def area(self) -> float:
+        return float(np.linalg.norm(self.cross, axis=1).sum() / 2)
+
+    @cached_property
+    def bounds(self) -> Floats:
+        """(2,3) lowest and highest corner."""
+        return np.array([self.vertices.min(0), self.vertices.max(0)])
+
+    @property
+    def diagonal(self) -> float:
+        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+
+def open_edges(faces: Ints) -> int:
+    """How many directed edges lack their opposite exactly once, or go from a vertex to itself; 0 for a closed,
+    consistently oriented 2-manifold."""
+    if not len(faces):
+        return 0
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    size = int(faces.max()) + 1
+    forward = edges[:, 0] * size + edges[:, 1]
+    backward = edges[:, 1] * size + edges[:, 0]
+    # most meshes are closed, and two sorts show it
+    ordered = np.sort(forward)
+    if (np.diff(ordered) > 0).all() and (edges[:, 0] != edges[:, 1]).all() and (ordered == np.sort(backward)).all():
+        return 0
+    codes, counts = np.unique(forward, return_counts=True)
+    lone = (
+        (counts > 1) | ~np.isin(codes, backward, assume_unique=True) | (codes % (size + 1) == 0)
+    )  # the last: from a vertex to itself
+    return int(lone.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Solid(Mesh):
+    """A watertight mesh bounding positive volume, of one or more components.
+
+    The constructor raises ArtefactError for anything else.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not len(self.faces):
+            raise ArtefactError("a solid needs faces; this mesh is empty")
+        if loose := open_edges(self.faces):
+            raise ArtefactError(f"not watertight: {loose} of its edges are not shared by two opposite triangles")
+        if self.volume <= 0:
+            raise ArtefactError(f"inside out or flat: its signed volume is {self.volume:.6g}")
+
+    @cached_property
+    def volume(self) -> float:
+        """By the divergence theorem, about the centre of the bounds (so that far coordinates cost no digits)."""
+        centre = (self.vertices.min(0) + self.vertices.max(0)) / 2
+        a, b, c = np.moveaxis(self.triangles - centre, 1, 0)
+        return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+
+@dataclass(frozen=True, eq=False)
+class Deposit(Solid):
+    """What is to be deposited for one damage, including stock to be milled off.
+
+    ``cavity`` is the damage volume (DV) enlarged by the cut-back into intact metal, None without a cut-back;
+    ``cut_back_volume`` the volume that this removes in addition. ``stock_volume``: what is above the nominal surface;
+    ``thickness``: its least, mean and largest height over the skin where stock was asked for, None where none was;
+    ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`, empty where the part has
+    none. ``heights``: of the damage's CAD faces by number, how high the job wants the stock on it, -1 where that is not
+    the same all over it; ``overlap``: how far the stock covers the intact skin. ``notes`` are warnings.
+    """
+
+    cavity: Solid | None = None
+    stock_volume: float = 0.0
+    cut_back_volume: float = 0.0
+    thickness: tuple[float, float, float] | None = None
+    touched: tuple[int, ...] = ()
+    heights: tuple[tuple[int, float], ...] = ()
+    overlap: float = 0.0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Surface(Mesh):
+    """An open mesh: the inner damage surface (IDS), normals toward the lost material."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part(Solid):
+    """The part as designed.
+
+    ``faces_brep`` (F,) gives the number of the CAD face that each triangle came from, ``face_names`` and
+    ``face_kinds`` what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds
+    the distance between the CAD surface and the triangles. ``cad_scale``: one length of the CAD file, as its reader
+    takes it, in ``unit``; 0 where the file was a mesh. ``notes`` say what was repaired or converted.
+    """
+
+    unit: str = "mm"
+    path: str = ""
+    sha256: str = ""
+    faces_brep: Ints | None = None
+    face_names: tuple[str, ...] = ()
+    face_kinds: tuple[str, ...] = ()
+    tessellation_error: float = 0.0
+    notes: tuple[str, ...] = ()
+    cad_scale: float = 0.0
+    _dtypes: ClassVar[dict[str, Any]] = {**Mesh._dtypes, "faces_brep": np.int64}

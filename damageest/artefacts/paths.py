@@ -1,0 +1,139 @@
+"""Paths that build up a deposit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from damageest.artefacts.arrays import Arrays, ArtefactError, Flags, Floats, Ints
+from damageest.artefacts.meshes import Mesh, Solid
+
+
+@dataclass(frozen=True)
+class Unreached:
+    """Deposit that no pass fills: its ``volume`` and ``why``."""
+
+    volume: float
+    why: str
+
+
+@dataclass(frozen=True)
+class BeadFill:
+    """The union of a path's beads against the deposit, on voxels with the edge ``voxel``.
+
+    ``filled``: share of the reachable deposit that is filled. ``gap``: volume of the reachable deposit that is not;
+    ``largest_gap``: that of its largest connected piece; ``void``: diameter of the largest ball in it. ``spill``:
+    volume of beads outside the deposit and the metal; ``spill_distance``: how far it reaches from the deposit.
+    ``sunk``: volume of beads where metal is already.
+    """
+
+    voxel: float
+    filled: float
+    gap: float
+    void: float
+    largest_gap: float
+    spill: float
+    spill_distance: float
+    sunk: float
+
+
+@dataclass(frozen=True, eq=False)
+class DepositPath(Arrays):
+    """Moves of the tool that build up one site's deposit, in the part's frame.
+
+    ``points`` (N,3): where the tool works, on the top of the bead. ``axes`` (N,3): the tool axis, a unit vector away
+    from the work; the nozzle's tip is ``standoff`` along it from the point. ``normals`` (N,3): the normal of the layer.
+    ``feed`` (N,): speed of the move that ends there, in lengths a minute; ``on`` (N,): whether it deposits. ``layer``,
+    ``number``, ``part`` (N,): of layer, pass and part of the deposit, from 1. ``directions`` (P,3): the build direction
+    of each part; ``heights`` (P,): of its layers. ``width`` of a bead; ``section``: area of its section, that of what
+    it adds. ``nozzle``: its mesh, tip at 0, axis along z. ``clearance``: least distance of the nozzle from anything
+    while it deposits, ``travel_clearance`` while it travels; inf without obstacles. ``tightest`` (2,3): point and axis
+    where it is least. ``unreached``: what is not filled, by reason, and ``missing``: the same as a solid. ``fill``: the
+    simulated beads; None where they were not simulated. ``notes`` are warnings.
+    """
+
+    points: Floats
+    axes: Floats
+    normals: Floats
+    feed: Floats
+    on: Flags
+    layer: Ints
+    number: Ints
+    part: Ints
+    directions: Floats
+    heights: Floats
+    width: float
+    section: Floats
+    standoff: float
+    deposit_volume: float
+    nozzle: Mesh
+    clearance: float
+    travel_clearance: float
+    tightest: Floats | None = None
+    unreached: tuple[Unreached, ...] = ()
+    missing: Solid | None = None
+    fill: BeadFill | None = None
+    notes: tuple[str, ...] = ()
+    _dtypes: ClassVar[dict[str, Any]] = {
+        "points": np.float64, "axes": np.float64, "normals": np.float64, "feed": np.float64, "on": np.bool_,
+        "layer": np.int64, "number": np.int64, "part": np.int64, "directions": np.float64, "heights": np.float64,
+        "section": np.float64, "tightest": np.float64,
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        count = len(self.points)
+        for name in ("points", "axes", "normals"):
+            if getattr(self, name).shape != (count, 3):
+                raise ArtefactError(f"{name}: expected {(count, 3)}, got {getattr(self, name).shape}")
+        for name in ("feed", "on", "layer", "number", "part"):
+            if getattr(self, name).shape != (count,):
+                raise ArtefactError(f"{name}: expected {(count,)}, got {getattr(self, name).shape}")
+        if count and not np.allclose(np.linalg.norm(self.axes, axis=1), 1, atol=1e-6):
+            raise ArtefactError("axes: not all have the length 1")
+        if count and not (np.isfinite(self.points).all() and (self.feed > 0).all()):
+            raise ArtefactError("points: not all finite, or a feed is not above 0")
+        if count and self.on[0]:
+            raise ArtefactError("on: the first move has no start, so it cannot deposit")
+
+    @cached_property
+    def moves(self) -> Floats:
+        """(N,) length of the move that ends at each point; 0 for the first."""
+        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
+        return np.concatenate([[0.0], steps]) if len(self.points) else np.empty(0)
+
+    @property
+    def length(self) -> float:
+        """Length of all passes."""
+        return float(self.moves[self.on].sum())
+
+    @property
+    def travel(self) -> float:
+        """Length of the moves between passes."""
+        return float(self.moves[~self.on].sum())
+
+    @property
+    def minutes(self) -> float:
+        """Time of all moves at their feeds, without acceleration."""
+        return float((self.moves / self.feed).sum()) if len(self.points) else 0.0
+
+    @property
+    def passes(self) -> int:
+        return int(self.number[-1]) if len(self.points) else 0
+
+    @property
+    def layers(self) -> int:
+        """Number of layers, summed over the parts of the deposit."""
+        return len(np.unique(np.stack([self.part, self.layer]), axis=1).T) if len(self.points) else 0
+
+    @property
+    def bead_volume(self) -> float:
+        """Volume that the passes add: length by section."""
+        return float((self.moves * self.section[self.part - 1])[self.on].sum()) if len(self.points) else 0.0
+
+    @property
+    def unreached_volume(self) -> float:
+        return sum(item.volume for item in self.unreached)

@@ -1,0 +1,186 @@
+"""A scan, where it lies on the part, and what its points are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts.arrays import Arrays, ArtefactError, Flags, Floats, Ints, Vector
+from damageest.artefacts.meshes import Solid
+
+INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
+"""Labels of a scan point: on the nominal surface; on an inner damage surface; outside the part by more than the
+tolerance (weld bead, dirt, fixture); deviating, but in no site (noise)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Truth(Arrays):
+    """The truth of a virtual scan: the true ``damage`` in the part's frame (None if there is none), the pose, and the
+    metal ``added`` outside the part, in the part's frame (None if there is none)."""
+
+    damage: Solid | None
+    T_part_scan: Floats
+    added: Solid | None = None
+    _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64}
+
+
+@dataclass(frozen=True, eq=False)
+class Scan(Arrays):
+    """Points (N,3) on the damaged part; ``normals`` (N,3) outward, or None.
+
+    ``noise`` is the measured standard deviation of the points off the local surface and ``spacing`` the median distance
+    to the nearest neighbours that a reconstructed surface has to bridge; both 0 until measured. ``viewpoints`` (V,3):
+    where the scanner stood for each view, in the frame of the points; ``view`` (N,): the number of each point's view,
+    -1 where its scanner position is not known. Both None where no position is known. ``total``: number of points in
+    the files where only some of them are here, else 0.
+    """
+
+    points: Floats
+    normals: Floats | None = None
+    unit: str = "mm"
+    paths: tuple[str, ...] = ()
+    noise: float = 0.0
+    spacing: float = 0.0
+    truth: Truth | None = None
+    notes: tuple[str, ...] = ()
+    viewpoints: Floats | None = None
+    view: NDArray[np.int32] | None = None
+    total: int = 0
+    _dtypes: ClassVar[dict[str, Any]] = {
+        "points": np.float64,
+        "normals": np.float64,
+        "viewpoints": np.float64,
+        "view": np.int32,
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.points.ndim != 2 or self.points.shape[1] != 3:
+            raise ArtefactError(f"points: expected (N,3), got {self.points.shape}")
+        if self.normals is not None and self.normals.shape != self.points.shape:
+            raise ArtefactError(f"normals: expected {self.points.shape}, got {self.normals.shape}")
+        if (self.viewpoints is None) != (self.view is None):
+            raise ArtefactError("viewpoints and view: give both or none")
+        if self.viewpoints is not None and self.view is not None:
+            if self.viewpoints.ndim != 2 or self.viewpoints.shape[1] != 3:
+                raise ArtefactError(f"viewpoints: expected (V,3), got {self.viewpoints.shape}")
+            if self.view.shape != (len(self.points),):
+                raise ArtefactError(f"view: expected ({len(self.points)},), got {self.view.shape}")
+            if len(self.view) and not -1 <= self.view.min() <= self.view.max() < len(self.viewpoints):
+                raise ArtefactError(f"view: number outside the {len(self.viewpoints)} viewpoints")
+
+    def move(self, T: Floats) -> Scan:
+        """The same scan in another frame; T is 4x4, rigid."""
+        # not @: on long, narrow arrays it takes several times as long
+        points = np.einsum("ij,kj->ik", self.points, T[:3, :3])
+        points += T[:3, 3]
+        normals = None if self.normals is None else np.einsum("ij,kj->ik", self.normals, T[:3, :3])
+        viewpoints = None if self.viewpoints is None else self.viewpoints @ T[:3, :3].T + T[:3, 3]
+        return replace(self, points=points, normals=normals, viewpoints=viewpoints)
+
+    def take(self, index: Ints | Flags) -> Scan:
+        """The scan with some of its points: their numbers (M,), or whether each is taken (N,)."""
+        normals = None if self.normals is None else self.normals[index]
+        return replace(
+            self, points=self.points[index], normals=normals, view=None if self.view is None else self.view[index]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Samples(Arrays):
+    """CAD points: ``points`` (N,3) exactly on the part, ``normals`` (N,3) of the face that each lies on (bisecting
+    ones on edges and corners), ``face`` (N,) the triangle, ``kind`` (N,): 0 on a face, 1 on a sharp edge, 2 on a
+    corner. ``spacing`` is the largest intended gap."""
+
+    points: Floats
+    normals: Floats
+    face: Ints
+    kind: NDArray[np.uint8]
+    spacing: float
+    _dtypes: ClassVar[dict[str, Any]] = {
+        "points": np.float64,
+        "normals": np.float64,
+        "face": np.int64,
+        "kind": np.uint8,
+    }
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """A motion that unworn skin does not exclude: after it the scan fits the part as well.
+
+    ``direction``: unit vector of a shift, or of the axis of a turn through ``point`` (None: a shift), in the part's
+    frame. ``low``, ``high``: how far the scan can be moved, 0 being the pose found, in the job's unit; of a turn, the
+    movement of the skin that moves most. ``turn``: angle in radians for each unit of it, 0 for a shift. ``text``: the
+    same in words.
+    """
+
+    direction: Vector
+    low: float
+    high: float
+    point: Vector | None = None
+    turn: float = 0.0
+    text: str = ""
+
+    def move(self, points: Floats) -> Floats:
+        """How points (N,3) of the scan, in the part's frame, move for each unit of the motion (N,3)."""
+        if self.point is None:
+            return np.tile(np.array(self.direction), (len(points), 1))
+        return np.cross(self.turn * np.array(self.direction), points - np.array(self.point))
+
+
+@dataclass(frozen=True, eq=False)
+class Pose(Arrays):
+    """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
+
+    ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is
+    one of several right ones. ``notes`` say so in words. ``doubts``: those of the notes that make the verdict on every
+    site doubtful, such as a small share of the scan on the part, or other poses that fit and are no symmetries.
+    ``free``: motions that unworn skin does not exclude. ``is_held``: whether skin without wear holds the pose but for
+    those; False where that was not tested.
+    """
+
+    T_part_scan: Floats
+    rms: float = 0.0
+    inliers: float = 1.0
+    alternatives: Floats | None = None
+    notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    free: tuple[FreeMotion, ...] = ()
+    is_held: bool = False
+    _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64}
+
+
+@dataclass(frozen=True, eq=False)
+class Deviation(Arrays):
+    """Per scan point, in the part's frame: ``distance`` (N,) signed to the part's surface, positive outside; ``face``
+    (N,) the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER. ``notes`` say what the scan
+    does not show."""
+
+    distance: Floats
+    face: Ints
+    label: NDArray[np.uint8]
+    notes: tuple[str, ...] = ()
+    _dtypes: ClassVar[dict[str, Any]] = {"distance": np.float64, "face": np.int64, "label": np.uint8}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if wrong := int((~np.isfinite(self.distance)).sum()):
+            raise ArtefactError(f"distance: {wrong} of {len(self.distance)} are not finite numbers")
+
+
+@dataclass(frozen=True, eq=False)
+class Sites(Arrays):
+    """``label`` (N,) int32 per scan point: the number of its site from 1 up, 0 for a point of none. ``count`` sites."""
+
+    label: NDArray[np.int32]
+    count: int
+    notes: tuple[str, ...] = ()
+    _dtypes: ClassVar[dict[str, Any]] = {"label": np.int32}
+
+    def members(self, site: int) -> Ints:
+        """Indices of the scan points of one site."""
+        return np.flatnonzero(self.label == site)
