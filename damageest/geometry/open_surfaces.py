@@ -13,6 +13,7 @@ from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.local_fits import smooth_points
 from damageest.geometry.neighbourhoods import thin_points
 from damageest.geometry.orientation import turn_toward_void
+from damageest.geometry.vectors import normalise
 
 FEWEST = 16
 """Points needed to reconstruct an inner damage surface."""
@@ -138,5 +139,4 @@ def faces_skin(surface: Surface, part: Part) -> bool:
 
 def _find_skin_directions(points: Floats, part: Part) -> Floats:
     """Unit vectors (N,3) from points (N,3) to the nearest place on the part; 0 for a point on it."""
-    step = closest_on_mesh(points, part).place - points
-    return np.asarray(step / np.maximum(np.linalg.norm(step, axis=1), 1e-300)[:, None])
+    return normalise(closest_on_mesh(points, part).place - points)

@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.vectors import normalise
 from damageest.geometry.voxels import number_cubes
 
 SMOOTH = 0.8
@@ -52,8 +53,7 @@ def _find_signs(points: Floats, normals: Floats, evidence: Floats) -> Floats:
     distance, index = find_neighbours(points, 11)
     first = np.repeat(np.arange(len(points)), index.shape[1] - 1)
     second = index[:, 1:].ravel()
-    step = points[second] - points[first]
-    step /= np.maximum(np.linalg.norm(step, axis=1), 1e-300)[:, None]
+    step = normalise(points[second] - points[first])
     # On a circular arc, and on both sides of a crease, the normal of one point, mirrored in the plane halfway between
     # the two, is that of the other; after Koenig and Gumhold (2009), who transport normals along curves.
     across = normals[first] - 2 * np.einsum("ij,ij->i", normals[first], step)[:, None] * step

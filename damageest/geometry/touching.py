@@ -13,6 +13,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Solid, open_edges
 from damageest.geometry.duplicates import list_used
+from damageest.geometry.vectors import normalise
 
 ROUNDS = 8
 """How often sheets are moved apart, each time farther than before."""
@@ -215,10 +216,8 @@ def _move_inward(vertices: Floats, origin: Ints, faces: Ints, by: float) -> tupl
     """The mesh with each vertex that has several copies moved inward by ``by``; ``origin`` (K,): what each copies."""
     points = vertices[origin]
     corners = points[faces]
-    ways = corners[:, [1, 2, 0]] - corners
-    ways /= np.maximum(np.linalg.norm(ways, axis=2), 1e-300)[:, :, None]
-    normal = np.cross(ways[:, 0], ways[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    ways = normalise(corners[:, [1, 2, 0]] - corners)
+    normal = normalise(np.cross(ways[:, 0], ways[:, 1]))
     cosine = -np.einsum("fkj,fkj->fk", ways, ways[:, [2, 0, 1]])
     weight = np.arccos(np.clip(cosine, -1, 1))
     total, inward, angle = np.zeros_like(points), np.zeros_like(points), np.zeros(len(points))
@@ -229,6 +228,6 @@ def _move_inward(vertices: Floats, origin: Ints, faces: Ints, by: float) -> tupl
     # at the end of a sheet or slit without thickness there is no normal: there it is made shorter
     flat = np.linalg.norm(total, axis=1) < FLAT * angle
     total[flat] = -inward[flat]
-    total /= np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
+    total = normalise(total)
     copied = np.bincount(origin, minlength=len(vertices))[origin] > 1
     return np.where(copied[:, None], points - by * total, points), faces

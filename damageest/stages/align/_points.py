@@ -100,8 +100,7 @@ def orient_scan(
 def orient_surface(part: Mesh, wanted: int, rng: np.random.Generator) -> OrientedPoints:
     """``wanted`` points spread over a mesh by area, with the normals of their faces."""
     points, face = sample_by_area(part, wanted, rng)
-    normal = part.cross[face]
-    return OrientedPoints(points, normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None], True)
+    return OrientedPoints(points, part.face_normals[face], True)
 
 
 def draw_by_direction(cloud: OrientedPoints, wanted: int, rng: np.random.Generator) -> OrientedPoints:

@@ -83,7 +83,7 @@ def label_skin(vertices: Floats, faces: Ints, part: Part, plan: StockPlan, origi
         value = np.where(np.abs(value) < ON_PART * part.diagonal, 0.0, value)
         vertices, faces, kept, _ = cut_triangles(vertices, faces, value)
         parent = parent[kept]
-    normal = normalise(part.cross)[parent]
+    normal = part.face_normals[parent]
     middle = vertices[faces].mean(axis=1) + origin
     height = plan.heights(middle, normal, parent, part)
     return SkinFaces(vertices, faces, parent, normal, height, plan.is_kept_free(middle, normal, parent, part))
@@ -102,8 +102,3 @@ def find_on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> t
     # the direction of a sliver is arbitrary, and gaps would remain without the slivers
     sliver = np.linalg.norm(cross, axis=1) < (100 * ON_PART * part.diagonal) ** 2
     return near & (sliver | (np.einsum("ij,ij->i", cross, part.cross[parent]) > 0)), parent
-
-
-def normalise(vectors: Floats) -> Floats:
-    """(N,3) the vectors scaled to length 1; 0 stays 0."""
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])

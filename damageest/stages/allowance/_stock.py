@@ -15,8 +15,9 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import find_members
+from damageest.geometry.vectors import normalise
 from damageest.stages.allowance._shells import build_shells
-from damageest.stages.allowance._skin import SkinFaces, normalise
+from damageest.stages.allowance._skin import SkinFaces
 
 SMOOTH = 30.0
 """Largest angle in degrees between neighbouring triangles that may share upper corners."""
@@ -150,15 +151,10 @@ def _find_directions(skin: SkinFaces, height: Floats, edges: _Edges, slack: floa
 def _measure_angles(triangles: Floats) -> Floats:
     """(F,3) angles at the corners, in radians."""
     along, back = (
-        _normalise_rows(triangles[:, [1, 2, 0]] - triangles),
-        _normalise_rows(triangles[:, [2, 0, 1]] - triangles),
+        normalise(triangles[:, [1, 2, 0]] - triangles),
+        normalise(triangles[:, [2, 0, 1]] - triangles),
     )
     return np.asarray(np.arccos(np.clip(np.einsum("fkj,fkj->fk", along, back), -1, 1)))
-
-
-def _normalise_rows(vectors: Floats) -> Floats:
-    """(...,3) the vectors scaled to length 1."""
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
 
 
 def _build_over_edges(

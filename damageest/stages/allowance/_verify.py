@@ -15,7 +15,7 @@ from damageest.geometry.rays import RayCaster
 from damageest.geometry.selectors import Mask
 from damageest.geometry.solids import to_arrays
 from damageest.stages.allowance._limits import StockConflict
-from damageest.stages.allowance._skin import ON_PART, SkinFaces, normalise
+from damageest.stages.allowance._skin import ON_PART, SkinFaces
 
 MAX_VOLUME = 1e-4
 """Largest share of the cavity that may lie outside the deposit, and of the deposit that may lie in metal."""
@@ -165,7 +165,7 @@ def find_stray_stock(work: DepositGeometry, part: Part, tolerance: float) -> tup
     corners = part.triangles - work.origin
     low, high = work.skin.vertices.min(axis=0) - 2 * reach, work.skin.vertices.max(axis=0) + 2 * reach
     near = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
-    normal = normalise(part.cross)[near]
+    normal = part.face_normals[near]
     zero = np.zeros(len(near))
     around = SkinFaces(part.vertices - work.origin, part.faces[near], near, normal, zero, zero > 0)
     points, face = around.sample(SAMPLES, seed=29)

@@ -10,6 +10,7 @@ from damageest.artefacts import Floats, Ints, Rims, Surface
 from damageest.errors import StageError
 from damageest.geometry.duplicates import find_members
 from damageest.geometry.loops import trace_loops
+from damageest.geometry.vectors import normalise
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +34,10 @@ def extend_rims(surface: Surface, rims: Rims, width: float) -> ExtendedSurface:
     for loop in rims.loops:
         at = surface.vertices[loop]
         along = np.roll(at, -2, axis=0) - np.roll(at, 2, axis=0)
-        out = np.cross(along, surface.vertex_cross[loop])
-        out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
+        out = normalise(np.cross(along, surface.vertex_cross[loop]))
         for _ in range(3):
             out = out + np.roll(out, 1, axis=0) + np.roll(out, -1, axis=0)
-        out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
+        out = normalise(out)
         new = np.arange(start, start + len(loop))
         vertices.append(at + width * out)
         before, after = loop, np.roll(loop, -1)

@@ -43,10 +43,8 @@ class Sample(Stage, ABC):
                 vertices, faces, parent = trimesh.remesh.subdivide_to_size(
                     part.vertices, part.faces, tolerance, max_iter=30, return_index=True
                 )
-                cross = part.cross[parent]
-                normals = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
                 points, kind = vertices[faces].mean(axis=1), np.zeros(len(parent), np.uint8)
-                return Samples(points, normals, parent, kind, tolerance)
+                return Samples(points, part.face_normals[parent], parent, kind, tolerance)
     """
 
     stage: ClassVar[str] = "sample"

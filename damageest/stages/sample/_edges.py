@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.vectors import normalise
 from damageest.stages.sample._spread import thin
 
 ON_EDGE, ON_CORNER = 1, 2
@@ -20,7 +21,7 @@ def find_sharp_edges(mesh: Mesh, angle: float) -> tuple[Ints, Ints]:
     edges, face = edges[order], face[order]
     twin = np.flatnonzero((edges[1:, 0] == edges[:-1, 0]) & (edges[1:, 1] == edges[:-1, 1]))
     pairs, sides = edges[twin], np.stack([face[twin], face[twin + 1]], axis=1)
-    normals = _normalise(mesh.cross)
+    normals = mesh.face_normals
     degenerate: NDArray[np.bool_] = np.asarray(~normals.any(axis=1))  # a face without area has no direction
     turn = np.einsum("ij,ij->i", normals[sides[:, 0]], normals[sides[:, 1]])
     sharp: NDArray[np.bool_] = (turn < np.cos(np.radians(angle))) & ~degenerate[sides].any(axis=1)
@@ -37,8 +38,8 @@ def place_sharp_points(mesh: Mesh, spacing: float, angle: float) -> tuple[Floats
     pairs, sides = find_sharp_edges(mesh, angle)
     if not len(pairs):
         return np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64), np.empty(0, np.uint8)
-    normals = _normalise(mesh.cross)
-    bisector = _normalise(normals[sides].sum(axis=1))
+    normals = mesh.face_normals
+    bisector = normalise(normals[sides].sum(axis=1))
     start, end = mesh.vertices[pairs[:, 0]], mesh.vertices[pairs[:, 1]]
     length = np.linalg.norm(end - start, axis=1)
 
@@ -63,7 +64,7 @@ def place_sharp_points(mesh: Mesh, spacing: float, angle: float) -> tuple[Floats
     is_corner = corner[vertex]
     return (
         np.concatenate([points, mesh.vertices[vertex[is_corner]]]),
-        np.concatenate([bisector[of], _normalise(sums[is_corner])]),
+        np.concatenate([bisector[of], normalise(sums[is_corner])]),
         np.concatenate([sides[of, 0], first_face[is_corner]]),
         np.concatenate([np.full(len(of), ON_EDGE), np.full(int(is_corner.sum()), ON_CORNER)]).astype(np.uint8),
     )
@@ -72,17 +73,11 @@ def place_sharp_points(mesh: Mesh, spacing: float, angle: float) -> tuple[Floats
 def _find_corners(mesh: Mesh, pairs: Ints, angle: float) -> NDArray[np.bool_]:
     """(V,) whether sharp edges end, branch or bend by more than ``angle`` degrees at a vertex."""
     count = np.bincount(pairs.ravel(), minlength=len(mesh.vertices))
-    outward = _normalise(mesh.vertices[pairs[:, 1]] - mesh.vertices[pairs[:, 0]])
+    outward = normalise(mesh.vertices[pairs[:, 1]] - mesh.vertices[pairs[:, 0]])
     sums = np.zeros((len(mesh.vertices), 3))
     np.add.at(sums, pairs[:, 0], outward)
     np.add.at(sums, pairs[:, 1], -outward)
     # The sum of two unit vectors along edges that bend by an angle t has length 2 sin(t/2).
     bent = np.linalg.norm(sums, axis=1) > 2 * np.sin(np.radians(angle) / 2)
     result: NDArray[np.bool_] = (count > 0) & ((count != 2) | bent)
-    return result
-
-
-def _normalise(vectors: Floats) -> Floats:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    result: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
     return result

@@ -190,7 +190,7 @@ class Simulate(ReadScan):
 
     def _draw(self, scene: Scene, part: Part, count: int, rng: np.random.Generator) -> _Draw:
         """Points without errors, in the part's frame."""
-        normal = scene.body.cross / np.maximum(np.linalg.norm(scene.body.cross, axis=1), 1e-300)[:, None]
+        normal = scene.body.face_normals
         faces = ~scene.bare
         planes = []
         for item in self.unseen:

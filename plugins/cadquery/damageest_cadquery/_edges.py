@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.vectors import normalise
 from damageest_cadquery._read import explore
 
 SMOOTH = 5e-4
@@ -107,4 +108,4 @@ def measure_normals(edge: Any, face: Any, parameters: Floats) -> Floats:
         surface.D1(at.X(), at.Y(), point, u, v)
         found[k] = np.cross(u.Coord(), v.Coord())
     found *= -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
-    return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1), 1e-300)[:, None])
+    return normalise(found)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Solid
+from damageest.geometry.vectors import normalise
 
 FLAT = 1e-8
 """Largest distance of corners from their common face or edge, in diagonals of the solid."""
@@ -57,7 +58,7 @@ def find_facets(solid: Solid) -> list[Facet]:
     loops = straighten(loops, vertices, tolerance)
     normal = np.zeros((label.max() + 1, 3))
     np.add.at(normal, label, solid.cross)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    normal = normalise(normal)
     area = np.einsum("lj,lj->l", _measure_areas(loops, vertices), normal[owner])
     order = np.lexsort([-area, owner])
     found: dict[int, list[Ints]] = {}
@@ -104,7 +105,7 @@ def _find_flat_regions(solid: Solid, other: Ints, tolerance: float) -> Ints:
     label = connected_components(graph, directed=False)[1].astype(np.int64)
     normal = np.zeros((label.max() + 1, 3))
     np.add.at(normal, label, cross)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    normal = normalise(normal)
     height = np.einsum("nij,nj->ni", vertices[faces], normal[label])
     low, high = np.full(len(normal), np.inf), np.full(len(normal), -np.inf)
     np.minimum.at(low, label, height.min(1))

@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.vectors import normalise
 from damageest_cadquery._facets import FLAT, Facet, straighten
 from damageest_cadquery._recognise import Shape, find_neighbours
 
@@ -139,7 +140,7 @@ def _gather(flat: Flat, region: Ints, loops: list[Ints], owners: Ints) -> dict[i
     for k, plane in enumerate(flat.planes):
         own = label == k
         normal[own] = plane.axis * np.sign(normal[own] @ plane.axis)[:, None]
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    normal = normalise(normal)
     found: dict[int, list[tuple[float, Ints]]] = {}
     for loop, owner in zip(loops, owners.tolist(), strict=True):
         off = vertices[loop] - vertices[loop[0]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.vectors import normalise
 
 
 def fill_gaps(mesh: Mesh, rim: Ints) -> Mesh:
@@ -49,8 +50,7 @@ def extend_rim(mesh: Mesh, rim: Ints, direction: Floats, width: float, steepest:
         return np.asarray(gaussian_filter1d(values, nodes, axis=0, mode="wrap"))
 
     line = smooth_along_rim(at)
-    out = np.cross(np.roll(line, -1, axis=0) - np.roll(line, 1, axis=0), direction)
-    out /= np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
+    out = normalise(np.cross(np.roll(line, -1, axis=0) - np.roll(line, 1, axis=0), direction))
     slope = smooth_along_rim(mesh.vertex_cross[rim])
     angle = np.arctan2(-np.einsum("ij,ij->i", slope, out), np.maximum(slope @ direction, 1e-300))
     angle = np.clip(angle, *np.deg2rad([-steepest, steepest]))[:, None]
