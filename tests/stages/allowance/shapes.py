@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
-from damageest.artefacts import Floats, Part, Solid
+from damageest.artefacts import Deposit, Floats, Part, Solid
 from damageest.geometry.solids import to_arrays
 
 TOLERANCE = 0.1
+INSET = 5e-4
+"""Share of these volumes that goes with the border of the stock, which begins a little inside that of the skin."""
 
 
 def block() -> Any:
@@ -118,3 +120,13 @@ def inside(points: Floats, solid: Any) -> Any:
         )
         > 0.5
     )
+
+
+def deposit_on(body: Any, tool: Any, others: Solid | None = None, part: Part | None = None, **chosen: Any) -> Deposit:
+    """The deposit for what a tool takes off a body."""
+    from damageest.stages.allowance.milling import Milling
+
+    lost = solid_of(body ^ tool)
+    deposit = Milling.model_validate(chosen).run(lost, part or part_of(body), TOLERANCE, others)
+    assert isinstance(deposit, Deposit)
+    return deposit

@@ -1,4 +1,4 @@
-"""Targets, regions to keep free, overlap, cut-back and limits of `allowance: milling`, against known figures."""
+"""Targets, regions to keep free, overlap, cut-back and bad options of `allowance: milling`, against known figures."""
 
 from __future__ import annotations
 
@@ -10,39 +10,27 @@ import pytest
 from manifold3d import Manifold
 from pydantic import ValidationError
 
-from damageest.artefacts import Deposit, Part, Solid
+from damageest.artefacts import Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_manifold
 from damageest.io.meshes import write_stl
 from damageest.stages.allowance.milling import Milling
 from tests.stages.allowance.shapes import (
+    INSET,
     TOLERANCE,
-    blade,
     block,
     bored,
     bracket,
-    comb,
-    dovetail,
+    deposit_on,
     nearest,
     part_of,
-    skin_points,
     solid_of,
 )
 
-INSET = 5e-4
-"""Share of these volumes that goes with the border of the stock, which begins a little inside that of the skin."""
 MORE = TOLERANCE / 4
 """How much higher the stock is than asked for, so that it is nowhere lower."""
 CHIP = Manifold.cube((6, 5, 4)).translate((0, 0, 8))
 """At a corner of the block: 6 along x, 5 along y, 4 down from the top."""
-
-
-def run(body: Any, tool: Any, others: Solid | None = None, part: Part | None = None, **chosen: Any) -> Deposit:
-    """The deposit for what a tool takes off a body."""
-    lost = solid_of(body ^ tool)
-    deposit = Milling.model_validate(chosen).run(lost, part or part_of(body), TOLERANCE, others)
-    assert isinstance(deposit, Deposit)
-    return deposit
 
 
 def extent(deposit: Solid) -> list[float]:
@@ -59,7 +47,7 @@ def extent(deposit: Solid) -> list[float]:
     ],
 )
 def test_stock_only_on_skin_that_faces_a_direction(direction: tuple[int, int, int], expected: list[float]) -> None:
-    deposit = run(block(), CHIP, targets=[{"facing": {"direction": direction}, "outer": 1}])
+    deposit = deposit_on(block(), CHIP, targets=[{"facing": {"direction": direction}, "outer": 1}])
     assert extent(deposit) == pytest.approx(expected)
     area = {12 + 1 + MORE: 30.0, 12: 0.0}.get(expected[5], 0.0) or (20.0 if expected[0] < 0 else 0.0)
     assert deposit.stock_volume == pytest.approx(area * (1 + MORE), rel=INSET, abs=1e-6)
@@ -68,7 +56,7 @@ def test_stock_only_on_skin_that_faces_a_direction(direction: tuple[int, int, in
 def test_the_first_target_that_matches_is_used() -> None:
     top = {"direction": (0, 0, 1)}
     targets = [{"facing": top, "outer": 0.4}, {"facing": top, "outer": 2}, {"facing": top, "outer": 0}]
-    deposit = run(block(), CHIP, targets=targets)
+    deposit = deposit_on(block(), CHIP, targets=targets)
     assert deposit.stock_volume == pytest.approx(30 * (0.4 + MORE), rel=INSET)
     assert deposit.thickness == pytest.approx((0.4 + MORE,) * 3)
 
@@ -81,12 +69,12 @@ def test_the_first_target_that_matches_is_used() -> None:
     ],
 )
 def test_skin_is_cut_where_a_target_ends(where: dict[str, Any]) -> None:
-    deposit = run(block(), CHIP, targets=[{"facing": {"direction": [0, 0, 1]}, **where, "outer": 1}])
+    deposit = deposit_on(block(), CHIP, targets=[{"facing": {"direction": [0, 0, 1]}, **where, "outer": 1}])
     assert deposit.stock_volume == pytest.approx(2 * 5 * (1 + MORE), rel=INSET)
 
 
 def test_two_heights_beside_one_another() -> None:
-    deposit = run(
+    deposit = deposit_on(
         block(), CHIP,
         targets=[
             {"facing": {"direction": [0, 0, 1]}, "half_space": {"point": [4, 0, 0], "normal": [1, 0, 0]}, "outer": 2},
@@ -97,7 +85,7 @@ def test_two_heights_beside_one_another() -> None:
 
 
 def test_stock_on_edges_and_corner() -> None:
-    deposit = run(block(), CHIP, outer=1)
+    deposit = deposit_on(block(), CHIP, outer=1)
     high = 1 + MORE
     assert extent(deposit) == pytest.approx([-high, -high, 8, 6, 5, 12 + high])
     faces = (30 + 20 + 24) * high
@@ -117,15 +105,15 @@ def test_stock_on_edges_and_corner() -> None:
     ],
 )
 def test_what_is_kept_free(item: dict[str, Any], reached: float) -> None:
-    deposit = run(block(), CHIP, targets=[{"facing": {"direction": [0, 0, 1]}, "outer": 1}], keep_out=[item])
+    deposit = deposit_on(block(), CHIP, targets=[{"facing": {"direction": [0, 0, 1]}, "outer": 1}], keep_out=[item])
     assert deposit.stock_volume == pytest.approx(reached, rel=2e-3, abs=1e-6)
 
 
 def test_no_stock_covers_skin_kept_free() -> None:
     """The wall's stock in a concave corner ends above the floor that is kept free."""
     tool = Manifold.cube((6, 5, 6), True).translate((6, 10, 6))
-    both = run(bracket(), tool, outer=1)
-    free = run(bracket(), tool, outer=1, keep_out=[{"facing": {"direction": [0, 0, 1]}}])
+    both = deposit_on(bracket(), tool, outer=1)
+    free = deposit_on(bracket(), tool, outer=1, keep_out=[{"facing": {"direction": [0, 0, 1]}}])
     floor = Manifold.cube((3, 5, 1)).translate((6, 7.5, 6))
     assert (to_manifold(both) ^ floor).volume() == pytest.approx(3 * 5, rel=INSET)
     assert (to_manifold(free) ^ floor).volume() < 1e-6
@@ -135,19 +123,19 @@ def test_a_mesh_to_keep_free(tmp_path: Path) -> None:
     body = solid_of(Manifold.cube((3, 9, 9)).translate((-0.0, 0, 12)))
     write_stl(tmp_path / "pad.stl", body)
     target = {"facing": {"direction": [0, 0, 1]}, "outer": 1}
-    deposit = run(block(), CHIP, targets=[target], keep_out=[{"mesh": tmp_path / "pad.stl"}])
+    deposit = deposit_on(block(), CHIP, targets=[target], keep_out=[{"mesh": tmp_path / "pad.stl"}])
     assert deposit.stock_volume == pytest.approx(15 * (1 + MORE), rel=INSET)
 
 
 def test_a_damage_in_a_solid_to_keep_free_is_refused() -> None:
     with pytest.raises(StageError, match=r"50.0% of the damage volume, 60, lies in keep_out 1") as caught:
-        run(block(), CHIP, outer=1, keep_out=[{"box": [[-1, -1, 0], [3, 9, 20]]}])
+        deposit_on(block(), CHIP, outer=1, keep_out=[{"box": [[-1, -1, 0], [3, 9, 20]]}])
     assert "smaller solid" in caught.value.remedy
 
 
 def test_overlap_covers_the_intact_skin_around_the_rim() -> None:
     tool = Manifold.cube((8, 8, 4)).translate((10, 6, 10))
-    deposit = run(block(), tool, outer=1, overlap=1.5)
+    deposit = deposit_on(block(), tool, outer=1, overlap=1.5)
     reach = 8 * 8 + 4 * 8 * 1.5 + np.pi * 1.5**2
     assert deposit.stock_volume / (1 + MORE) == pytest.approx(reach, rel=0.01)
     low, high = deposit.bounds
@@ -159,7 +147,7 @@ def test_overlap_covers_the_intact_skin_around_the_rim() -> None:
 def test_overlap_stays_on_its_side_of_a_thin_wall() -> None:
     plate = Manifold.cube((20, 20, 1))
     tool = Manifold.cube((4, 4, 1)).translate((8, 8, 0.5))
-    deposit = run(plate, tool, outer=0.5, overlap=3)
+    deposit = deposit_on(plate, tool, outer=0.5, overlap=3)
     assert deposit.bounds[0][2] == pytest.approx(0.5)
 
 
@@ -167,7 +155,7 @@ def test_cut_back_removes_intact_metal_up_to_inner() -> None:
     tool = Manifold.sphere(4, 64).translate((15, 10, 12))
     body, inner = block(), 0.6
     lost = solid_of(body ^ tool)
-    deposit = run(body, tool, outer=1, inner=inner)
+    deposit = deposit_on(body, tool, outer=1, inner=inner)
     assert deposit.cavity is not None
     least = (Manifold.sphere(4 + inner, 128).translate((15, 10, 12)) ^ body).volume()
     most = (Manifold.sphere(4 + inner + TOLERANCE / 2, 128).translate((15, 10, 12)) ^ body).volume()
@@ -184,7 +172,7 @@ def test_a_deep_cut_back_of_a_pocket_has_the_volume_of_the_offset() -> None:
     """Thirty tolerances deep, round an L, whose inner corner gives the offset a crease."""
     inner, depth, block_ = 3.0, 2.0, Manifold.cube((60, 60, 20))
     arms = Manifold.cube((14, 6, depth)) + Manifold.cube((6, 14, depth))
-    deposit = run(block_, arms.translate((22, 22, 20 - depth)), outer=0, inner=inner)
+    deposit = deposit_on(block_, arms.translate((22, 22, 20 - depth)), outer=0, inner=inner)
     assert deposit.cavity is not None
 
     def offset(reach: float) -> float:
@@ -204,64 +192,9 @@ def test_a_deep_cut_back_of_a_pocket_has_the_volume_of_the_offset() -> None:
 def test_cut_back_leaves_out_the_other_damages() -> None:
     other = solid_of(Manifold.cube((3, 3, 3)).translate((16.2, 8, 9)))
     tool = Manifold.cube((4, 4, 3)).translate((12, 8, 9))
-    deposit = run(block(), tool, others=other, inner=0.5)
+    deposit = deposit_on(block(), tool, others=other, inner=0.5)
     assert deposit.cavity is not None
     assert (to_manifold(deposit.cavity) ^ to_manifold(other)).volume() < 1e-6
-
-
-def test_stock_on_both_faces_of_a_thin_blade() -> None:
-    tool = Manifold.cube((40, 40, 8), True).translate((0, 0, 30))
-    deposit = run(blade(), tool, outer=0.5)
-    points, normals = skin_points(solid_of(blade() ^ tool), part_of(blade()), 400, 3)
-    away = nearest(points + 0.5 * normals, deposit)[0]
-    assert deposit.thickness is not None
-    assert deposit.thickness[0] >= 0.5
-    assert deposit.thickness[2] <= 0.5 + TOLERANCE
-    assert np.percentile(away, 95) < TOLERANCE
-
-
-GAP = Manifold.cube((11, 6, 5)).translate((0, 4, 9))
-"""Takes the walls of both teeth beside a gap of the comb."""
-
-
-@pytest.mark.parametrize(("outer", "fits"), [(1.4, True), (1.6, False)])
-def test_a_gap_narrower_than_twice_the_stock(outer: float, fits: bool) -> None:
-    flanks = [{"facing": {"direction": [k, 0, 0], "angle": 20}, "outer": outer} for k in (-1, 1)]
-    if fits:
-        assert run(comb(3.0), GAP, targets=flanks).notes == ()
-        return
-    message = r"no room for the stock at \((4|7), .*\): 3 is free there, but the stock is 1.6 high and 1.6 on"
-    with pytest.raises(StageError, match=message):
-        run(comb(3.0), GAP, targets=flanks)
-    clipped = run(comb(3.0), GAP, targets=flanks, crowded="clip")
-    assert "clipped" in clipped.notes[0]
-    between = Manifold.cube((3, 6, 4)).translate((4, 4, 9))
-    assert (to_manifold(clipped) ^ between).volume() == pytest.approx(between.volume(), rel=INSET)
-
-
-def test_a_bore_that_would_close_is_refused() -> None:
-    tool = Manifold.cylinder(6, 8, 8, 64).translate((15, 10, 8))
-    inward = {"half_space": {"point": [0, 0, 11.9], "normal": [0, 0, -1]}, "outer": 5.5}
-    with pytest.raises(StageError, match=r"no room .* the stock is 5.5 high and 5.5 on the opposite wall"):
-        run(bored(), tool, targets=[inward])
-    assert run(bored(), tool, targets=[{**inward, "outer": 2.0}]).thickness is not None
-
-
-def test_an_intact_wall_in_the_way_is_refused() -> None:
-    tool = Manifold.cube((4, 6, 5)).translate((0, 4, 9))  # one tooth alone; the next one is 3 away
-    with pytest.raises(StageError, match=r"3 is free there, but the stock is 3.5 high"):
-        run(comb(3.0), tool, outer=3.5)
-    deposit = run(comb(3.0), tool, outer=3.5, crowded="clip")
-    left = comb(3.0) - tool
-    assert (to_manifold(deposit) ^ left).volume() < 1e-6
-
-
-@pytest.mark.parametrize("shape", [bracket, dovetail])
-def test_a_concave_corner_is_no_wall_in_the_way(shape: Any) -> None:
-    place = (6, 10, 6) if shape is bracket else (8.5, 15, 7)
-    deposit = run(shape(), Manifold.cube((4, 4, 4), True).translate(place), outer=0.8)
-    assert deposit.thickness is not None
-    assert deposit.thickness[0] >= 0.8
 
 
 def named(body: Any) -> Part:
@@ -278,25 +211,25 @@ def named(body: Any) -> Part:
 
 @pytest.mark.parametrize("where", [{"faces": [5]}, {"faces": ["top"]}, {"faces": ["top", 5]}])
 def test_cad_faces_by_number_and_name(where: dict[str, Any]) -> None:
-    deposit = run(block(), CHIP, part=named(block()), targets=[{**where, "outer": 1}])
+    deposit = deposit_on(block(), CHIP, part=named(block()), targets=[{**where, "outer": 1}])
     assert deposit.stock_volume == pytest.approx(30 * (1 + MORE), rel=INSET)
     assert deposit.touched == (5,)
 
 
 def test_heights_of_cad_faces() -> None:
-    deposit = run(block(), CHIP, part=named(block()), outer=0.5, targets=[{"faces": [5], "outer": 1}])
+    deposit = deposit_on(block(), CHIP, part=named(block()), outer=0.5, targets=[{"faces": [5], "outer": 1}])
     heights = dict(deposit.heights)
     assert heights.pop(5) == 1
     assert set(heights.values()) == {0.5}
     assert len(heights) == 2
     half = {"half_space": {"point": [3, 0, 0], "normal": [-1, 0, 0]}, "outer": 1}
-    assert dict(run(block(), CHIP, part=named(block()), targets=[half]).heights)[5] == -1
-    assert run(block(), CHIP, part=named(block()), outer=1, overlap=0.5).overlap == 0.5
+    assert dict(deposit_on(block(), CHIP, part=named(block()), targets=[half]).heights)[5] == -1
+    assert deposit_on(block(), CHIP, part=named(block()), outer=1, overlap=0.5).overlap == 0.5
 
 
 def test_kinds_of_surface() -> None:
     tool = Manifold.cube((6, 6, 4)).translate((18, 7, 9))
-    deposit = run(bored(), tool, part=named(bored()), targets=[{"kind": "cylinder", "outer": 0.5}])
+    deposit = deposit_on(bored(), tool, part=named(bored()), targets=[{"kind": "cylinder", "outer": 0.5}])
     assert 6 in deposit.touched
     assert 5 not in deposit.touched
     assert deposit.bounds[1][2] == pytest.approx(12)
@@ -313,7 +246,7 @@ def test_kinds_of_surface() -> None:
 )
 def test_faces_that_do_not_exist(part: Any, where: dict[str, Any], message: str, remedy: str) -> None:
     with pytest.raises(StageError, match=message) as caught:
-        run(block(), CHIP, part=part(block()), targets=[{**where, "outer": 1}])
+        deposit_on(block(), CHIP, part=part(block()), targets=[{**where, "outer": 1}])
     assert remedy in caught.value.remedy
 
 
@@ -338,44 +271,16 @@ def test_options_that_are_wrong(chosen: dict[str, Any], message: str) -> None:
         Milling.model_validate(chosen)
 
 
-def test_stock_that_is_clipped_everywhere_has_the_thickness_of_the_room() -> None:
-    """Both gaps beside the middle tooth are 3 wide and get filled."""
-    tool = Manifold.cube((4, 6, 5)).translate((7, 4, 9))
-    flanks = [{"facing": {"direction": [k, 0, 0], "angle": 20}, "outer": 3.5} for k in (-1, 1)]
-    deposit = run(comb(3.0), tool, targets=flanks, crowded="clip")
-    assert deposit.stock_volume == pytest.approx(2 * 3 * 6 * 4, rel=1e-3)
-    assert deposit.thickness == pytest.approx((3, 3, 3), abs=1e-3)
-    assert "nowhere as high as the options ask for: at most 3 of 3.5" in deposit.notes[1]
-    assert not any("ask for no stock" in note for note in deposit.notes)
-
-
-def test_a_bore_that_stock_closes_is_filled_to_its_axis() -> None:
-    tool = Manifold.cylinder(6, 8, 8, 64).translate((15, 10, 8))
-    inward = {"half_space": {"point": [0, 0, 11.9], "normal": [0, 0, -1]}, "outer": 5.5}
-    deposit = run(bored(), tool, targets=[inward], crowded="clip")
-    assert deposit.stock_volume == pytest.approx(np.pi * 5**2 * 3.9, rel=0.01)
-    assert deposit.thickness == pytest.approx((5.5, 5.5, 5.5), rel=0.01)
-    assert "ask for no stock" not in " ".join(deposit.notes)
-
-
-def test_stock_between_two_damaged_walls_is_no_thicker_than_the_gap() -> None:
-    flanks = [{"facing": {"direction": [k, 0, 0], "angle": 20}, "outer": 3.5} for k in (-1, 1)]
-    tool = Manifold.cube((2, 6, 4)).translate((3, 4, 9)) + Manifold.cube((2, 6, 4)).translate((6, 4, 9))
-    deposit = run(comb(3.0), tool, targets=flanks, crowded="clip")
-    assert deposit.thickness is not None
-    assert deposit.thickness[2] == pytest.approx(3, abs=1e-3)
+def test_no_stock_at_all_is_noted() -> None:
+    deposit = deposit_on(block(), CHIP)
+    assert deposit.volume == pytest.approx(120)
+    assert deposit.thickness is None
+    assert "ask for no stock" in deposit.notes[0]
 
 
 def test_stock_without_any_room_says_so() -> None:
     top = {"targets": [{"facing": {"direction": [0, 0, 1]}, "outer": 1}]}
-    deposit = run(block(), CHIP, **top, keep_out=[{"box": [[-9, -9, 12], [99, 99, 99]]}])
+    deposit = deposit_on(block(), CHIP, **top, keep_out=[{"box": [[-9, -9, 12], [99, 99, 99]]}])
     assert deposit.stock_volume == pytest.approx(0, abs=1e-6)
     assert deposit.thickness == (0, 0, 0)
     assert deposit.notes == ("the options ask for stock, but keep_out or metal leaves no room for any of it",)
-
-
-def test_no_stock_at_all_is_noted() -> None:
-    deposit = run(block(), CHIP)
-    assert deposit.volume == pytest.approx(120)
-    assert deposit.thickness is None
-    assert "ask for no stock" in deposit.notes[0]
