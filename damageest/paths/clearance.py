@@ -121,7 +121,7 @@ class Clearance:
     def _measure_from(self, points: Floats, pose: Ints, tips: Floats, axes: Floats) -> Floats:
         """Distances (M,) of points (M,3) from the nozzle at a ``pose`` (M,) each; negative inside."""
         assert self.nozzle.profile is not None
-        return _measure_points(points, tips.take(pose, 0), axes.take(pose, 0), self.nozzle.profile)
+        return measure_points(points, tips.take(pose, 0), axes.take(pose, 0), self.nozzle.profile)
 
     def _dive(self, roots: Ints, tips: Floats, axes: Floats, needed: float, high: Floats) -> None:
         """Lowers ``high`` (N,) straight down the tree: from the nearest of the balls ``roots`` (K,) to the nearest that
@@ -193,7 +193,7 @@ def _take_least(least: Floats, pose: Ints, found: Floats) -> None:
         least[own] = np.minimum(least[own], np.minimum.reduceat(found, starts))
 
 
-def _measure_points(points: Floats, tips: Floats, axes: Floats, profile: Floats) -> Floats:
+def measure_points(points: Floats, tips: Floats, axes: Floats, profile: Floats) -> Floats:
     """Distances (N,) of points (N,3) to the nozzle with its tip at ``tips`` (N,3) and its axis along ``axes`` (N,3)."""
     away = points - tips
     height = np.einsum("ij,ij->i", away, axes)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest.paths.clearance import Clearance
+from damageest.paths.gauges import Gauge
 from damageest.paths.process import Pass
 
 LIFTS = (1, 3, 9)
@@ -49,16 +49,20 @@ class Moves(NamedTuple):
     blocked: int
 
 
-def join_passes(groups: Sequence[tuple[Sequence[Pass], Clearance]], travel: Travel) -> Moves:
+Group = tuple[Sequence[Pass], Gauge, int]
+"""Passes, what the nozzle keeps clear of on the way to them, and the part of the deposit, from 1."""
+
+
+def join_passes(groups: Sequence[Group], travel: Travel) -> Moves:
     """One sequence of moves through passes in the part's frame.
 
-    ``groups``: the passes of each part of the deposit, and the clearance to what is there then. Between two passes the
-    tool is lifted by the hop, or by as much more as a clear straight way needs, up to the safe distance.
+    ``groups``: passes in their order, with the clearance to what is there then. Between two passes the tool is lifted
+    by the hop, or by as much more as a clear straight way needs, up to the safe distance.
     """
     rows: list[tuple[Floats, Floats, Floats, float, bool, int, int, int]] = []
     gap, number, blocked = np.inf, 0, 0
     before: Pass | None = None
-    for part, (passes, clearance) in enumerate(groups, 1):
+    for passes, clearance, part in groups:
         for one in passes:
             number += 1
             way, way_axes, found = _find_way(before, one, clearance, travel)
@@ -90,7 +94,7 @@ def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
     return np.asarray(point + max(root - along, travel.hop) * axis)
 
 
-def _find_way(before: Pass | None, one: Pass, clearance: Clearance, travel: Travel) -> tuple[Floats, Floats, float]:
+def _find_way(before: Pass | None, one: Pass, clearance: Gauge, travel: Travel) -> tuple[Floats, Floats, float]:
     """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
     stop, axis = one.points[0], one.axes[0]
     above = _lift(stop, axis, travel)
@@ -137,7 +141,7 @@ def _round_the_sphere(way: Floats, axes: Floats, travel: Travel) -> tuple[Floats
     return travel.centre + inner, turned
 
 
-def _measure_way(points: Floats, axes: Floats, clearance: Clearance, travel: Travel) -> float:
+def _measure_way(points: Floats, axes: Floats, clearance: Gauge, travel: Travel) -> float:
     """The least distance along a way, as a lower bound between the poses that are measured."""
     far = np.linalg.norm(np.diff(points, axis=0), axis=1) + clearance.bound_turns(axes)
     counts = np.clip(np.ceil(far / travel.gap - 1e-9).astype(int), 1, MOST_POSES)

@@ -15,7 +15,7 @@ from damageest.paths.clearance import Clearance
 from damageest.paths.fill import fill_region
 from damageest.paths.frames import Frame
 from damageest.paths.obstacles import Obstacles
-from damageest.paths.process import Pass, Plan, Process, order_passes, resample
+from damageest.paths.process import Pass, Plan, Process, extend_line, order_passes, resample
 from damageest.paths.regions import cover, make_region, measure_length, shift_border, unite_regions
 
 UNSUPPORTED, COLLIDES, SHORT = (
@@ -135,7 +135,7 @@ class _AxisChoice:
         limits = Limits(needed, process.step, process.turn_rate, least)
         sampled = []
         for line in lines:
-            line = _extend(line, *process.extend)
+            line = extend_line(line, *process.extend)
             sampled.append(resample(np.column_stack([line, np.full(len(line), top)]), process.step))
         chosen = choose_axes([points for points, _ in sampled], self.axes, self.last, clearance, limits)
         for (points, corner), pieces in zip(sampled, chosen, strict=True):
@@ -177,18 +177,3 @@ def _find_lowest(clearance: Clearance, axis: Floats) -> float:
     from damageest.paths.nozzle import turn_to_axis
 
     return float((clearance.nozzle.mesh.vertices @ turn_to_axis(axis).T)[:, 2].min() + clearance.standoff * axis[2])
-
-
-def _extend(line: Floats, before: float, after: float) -> Floats:
-    """A line that begins earlier and ends later; a closed one overlaps its own start."""
-    if not before and not after:
-        return line
-    if np.allclose(line[0], line[-1]):
-        at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-        stop = min(before + after, at[-1] / 2)
-        end = np.array([np.interp(stop, at, line[:, k]) for k in range(2)])
-        return np.concatenate([line, line[1:][at[1:] < stop], end[None]])
-    first, last = line[0] - line[1], line[-1] - line[-2]
-    start = line[0] + before * first / max(float(np.linalg.norm(first)), 1e-300)
-    end = line[-1] + after * last / max(float(np.linalg.norm(last)), 1e-300)
-    return np.concatenate([start[None], line[1:-1], end[None]])

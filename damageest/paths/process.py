@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Mesh
 from damageest.paths.fill import Pattern
 from damageest.paths.frames import Frame
 from damageest.paths.stripes import Bead
@@ -74,6 +74,7 @@ class Plan:
     """Passes for one build direction, in the order of their layers, in coordinates relative to the frame's origin.
 
     ``height``: of a layer. ``missing``: a Manifold of what they do not fill, or None; ``reasons``: volume by reason.
+    ``tops``: for each layer a surface that the nozzle stays above while it works on it; none where layers are planes.
     """
 
     frame: Frame
@@ -81,6 +82,7 @@ class Plan:
     passes: tuple[Pass, ...]
     missing: Any
     reasons: dict[str, float] = field(default_factory=dict)
+    tops: tuple[Mesh, ...] = ()
 
     @property
     def missing_volume(self) -> float:
@@ -101,6 +103,21 @@ def resample(line: Floats, longest: float) -> tuple[Floats, Floats]:
 def measure_along(points: Floats) -> Floats:
     """The way (N,) along a polyline to each of its points (N,K)."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def extend_line(line: Floats, before: float, after: float) -> Floats:
+    """A line that begins earlier and ends later; a closed one overlaps its own start."""
+    if not before and not after:
+        return line
+    if np.allclose(line[0], line[-1]):
+        at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        stop = min(before + after, at[-1] / 2)
+        end = np.array([np.interp(stop, at, line[:, k]) for k in range(2)])
+        return np.concatenate([line, line[1:][at[1:] < stop], end[None]])
+    first, last = line[0] - line[1], line[-1] - line[-2]
+    start = line[0] + before * first / max(float(np.linalg.norm(first)), 1e-300)
+    end = line[-1] + after * last / max(float(np.linalg.norm(last)), 1e-300)
+    return np.concatenate([start[None], line[1:-1], end[None]])
 
 
 def order_passes(passes: Sequence[Pass], start: Floats | None) -> list[Pass]:

@@ -69,6 +69,11 @@ class Layers(Path):
     height: Length = Field(
         description="largest height of a layer; layers are made equal, so that the last ends at the top"
     )
+    layers: Literal["planar", "conformal"] = Field(
+        "planar",
+        description="planar: planes across the build direction; conformal: surfaces at equal depth above the floor of "
+        "the cavity, that is what of the deposit lies on metal and is less than 75 degrees steep",
+    )
     width: Length = Field(description="of a bead")
     feed: Length = Field(description="speed of deposition, in lengths a minute")
     nozzle: Nozzle = Field(
@@ -136,6 +141,7 @@ class Layers(Path):
     def run(self, body: Solid, left: Solid | None, built: Solid | None, tolerance: float) -> DepositPath | None:
         """The path. Raises StageError where the nozzle, the fixture or the direction cannot be used."""
         from damageest.paths.assemble import Speeds, Task, plan_path
+        from damageest.paths.conformal import plan_conformal
         from damageest.paths.directions import find_open_normal
         from damageest.paths.planar import plan_planar
         from damageest.paths.process import Process
@@ -163,7 +169,7 @@ class Layers(Path):
         others: list[Mesh] = [built] if built is not None else []
         if self.fixture is not None:
             others.append(_read_mesh(self.fixture, "fixture", False))
-        return plan_path(
+        path = plan_path(
             Task(body, left, others, tolerance),
             self._make_nozzle(),
             self.standoff or self.width,
@@ -172,8 +178,12 @@ class Layers(Path):
                 self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance or 2 * self.width, self.simulate
             ),
             direction,
-            plan_planar,
+            plan_conformal if self.layers == "conformal" else plan_planar,
         )
+        if self.layers == "conformal" and not len(path.points):
+            why = "; ".join(item.why for item in path.unreached)
+            raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")
+        return path
 
     def _make_nozzle(self) -> Any:
         from damageest.paths import nozzle

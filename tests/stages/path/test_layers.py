@@ -10,9 +10,12 @@ import pytest
 from pydantic import ValidationError
 
 from damageest.artefacts import DepositPath, Mesh, Solid
+from damageest.errors import StageError
+from damageest.evaluate.paths.check import measure_nozzle
 from damageest.geometry.distance import distance_to_mesh
 from damageest.paths.nozzle import turn_to_axis
 from damageest.stages.path.layers import Layers
+from tests.paths.cavities import bowl, groove, stair, tip
 from tests.paths.shapes import NOZZLE, OPTIONS, TOLERANCE, Loss, corner, dent, plan, slot
 
 UP = (0.0, 0.0, 1.0)
@@ -161,6 +164,49 @@ def test_options_that_contradict_each_other_are_refused(options: dict[str, Any],
 def test_sites_named_come_first() -> None:
     stage = Layers(**OPTIONS, sites=(3, 1))
     assert sorted([1, 2, 3, 4], key=lambda number: (stage.rank_site(number), number)) == [3, 1, 2, 4]
+
+
+@cache
+def plan_along(name: str) -> tuple[Loss, DepositPath]:
+    loss = {"groove": groove, "bowl": bowl, "tip": tip}[name]()
+    return loss, plan(loss, layers="conformal", axes=5, direction=UP)
+
+
+@pytest.mark.parametrize("name", ["groove", "bowl", "tip"])
+def test_layers_along_the_floor_fill_the_deposit(name: str) -> None:
+    loss, path = plan_along(name)
+    assert path.unreached_volume < 0.01 * loss.lost.volume
+    assert path.fill is not None
+    assert path.fill.filled > 0.99
+    assert path.fill.spill_distance <= path.width
+    assert path.fill.void <= path.heights[0]
+    assert path.bead_volume > 0.7 * path.deposit_volume
+
+
+@pytest.mark.parametrize("name", ["groove", "bowl"])
+def test_the_turning_nozzle_keeps_its_clearance(name: str) -> None:
+    loss, path = plan_along(name)
+    assert np.abs(np.diff(path.axes[path.on], axis=0)).max() > 1e-3
+    assert path.clearance >= 0.2
+    assert measure_nozzle(path, loss.left, path.width / 40) >= min(path.clearance, path.travel_clearance) - 1e-6
+
+
+def test_the_nozzle_stays_above_the_layer_that_it_lays() -> None:
+    """Of a dome, whose middle lies in the way between its sides."""
+    loss, path = plan_along("tip")
+    own = path.layer == path.layer.max()
+    tips = (path.points + path.standoff * path.axes)[own]
+    assert measure_depth(tips, loss, path) >= path.layer.max() * path.heights[0] + 0.2
+
+
+def measure_depth(points: Any, loss: Loss, path: DepositPath) -> float:
+    """The least distance of points from the stub of the blade, a cylinder about the y axis."""
+    return float(np.linalg.norm(points[:, [0, 2]], axis=1).min() - 26)
+
+
+def test_a_floor_that_cannot_be_followed_is_refused() -> None:
+    with pytest.raises(StageError, match="steps"):
+        plan(stair(), layers="conformal", direction=UP)
 
 
 def test_a_nozzle_from_a_mesh(tmp_path: Any) -> None:
