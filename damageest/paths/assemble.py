@@ -112,8 +112,10 @@ def _group_passes(
     groups: list[Group] = []
     for layer, top in enumerate(plan.tops):
         turned = Mesh(top.vertices @ plan.frame.turn, top.faces)
-        above = clearance.with_obstacles(Obstacles([turned], low, high, process.bead.width))
         own = [one for one in passes if one.layer == layer]
+        if not own:
+            continue
+        above = clearance.with_obstacles(Obstacles([turned], low, high, process.bead.width))
         groups.append((own, Together([clearance, above]), part))
     return groups
 

@@ -115,8 +115,8 @@ class _Work:
             self.stack.append((sheet, reach))
             top = self._gather_top(grid)
             self.tops.append(top)
-            above = [prepare_sweeps(self.standing.clearance, [top], corners[0], corners[1], width)]
-            around = [self.standing, *(above if len(top.faces) else [])]
+            meshes = [top] if len(top.faces) else []
+            around = [self.standing, prepare_sweeps(self.standing.clearance, meshes, corners[0], corners[1], width)]
             self.layer = []
             for patch in list_patches(sheet, grid, reach, self.floor, self.process):
                 self._fill_patch(patch, number, reach, held - lean, around)

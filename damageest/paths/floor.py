@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
-from damageest.geometry.distance import SurfaceTree, distance_to_mesh
+from damageest.geometry.distance import SurfaceTree, is_inside
 from damageest.geometry.solids import to_arrays
 from damageest.paths.process import Process
 
 STEEPEST = np.radians(75.0)
 """Largest angle between the floor's normal and the build direction; what is steeper is a wall."""
-NEAR = 0.05
-"""Share of the bead's width or height within which a face lies on metal."""
+PROBE = 0.15
+"""Share of the bead's width or height by which metal is thick where a face lies on it: slivers do not count."""
 EDGE = 0.5
 """Longest edge of the floor's triangles in bead widths."""
 SPECK = 0.25
@@ -84,9 +84,8 @@ def find_floor(body: Any, metal: Any, process: Process) -> Floor | None:
     mesh = Mesh(vertices, faces)
     area = np.linalg.norm(mesh.cross, axis=1) / 2
     sound = area > 1e-12 * width**2
-    on_metal = sound & (
-        distance_to_mesh(mesh.triangles.mean(axis=1), Mesh(*to_arrays(metal))) < NEAR * min(width, process.height)
-    )
+    probe = mesh.triangles.mean(axis=1) + PROBE * min(width, process.height) * mesh.face_normals
+    on_metal = sound & is_inside(probe, Mesh(*to_arrays(metal)))
     is_floor = on_metal & (-mesh.cross[:, 2] > 2 * area * np.cos(STEEPEST))
     is_floor = _drop_specks(faces, on_metal, is_floor, area, SPECK * width**2)
     if not is_floor.any():
@@ -115,9 +114,11 @@ def _find_normals(mesh: Mesh, on_rim: Flags, radius: float) -> Floats:
     for corner in range(3):
         np.add.at(normals, mesh.faces[:, corner], mesh.cross)
     rim = np.flatnonzero(on_rim)
-    tree = cKDTree(mesh.triangles.mean(axis=1))
+    smooth = np.flatnonzero(mesh.face_normals[:, 2] > np.cos(STEEPEST))
+    tree = cKDTree(mesh.triangles[smooth].mean(axis=1))
     for vertex, near in zip(rim, tree.query_ball_point(mesh.vertices[rim], radius, return_sorted=True), strict=True):
-        normals[vertex] += mesh.cross[near].sum(axis=0)
+        total = mesh.cross[smooth[near]].sum(axis=0)
+        normals[vertex] = total if total.any() else normals[vertex]
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None])
 
 
@@ -138,5 +139,9 @@ def _drop_specks(faces: Ints, on_metal: Flags, is_floor: Flags, area: Floats, sm
         graph = coo_matrix((np.ones(linked.sum()), (first[linked], second[linked])), (len(faces), len(faces)))
         _, piece = connected_components(graph, directed=False)
         small = mine & (np.bincount(piece, weights=area * mine)[piece] < smallest)
+        if not kind:  # not where it is on the border
+            border = np.zeros(len(faces), bool)
+            border[piece[np.concatenate([first[~on_metal[second]], second[~on_metal[first]]])]] = True
+            small &= ~border[piece]
         found[small] = not kind
     return found & on_metal
