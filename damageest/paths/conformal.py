@@ -14,6 +14,7 @@ from damageest.paths.fill import fill_region
 from damageest.paths.floor import Floor, find_floor
 from damageest.paths.follow import follow_line, make_pass
 from damageest.paths.frames import Frame
+from damageest.paths.obstacles import Obstacles
 from damageest.paths.patches import NotFollowedError, Patch, list_patches
 from damageest.paths.planar import COLLIDES, SHORT, UNSUPPORTED, Surroundings
 from damageest.paths.process import Pass, Plan, Process, extend_line, order_passes, resample
@@ -28,7 +29,7 @@ from damageest.paths.sheets import (
     measure_reach,
     measure_support,
 )
-from damageest.paths.sweeps import Sweeps, prepare_sweeps
+from damageest.paths.sweeps import Sweeps
 
 NO_FLOOR, BESIDE = (
     "no side of it that lies on metal faces the build direction",
@@ -60,7 +61,8 @@ def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Proce
     corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
     meshes = [Mesh(*to_arrays(metal))]
     meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
-    standing = prepare_sweeps(around.clearance, meshes, corners[0], corners[1], process.bead.width)
+    near = Obstacles(meshes, corners[0], corners[1], process.bead.width)
+    standing = Sweeps(around.clearance.with_obstacles(near))
     thickest = float(floor.measure(to_arrays(local.refine_to_length(process.bead.width))[0]).distance.max())
     count = max(1, int(np.ceil(thickest / process.height - SPARE)))
     work = _Work(local, _crop(metal, corners, process), floor, standing, process, min(thickest / count, process.height))
@@ -116,7 +118,8 @@ class _Work:
             top = self._gather_top(grid)
             self.tops.append(top)
             meshes = [top] if len(top.faces) else []
-            around = [self.standing, prepare_sweeps(self.standing.clearance, meshes, corners[0], corners[1], width)]
+            above = Obstacles(meshes, corners[0], corners[1], width)
+            around = [self.standing, Sweeps(self.standing.clearance.with_obstacles(above))]
             self.layer = []
             for patch in list_patches(sheet, grid, reach, self.floor, self.process):
                 self._fill_patch(patch, number, reach, held - lean, around)

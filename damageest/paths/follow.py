@@ -22,6 +22,8 @@ ROOM = 1.5
 """Multiple of the clearance that counts as room to spare."""
 SPARSE, BEST = 5, 4
 """Points of a pass at which all ways to hold the tool are tried first, and how many of these are tried all along."""
+STILL = 1e-3
+"""Angle in radians between the axes at two points up to which the tool does not count as turning."""
 STRAIGHT = 0.002
 """Share of a bead's width by which a pass may leave out points that lie on a straight line."""
 TURN = 0.02
@@ -75,8 +77,9 @@ def _tilt_less(axes: Floats, angle: Floats) -> Floats:
 def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], process: Process, least: int) -> list[Run]:
     """The runs of a pass with points (N,3), N at least 2, and normals (N,3), along which the nozzle is clear.
 
-    Between two points, point and axis change evenly. The distance is taken so often that nothing comes nearer by more
-    than half of the process's step in between. ``least``: number of points of a run.
+    Between two points, point and axis change evenly, the axis not faster than the machine may turn it. The distance is
+    taken so often that nothing comes nearer by more than half of the process's step in between. ``least``: number of
+    points of a run.
     """
     ways, around = list_ways(normals, process), Together(parts)
     tried = [_measure(points, ways[0], around, process)]
@@ -128,6 +131,9 @@ def _measure(points: Floats, axes: Floats, around: Gauge, process: Process) -> _
     starts = np.concatenate([[0], np.cumsum(counts)])
     # the last pose of each stretch is the first of the next
     least = np.minimum(np.minimum.reduceat(gaps, starts[:-1]), gaps[starts[1:]])
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    angle = np.linalg.norm(np.diff(axes, axis=0), axis=1)
+    least[angle > process.turn_rate * length + STILL] = 0.0
     where = np.array([low + int(np.argmin(gaps[low : high + 1])) for low, high in pairwise(starts)])
     return _Try(axes, least, poses[where], turned[where])
 

@@ -80,6 +80,7 @@ def make_process(**options: Any) -> Process:
     values: dict[str, Any] = {
         "height": 1.0, "bead": Bead(2.0, 1.4), "pattern": "zigzag", "angle": 0.0, "turn": np.pi / 2,
         "overhang": np.pi / 4, "shortest": 0.0, "gap": 0.5, "axes": 5, "tilt": np.radians(60.0),
+        "turn_rate": np.radians(10.0),
     }  # fmt: skip
     return Process(**{**values, **options})
 
