@@ -12,7 +12,11 @@ from damageest.paths.regions import cover, turn_points
 
 NEAR, FAR = 1.0, 6.0
 """Bead widths along the rows up to which the end of one row is linked with the end of the next: in any case, and where
-the bead of the link stays as near to the region as other beads."""
+the link stays near enough to the region."""
+THIN = 0.1
+"""Bead widths at the two sides of a region that do not lengthen a row: beside so thin a tip the bead would spill."""
+BESIDE = 0.35
+"""Bead widths that the centre line of a link may be outside the region."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,10 @@ class Bead:
     def inset(self) -> float:
         """How far before the end of the region a row may stop so that its round end still covers the row's corners."""
         return float(np.sqrt(max(self.width**2 - self.step**2, 0.0)) / 2)
+
+    def find_inset(self, reach: float) -> float:
+        """The same for corners ``reach`` from the centre line, but not less than half as much as for other rows."""
+        return float(np.clip(np.sqrt(max(self.width**2 / 4 - reach**2, 0.0)), self.inset / 2, self.inset))
 
 
 @dataclass
@@ -49,7 +57,7 @@ def fill_with_rows(region: Any, bead: Bead, angle: float, linked: bool = True) -
     turned = region.rotate(float(-np.degrees(angle)))
     lines: list[Floats] = []
     for piece in sorted(turned.decompose(), key=lambda each: each.bounds()):
-        lines += _link(_find_rows(piece, bead), bead, piece.offset(bead.width / 2) if linked else None)
+        lines += _link(_find_rows(piece, bead), bead, piece.offset(BESIDE * bead.width) if linked else None)
     return [turn_points(line, angle) for line in lines]
 
 
@@ -58,10 +66,11 @@ def _find_rows(piece: Any, bead: Bead) -> list[_Row]:
     left, low, right, high = piece.bounds()
     extent = high - low
     if extent <= bead.width:
-        return [_shorten(0, (low + high) / 2, left, right, bead)]
+        return [_shorten(0, (low + high) / 2, left, right, bead, extent / 2)]
     count = 1 + int(np.ceil((extent - bead.width) / bead.step - 1e-9))
     heights = np.linspace(low + bead.width / 2, high - bead.width / 2, count)
-    edges = np.concatenate([[low - bead.width], (heights[1:] + heights[:-1]) / 2, [high + bead.width]])
+    thin = THIN * bead.width
+    edges = np.concatenate([[low + thin], (heights[1:] + heights[:-1]) / 2, [high - thin]])
     return [row for number in range(count) for row in _cut(piece, number, heights[number], edges, bead)]
 
 
@@ -72,18 +81,19 @@ def _cut(piece: Any, number: int, height: float, edges: Floats, bead: Bead) -> l
     left, _, right, _ = piece.bounds()
     low, high = float(edges[number]), float(edges[number + 1])
     stripe = CrossSection.square((right - left + 2, high - low)).translate((left - 1, low))
-    spans = sorted((each.bounds()[0], each.bounds()[2]) for each in (piece ^ stripe).decompose())
+    spans = sorted(each.bounds() for each in (piece ^ stripe).decompose())
     merged: list[list[float]] = []
-    for start, stop in spans:
+    for start, bottom, stop, top in spans:
+        reach = max(height - bottom, top - height)
         if merged and start - merged[-1][1] < bead.width / 2:
-            merged[-1][1] = max(merged[-1][1], stop)
+            merged[-1][1:] = [max(merged[-1][1], stop), max(merged[-1][2], reach)]
         else:
-            merged.append([start, stop])
-    return [_shorten(number, height, start, stop, bead) for start, stop in merged]
+            merged.append([start, stop, reach])
+    return [_shorten(number, height, start, stop, bead, reach) for start, stop, reach in merged]
 
 
-def _shorten(number: int, height: float, low: float, high: float, bead: Bead) -> _Row:
-    inset = min(bead.inset, 0.5 * (high - low) - 1e-3 * bead.width)
+def _shorten(number: int, height: float, low: float, high: float, bead: Bead, reach: float) -> _Row:
+    inset = min(bead.find_inset(reach), 0.5 * (high - low) - 1e-3 * bead.width)
     middle = (low + high) / 2
     if inset <= 0:
         return _Row(number, float(height), middle - 5e-4 * bead.width, middle + 5e-4 * bead.width)
