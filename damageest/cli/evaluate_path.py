@@ -17,7 +17,10 @@ def command(
         list[Path] | None,
         typer.Argument(metavar="[JOB]...", help="Job files; the losses of their virtual scans count."),
     ] = None,
-    each: Annotated[int, typer.Option(min=0, help="Number of pockets, worn bores, blade tips and broken teeth.")] = 8,
+    each: Annotated[
+        int,
+        typer.Option(min=0, help="Number of pockets, worn bores, blade tips, broken teeth, and of each tight place."),
+    ] = 6,
     random: Annotated[int, typer.Option(min=0, help="Number of random damages of the suite.")] = 20,
     out: Annotated[Path | None, typer.Option(dir_okay=False, help="File for the rows, as JSON.")] = None,
     write: Annotated[

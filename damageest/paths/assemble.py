@@ -14,10 +14,9 @@ from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.paths.beads import SHARE, Beads, simulate_beads
 from damageest.paths.clearance import Clearance
 from damageest.paths.directions import Planner, gather_missing, list_directions, plan_parts
-from damageest.paths.gauges import Together
-from damageest.paths.moves import Group, Moves, Travel, join_passes
+from damageest.paths.moves import Moves, Travel, join_passes, rank_layers
 from damageest.paths.nozzle import Nozzle
-from damageest.paths.obstacles import Obstacles
+from damageest.paths.obstacles import Obstacles, draw_passes
 from damageest.paths.planar import Surroundings
 from damageest.paths.process import Pass, Plan, Process
 
@@ -67,21 +66,15 @@ def plan_path(
     around = Surroundings(_take_metal(task.left, origin), _shift(task.others, origin), clearance)
     directions = list_directions(task.body, task.left, task.tolerance) if direction is None else [direction]
     plans = plan_parts(body, origin, directions, around, process, planner)
-    groups: list[Group] = []
-    standing = around.metal
-    for part, plan in enumerate(plans, 1):
-        meshes = [*_shift(task.others, origin), *([] if standing.is_empty() else [Mesh(*to_arrays(standing))])]
-        passes = [_to_relative(one, plan) for one in plan.passes]
-        low, high = task.body.bounds - origin
-        near = Obstacles(meshes, low, high, process.bead.width)
-        groups += _group_passes(passes, plan, part, clearance.with_obstacles(near), task, origin, process)
-        if plan is not plans[-1]:
-            standing = around.metal + (body - _to_relative_body(plan))
-    moves = join_passes(groups, _choose_travel(task, clearance, speeds, process, origin))
+    groups = [[_to_relative(one, plan) for one in plan.passes] for plan in plans]
+    near = _gather_obstacles(groups, plans, around, task.body.bounds - origin, process)
+    moves = join_passes(
+        groups, clearance.with_obstacles(near), _choose_travel(task, clearance, speeds, process, origin)
+    )
     missing = gather_missing(plans)
     solid = None if missing is None else to_solid(missing, origin)
     fill = _simulate(task, moves, plans, solid, origin, process) if speeds.is_simulated and len(moves.points) else None
-    tightest = min((one for passes, _, _ in groups for one in passes), key=lambda one: one.gap, default=None)
+    tightest = min((one for passes in groups for one in passes), key=lambda one: one.gap, default=None)
     path = DepositPath(
         moves.points + origin, moves.axes, moves.normals, moves.feed, moves.on, moves.layer, moves.number, moves.part,
         directions=np.array([plan.frame.direction for plan in plans]),
@@ -99,25 +92,6 @@ def plan_path(
         fill=fill,
     )  # fmt: skip
     return _add_notes(path, moves, process)
-
-
-def _group_passes(
-    passes: Sequence[Pass], plan: Plan, part: int, clearance: Clearance, task: Task, origin: Floats, process: Process
-) -> list[Group]:
-    """The passes of a part with what the nozzle keeps clear of on the way to them: for layers that are no planes, also
-    their tops."""
-    if not plan.tops:
-        return [(passes, clearance, part)]
-    low, high = task.body.bounds - origin
-    groups: list[Group] = []
-    for layer, top in enumerate(plan.tops):
-        turned = Mesh(top.vertices @ plan.frame.turn, top.faces)
-        own = [one for one in passes if one.layer == layer]
-        if not own:
-            continue
-        above = clearance.with_obstacles(Obstacles([turned], low, high, process.bead.width))
-        groups.append((own, Together([clearance, above]), part))
-    return groups
 
 
 def _take_metal(left: Solid | None, origin: Floats) -> Any:
@@ -138,12 +112,17 @@ def _to_relative(one: Pass, plan: Plan) -> Pass:
     return Pass(one.points @ turn, one.axes @ turn, one.normals @ turn, one.layer, one.gap, tightest)
 
 
-def _to_relative_body(plan: Plan) -> Any:
-    from manifold3d import Manifold
-
-    if plan.missing is None:
-        return Manifold()
-    return plan.missing.transform(np.hstack([plan.frame.turn.T, np.zeros((3, 1))]))
+def _gather_obstacles(
+    groups: Sequence[Sequence[Pass]], plans: Sequence[Plan], around: Surroundings, bounds: Floats, process: Process
+) -> Obstacles:
+    """What is left of the part and other meshes, and the beads of each layer with its rank."""
+    meshes = [*around.others, *([] if around.metal.is_empty() else [Mesh(*to_arrays(around.metal))])]
+    ranks = [0] * len(meshes)
+    for (group, layer), rank in rank_layers(groups).items():
+        own = [one for one in groups[group] if one.layer == layer]
+        meshes.append(draw_passes(own, process.bead.width, plans[group].height))
+        ranks.append(rank)
+    return Obstacles(meshes, bounds[0], bounds[1], process.bead.width, ranks)
 
 
 def _find_tightest(one: Pass | None, origin: Floats) -> Floats | None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
+from damageest.geometry.duplicates import list_distinct
 from damageest.paths.nozzle import Nozzle, turn_to_axis
 from damageest.paths.obstacles import MEMBERS, Obstacles
 
@@ -21,6 +22,7 @@ STRIDES = (16, 4, 1)
 """Of the poses of a pass, each sixteenth is measured first, then those in between for which it does not decide."""
 BEAM = 12
 """Balls of each level that are followed straight down the tree."""
+MOST_RANKS = 1 << 30
 ENOUGH = 1.5
 """Multiple of the needed distance from which a distance need not be known well."""
 
@@ -30,7 +32,8 @@ class Clearance:
     """The distance between a nozzle and obstacles.
 
     ``standoff``: how far the tip is above the point that it works on. ``detail``: how far the obstacles may lie from
-    what they stand for; it is taken off each distance. ``floor``: a height below which obstacles do not count.
+    what they stand for; it is taken off each distance. ``floor``: a height below which obstacles do not count;
+    ``until``: the last rank of those that stand already.
     """
 
     nozzle: Nozzle
@@ -38,6 +41,7 @@ class Clearance:
     obstacles: Obstacles | None = None
     detail: float = 0.0
     floor: float = -np.inf
+    until: int = 0
 
     def with_obstacles(self, obstacles: Obstacles | None) -> Clearance:
         """The same nozzle among other obstacles."""
@@ -47,16 +51,20 @@ class Clearance:
         """The same, where the bounds leave out what lies below the height ``floor``: the caller knows it to be far."""
         return replace(self, floor=floor)
 
+    def after(self, rank: int) -> Clearance:
+        """The same, among the obstacles of all ranks up to ``rank``."""
+        return replace(self, until=rank)
+
     @property
     def reach(self) -> float:
         """The farthest point of the nozzle from the point that it works on."""
         far = self.nozzle.mesh.vertices + np.array([0, 0, self.standoff])
         return float(np.linalg.norm(far, axis=1).max())
 
-    def measure(self, point: Floats, axis: Floats) -> float:
+    def measure(self, point: Floats, axis: Floats, ranks: Ints | None = None) -> float:
         """Distance between the nozzle, working on ``point`` (3,) with its axis along ``axis`` (3,), and the obstacles.
 
-        0 where they touch or overlap; inf without obstacles.
+        0 where they touch or overlap; inf without obstacles. ``ranks``: only those of these ranks.
         """
         import fcl
 
@@ -65,14 +73,18 @@ class Clearance:
             return found
         moving = self.nozzle.object
         moving.setTransform(fcl.Transform(turn_to_axis(axis), point + self.standoff * axis))
-        for each in self.obstacles.objects:
-            found = min(found, fcl.distance(each, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
+        for rank, each in zip(self.obstacles.ranks, self.obstacles.objects, strict=True):
+            if rank <= self.until and (ranks is None or rank in ranks):
+                found = min(found, fcl.distance(each, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
         return max(float(found) - self.detail, 0.0)
 
-    def bound(self, points: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats]:
+    def bound(
+        self, points: Floats, axes: Floats, needed: float, near: list[Ints] | None = None
+    ) -> tuple[Floats, Floats]:
         """Two distances (N,) for the poses at ``points`` (N,3) with ``axes`` (N,3): the true one lies between them.
 
         They are only as near to each other as it takes to see whether the nozzle keeps the distance ``needed``.
+        ``near`` takes the poses and the ranks (K,2) of what may be nearer than ``ENOUGH`` times that.
         """
         low, high = np.full(len(points), np.inf), np.full(len(points), np.inf)
         if self.obstacles is None or not self.obstacles.levels:
@@ -82,18 +94,21 @@ class Clearance:
         tips = points + self.standoff * axes
         for start in range(0, len(points), CHUNK):
             own = slice(start, start + CHUNK)
-            low[own], high[own] = self._bound_some(tips[own], axes[own], needed + self.detail)
+            low[own], high[own], pairs = self._bound_some(tips[own], axes[own], needed + self.detail)
+            if near is not None:
+                near.append(pairs + np.array([start, 0], np.int64))
         return np.maximum(low - self.detail, 0.0), np.maximum(high - self.detail, 0.0)
 
-    def _bound_some(self, tips: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats]:
-        """As `bound`, from tips (N,3). Most poses that are not free are found on the way straight down the tree; the
-        others go down it wherever a ball is near."""
+    def _bound_some(self, tips: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats, Ints]:
+        """As `bound`, from tips (N,3), with the poses and ranks (K,2). Most poses
+        that are not free are found straight down the tree; the others go down it wherever a ball is near."""
         assert self.obstacles is not None
         levels = self.obstacles.levels
         low, high = np.full(len(tips), np.inf), np.full(len(tips), np.inf)
-        ball = np.flatnonzero(levels[0].top > self.floor)
+        ball = np.flatnonzero((levels[0].top > self.floor) & (levels[0].rank <= self.until))
+        pairs = np.empty((0, 2), np.int64)
         if not len(ball):
-            return low, high
+            return low, high, pairs
         self._dive(ball, tips, axes, needed, high)
         pose = np.repeat(np.flatnonzero(high >= needed), len(ball))
         ball = np.tile(ball, len(tips))[: len(pose)]
@@ -107,16 +122,19 @@ class Clearance:
             if number == len(levels) - 1:
                 _take_least(high, pose, np.maximum(own, 0.0))
                 _take_least(low, pose, own - radius)
+                close = own - radius < ENOUGH * needed
+                pairs = np.stack([pose[close], level.rank.take(ball[close])], axis=1)
                 break
             _take_least(high, pose, np.maximum(own + radius, 0.0))
             lower = own - radius
             near = lower < ENOUGH * needed
             _take_least(low, pose[~near], lower[~near])
             pose, ball = np.repeat(pose[near], MEMBERS), _list_members(ball[near]).ravel()
-            kept = np.flatnonzero(levels[number + 1].top.take(ball) > self.floor)
+            following = levels[number + 1]
+            kept = np.flatnonzero((following.top.take(ball) > self.floor) & (following.rank.take(ball) <= self.until))
             pose, ball = pose[kept], ball[kept]
         low[high < needed] = 0.0
-        return low, high
+        return low, high, pairs
 
     def _measure_from(self, points: Floats, pose: Ints, tips: Floats, axes: Floats) -> Floats:
         """Distances (M,) of points (M,3) from the nozzle at a ``pose`` (M,) each; negative inside."""
@@ -132,7 +150,7 @@ class Clearance:
         for number, level in enumerate(self.obstacles.levels):
             flat, count = ball.ravel(), ball.shape[1]
             own = self._measure_from(level.one.take(flat, 0), np.repeat(pose, count), tips, axes)
-            own[level.top.take(flat) <= self.floor] = np.inf
+            own[(level.top.take(flat) <= self.floor) | (level.rank.take(flat) > self.until)] = np.inf
             found = own.reshape(-1, count)
             most = min(BEAM, count - 1)
             nearest = np.argpartition(found, most, axis=1)[:, : most + 1]
@@ -164,14 +182,31 @@ class Clearance:
 
     def _measure_some(self, points: Floats, axes: Floats, far: Floats, needed: float) -> Floats:
         """As `measure_poses`; ``far`` (N,): the way to each pose."""
-        low, high = self.bound(points, axes, needed)
+        near: list[Ints] = []
+        low, high = self.bound(points, axes, needed, near)
         found = np.where(high < needed, high, low)
+        undecided = np.flatnonzero((low < needed) & (high >= needed))
+        if not len(undecided):
+            return found
+        ranks = self._list_ranks(near, undecided, len(points))
         known, at = -np.inf, 0.0
-        for k in np.flatnonzero((low < needed) & (high >= needed)):
+        for k, own in zip(undecided, ranks, strict=True):
             if known - (far[k] - at) < needed:
-                known, at = self.measure(points[k], axes[k]), float(far[k])
+                known, at = self.measure(points[k], axes[k], own), float(far[k])
+                if own is not None:  # the others are farther than that
+                    known = min(known, ENOUGH * needed)
             found[k] = known - (far[k] - at)
         return found
+
+    def _list_ranks(self, near: list[Ints], chosen: Ints, count: int) -> list[Ints | None]:
+        """For each of the ``chosen`` of ``count`` poses the ranks of what may be near; None for all."""
+        assert self.obstacles is not None
+        if not near or self.obstacles.ranks[-1] == self.obstacles.ranks[0]:
+            return [None] * len(chosen)
+        number = list_distinct(np.concatenate(near) @ np.array([MOST_RANKS, 1]))
+        pose, rank = number // MOST_RANKS, number % MOST_RANKS
+        ends = np.searchsorted(pose, np.arange(count + 1))
+        return [rank[ends[k] : ends[k + 1]] for k in chosen]
 
     def bound_turns(self, axes: Floats) -> Floats:
         """How far (N-1,) any point of the nozzle moves at most while its axis turns from each of ``axes`` (N,3) to the

@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
 from damageest.paths.frames import Frame, make_frame, make_unit
+from damageest.paths.obstacles import draw_passes
 from damageest.paths.planar import Surroundings
 from damageest.paths.process import Plan, Process
 
@@ -92,11 +93,20 @@ def plan_parts(
         left = plans[-1].missing
         left_local = left.transform(np.hstack([plans[-1].frame.turn.T, np.zeros((3, 1))]))
         standing = around.metal + (body - left_local)
-        plan = choose_direction(left_local, origin, within, replace(around, metal=standing), process, planner)
+        beads = [
+            Mesh(mesh.vertices @ plan.frame.turn, mesh.faces) for plan in plans for mesh in _draw_plan(plan, process)
+        ]
+        there = replace(around, metal=standing, others=[*around.others, *beads])
+        plan = choose_direction(left_local, origin, within, there, process, planner)
         if plan.missing_volume > 0.9 * plans[-1].missing_volume:
             break
         plans.append(plan)
     return plans
+
+
+def _draw_plan(plan: Plan, process: Process) -> list[Mesh]:
+    """The beads of a plan, in its local coordinates."""
+    return [draw_passes(plan.passes, process.bead.width, plan.height)] if plan.passes else []
 
 
 def gather_missing(plans: Sequence[Plan]) -> Any:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest.paths.gauges import Gauge
+from damageest.paths.clearance import Clearance
 from damageest.paths.process import Pass
 
 LIFTS = (1, 3, 9)
@@ -49,23 +49,24 @@ class Moves(NamedTuple):
     blocked: int
 
 
-Group = tuple[Sequence[Pass], Gauge, int]
-"""Passes, what the nozzle keeps clear of on the way to them, and the part of the deposit, from 1."""
-
-
-def join_passes(groups: Sequence[Group], travel: Travel) -> Moves:
+def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: Travel) -> Moves:
     """One sequence of moves through passes in the part's frame.
 
-    ``groups``: passes in their order, with the clearance to what is there then. Between two passes the tool is lifted
-    by the hop, or by as much more as a clear straight way needs, up to the safe distance.
+    ``groups``: the passes of each part of the deposit. ``clearance``: to what is there; the layers, numbered from 1
+    over all groups, have that rank. Between two passes the tool is lifted by the hop, or by as much more as a clear
+    straight way needs, up to the safe distance. On the way to a pass the layers before it stand, and its own layer
+    unless the pass is the first of it.
     """
     rows: list[tuple[Floats, Floats, Floats, float, bool, int, int, int]] = []
     gap, number, blocked = np.inf, 0, 0
     before: Pass | None = None
-    for passes, clearance, part in groups:
+    old, ranks = 0, rank_layers(groups)
+    for part, passes in enumerate(groups, 1):
         for one in passes:
+            rank = ranks[part - 1, one.layer]
             number += 1
-            way, way_axes, found = _find_way(before, one, clearance, travel)
+            way, way_axes, found = _find_way(before, one, clearance.after(rank if rank == old else rank - 1), travel)
+            old = rank
             blocked += found < travel.gap / 2
             gap = min(gap, found)
             for point, axis in zip(way, way_axes, strict=True):
@@ -86,6 +87,12 @@ def join_passes(groups: Sequence[Group], travel: Travel) -> Moves:
     return Moves(points, axes, normals, feed, on, layer, numbers, parts, gap, blocked)
 
 
+def rank_layers(groups: Sequence[Sequence[Pass]]) -> dict[tuple[int, int], int]:
+    """The number, from 1, of each layer that has passes, by the number of its group and its own in the group."""
+    layers = dict.fromkeys((number, one.layer) for number, passes in enumerate(groups) for one in passes)
+    return {each: rank for rank, each in enumerate(layers, 1)}
+
+
 def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
     """The point (3,) at the safe distance from the centre, straight up the axis."""
     away = point - travel.centre
@@ -94,7 +101,7 @@ def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
     return np.asarray(point + max(root - along, travel.hop) * axis)
 
 
-def _find_way(before: Pass | None, one: Pass, clearance: Gauge, travel: Travel) -> tuple[Floats, Floats, float]:
+def _find_way(before: Pass | None, one: Pass, clearance: Clearance, travel: Travel) -> tuple[Floats, Floats, float]:
     """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
     stop, axis = one.points[0], one.axes[0]
     above = _lift(stop, axis, travel)
@@ -141,7 +148,7 @@ def _round_the_sphere(way: Floats, axes: Floats, travel: Travel) -> tuple[Floats
     return travel.centre + inner, turned
 
 
-def _measure_way(points: Floats, axes: Floats, clearance: Gauge, travel: Travel) -> float:
+def _measure_way(points: Floats, axes: Floats, clearance: Clearance, travel: Travel) -> float:
     """The least distance along a way, as a lower bound between the poses that are measured."""
     far = np.linalg.norm(np.diff(points, axis=0), axis=1) + clearance.bound_turns(axes)
     counts = np.clip(np.ceil(far / travel.gap - 1e-9).astype(int), 1, MOST_POSES)

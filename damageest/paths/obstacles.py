@@ -11,6 +11,8 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import order_integers
+from damageest.paths.frames import find_across
+from damageest.paths.process import Pass
 
 FINE, GROWTH = 0.4, 0.4
 """Longest edge of the obstacles' triangles, whose middles are the points: in bead widths near the deposit, and as a
@@ -19,18 +21,21 @@ MEMBERS = 8
 """Balls of one level of the tree, or points, that a ball of the next level holds."""
 ROOTS = 16
 """Balls of the first level at most."""
+SIDES = 6
+"""Of the half circle at the end of a bead."""
 BITS = 14
 """Digits of a point's place along each axis by which neighbours are found."""
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Balls: ``middle`` (K,3), ``radius`` (K,), ``top`` (K,): the largest height of what they hold, and ``one`` (K,3):
-    a point on the surface that they hold, near the middle."""
+    """Balls: ``middle`` (K,3), ``radius`` (K,), ``top`` (K,): the largest height of what they hold, ``rank`` (K,): the
+    least rank of it, and ``one`` (K,3): a point of that rank on the surface that they hold, near the middle."""
 
     middle: Floats
     radius: Floats
     top: Floats
+    rank: Ints
     one: Floats
 
 
@@ -42,12 +47,17 @@ class Obstacles:
     of the level before. ``objects``: the meshes, as FCL has them.
     """
 
-    def __init__(self, meshes: Sequence[Mesh], low: Floats, high: Floats, width: float) -> None:
-        """``low``, ``high`` (3,): the box round the deposit, near which the points are dense; ``width`` of a bead."""
+    def __init__(
+        self, meshes: Sequence[Mesh], low: Floats, high: Floats, width: float, ranks: Sequence[int] | None = None
+    ) -> None:
+        """``low``, ``high`` (3,): the box round the deposit, near which the points are dense; ``width`` of a bead;
+        ``ranks``: of each mesh, ascending: when it comes to stand. All stand from the beginning by default."""
         self.trees: list[Any] = [make_tree(mesh) for mesh in meshes]
+        self.ranks: list[int] = [0] * len(meshes) if ranks is None else list(ranks)
         parts = [_cut_triangles(mesh.triangles, low, high, width) for mesh in meshes]
         triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
-        self.levels: list[Level] = _make_levels(triangles) if len(triangles) else []
+        rank = np.repeat(np.array(self.ranks, np.int64), [len(part) for part in parts])
+        self.levels: list[Level] = _make_levels(triangles, rank) if len(triangles) else []
         self._turn = np.eye(3)
 
     @cached_property
@@ -59,11 +69,50 @@ class Obstacles:
     def turn(self, turn: Floats) -> Obstacles:
         """The same in other coordinates, whose axes are the rows of ``turn`` (3,3)."""
         found = Obstacles((), np.zeros(3), np.zeros(3), 1.0)
-        found.trees, found._turn = self.trees, turn @ self._turn
+        found.trees, found.ranks, found._turn = self.trees, self.ranks, turn @ self._turn
         for level in self.levels:
             middle = level.middle @ turn.T
-            found.levels.append(Level(middle, level.radius, middle[:, 2] + level.radius, level.one @ turn.T))
+            found.levels.append(
+                Level(middle, level.radius, middle[:, 2] + level.radius, level.rank, level.one @ turn.T)
+            )
         return found
+
+
+def draw_beads(start: Floats, stop: Floats, normals: Floats, width: float, height: float) -> Mesh:
+    """Closed prisms that hold the beads from ``start`` (N,3) to ``stop`` (N,3), both on their tops.
+
+    ``normals`` (N,3): of the layer. The round ends have `SIDES` sides each.
+    """
+    along = stop - start
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    across = np.cross(normals, along) / np.maximum(length, 1e-300)
+    along = along / np.maximum(length, 1e-300)
+    short = length[:, 0] <= 1e-12
+    if short.any():
+        along[short] = np.array([find_across(normal) for normal in normals[short]])
+        across[short] = np.cross(normals[short], along[short])
+    angle = np.pi * (np.arange(SIDES) + 0.5) / SIDES - np.pi / 2
+    radius = width / 2 / np.cos(np.pi / SIDES / 2)
+    ahead = radius * (np.cos(angle)[:, None] * along[:, None] + np.sin(angle)[:, None] * across[:, None])
+    top = np.concatenate([stop[:, None] + ahead, start[:, None] - ahead], axis=1)
+    corners = np.concatenate([top, top - height * normals[:, None]], axis=1)
+    count = 2 * SIDES
+    near = np.arange(count)
+    after = (near + 1) % count
+    fan = np.stack([np.zeros(count - 2, int), near[1:-1], near[2:]], axis=1)
+    sides = np.concatenate(
+        [np.stack([near + count, after + count, after], axis=1), np.stack([near + count, after, near], axis=1)]
+    )
+    faces = np.concatenate([fan, fan[:, ::-1] + count, sides])
+    shift = 2 * count * np.arange(len(start))
+    return Mesh(corners.reshape(-1, 3), (faces + shift[:, None, None]).reshape(-1, 3))
+
+
+def draw_passes(passes: Sequence[Pass], width: float, height: float) -> Mesh:
+    """The beads of passes, see `draw_beads`."""
+    start = np.concatenate([one.points[:-1] for one in passes])
+    stop = np.concatenate([one.points[1:] for one in passes])
+    return draw_beads(start, stop, np.concatenate([one.normals[1:] for one in passes]), width, height)
 
 
 def make_tree(mesh: Mesh) -> Any:
@@ -77,7 +126,7 @@ def make_tree(mesh: Mesh) -> Any:
     return tree
 
 
-def _make_levels(triangles: Floats) -> list[Level]:
+def _make_levels(triangles: Floats, rank: Ints) -> list[Level]:
     points = triangles.mean(axis=1)
     order = _order_by_place(points)
     depth = 0
@@ -87,15 +136,17 @@ def _make_levels(triangles: Floats) -> list[Level]:
     order = np.append(order, np.repeat(order[-1:], -len(order) % MEMBERS**depth))
     points = points[order]
     radius = np.sqrt(((triangles[order] - points[:, None]) ** 2).sum(axis=2).max(axis=1))
-    levels = [Level(points, radius, triangles[order, :, 2].max(axis=1), points)]
+    levels = [Level(points, radius, triangles[order, :, 2].max(axis=1), rank[order], points)]
     for _ in range(depth):
         own, reach = levels[0].middle.reshape(-1, MEMBERS, 3), levels[0].radius.reshape(-1, MEMBERS)
         middle = (own.min(axis=1) + own.max(axis=1)) / 2
         away = np.sqrt(((own - middle[:, None]) ** 2).sum(axis=2)) + reach
-        ones = levels[0].one.reshape(-1, MEMBERS, 3)
-        best = ((ones - middle[:, None]) ** 2).sum(axis=2).argmin(axis=1)
+        ones, ranks = levels[0].one.reshape(-1, MEMBERS, 3), levels[0].rank.reshape(-1, MEMBERS)
+        far = ((ones - middle[:, None]) ** 2).sum(axis=2)
+        best = np.where(ranks == ranks.min(axis=1)[:, None], far, np.inf).argmin(axis=1)
         top = levels[0].top.reshape(-1, MEMBERS).max(axis=1)
-        levels.insert(0, Level(middle, away.max(axis=1), top, ones[np.arange(len(ones)), best]))
+        one = ones[np.arange(len(ones)), best]
+        levels.insert(0, Level(middle, away.max(axis=1), top, ranks.min(axis=1), one))
     return levels
 
 

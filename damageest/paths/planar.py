@@ -71,8 +71,8 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         done = cover([one.points[:, :2] for one in made], process.bead.width)
         left = {
             UNSUPPORTED: wanted - held,
-            COLLIDES: (cover(dropped, process.bead.width) ^ held) - done,
-            SHORT: (cover(short, process.bead.width) ^ held) - done - cover(dropped, process.bead.width),
+            COLLIDES: (cover(long, process.bead.width) ^ held) - done if dropped else make_region([]),
+            SHORT: (cover(short, process.bead.width) ^ held) - done - cover(long, process.bead.width),
         }
         for why, region in left.items():
             if region.is_empty():

@@ -83,8 +83,9 @@ def _cut(piece: Any, number: int, height: float, edges: Floats, bead: Bead) -> l
     stripe = CrossSection.square((right - left + 2, high - low)).translate((left - 1, low))
     spans = sorted(each.bounds() for each in (piece ^ stripe).decompose())
     merged: list[list[float]] = []
+    outside = THIN * bead.width if number in (0, len(edges) - 2) else 0.0
     for start, bottom, stop, top in spans:
-        reach = max(height - bottom, top - height)
+        reach = max(height - bottom, top - height) + outside
         if merged and start - merged[-1][1] < bead.width / 2:
             merged[-1][1:] = [max(merged[-1][1], stop), max(merged[-1][2], reach)]
         else:

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from damageest.artefacts import DepositPath, Solid
-from damageest.evaluate.paths.check import count_crossings, measure_nozzle
+from damageest.evaluate.paths.check import count_crossings, measure_built, measure_nozzle
 from damageest.evaluate.paths.scenes import Scene
 from damageest.stages.path.layers import Layers
 
@@ -21,9 +21,10 @@ SUFFICES = 0.01
 
 @dataclass(frozen=True)
 class PathRow:
-    """One deposit. Lengths in the part's unit; ``gap``: least distance of the nozzle by the independent check;
-    ``claimed``: by the planner. Both in bead widths. Shares of the deposit: ``unreached_3``, ``unreached_5``; of the
-    reachable: ``filled``. ``seconds_3``, ``seconds_5``: of the processor."""
+    """One deposit. Lengths in the part's unit; ``gap``: least distance of the nozzle from metal by the independent
+    check; ``built``: the same from beads that were laid before; ``claimed``: by the planner. All three in bead widths.
+    Shares of the deposit: ``unreached_3``, ``unreached_5``; of the reachable: ``filled``. ``seconds_3``, ``seconds_5``:
+    of the processor."""
 
     kind: str
     name: str
@@ -37,6 +38,7 @@ class PathRow:
     void: float
     largest_gap: float
     gap: float
+    built: float
     claimed: float
     crossings: int
     passes: int
@@ -81,6 +83,7 @@ def evaluate_scene(scene: Scene) -> PathRow:
         void=fill.void / min(width, height) if fill else np.nan,
         largest_gap=fill.largest_gap / (width**2 * height) if fill else np.nan,
         gap=gap / width,
+        built=(measure_built(path, path.width / 4 / 2) if path.on.any() else np.inf) / width,
         claimed=min(path.clearance, path.travel_clearance) / width,
         crossings=count_crossings(path),
         passes=path.passes,
@@ -117,7 +120,7 @@ def make_table(rows: Sequence[PathRow]) -> str:
 
     head = [
         "deposits", "number", "out of reach, 3 axes", "5 axes", "5 needed", "filled, least", "spill, largest",
-        "void, largest", "nozzle gap, least", "travel, median", "time 3 axes", "5 axes",
+        "void, largest", "nozzle gap, least", "from beads", "travel, median", "time 3 axes", "5 axes",
     ]  # fmt: skip
     lines = [head]
     for kind in [*dict.fromkeys(row.kind for row in rows), "all"]:
@@ -134,6 +137,7 @@ def make_table(rows: Sequence[PathRow]) -> str:
                 f"{np.nanmax([row.spill for row in own]):.2f}",
                 f"{np.nanmax([row.void for row in own]):.2f}",
                 f"{min(row.gap for row in own):.2f}",
+                f"{min(row.built for row in own):.2f}",
                 f"{np.median([row.travel for row in own]):.0%}",
                 f"{np.median([row.seconds_3 for row in own]):.1f} s",
                 f"{np.median([row.seconds_5 for row in own]):.1f} s",

@@ -12,6 +12,7 @@ import numpy as np
 from damageest.artefacts import Part, Solid
 from damageest.evaluate.damages import KINDS, make_random_damage
 from damageest.evaluate.parts import PARTS
+from damageest.evaluate.paths.tight import TIGHT
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.stages.scan.scanner import apply_tools
 
@@ -143,11 +144,15 @@ def read_job(path: Path, registry: Any) -> list[Scene]:
 
 
 def make_scenes(jobs: Sequence[Path], each: int, random: int, registry: Any) -> list[Scene]:
-    """Deposits of the jobs, ``each`` of the four kinds that are made to measure, and ``random`` of the suite."""
+    """Deposits of the jobs, ``each`` of the kinds that are made to measure, and ``random`` of the suite."""
     scenes = [scene for path in jobs for scene in read_job(path, registry)]
     for kind, make in MAKERS.items():
         for number in range(each):
             scenes += make(np.random.default_rng([4711, number, len(kind)]), f"{kind} {number + 1}")[:1]
+    for kind, lose in TIGHT.items():
+        for number in range(each):
+            loss = lose(np.random.default_rng([4712, number, len(kind)]))
+            scenes += _cut(kind, f"{kind} {number + 1}", loss.part, loss.tool)[:1]
     for seed in range(random):
         scenes += make_random(seed)[:1]
     return scenes
