@@ -134,20 +134,26 @@ def stamp_beads(beads: Beads, frame: Frame, low: Floats, size: tuple[int, int, i
     ball = ball[np.linalg.norm(ball, axis=1) * edge <= half]
     for first in range(0, len(points), max(CHUNK // len(ball), 1)):
         own = slice(first, first + max(CHUNK // len(ball), 1))
-        width, height = beads.width[owner[own]], beads.height[owner[own]]
-        _stamp(done, points[own], middle[own], normal[owner[own]], width, height, ball, low, edge)
+        which = owner[own]
+        ahead, behind = (stop - start)[which] * (1 - share[own, None]), (stop - start)[which] * share[own, None]
+        width, height = beads.width[which], beads.height[which]
+        _stamp(done, points[own], middle[own], normal[which], ahead, behind, width, height, ball, low, edge)
     return done
 
 
 def _stamp(
-    done: NDArray[np.bool_], points: Floats, middle: Floats, normal: Floats, width: Floats, height: Floats,
-    ball: NDArray[np.int64], low: Floats, edge: float,
+    done: NDArray[np.bool_], points: Floats, middle: Floats, normal: Floats, ahead: Floats, behind: Floats,
+    width: Floats, height: Floats, ball: NDArray[np.int64], low: Floats, edge: float,
 ) -> None:  # fmt: skip
-    """Marks the voxels in discs as wide as the bead and as high as the layer, with their tops at ``points`` (N,3)."""
+    """Marks the voxels near ``points`` (N,3) on the tops of beads that lie in the bead: as high as the layer, and not
+    farther than half its width from the line that goes on ``ahead`` (N,3) and ``behind`` (N,3)."""
     cell = np.floor((middle - low) / edge).astype(np.int64)[:, None] + ball
     away = low + (cell + 0.5) * edge - points[:, None]
     up = np.einsum("nmi,ni->nm", away, normal)
-    across = np.einsum("nmi,nmi->nm", away, away) - up**2
+    front, back = np.linalg.norm(ahead, axis=1), np.linalg.norm(behind, axis=1)
+    along = np.einsum("nmi,ni->nm", away, (ahead + behind) / np.maximum(front + back, 1e-300)[:, None])
+    beside = np.clip(along, -back[:, None], front[:, None])
+    across = np.einsum("nmi,nmi->nm", away, away) - up**2 - beside * (2 * along - beside)
     tiny = 1e-9 * edge
     inside = (up <= tiny) & (up >= -height[:, None] - tiny) & (across <= (width[:, None] / 2) ** 2 + tiny)
     inside &= ((cell >= 0) & (cell < np.array(done.shape))).all(axis=2)
