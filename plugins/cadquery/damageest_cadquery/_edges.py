@@ -84,7 +84,7 @@ def _measure_edge(edge: Any, other: Any, faces: Sequence[Any], first: int, secon
         point, way = gp_Pnt(), gp_Vec()
         curve.D1(parameter, point, way)
         points[k], tangents[k] = point.Coord(), way.Coord()
-    tangents *= (-1.0 if reverse else 1.0) / np.maximum(np.linalg.norm(tangents, axis=1), 1e-300)[:, None]
+    tangents = normalise(-tangents if reverse else tangents)
     normals, others = (
         measure_normals(shape, faces[number], parameters) for shape, number in ((edge, first), (other, second))
     )
