@@ -42,6 +42,8 @@ SLIVER = 0.05
 GROWN, DEEPER = 0.1, 0.5
 """Shares of a bead's width and height by which layers are taken to be wider and deeper when it is looked for: below a
 crease of the floor it is farther than one height to the layer below."""
+ROUGH = 0.02
+"""Share of a layer's height within which the deposit is simplified where it is looked for in a layer."""
 THIN = 0.01
 """Share of the layer height up to which what reaches into a layer is left out."""
 
@@ -103,7 +105,7 @@ class _Work:
 
     def build(self, count: int, corners: Floats) -> None:
         grid = make_grid(self.floor, corners[0, :2], corners[1, :2], self.process)
-        solid = Mesh(*to_arrays(self.body))
+        solid = Mesh(*to_arrays(self.body.simplify(ROUGH * self.height)))
         heights = guess_heights(self.floor, grid)
         width = self.process.bead.width
         for number in range(count):

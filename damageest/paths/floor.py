@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
-from damageest.geometry.distance import SurfaceTree, is_inside
+from damageest.geometry.distance import SurfaceTree, distance_to_mesh, is_inside
 from damageest.geometry.solids import to_arrays
 from damageest.paths.process import Process
 
@@ -84,8 +84,11 @@ def find_floor(body: Any, metal: Any, process: Process) -> Floor | None:
     mesh = Mesh(vertices, faces)
     area = np.linalg.norm(mesh.cross, axis=1) / 2
     sound = area > 1e-12 * width**2
-    probe = mesh.triangles.mean(axis=1) + PROBE * min(width, process.height) * mesh.face_normals
-    on_metal = sound & is_inside(probe, Mesh(*to_arrays(metal)))
+    on_metal, standing = np.zeros(len(faces), bool), Mesh(*to_arrays(metal))
+    middle, deep = mesh.triangles.mean(axis=1), PROBE * min(width, process.height)
+    near = np.flatnonzero(sound)
+    near = near[distance_to_mesh(middle[near], standing) < deep]
+    on_metal[near] = is_inside(middle[near] + deep * mesh.face_normals[near], standing)
     is_floor = on_metal & (-mesh.cross[:, 2] > 2 * area * np.cos(STEEPEST))
     is_floor = _drop_specks(faces, on_metal, is_floor, area, SPECK * width**2)
     if not is_floor.any():
