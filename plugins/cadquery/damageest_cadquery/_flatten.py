@@ -53,8 +53,7 @@ def _flatten_disk(mesh: Mesh, rim: Ints) -> Floats | None:
         return None
     steps = np.linalg.norm(mesh.vertices[rim] - mesh.vertices[np.roll(rim, 1)], axis=1)
     # the rim zigzags: its length counts, smoothed over neighbours
-    kernel = np.ones(15) / 15
-    steps = np.convolve(np.concatenate([steps[-7:], steps, steps[:7]]), kernel, "valid")
+    steps = np.convolve(np.pad(steps, 7, mode="wrap"), np.ones(15) / 15, "valid")
     angle = 2 * np.pi * np.cumsum(steps) / steps.sum()
     disk = np.zeros((len(mesh.vertices), 2))
     disk[rim] = np.column_stack([np.cos(angle), np.sin(angle)])

@@ -136,6 +136,19 @@ def test_a_closed_surface_does_not_spread() -> None:
     assert flatten(make_cap(low=-9)) is None
 
 
+@pytest.mark.parametrize("count", [3, 6, 8])
+def test_a_surface_with_a_short_rim_is_flattened(count: int) -> None:
+    from damageest_cadquery._flatten import flatten
+
+    angle = 2 * np.pi * np.arange(count) / count
+    rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
+    around = np.arange(count)
+    fan = np.column_stack([around, np.roll(around, -1), np.full(count, count)])
+    places = flatten(Mesh(np.concatenate([rim, [[0, 0, 0.2]]]), fan))
+    assert places is not None
+    np.testing.assert_allclose(np.linalg.norm(places, axis=1), [1] * count + [0], atol=1e-9)
+
+
 def test_tails_along_the_skin_are_dropped() -> None:
     from damageest_cadquery._cut import take_faces
     from damageest_cadquery._spline import drop_tails
