@@ -20,6 +20,9 @@ NEIGHBOURS = (12, 48)
 """Fewest and most points that a normal is fitted to."""
 DEEP = 0.25
 """Share of the points of a small cube that lie deeper than most noise, from which they may lie on another surface."""
+BY_CHANCE, SURE = 0.067, 3.0
+"""Share of the points of skin that noise takes deeper than 1.5 of its standard deviations, and how many standard
+deviations of their number more there have to be in a cube: of a few points, two are deep often enough."""
 FLAT = 0.35
 """Largest thickness of a patch over its width: a patch across an edge has no clear normal."""
 CHUNK = 20_000
@@ -38,7 +41,7 @@ def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: floa
         return turned
     near = deviation.label == INTACT
     asked = np.flatnonzero(near & (deviation.distance < -max(1.5 * aligned.noise, 0.1 * tolerance)))
-    asked = _drop_single(aligned, asked, near, tolerance)
+    asked = _drop_single(aligned, part, deviation, asked, tolerance)
     for _ in range(2):  # the second round asks the neighbours of what the first one found
         if not len(asked):
             return turned
@@ -60,20 +63,28 @@ def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: floa
     return turned
 
 
-def _drop_single(aligned: Scan, asked: Ints, near: Flags, tolerance: float) -> Ints:
+def _drop_single(aligned: Scan, part: Part, deviation: Deviation, asked: Ints, tolerance: float) -> Ints:
     """Those of the points ``asked`` (A,) that noise alone does not explain: on another surface most points lie deep, on
-    the skin a few. All where the scan is too sparse to tell."""
+    the skin a few. All where the scan is too sparse to tell.
+
+    Points are counted in cubes of the skin below them: a border between cubes within the noise would part deep points
+    from the others.
+    """
     edge = min(3 * aligned.spacing, 2 * tolerance)
     if edge < 2 * aligned.spacing or not len(asked):
         return asked
+    near = deviation.label == INTACT
     around = np.flatnonzero(near)
-    cube = number_cubes(aligned.points[around], edge)[1]
-    place, count = group_integers(cube)[1:]
+    feet = part.face_normals[deviation.face[around]]
+    feet *= -deviation.distance[around, None]
+    feet += aligned.points[around]
+    place, count = group_integers(number_cubes(feet, edge)[1])[1:]
     deep = np.zeros(len(near), bool)
     deep[asked] = True
     deep = deep[around]
-    share = np.bincount(place[deep], minlength=len(count)) / count
-    return np.asarray(around[deep & (share[place] >= DEEP)])
+    found = np.bincount(place[deep], minlength=len(count))
+    many = (found >= DEEP * count) & (found >= BY_CHANCE * count + SURE * np.sqrt(BY_CHANCE * count))
+    return np.asarray(around[deep & many[place]])
 
 
 def _fit_normals(aligned: Scan, asked: Ints, tolerance: float) -> tuple[Floats, Flags]:

@@ -42,8 +42,6 @@ SLIVER = 0.05
 GROWN, DEEPER = 0.1, 0.5
 """Shares of a bead's width and height by which layers are taken to be wider and deeper when it is looked for: below a
 crease of the floor it is farther than one height to the layer below."""
-ROUGH = 0.02
-"""Share of a layer's height within which the deposit is simplified where it is looked for in a layer."""
 THIN = 0.01
 """Share of the layer height up to which what reaches into a layer is left out."""
 
@@ -72,7 +70,7 @@ def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Proce
         work.build(count, corners)
     except NotFollowedError as error:
         return Plan(frame, work.height, (), local, {str(error): float(local.volume())})
-    return Plan(frame, work.height, tuple(work.passes), work.missing, work.reasons, tuple(work.tops))
+    return Plan(frame, work.height, tuple(work.passes), work.missing, work.reasons)
 
 
 def _crop(metal: Any, corners: Floats, process: Process) -> Mesh:
@@ -87,7 +85,7 @@ def _crop(metal: Any, corners: Floats, process: Process) -> Mesh:
 @dataclass(eq=False)
 class _Work:
     """What is planned of a body. ``near``: the metal round it. ``stack``: triangles of the layers below that are not
-    covered by another. ``tops``: what lies below each layer's tool."""
+    covered by another."""
 
     body: Any
     near: Mesh
@@ -100,12 +98,11 @@ class _Work:
     missing: Any = None
     reasons: dict[str, float] = field(default_factory=dict)
     stack: list[tuple[Sheet, Floats]] = field(default_factory=list)
-    tops: list[Mesh] = field(default_factory=list)
     covered: list[Any] = field(default_factory=list)
 
     def build(self, count: int, corners: Floats) -> None:
         grid = make_grid(self.floor, corners[0, :2], corners[1, :2], self.process)
-        solid = Mesh(*to_arrays(self.body.simplify(ROUGH * self.height)))
+        solid = Mesh(*to_arrays(self.body))
         heights = guess_heights(self.floor, grid)
         width = self.process.bead.width
         for number in range(count):
@@ -118,7 +115,6 @@ class _Work:
             held = measure_support(sheet, some, self.near, lines, width / 2, self.height, lean - 3 * FINE * width)
             self.stack.append((sheet, reach))
             top = self._gather_top(grid)
-            self.tops.append(top)
             meshes = [top] if len(top.faces) else []
             above = Obstacles(meshes, corners[0], corners[1], width)
             around = [self.standing, Sweeps(self.standing.clearance.with_obstacles(above))]

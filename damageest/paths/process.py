@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh
+from damageest.artefacts import Floats
 from damageest.paths.fill import Pattern
 from damageest.paths.frames import Frame
 from damageest.paths.stripes import Bead
@@ -74,7 +74,6 @@ class Plan:
     """Passes for one build direction, in the order of their layers, in coordinates relative to the frame's origin.
 
     ``height``: of a layer. ``missing``: a Manifold of what they do not fill, or None; ``reasons``: volume by reason.
-    ``tops``: for each layer a surface that the nozzle stays above while it works on it; none where layers are planes.
     """
 
     frame: Frame
@@ -82,7 +81,6 @@ class Plan:
     passes: tuple[Pass, ...]
     missing: Any
     reasons: dict[str, float] = field(default_factory=dict)
-    tops: tuple[Mesh, ...] = ()
 
     @property
     def missing_volume(self) -> float:

@@ -183,7 +183,7 @@ def test_layers_along_the_floor_fill_the_deposit(name: str) -> None:
     assert path.bead_volume > 0.7 * path.deposit_volume
 
 
-@pytest.mark.parametrize("name", ["groove", "bowl"])
+@pytest.mark.parametrize("name", ["groove", pytest.param("bowl", marks=pytest.mark.slow)])
 def test_the_turning_nozzle_keeps_its_clearance(name: str) -> None:
     loss, path = plan_along(name)
     assert np.abs(np.diff(path.axes[path.on], axis=0)).max() > 1e-3
