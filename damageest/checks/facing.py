@@ -90,9 +90,13 @@ def _drop_single(aligned: Scan, part: Part, deviation: Deviation, asked: Ints, t
 def _fit_normals(aligned: Scan, asked: Ints, tolerance: float) -> tuple[Floats, Flags]:
     """Unit normals (A,3) of the scan at some of its points, of either sign, and whether each is clear (A,)."""
     density = (1.1 / aligned.spacing) ** 2
-    count = int(np.clip(np.pi * tolerance**2 * density, *NEIGHBOURS))
+    within = np.pi * tolerance**2 * density
+    count = int(np.clip(within, *NEIGHBOURS))
     places = aligned.points[asked]
     around = find_nearby(aligned.points, places, 3 * max(tolerance, 2 * aligned.spacing))
+    if within > 2 * NEIGHBOURS[1]:  # a patch of the densest points would be as thick as it is wide
+        share = np.random.default_rng(17).random(len(around)) < NEIGHBOURS[1] / within
+        around = around[share]
     among = aligned.points[around]
     normals, clear = np.empty((len(places), 3)), np.empty(len(places), bool)
     tree, count = make_tree(among), min(count, len(among))
