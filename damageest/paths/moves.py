@@ -14,6 +14,8 @@ from damageest.paths.process import Pass
 
 LIFTS = (1, 3, 9)
 """Multiples of the hop that are tried."""
+MOST_EXITS = 12
+"""Tool axes of passes along which the tool leaves where its own axis is not clear, as in a bore."""
 MOST_POSES = 2000
 """Poses at which one leg of a travel is checked at most."""
 
@@ -54,18 +56,20 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
 
     ``groups``: the passes of each part of the deposit. ``clearance``: to what is there; the layers, numbered from 1
     over all groups, have that rank. Between two passes the tool is lifted by the hop, or by as much more as a clear
-    straight way needs, up to the safe distance. On the way to a pass the layers before it stand, and its own layer
-    unless the pass is the first of it.
+    straight way needs, up to the safe distance. It comes and leaves along its axis, or that of another pass where its
+    own is not clear. On the way to a pass the layers before it stand, and its own layer unless the pass is the first of
+    it.
     """
     rows: list[tuple[Floats, Floats, Floats, float, bool, int, int, int]] = []
     gap, number, blocked = np.inf, 0, 0
     before: Pass | None = None
-    old, ranks = 0, rank_layers(groups)
+    old, ranks, exits = 0, rank_layers(groups), _list_exits(groups)
     for part, passes in enumerate(groups, 1):
         for one in passes:
             rank = ranks[part - 1, one.layer]
             number += 1
-            way, way_axes, found = _find_way(before, one, clearance.after(rank if rank == old else rank - 1), travel)
+            standing = clearance.after(rank if rank == old else rank - 1)
+            way, way_axes, found = _find_way(before, one, exits, standing, travel)
             old = rank
             blocked += found < travel.gap / 2
             gap = min(gap, found)
@@ -78,13 +82,17 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
                 rows.append((*values, one.layer + 1, number, part))
             before = one
     if before is not None:
-        end = _lift(before.points[-1], before.axes[-1], travel)
-        rows.append((end, before.axes[-1], before.normals[-1], travel.fast, False, rows[-1][5], number, rows[-1][7]))
+        standing = clearance.after(len(ranks))
+        way, way_axes, found = _find_exit(before.points[-1], before.axes[-1], exits, standing, travel)
+        blocked += found < travel.gap / 2
+        gap = min(gap, found)
+        for point, axis in zip(way, way_axes, strict=True):
+            rows.append((point, axis, before.normals[-1], travel.fast, False, rows[-1][5], number, rows[-1][7]))
     columns: list[Any] = list(zip(*rows, strict=True)) or [()] * 8
     points, axes, normals = (np.array(column, float).reshape(-1, 3) for column in columns[:3])
     layer, numbers, parts = (np.array(column, np.int64) for column in columns[5:])
     feed, on = np.array(columns[3], float), np.array(columns[4], bool)
-    return Moves(points, axes, normals, feed, on, layer, numbers, parts, gap, blocked)
+    return Moves(points, axes, normals, feed, on, layer, numbers, parts, max(gap, 0.0), blocked)
 
 
 def rank_layers(groups: Sequence[Sequence[Pass]]) -> dict[tuple[int, int], int]:
@@ -101,12 +109,45 @@ def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
     return np.asarray(point + max(root - along, travel.hop) * axis)
 
 
-def _find_way(before: Pass | None, one: Pass, clearance: Clearance, travel: Travel) -> tuple[Floats, Floats, float]:
+def _list_exits(groups: Sequence[Sequence[Pass]]) -> list[Floats]:
+    """Tool axes (3,) of the passes, each once, in their order."""
+    found: dict[tuple[float, ...], Floats] = {}
+    for passes in groups:
+        for one in passes:
+            found.setdefault(tuple(np.round(one.axes[0], 6).tolist()), one.axes[0])
+    return list(found.values())[:MOST_EXITS]
+
+
+def _find_exit(
+    point: Floats, axis: Floats, exits: Sequence[Floats], clearance: Clearance, travel: Travel
+) -> tuple[Floats, Floats, float]:
+    """Points (K,3) and axes (K,3) from a place (3,) on a pass to the safe distance, and the least distance: straight up
+    the tool's ``axis`` (3,), or after a hop along the first of the ``exits`` (3,) that is clear; else the clearest."""
+    best = np.empty((0, 3)), np.empty((0, 3)), -np.inf
+    for other in [axis, *exits]:
+        if np.allclose(other, axis):
+            if np.isfinite(best[2]):
+                continue
+            way, axes = _lift(point, axis, travel)[None], axis[None]
+        else:
+            way = np.array([point + travel.hop * axis, point + travel.hop * other, _lift(point, other, travel)])
+            axes = np.array([axis, other, other])
+        gap = _measure_way(np.concatenate([point[None], way]), np.concatenate([axis[None], axes]), clearance, travel)
+        if gap > best[2]:
+            best = way, axes, gap
+        if gap >= travel.gap / 2:
+            break
+    return best
+
+
+def _find_way(
+    before: Pass | None, one: Pass, exits: Sequence[Floats], clearance: Clearance, travel: Travel
+) -> tuple[Floats, Floats, float]:
     """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
     stop, axis = one.points[0], one.axes[0]
-    above = _lift(stop, axis, travel)
     if before is None:
-        return above[None], axis[None], _measure_way(np.array([above, stop]), np.array([axis, axis]), clearance, travel)
+        way, axes, gap = _find_exit(stop, axis, exits, clearance, travel)
+        return way[::-1], axes[::-1], gap
     start, old = before.points[-1], before.axes[-1]
     if np.linalg.norm(stop - start) < 1e-9 and np.allclose(axis, old):
         return np.empty((0, 3)), np.empty((0, 3)), np.inf
@@ -122,12 +163,11 @@ def _find_way(before: Pass | None, one: Pass, clearance: Clearance, travel: Trav
         gap = _measure_way(points, turned, clearance, travel)
         if gap >= travel.gap / 2:
             return way, axes, gap
-    way = np.array([_lift(start, old, travel), above])
-    axes = np.array([old, axis])
-    way, axes = _round_the_sphere(way, axes, travel)
-    points = np.concatenate([start[None], way, stop[None]])
-    gap = _measure_way(points, np.concatenate([old[None], axes, axis[None]]), clearance, travel)
-    return way, axes, gap
+    out, out_axes, first = _find_exit(start, old, exits, clearance, travel)
+    back, back_axes, last = _find_exit(stop, axis, exits, clearance, travel)
+    way, axes = _round_the_sphere(np.array([out[-1], back[-1]]), np.array([out_axes[-1], back_axes[-1]]), travel)
+    gap = min(first, last, _measure_way(way, axes, clearance, travel))
+    return np.concatenate([out[:-1], way, back[-2::-1]]), np.concatenate([out_axes[:-1], axes, back_axes[-2::-1]]), gap
 
 
 def _round_the_sphere(way: Floats, axes: Floats, travel: Travel) -> tuple[Floats, Floats]:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Mesh
 from damageest.evaluate.paths.check import measure_built, measure_nozzle
+from damageest.geometry.solids import to_arrays
 from damageest.paths.clearance import Clearance
-from damageest.paths.moves import Travel, join_passes
-from damageest.paths.nozzle import Cone, make_nozzle
+from damageest.paths.moves import Moves, Travel, join_passes
+from damageest.paths.nozzle import Cone, Nozzle, make_nozzle, make_nozzle_mesh
 from damageest.paths.obstacles import Obstacles, draw_passes
 from damageest.paths.process import Pass
 from tests.paths.shapes import BLOCK, Loss, cut, dent, plan
@@ -89,3 +90,29 @@ def test_the_check_sees_a_nozzle_in_beads() -> None:
     assert measure_built(path, 4.0) >= 0.25
     lower = replace(path, standoff=0.001, axes=path.axes * [1, 1, -1])
     assert measure_built(lower, 0.5) == 0
+
+
+def leave(obstacle: Manifold) -> Moves:
+    """The moves of two passes, the second with the tool leaning towards x, beside an obstacle."""
+    lean = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5)])
+    passes = [make_pass(0.0, 0.0, 0), replace(make_pass(2.0, 0.0, 0), axes=np.tile(lean, (2, 1)))]
+    mesh = Mesh(*to_arrays(obstacle))
+    near = Obstacles([mesh], np.array([-5.0, -12, -5]), np.array([5.0, 12, 5]), 2.0)
+    nozzle = Nozzle(make_nozzle_mesh(Cone(1.0, 4.0, 40.0, np.radians(20))))  # as long as its mesh
+    return join_passes([passes], Clearance(nozzle, 2.0, near), Travel(1.0, 100.0, np.zeros(3), 0.5, 600.0, 3000.0))
+
+
+def test_the_tool_leaves_where_it_is_clear() -> None:
+    beyond = Manifold.cube((20, 60, 60), True).translate((75, 0, 60))
+    moves = leave(beyond)
+    assert moves.blocked == 0
+    assert moves.gap >= 0.25
+    assert np.allclose(moves.axes[-1], UP)
+    assert np.linalg.norm(moves.points[-1]) == pytest.approx(100)
+
+
+def test_a_way_out_that_is_blocked_is_counted() -> None:
+    room = Manifold.cube((190, 190, 190), True) - Manifold.cube((160, 160, 160), True)
+    moves = leave(room)
+    assert moves.blocked == 2  # the way in, and the way out
+    assert moves.gap == 0
