@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from damageest.paths.process import Pass
 LIFTS = (1, 3, 9)
 """Multiples of the hop that are tried."""
 MOST_EXITS = 12
-"""Tool axes of passes along which the tool leaves where its own axis is not clear, as in a bore."""
+"""Passes whose axes, and places, are tried where the tool cannot leave along its own axis, as in a bore."""
 MOST_POSES = 2000
 """Poses at which one leg of a travel is checked at most."""
 
@@ -32,6 +32,13 @@ class Travel:
     gap: float
     feed: float
     fast: float
+
+
+class Exit(NamedTuple):
+    """A ``place`` (3,) from which the tool may be clear when it leaves along an ``axis`` (3,)."""
+
+    place: Floats
+    axis: Floats
 
 
 class Moves(NamedTuple):
@@ -56,9 +63,9 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
 
     ``groups``: the passes of each part of the deposit. ``clearance``: to what is there; the layers, numbered from 1
     over all groups, have that rank. Between two passes the tool is lifted by the hop, or by as much more as a clear
-    straight way needs, up to the safe distance. It comes and leaves along its axis, or that of another pass where its
-    own is not clear. On the way to a pass the layers before it stand, and its own layer unless the pass is the first of
-    it.
+    straight way needs, up to the safe distance. It comes and leaves along its axis; where that is not clear, along that
+    of another pass, or from above that pass. On the way to a pass the layers before it stand, and its own layer unless
+    the pass is the first of it.
     """
     rows: list[tuple[Floats, Floats, Floats, float, bool, int, int, int]] = []
     gap, number, blocked = np.inf, 0, 0
@@ -109,29 +116,35 @@ def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
     return np.asarray(point + max(root - along, travel.hop) * axis)
 
 
-def _list_exits(groups: Sequence[Sequence[Pass]]) -> list[Floats]:
-    """Tool axes (3,) of the passes, each once, in their order."""
-    found: dict[tuple[float, ...], Floats] = {}
+def _list_exits(groups: Sequence[Sequence[Pass]]) -> list[Exit]:
+    """The tool axes of the passes, each once, in their order, with the start of the first pass that has it."""
+    found: dict[tuple[float, ...], Exit] = {}
     for passes in groups:
         for one in passes:
-            found.setdefault(tuple(np.round(one.axes[0], 6).tolist()), one.axes[0])
+            key = tuple(np.round(one.axes[0], 6).tolist())
+            found.setdefault(key, Exit(one.points[0], one.axes[0]))
     return list(found.values())[:MOST_EXITS]
 
 
+def _list_ways_out(
+    point: Floats, axis: Floats, exits: Sequence[Exit], travel: Travel
+) -> Iterator[tuple[Floats, Floats]]:
+    """Ways from a place (3,) to the safe distance: points (K,3) and axes (K,3). Straight up the tool's ``axis`` (3,);
+    after a hop along that of an exit; from above the exit."""
+    yield _lift(point, axis, travel)[None], axis[None]
+    turned = [(point, gate.axis) for gate in exits if not np.allclose(gate.axis, axis)]
+    for place, along in [*turned, *exits]:
+        way = [point + travel.hop * axis, place + travel.hop * along, _lift(place, along, travel)]
+        yield np.array(way), np.array([axis, along, along])
+
+
 def _find_exit(
-    point: Floats, axis: Floats, exits: Sequence[Floats], clearance: Clearance, travel: Travel
+    point: Floats, axis: Floats, exits: Sequence[Exit], clearance: Clearance, travel: Travel
 ) -> tuple[Floats, Floats, float]:
-    """Points (K,3) and axes (K,3) from a place (3,) on a pass to the safe distance, and the least distance: straight up
-    the tool's ``axis`` (3,), or after a hop along the first of the ``exits`` (3,) that is clear; else the clearest."""
+    """Points (K,3) and axes (K,3) from a place (3,) on a pass to the safe distance, and the least distance: the first
+    way that is clear, else the clearest."""
     best = np.empty((0, 3)), np.empty((0, 3)), -np.inf
-    for other in [axis, *exits]:
-        if np.allclose(other, axis):
-            if np.isfinite(best[2]):
-                continue
-            way, axes = _lift(point, axis, travel)[None], axis[None]
-        else:
-            way = np.array([point + travel.hop * axis, point + travel.hop * other, _lift(point, other, travel)])
-            axes = np.array([axis, other, other])
+    for way, axes in _list_ways_out(point, axis, exits, travel):
         gap = _measure_way(np.concatenate([point[None], way]), np.concatenate([axis[None], axes]), clearance, travel)
         if gap > best[2]:
             best = way, axes, gap
@@ -141,7 +154,7 @@ def _find_exit(
 
 
 def _find_way(
-    before: Pass | None, one: Pass, exits: Sequence[Floats], clearance: Clearance, travel: Travel
+    before: Pass | None, one: Pass, exits: Sequence[Exit], clearance: Clearance, travel: Travel
 ) -> tuple[Floats, Floats, float]:
     """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
     stop, axis = one.points[0], one.axes[0]

@@ -8,6 +8,7 @@ of the contract lists all parameters that are available; the ``run`` of an imple
 from __future__ import annotations
 
 import inspect
+import re
 import sys
 import types
 import typing
@@ -188,4 +189,7 @@ def _text(kind: Any) -> str:
         return "Floats"
     if kind is type(None):
         return "None"
-    return kind.__name__ if isinstance(kind, type) and not typing.get_args(kind) else str(kind).replace("typing.", "")
+    if isinstance(kind, type) and not typing.get_args(kind):
+        return kind.__name__
+    # artefacts are imported from their package, not from its modules
+    return re.sub(r"\b(damageest\.artefacts\.)\w+\.", r"\1", str(kind).replace("typing.", ""))

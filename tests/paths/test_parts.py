@@ -92,12 +92,12 @@ def test_the_check_sees_a_nozzle_in_beads() -> None:
     assert measure_built(lower, 0.5) == 0
 
 
-def leave(obstacle: Manifold) -> Moves:
-    """The moves of two passes, the second with the tool leaning towards x, beside an obstacle."""
+def leave(obstacle: Manifold, x: float = 2.0) -> Moves:
+    """The moves of two passes, the second at ``x`` with the tool leaning towards x, beside an obstacle."""
     lean = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5)])
-    passes = [make_pass(0.0, 0.0, 0), replace(make_pass(2.0, 0.0, 0), axes=np.tile(lean, (2, 1)))]
+    passes = [make_pass(0.0, 0.0, 0), replace(make_pass(x, 0.0, 0), axes=np.tile(lean, (2, 1)))]
     mesh = Mesh(*to_arrays(obstacle))
-    near = Obstacles([mesh], np.array([-5.0, -12, -5]), np.array([5.0, 12, 5]), 2.0)
+    near = Obstacles([mesh], np.array([-35.0, -12, -5]), np.array([5.0, 12, 5]), 2.0)
     nozzle = Nozzle(make_nozzle_mesh(Cone(1.0, 4.0, 40.0, np.radians(20))))  # as long as its mesh
     return join_passes([passes], Clearance(nozzle, 2.0, near), Travel(1.0, 100.0, np.zeros(3), 0.5, 600.0, 3000.0))
 
@@ -109,6 +109,17 @@ def test_the_tool_leaves_where_it_is_clear() -> None:
     assert moves.gap >= 0.25
     assert np.allclose(moves.axes[-1], UP)
     assert np.linalg.norm(moves.points[-1]) == pytest.approx(100)
+
+
+def test_the_tool_leaves_from_above_another_pass() -> None:
+    """A roof over the second pass, so low that the tool cannot be upright under it."""
+    wall = Manifold.cube((20, 60, 60), True).translate((75, 0, 60))
+    roof = Manifold.cube((16, 60, 5)).translate((-32, -30, 34))
+    moves = leave(wall + roof, -25.0)
+    assert moves.blocked == 0
+    assert moves.gap >= 0.25
+    assert np.allclose(moves.axes[-1], UP)
+    assert moves.points[-1][0] == pytest.approx(0)
 
 
 def test_a_way_out_that_is_blocked_is_counted() -> None:
