@@ -14,6 +14,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.distance import SurfaceTree, distance_to_mesh, is_inside
 from damageest.geometry.solids import to_arrays
+from damageest.geometry.vectors import normalise
 from damageest.paths.process import Process
 
 STEEPEST = np.radians(75.0)
@@ -51,8 +52,7 @@ class Floor:
         distance, face, place = self.tree.closest(points)
         share = find_shares(self.mesh.triangles[face], place)
         corners = self.mesh.faces[face]
-        normal = np.einsum("nk,nki->ni", share, self.normals[corners])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        normal = normalise(np.einsum("nk,nki->ni", share, self.normals[corners]))
         away = points - place
         above = np.einsum("ni,ni->n", away, normal)
         beyond = ((share < 1e-6) & self.rim_edges[face]).any(axis=1)
@@ -122,7 +122,7 @@ def _find_normals(mesh: Mesh, on_rim: Flags, radius: float) -> Floats:
     for vertex, near in zip(rim, tree.query_ball_point(mesh.vertices[rim], radius, return_sorted=True), strict=True):
         total = mesh.cross[smooth[near]].sum(axis=0)
         normals[vertex] = total if total.any() else normals[vertex]
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None])
+    return normalise(normals)
 
 
 def _drop_specks(faces: Ints, on_metal: Flags, is_floor: Flags, area: Floats, smallest: float) -> Flags:

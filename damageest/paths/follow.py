@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.paths.gauges import Gauge, Together
-from damageest.paths.process import Pass, Process
+from damageest.paths.process import Pass, Process, measure_along
 from damageest.paths.sweeps import Sweeps
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -176,7 +176,7 @@ def make_pass(points: Floats, normals: Floats, run: Run, layer: int, process: Pr
 def _thin(values: Floats, line: Floats) -> Ints:
     """The numbers of the points that are kept so that ``values`` (N,K) between them differ by 1 at most from those
     that change evenly along the line (N,3); by the method of Douglas and Peucker (1973)."""
-    far = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    far = measure_along(line)
     kept = {0, len(line) - 1}
     todo = [(0, len(line) - 1)]
     while todo:

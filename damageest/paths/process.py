@@ -108,7 +108,7 @@ def extend_line(line: Floats, before: float, after: float) -> Floats:
     if not before and not after:
         return line
     if np.allclose(line[0], line[-1]):
-        at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        at = measure_along(line)
         stop = min(before + after, at[-1] / 2)
         end = np.array([np.interp(stop, at, line[:, k]) for k in range(2)])
         return np.concatenate([line, line[1:][at[1:] < stop], end[None]])

@@ -12,6 +12,7 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.paths.clearance import Clearance, measure_points
 from damageest.paths.obstacles import MEMBERS
+from damageest.paths.process import measure_along
 
 STRIDES = (64, 16, 4)
 """Poses for which one stands: first so many, then fewer where that does not decide."""
@@ -39,7 +40,7 @@ class Sweeps:
             return np.full(len(points), np.inf)
         if clearance.nozzle.profile is None:
             return clearance.measure_poses(points, axes, needed)
-        gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        gone = measure_along(points)
         turned = np.concatenate([[0.0], np.cumsum(_measure_turns(axes))])
         found = np.full(len(points), -np.inf)
         for stride in STRIDES:
