@@ -22,6 +22,10 @@ MIN_AGREEMENT, DOUBTFUL_AGREEMENT = 0.55, 0.72
 poses it was 0.74 or more with a third of the metal missing, with surroundings 0.79; with wrong parts 0.5 or less. Below
 the first the pose is refused, below the second it is doubtful."""
 
+MIN_AGREEMENT_INSIDE, MOST_BESIDE = 0.45, 0.01
+"""The first is enough where the points cover `MIN_COVER` of the part's surface and no more than the second of them lie
+outside it, but near: a part that lost a third of its metal at two large fractures. Wrong parts lie outside as well."""
+
 NEAR = 0.05
 """Distance outside the part, in diagonals, from which a point shows something beside the part, such as a table."""
 
@@ -56,7 +60,8 @@ class PoseCheck:
     def is_acceptable(self) -> bool:
         """Whether enough of the scan lies on the part."""
         enough = self.on >= MIN_ON_PART or (self.on >= MIN_ON_PART_IF_COVERED and self.cover >= MIN_COVER)
-        return enough and self.agreement >= MIN_AGREEMENT
+        is_all_inside = self.beside <= MOST_BESIDE and self.cover >= MIN_COVER
+        return enough and self.agreement >= (MIN_AGREEMENT_INSIDE if is_all_inside else MIN_AGREEMENT)
 
     def describe(self) -> str:
         """The shares in words."""

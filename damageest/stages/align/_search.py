@@ -100,7 +100,8 @@ def search(poses: Floats, scan: OrientedPoints, field: PlaneGrid, rng: np.random
     fewest, few, some, many = (draw_by_direction(scan, count, rng) for count in (30, 100, 250, 600))
     poses = poses[np.argsort(-score(poses, fewest, field, 0.05), kind="stable")[:12_000]]
     poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:3000]]
-    poses = refine(poses, few, field, np.array([0.06, 0.05, 0.04, 0.03]))
+    # A coarse step may be drawn to a large fracture that is nearly parallel to the skin: the poses before it stay too.
+    poses = np.concatenate([refine(poses, few, field, np.array([0.06, 0.05, 0.04, 0.03])), poses])
     poses = poses[select_distinct(poses, score(poses, some, field, 0.03), 0.03, 400)]
     poses = refine(poses, some, field, np.geomspace(0.04, 0.012, 5))
     poses = poses[select_distinct(poses, score(poses, many, field, 0.012), 0.015, 80)]
