@@ -45,7 +45,7 @@ def measure_depth_step(
     from scipy.spatial import cKDTree
 
     rng = np.random.default_rng(0)
-    chosen = rng.permutation(len(points))[:MOST]
+    chosen = rng.choice(len(points), min(MOST, len(points)), replace=False)
     middle = points.mean(axis=0)
     some = points[chosen] - middle
     candidates = [(some @ way, np.broadcast_to(way, some.shape)) for way in np.eye(3)]

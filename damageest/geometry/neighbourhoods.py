@@ -5,6 +5,7 @@ All lengths and points of a call are in one unit and one frame.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ BYTES_OF_PLACE = 60
 
 MANY = 20_000
 """Points from which a tree and its queries are made for speed."""
+SOME = 200_000
+"""Number of points that tell how dense a scan of more points is."""
 ALONG = 48
 """Cubes along the longest side of the places asked, in whose order they are asked."""
 
@@ -42,6 +45,18 @@ def find_nearby(points: Floats, places: Floats, reach: float) -> Ints:
     for start in range(0, len(points), CHUNK):
         found.append(start + np.flatnonzero(is_near[grid.number_cells(points[start : start + CHUNK])]))
     return np.concatenate(found)
+
+
+def gather_around(points: Floats, places: Floats, count: int, rng: np.random.Generator) -> Ints:
+    """Ascending indices of points (N,3) that include the ``count`` nearest ones of nearly every one of the few places
+    (M,3); for a tree over very many points, which takes seconds.
+
+    How far these are is estimated from `SOME` points drawn at random.
+    """
+    some = points[rng.integers(0, len(points), SOME)]
+    enough = max(3, math.ceil(1.3 * count * len(some) / len(points)))
+    reach = query_neighbours(make_tree(some), places, enough + 1)[0][:, -1]
+    return find_nearby(points, places, float(np.percentile(reach, 95)))
 
 
 def find_in_box(points: Floats, low: Floats, high: Floats) -> Ints:

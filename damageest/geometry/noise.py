@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.geometry.neighbourhoods import find_nearby
+from damageest.geometry.neighbourhoods import gather_around
 
 _SAMPLES = (4000, 1500)
 """Places at which the scan is measured: for a scan of up to _WHOLE points, and for a larger one."""
@@ -44,17 +42,24 @@ def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, flo
 
     rng = np.random.default_rng(seed)
     dense = len(points) > _WHOLE
-    centres = points[rng.permutation(len(points))[: _SAMPLES[dense]]]
+    centres = points[rng.choice(len(points), min(_SAMPLES[dense], len(points)), replace=False)]
     middle = centres.mean(axis=0)  # far from the origin, products of coordinates lose digits
     centres = centres - middle
     noise = spacing = 0.0
-    settled, gathered = False, 0
-    for k in sorted({min(k, len(points)) for k in _LEVELS}):
+    settled, gathered, enough = False, 0, 0.0
+    levels = sorted({min(k, len(points)) for k in _LEVELS})
+    for k in levels:
+        if k not in (levels[0], 64, levels[-1]) and (settled or k < enough):
+            continue
+        # wide patches average more points each, so fewer are needed
+        some = centres[: max(500, (96_000 if dense else 400_000) // k)]
         if k > gathered:  # 64 are enough for most scans
             gathered = max(k, 64) if dense else len(points)
-            around = (_gather_around(points, centres + middle, gathered, rng) if dense else points) - middle
+            around = points
+            if dense:  # the points must not be thinned, because their density matters
+                around = points[gather_around(points, (centres if k <= 64 else some) + middle, gathered, rng)]
+            around = around - middle
             tree = cKDTree(around, balanced_tree=False, compact_nodes=False)
-        some = centres[: max(500, 400_000 // k)]  # wide patches average more points each, so fewer are needed
         far, index = (np.asarray(a) for a in tree.query(some, k=k))
         local, roundness = _to_principal_axes(around[index])
         if k <= 64:
@@ -63,23 +68,13 @@ def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, flo
         # where points lie in rows, a patch has to span several rows before it shows the surface
         if not settled and even.sum() >= 0.3 * len(even):
             noise = _find_clean_level(_measure_residual_variance(local[even]), k - 6)
-            settled = bool(np.median(far[:, -1]) >= _WIDE * noise)
+            radius = float(np.median(far[:, -1]))
+            settled = radius >= _WIDE * noise
+            # four times the points make a patch twice as wide; well below that it is still too narrow
+            enough = 0.6 * k * (_WIDE * noise / max(radius, 1e-300)) ** 2
         if settled and k >= 64:
             break
     return noise, spacing
-
-
-def _gather_around(points: Floats, centres: Floats, count: int, rng: np.random.Generator) -> Floats:
-    """The points around the centres (M,3), including the ``count`` nearest ones of nearly every centre.
-
-    The points must not be thinned, because their density matters; but a tree over very many points takes seconds.
-    """
-    from scipy.spatial import cKDTree
-
-    some = points[rng.integers(0, len(points), _WHOLE)]
-    enough = max(3, math.ceil(1.3 * count * len(some) / len(points)))
-    reach = np.asarray(cKDTree(some).query(centres, k=[enough + 1], workers=2)[0])
-    return points[find_nearby(points, centres, float(np.percentile(reach, 95)))]
 
 
 def _to_principal_axes(patches: Floats) -> tuple[Floats, Floats]:

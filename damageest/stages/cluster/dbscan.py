@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
 from damageest.artefacts import DAMAGE, Deviation, Floats, Ints, Scan, Sites
-from damageest.geometry.neighbourhoods import find_nearby
+from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, gather_around
 from damageest.stages.cluster import Cluster
 from damageest.stages.cluster._density import measure_neighbour_distances, run_dbscan
 
@@ -131,20 +131,13 @@ def find_sharpest_bend(average: Floats) -> float:
 def _measure_gaps(points: Floats, neighbours: int) -> tuple[float, float]:
     """95th percentile and median of the distance to the k-th nearest scan point, of evenly picked points: 5,000, or 600
     of a dense scan."""
-    from scipy.spatial import cKDTree
-
     if len(points) <= neighbours:
         return 0.0, 0.0
     dense = len(points) > MAX_FOR_ALL
     picked = points[_draw_evenly(len(points), 600 if dense else 5000)]
-    reach = np.inf
     if dense:
-        # The k-th nearest of a subset is farther than the k-th nearest of all: an upper bound of the reach.
-        some = cKDTree(points[_draw_evenly(len(points), MAX_FOR_ALL)])
-        reach = float(np.percentile(np.asarray(some.query(picked, k=[neighbours + 1], workers=2)[0]), 97))
-        points = points[find_nearby(points, picked, reach)]
-    tree = cKDTree(points)
-    distance = np.asarray(tree.query(picked, k=[neighbours + 1], distance_upper_bound=reach, workers=2)[0])[:, 0]
+        points = points[gather_around(points, picked, neighbours + 1, np.random.default_rng(0))]
+    distance = find_neighbours(picked, neighbours + 1, points)[0][:, -1]
     return float(np.percentile(distance, 95)), float(np.median(distance))
 
 
