@@ -63,7 +63,7 @@ def choose_pose(
             found = _compare(heads, axis, target, field, points, noise)
             if found.axis is not None:
                 return found
-    return _compare(poses, axis, target, field, points, noise)
+    return _compare(poses[:MAX_POSES], axis, target, field, points, noise)
 
 
 def _compare(
@@ -152,7 +152,7 @@ def _add_counterparts(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> 
         turned = refine(turned, scan, field, np.geomspace(1.5 * COARSE, 0.75 * COARSE, 5))
         poses, scores = _rank(np.concatenate([poses, turned]), field, scan)
         poses = poses[_select_promising(scores)]
-    return poses[:MAX_POSES], axis
+    return poses, axis
 
 
 def _rank(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Floats]:

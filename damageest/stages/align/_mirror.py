@@ -18,7 +18,7 @@ from damageest.stages.align._points import OrientedPoints, orient_surface
 from damageest.stages.align._prepare_part import PreparedPart
 from damageest.stages.align._search import search
 
-POINTS = 6000
+POINTS = 2500
 """Number of scan points that mirrored poses are compared with."""
 
 STEP = 5.0

@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import order_integers
+from damageest.geometry.threads import map_in_threads
 from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
-MODEL_POINTS, MODEL_PAIRS = 1600, 1_600_000
+MODEL_POINTS, MODEL_PAIRS = 1600, 800_000
 SCAN_POINTS, SCAN_PAIRS, KEPT_PAIRS = 1200, 40_000, 6000
 SHORTEST = 0.12
+HASHED = 100_000
+"""Pairs that are hashed at a time, so that intermediate arrays fit in the processor's cache."""
 BINS = (26, 18, 18, 24)
 """Number of bins of the distance (0 to 1 diagonal), of the two angles with the line, of the angle about the line."""
 
@@ -87,6 +90,15 @@ def _hash_pairs(cloud: OrientedPoints, i: Ints, j: Ints, a: int = 1, b: int = 1)
 
     ``i``, ``j`` (M,): the points of each pair; ``a``, ``b``: signs of their normals.
     """
+    found = map_in_threads(
+        lambda own: _hash_some(cloud, i[own], j[own], a, b),
+        [slice(start, start + HASHED) for start in range(0, len(i), HASHED)],
+    )
+    key, good = (np.concatenate(column) for column in zip(*found, strict=True))
+    return key, good
+
+
+def _hash_some(cloud: OrientedPoints, i: Ints, j: Ints, a: int, b: int) -> tuple[Ints, NDArray[np.bool_]]:
     points, normals = cloud.points.astype(np.float32), cloud.normals.astype(np.float32)
     line = points[j] - points[i]
     length = np.linalg.norm(line, axis=1)

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.threads import map_in_threads
 from damageest.geometry.transforms import make_motions
 from damageest.stages.align._field import Floats32, PlaneGrid
 from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
-CHUNK = 2_000_000
-"""Number of points looked up at once, to limit memory."""
+CHUNK = 200_000
+"""Number of points that a thread looks up at once, to limit memory."""
 
 
 def score(poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float) -> Floats:
@@ -22,15 +23,14 @@ def score(poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float) ->
     A point within ``band`` of the surface, with a normal that agrees, adds up to 1, the more the closer. A point inside
     the part may be damage and adds 0. A point outside subtracts up to 0.7: damage does not explain it.
     """
-    result = np.empty(len(poses))
-    step = max(1, CHUNK // len(scan.points))
-    for start in range(0, len(poses), step):
-        part = slice(start, start + step)
-        _, offset, near, agree, distance = _look_up(poses[part], scan, field, band)
+
+    def score_some(some: Floats) -> Floats:
+        _, offset, near, agree, distance = _look_up(some, scan, field, band)
         good = np.maximum(1 - (offset / band) ** 2, 0) * agree * near
         bad = np.clip((distance - band) / (2 * band), 0, 1)
-        result[part] = (good - 0.7 * bad).mean(1, dtype=np.float64)
-    return result
+        return np.asarray((good - 0.7 * bad).mean(1, dtype=np.float64))
+
+    return np.concatenate(map_in_threads(score_some, _split(poses, len(scan.points))))
 
 
 def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats) -> Floats:
@@ -38,12 +38,10 @@ def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats)
 
     Weights are Tukey's, 0 beyond the band, so that points on damage have no weight.
     """
-    poses = poses.copy()
-    step = max(1, CHUNK // 4 // len(scan.points))
-    for band in bands:
-        for start in range(0, len(poses), step):
-            part = slice(start, start + step)
-            moved, offset, near, agree, index = _look_up(poses[part], scan, field, float(band), planes=True)
+
+    def refine_some(some: Floats) -> Floats:
+        for band in bands:
+            moved, offset, near, agree, index = _look_up(some, scan, field, float(band), planes=True)
             weight = np.maximum(1 - (offset / np.float32(band)) ** 2, 0) ** 2 * agree * near
             normal = field.plane[index][..., :3]
             jacobian = np.concatenate([np.cross(moved, normal), normal], axis=2)
@@ -51,8 +49,16 @@ def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats)
             hessian = (np.swapaxes(weighted, 1, 2) @ jacobian).astype(np.float64)
             gradient = (np.swapaxes(weighted, 1, 2) @ offset[..., None]).astype(np.float64)
             damping = 1e-3 * len(scan.points) * np.diag([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
-            poses[part] = make_motions(-np.linalg.solve(hessian + damping, gradient)[..., 0]) @ poses[part]
-    return poses
+            some = make_motions(-np.linalg.solve(hessian + damping, gradient)[..., 0]) @ some
+        return some
+
+    return np.concatenate(map_in_threads(refine_some, _split(poses, 4 * len(scan.points))))
+
+
+def _split(poses: Floats, cost: int) -> list[Floats]:
+    """The poses (H,4,4) in pieces that look up at most `CHUNK` points, where one pose looks up ``cost`` of them."""
+    step = max(1, CHUNK // cost)
+    return [poses[start : start + step] for start in range(0, len(poses), step)]
 
 
 def select_distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:
@@ -64,13 +70,10 @@ def select_distinct(poses: Floats, scores: Floats, apart: float, wanted: int) ->
     # Compared by the inverse poses, which move the corners from the part's frame to the scan's.
     where = (np.linalg.inv(poses)[:, :3] @ corner.T).reshape(len(poses), -1) / np.sqrt(len(corner))
     chosen: list[int] = []
-    free = np.ones(len(poses), bool)
-    for index in np.argsort(-scores, kind="stable"):
-        if free[index]:
-            chosen.append(int(index))
-            if len(chosen) == wanted:
-                break
-            free &= ((where - where[index]) ** 2).sum(1) > apart**2
+    left = np.argsort(-scores, kind="stable")
+    while len(left) and len(chosen) < wanted:
+        chosen.append(int(left[0]))
+        left = left[((where[left] - where[left[0]]) ** 2).sum(1) > apart**2]
     return np.array(chosen, np.int64)
 
 
@@ -99,7 +102,7 @@ def search(poses: Floats, scan: OrientedPoints, field: PlaneGrid, rng: np.random
     """Refines and selects: at most 80 poses (K,4,4), best first, from the rough ``poses`` (H,4,4)."""
     fewest, few, some, many = (draw_by_direction(scan, count, rng) for count in (30, 100, 250, 600))
     poses = poses[np.argsort(-score(poses, fewest, field, 0.05), kind="stable")[:12_000]]
-    poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:3000]]
+    poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:2000]]
     # A coarse step may be drawn to a large fracture that is nearly parallel to the skin: the poses before it stay too.
     poses = np.concatenate([refine(poses, few, field, np.array([0.06, 0.05, 0.04, 0.03])), poses])
     poses = poses[select_distinct(poses, score(poses, some, field, 0.03), 0.03, 400)]
