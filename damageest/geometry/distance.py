@@ -23,8 +23,14 @@ BYTES_OF_POINT, BYTES_OF_TRIANGLE = 230, 480
 LARGE = 16.0
 """Longest edge of a triangle, in medians of all, from which it is a large one."""
 
+MOST_KEPT = 100_000
+"""Triangles up to which the tree of a mesh is kept with the mesh: the result's checks ask one damage volume ten times.
+More would hold memory that the next stages need."""
 
 _faults: WeakKeyDictionary[Mesh, tuple[Flags, Flags]] = WeakKeyDictionary()
+
+
+_centred: WeakKeyDictionary[Mesh, SurfaceTree] = WeakKeyDictionary()
 
 
 class Closest(NamedTuple):
@@ -41,7 +47,10 @@ def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
     if not len(points):
         return Closest(np.empty(0), np.empty(0, np.int64), np.empty((0, 3)))
     centre = mesh.bounds.mean(axis=0)
-    tree = SurfaceTree(Mesh(mesh.vertices - centre, mesh.faces))
+    if (tree := _centred.get(mesh)) is None:
+        tree = SurfaceTree(Mesh(mesh.vertices - centre, mesh.faces))
+        if len(mesh.faces) <= MOST_KEPT:
+            _centred[mesh] = tree
     distance, face, place = tree.closest(points - centre)
     return Closest(distance, face, place + centre)
 

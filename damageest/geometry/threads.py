@@ -1,4 +1,4 @@
-"""Runs a function on parts of the data in threads: numpy and scipy compute large arrays without the interpreter's lock."""
+"""Runs a function on parts of the data in threads: numpy and scipy compute large arrays without the global lock."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +11,13 @@ import numpy as np
 from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Samples, Scan, Sites
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.local_fits import average_points
-from damageest.geometry.neighbourhoods import find_neighbours, measure_local_areas, pick_one_per_cube, thin_points
+from damageest.geometry.neighbourhoods import (
+    find_in_box,
+    find_neighbours,
+    measure_local_areas,
+    pick_one_per_cube,
+    thin_points,
+)
 from damageest.geometry.orientation import turn_toward_void
 from damageest.geometry.poisson import Grid, GridValues, refine_field
 from damageest.geometry.voxels import measure_bounds, number_cubes
@@ -89,14 +96,22 @@ class _Sorted:
         return np.asarray(some[grid.contains(self.points[some])])
 
 
-def gather_losses(
-    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float,
-    band: float, push: float,
-) -> GatheredLosses:  # fmt: skip
-    """Sorts scan points and skin samples into damaged, lost and intact.
+@dataclass(frozen=True, eq=False)
+class IntactSkin:
+    """Samples of the skin that is neither lost nor near the losses: ``points`` (K,3), outward ``normals`` (K,3) and the
+    area (K,) that each stands for."""
 
-    ``band``: width of skin round the damaged points that counts as neither lost nor intact; ``push``: how far the
-    intact skin is moved outward; both in tolerances.
+    points: Floats
+    normals: Floats
+    areas: Floats
+
+
+def sort_losses(
+    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float, band: float
+) -> tuple[tuple[LossGroup, ...], IntactSkin]:
+    """Sorts scan points and skin samples into losses and intact skin.
+
+    ``band``: width of skin round the damaged points that counts as neither lost nor intact, in tolerances.
     """
     points, label, grown, of_scan = _grow_to_rim(aligned, deviation, sites, tolerance)
     skin = sample_skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
@@ -104,10 +119,21 @@ def gather_losses(
     free = find_neighbours(skin.points, 1, points, float(beside.max(initial=0.0)))[0][:, 0] < beside
     above, depth = part.face_normals[deviation.face[of_scan]], -deviation.distance[of_scan]
     groups, lost_by = _group_losses(points, above, depth, label, skin, free, tolerance, aligned.spacing, aligned.noise)
-    areas = measure_local_areas(skin.points)
     kept = np.flatnonzero((lost_by < 0) & ~free)
-    moved = push_outward(part, skin.points[kept], skin.normals[kept], push * tolerance)
-    return GatheredLosses(groups, moved, skin.normals[kept], areas[kept])
+    return groups, IntactSkin(skin.points[kept], skin.normals[kept], measure_local_areas(skin.points)[kept])
+
+
+def push_intact(
+    part: Part, groups: tuple[LossGroup, ...], skin: IntactSkin, grids: Sequence[Grid], push: float
+) -> GatheredLosses:
+    """The groups and the intact skin that lies in one of the ``grids`` after it is moved outward by ``push``, in the
+    part's unit. The distances that the move needs cost more than all else here, so the other samples are left out."""
+    near = np.zeros(len(skin.points), bool)
+    for grid in grids:
+        high = grid.origin + grid.cell * (np.array(grid.shape) - 1)
+        near[find_in_box(skin.points, grid.origin - push, high + push)] = True
+    points, normals = skin.points[near], skin.normals[near]
+    return GatheredLosses(groups, push_outward(part, points, normals, push), normals, skin.areas[near])
 
 
 def select_in_grid(gathered: GatheredLosses, grid: Grid) -> tuple[Floats, Floats, Floats]:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field
 
-from damageest.artefacts import Deviation, Enclosure, Enclosures, Part, Samples, Scan, Sites
+from damageest.artefacts import Deviation, Enclosure, Enclosures, Floats, Part, Samples, Scan, Sites
 from damageest.errors import StageError
+from damageest.geometry.voxels import measure_bounds
 from damageest.stages.enclose import EncloseAll
+
+if TYPE_CHECKING:
+    from damageest.geometry.poisson import Grid
 
 
 class Implicit(EncloseAll):
@@ -48,26 +52,23 @@ class Implicit(EncloseAll):
     ) -> Enclosures:
         """Raises StageError where no closed surface can be reconstructed."""
         from damageest.geometry.isosurface import extract_region
-        from damageest.geometry.poisson import make_grid, solve_coarse_to_fine
-        from damageest.stages.enclose._gather import cut_beyond_reach, gather_losses, select_in_grid
+        from damageest.geometry.poisson import solve_coarse_to_fine
+        from damageest.stages.enclose._gather import cut_beyond_reach, push_intact, select_in_grid, sort_losses
         from damageest.stages.enclose._refit import refit_region, thin_region
 
         if not sites.count:
             return Enclosures(())
-        gathered = gather_losses(part, aligned, deviation, sites, samples, tolerance, self.band, self.push)
+        groups, skin = sort_losses(part, aligned, deviation, sites, samples, tolerance, self.band)
+        grids = [self._make_grid(np.concatenate([group.points, group.lost]), tolerance) for group in groups]
+        gathered = push_intact(part, groups, skin, grids, self.push * tolerance)
         items = []
-        for number, group in enumerate(gathered.groups):
-            low = np.minimum(group.points.min(axis=0), group.lost.min(axis=0, initial=np.inf)) - self.margin * tolerance
-            high = (
-                np.maximum(group.points.max(axis=0), group.lost.max(axis=0, initial=-np.inf)) + self.margin * tolerance
-            )
-            cell = max(self.cell * tolerance, float((np.prod(high - low) / self.most_cells) ** (1 / 3)))
+        for number, (group, grid) in enumerate(zip(groups, grids, strict=True)):
             notes: tuple[str, ...] = ()
-            if cell > 2 * self.cell * tolerance:
+            if grid.cell > 2 * self.cell * tolerance:
                 notes = (
-                    f"this loss is large: it was solved in cells of {cell:.3g}, {cell / tolerance:.1f} tolerances",
+                    f"this loss is large: it was solved in cells of {grid.cell:.3g}, {grid.cell / tolerance:.1f} "
+                    "tolerances",
                 )
-            grid = make_grid(low, high, cell)
             points, normals, areas = select_in_grid(gathered, grid)
             field = solve_coarse_to_fine(grid, points, normals, areas, self.screening)
             field = cut_beyond_reach(grid, field, gathered, number, 4 * tolerance)
@@ -81,3 +82,11 @@ class Implicit(EncloseAll):
                 "no closed surface could be reconstructed round the damage", "method: surface, or a larger tolerance"
             )
         return Enclosures(tuple(items))
+
+    def _make_grid(self, points: Floats, tolerance: float) -> Grid:
+        """A grid round the points (N,3) of a loss."""
+        from damageest.geometry.poisson import make_grid
+
+        low, high = measure_bounds(points) + self.margin * tolerance * np.array([[-1.0], [1.0]])
+        cell = max(self.cell * tolerance, float((np.prod(high - low) / self.most_cells) ** (1 / 3)))
+        return make_grid(low, high, cell)
