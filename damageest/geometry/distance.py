@@ -28,8 +28,6 @@ MOST_KEPT = 100_000
 More would hold memory that the next stages need."""
 
 _faults: WeakKeyDictionary[Mesh, tuple[Flags, Flags]] = WeakKeyDictionary()
-
-
 _centred: WeakKeyDictionary[Mesh, SurfaceTree] = WeakKeyDictionary()
 
 

@@ -66,6 +66,8 @@ def average_points(points: Floats, counts: Ints, noise: float, chosen: Ints) -> 
     tree = make_tree(points)
     distance, index = query_neighbours(tree, points, min(SCALES[0], len(points)))
     normals, _ = _fit_planes(points, index, distance, noise)
+    if not len(chosen):
+        return points[chosen], normals[chosen]
     parts = [chosen[start : start + CHUNK] for start in range(0, len(chosen), CHUNK)]
     found = map_in_threads(lambda own: _choose_widest(tree, points, counts, noise, normals, own), parts)
     out, tilted = (np.concatenate(column) for column in zip(*found, strict=True))

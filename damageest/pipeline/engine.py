@@ -89,10 +89,6 @@ class Engine:
         tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
         return state.with_named(contract.gives, value, key)
 
-    def _run(self, stage: Stage, item: Implementation, state: S) -> Any:
-        named = {name: state.get(name) for name in item.cls.needs()}
-        return run_stage(stage, item, named, self.limits, state.number)
-
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
         """(was it known, value): from this run's memory, else from the cache, else computed and kept."""
         if key in self.memo:

@@ -99,6 +99,7 @@ def _hash_pairs(cloud: OrientedPoints, i: Ints, j: Ints, a: int = 1, b: int = 1)
 
 
 def _hash_some(cloud: OrientedPoints, i: Ints, j: Ints, a: int, b: int) -> tuple[Ints, NDArray[np.bool_]]:
+    """As `_hash_pairs`, all at once."""
     points, normals = cloud.points.astype(np.float32), cloud.normals.astype(np.float32)
     line = points[j] - points[i]
     length = np.linalg.norm(line, axis=1)

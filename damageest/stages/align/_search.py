@@ -58,7 +58,7 @@ def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats)
 def _split(poses: Floats, cost: int) -> list[Floats]:
     """The poses (H,4,4) in pieces that look up at most `CHUNK` points, where one pose looks up ``cost`` of them."""
     step = max(1, CHUNK // cost)
-    return [poses[start : start + step] for start in range(0, len(poses), step)]
+    return [poses[start : start + step] for start in range(0, max(len(poses), 1), step)]
 
 
 def select_distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from align_scenes import error, scene
 
 from damageest.artefacts import Scan
 from damageest.errors import StageError
+from damageest.evaluate.parts import PARTS
 from damageest.stages.align.register import Register
+from damageest.stages.scan.simulate import Simulate
 
 
 @pytest.mark.parametrize(
@@ -42,6 +46,47 @@ def test_continuous_symmetry_is_noted_and_all_alternatives_are_right() -> None:
     assert any("continuous" in note for note in pose.notes)
     assert pose.alternatives is not None
     assert max(error(part, T, scan) for T in [pose.T_part_scan, *pose.alternatives]) < 1
+
+
+def test_both_ends_of_a_cylinder_are_listed() -> None:
+    """Poses that differ by a turn about the axis fit alike, and there are more of them than are compared."""
+    part, scan = scene("cylinder", seed=7, missing=0.0)
+    pose = Register().run(scan, part, 4 * scan.noise)
+    assert pose.alternatives is not None
+    ends = [float(pose.T_part_scan[2, :3] @ T[2, :3]) for T in pose.alternatives]
+    assert min(ends) < -0.99 < 0.99 < max(ends)
+
+
+def test_two_fractures_that_are_nearly_parallel_to_the_skin() -> None:
+    """A third of the metal is gone, half of the scan lies inside the part, and tilted poses fit the fractures."""
+    part = PARTS["cuboid"]()
+    tools = [
+        {
+            "tool": "plane",
+            "point": [-0.8, -1.7, -13.4],
+            "normal": [-0.062, -0.128, -0.99],
+            "roughness": 0.28,
+            "seed": 1,
+        },
+        {"tool": "plane", "point": [-1.8, -0.2, 6.5], "normal": [-0.268, -0.029, 0.963], "roughness": 0.05, "seed": 2},
+    ]
+    noise = 0.0005 * part.diagonal
+    options = {"damage": tools, "points": 60_000, "noise": noise, "density": 0.4, "pose": "random", "seed": 4012}
+    scan = replace(Simulate.model_validate(options).run("mm", part), noise=noise)
+    for seed in (0, 1):
+        pose = Register(seed=seed).run(scan, part, 4 * noise)
+        assert pose.alternatives is not None
+        assert min(error(part, T, scan) for T in [pose.T_part_scan, *pose.alternatives]) < 0.5
+        assert any("may show another part" in note for note in pose.doubts)
+
+
+def test_the_same_pose_with_one_thread_and_with_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    part, scan = scene("cuboid", seed=3, missing=0.1)
+    poses = []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        poses.append(Register().run(scan, part, 4 * scan.noise).T_part_scan.tobytes())
+    assert poses[0] == poses[1]
 
 
 @pytest.mark.slow
