@@ -50,12 +50,24 @@ def extend_rims(surface: Surface, rims: Rims, width: float) -> ExtendedSurface:
 
 
 def fill_loops(wide: ExtendedSurface) -> Ints:
-    """Faces (F,3) with a fan from its first node in every boundary loop that is not a rim (paper 3.2)."""
+    """Faces (F,3) with a fan from one of its nodes in every boundary loop that is not a rim (paper 3.2).
+
+    From the first node whose fan has no edge that the surface has already: an edge of four faces is not closed.
+    """
     rim = {int(loop.min()) for loop in wide.loops}
+    size = int(wide.faces.max()) + 1
+    edges = np.sort(wide.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    known = edges[:, 0] * size + edges[:, 1]
     fans = [wide.faces]
     for loop in trace_loops(wide.faces):
-        if int(loop.min()) not in rim:
-            fans.append(np.stack([np.full(len(loop) - 2, loop[0]), loop[2:], loop[1:-1]], axis=1))
+        if int(loop.min()) in rim:
+            continue
+        for first in range(len(loop)):
+            turned = np.roll(loop, -first)
+            spokes = np.minimum(turned[0], turned[2:-1]) * size + np.maximum(turned[0], turned[2:-1])
+            if not find_members(spokes, known).any():
+                break
+        fans.append(np.stack([np.full(len(loop) - 2, turned[0]), turned[2:], turned[1:-1]], axis=1))
     return np.concatenate(fans)
 
 
