@@ -85,6 +85,23 @@ def test_a_plate_is_free_across_its_worn_faces(kind: str, worn: float) -> None:
     assert motion.low - 0.2 * tolerance < -up < motion.high + 0.2 * tolerance
 
 
+@pytest.mark.parametrize("points", [20_000, 30_000])
+def test_worn_faces_taken_as_sound_leave_the_pose_free(points: int) -> None:
+    """Both faces are worn by as much, and the pose found puts one of them on the skin: then the few faces that are not
+    worn lie outside. The true pose is within the range that is said."""
+    case = Scanning("block", 0, points=points, amount=3.0)
+    scan, tolerance = Scan(wear.wear_both_faces(case).points, noise=case.noise), case.tolerance
+    frame, shifted = Frame.build(scan, case.part), np.eye(4)
+    shifted[2, 3] = -3.0 * tolerance
+    at, noise, band = frame.scale_points(scan), scan.noise / frame.size, tolerance / frame.size
+    best = fit(frame.target, at, frame.scale_pose(shifted), 0.5 * band, noise, 30)
+    done = finish_pose(frame, at, best, noise, band, "mm")
+    up = frame.unscale_pose(done.fit.pose)[2, 3]
+    assert abs(up) < 0.1 * tolerance or any(
+        motion.low - 0.2 * tolerance < -up < motion.high + 0.2 * tolerance for motion in done.free
+    )
+
+
 def test_a_plate_worn_to_a_wedge_is_free_to_turn() -> None:
     part, scan, tolerance = scan_worn("wedge", "plate", 3.0)
     pose = align(part, scan, tolerance)
