@@ -40,7 +40,8 @@ def find_freedoms(
     """The motions from the present pose after which the scan fits about as well.
 
     ``motions`` (H,K): poses to be compared with. As well: with nothing more outside, and with other skin in contact, or
-    less outside, in place of what no longer is in contact. Where skin was not scanned nothing comes into contact, and the pose is not free.
+    less outside, in place of what no longer is in contact. Where skin was not scanned nothing comes into contact, and
+    the pose is not free.
     ``datum`` (P,): patches that stay in contact.
     """
     moved = measure_movement(patches, motions)
