@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from damageest.errors import InputError
+from damageest.geometry.threads import count_cores
 
 CONNECT_SECONDS = 30
 """Longest time until a scheduler answers."""
@@ -26,11 +27,6 @@ def require_dask(command: str, extra: str) -> None:
         raise InputError(
             f"{command} needs dask distributed, which is not installed\n  try: pip install 'damageest[{extra}]'"
         ) from None
-
-
-def count_cores() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextlib.contextmanager

@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from damageest.batches.cluster import count_cores, open_client, require_dask
+from damageest.batches.cluster import open_client, require_dask
 from damageest.batches.files import write_page, write_tables
 from damageest.batches.jobs import BatchJob, find_jobs
 from damageest.batches.rows import Row, read_row
 from damageest.batches.tasks import run_tasks
 from damageest.batches.work import compute_key, load_job, release, work
 from damageest.errors import DamageestError, Fault, JobError
+from damageest.geometry.threads import count_cores
 from damageest.io.files import expand_home
 from damageest.isolation import measure_free_memory
 from damageest.isolation.limits import STAGE_SECONDS

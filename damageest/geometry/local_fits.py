@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.neighbourhoods import find_neighbours, make_tree, query_neighbours
-from damageest.geometry.threads import map_in_threads
+from damageest.geometry.threads import cut_evenly, map_in_threads
 from damageest.isolation.foresee import require_memory
 
 Floats32 = NDArray[np.float32]
@@ -66,10 +66,9 @@ def average_points(points: Floats, counts: Ints, noise: float, chosen: Ints) -> 
     tree = make_tree(points)
     distance, index = query_neighbours(tree, points, min(SCALES[0], len(points)))
     normals, _ = _fit_planes(points, index, distance, noise)
-    if not len(chosen):
-        return points[chosen], normals[chosen]
-    parts = [chosen[start : start + CHUNK] for start in range(0, len(chosen), CHUNK)]
-    found = map_in_threads(lambda own: _choose_widest(tree, points, counts, noise, normals, own), parts)
+    found = map_in_threads(
+        lambda own: _choose_widest(tree, points, counts, noise, normals, chosen[own]), cut_evenly(len(chosen), CHUNK)
+    )
     out, tilted = (np.concatenate(column) for column in zip(*found, strict=True))
     return out, tilted
 

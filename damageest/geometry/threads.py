@@ -14,12 +14,22 @@ MOST = 8
 """Threads at most: each holds the intermediate arrays of its item."""
 
 
+def count_cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def count_threads() -> int:
     """The threads to use: the cores of this process, or fewer where OMP_NUM_THREADS says so, as for one job of many."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = count_cores()
     with contextlib.suppress(ValueError):
         cores = min(cores, int(os.environ.get("OMP_NUM_THREADS", cores)))
     return max(1, min(cores, MOST))
+
+
+def cut_evenly(count: int, most: int) -> list[slice]:
+    """Slices of ``most`` items that together are the first ``count``; one empty slice for none."""
+    return [slice(start, start + most) for start in range(0, max(count, 1), most)]
 
 
 def map_in_threads(function: Callable[[Item], Value], items: Iterable[Item]) -> list[Value]:

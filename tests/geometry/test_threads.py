@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from damageest.geometry.threads import count_threads, map_in_threads
+from damageest.geometry.threads import count_threads, cut_evenly, map_in_threads
 
 
 @pytest.mark.parametrize("threads", ["1", "2", "5"])
@@ -40,3 +40,10 @@ def test_an_error_reaches_the_caller() -> None:
 
     with pytest.raises(ValueError, match="item 0"):
         map_in_threads(fail, range(3))
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9])
+def test_slices_are_the_whole(count: int) -> None:
+    pieces = [list(range(count))[own] for own in cut_evenly(count, 4)]
+    assert [item for piece in pieces for item in piece] == list(range(count))
+    assert max(map(len, pieces)) <= 4

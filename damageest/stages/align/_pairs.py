@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import order_integers
-from damageest.geometry.threads import map_in_threads
+from damageest.geometry.threads import cut_evenly, map_in_threads
 from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
 MODEL_POINTS, MODEL_PAIRS = 1600, 800_000
@@ -90,10 +90,7 @@ def _hash_pairs(cloud: OrientedPoints, i: Ints, j: Ints, a: int = 1, b: int = 1)
 
     ``i``, ``j`` (M,): the points of each pair; ``a``, ``b``: signs of their normals.
     """
-    found = map_in_threads(
-        lambda own: _hash_some(cloud, i[own], j[own], a, b),
-        [slice(start, start + HASHED) for start in range(0, len(i), HASHED)],
-    )
+    found = map_in_threads(lambda own: _hash_some(cloud, i[own], j[own], a, b), cut_evenly(len(i), HASHED))
     key, good = (np.concatenate(column) for column in zip(*found, strict=True))
     return key, good
 

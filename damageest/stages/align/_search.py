@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.threads import map_in_threads
+from damageest.geometry.threads import cut_evenly, map_in_threads
 from damageest.geometry.transforms import make_motions
 from damageest.stages.align._field import Floats32, PlaneGrid
 from damageest.stages.align._points import OrientedPoints, draw_by_direction
@@ -57,8 +57,7 @@ def refine(poses: Floats, scan: OrientedPoints, field: PlaneGrid, bands: Floats)
 
 def _split(poses: Floats, cost: int) -> list[Floats]:
     """The poses (H,4,4) in pieces that look up at most `CHUNK` points, where one pose looks up ``cost`` of them."""
-    step = max(1, CHUNK // cost)
-    return [poses[start : start + step] for start in range(0, max(len(poses), 1), step)]
+    return [poses[own] for own in cut_evenly(len(poses), max(1, CHUNK // cost))]
 
 
 def select_distinct(poses: Floats, scores: Floats, apart: float, wanted: int) -> Ints:
