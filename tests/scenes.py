@@ -51,6 +51,16 @@ def plate() -> Any:
     return Manifold.cube((30, 20, 0.8)) + Manifold.cube((30, 0.8, 6))
 
 
+def rough_box() -> Any:
+    """A box whose faces have waves of a third of the tolerance, ten tolerances long."""
+
+    def displace(points: Floats) -> Floats:
+        wave = np.sin(2 * np.pi / (10 * TOLERANCE) * points)
+        return points + 0.33 * TOLERANCE * wave[:, [1, 2, 0]] * wave[:, [2, 0, 1]]
+
+    return Manifold.cube((3, 3, 2), True).refine_to_length(0.1).warp_batch(displace)
+
+
 TOOLS: dict[str, tuple[Any, Any]] = {
     "pit": (block, lambda: Manifold.sphere(4, 128).translate((9, 9, 14))),
     "edge": (block, lambda: Manifold.cube((8, 8, 8), True).rotate((35, 20, 10)).translate((1, 4, 12))),
@@ -58,22 +68,25 @@ TOOLS: dict[str, tuple[Any, Any]] = {
     "end": (block, lambda: Manifold.cube((40, 60, 60), True).rotate((0, 12, 7)).translate((38, 10, 6))),
     "beside the bore": (block, lambda: Manifold.sphere(3, 128).translate((18.5, 9, 12.5))),
     "worn through": (plate, lambda: Manifold.sphere(4, 128).translate((12, 11, 2.5))),
+    "rough": (lambda: Manifold.cube((6, 6, 3)), lambda: rough_box().translate((3, 3, 3))),
     "two": (
         block,
         lambda: Manifold.sphere(2, 96).translate((5, 5, 12.5)) + Manifold.sphere(2, 96).translate((12, 15, 12.5)),
     ),
 }
+DENSITY = {"rough": 1400}
+"""Points per square millimetre where they are not 12."""
 
 
 @lru_cache
 def scene(name: str) -> Scene:
-    """One of TOOLS, scanned with 12 points per square millimetre."""
+    """One of TOOLS, scanned with `DENSITY` points per square millimetre, or 12."""
     make, tool = TOOLS[name]
     whole = make()
     left, lost = whole - tool(), whole ^ tool()
     mesh = Mesh(*to_arrays(left))
     rng = np.random.default_rng(7)
-    points, normals = spread(mesh, int(12 * mesh.area), rng)
+    points, normals = spread(mesh, int(DENSITY.get(name, 12) * mesh.area), rng)
     points = points + NOISE * rng.normal(size=len(points))[:, None] * normals
     return _seen(Part(*to_arrays(whole)), Solid(*to_arrays(lost)), points)
 

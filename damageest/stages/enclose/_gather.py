@@ -32,6 +32,9 @@ near the rim. All in cells of the surface."""
 
 FEWEST_IN_CUBE = 16
 """Points of such a cube from which its flatness is known; in a sparse scan nothing is left out."""
+SURE, BENT = 2.0, 0.1
+"""Such a cube is flat where the variance of its points from a plane exceeds that of their noise by no more than
+``SURE`` times the error of that variance, and by the square of ``BENT`` cells."""
 MOST_LOST = 5000
 """Samples of the lost skin that tell on which side of the points the lost metal is."""
 
@@ -180,7 +183,7 @@ def _build_surface(
     points, counts, first = thin_points(points, 0.5 * cell)
     # The local fits overlap much farther than this, so that more of them would add nothing.
     chosen = pick_one_per_cube(points, APART * cell)
-    chosen = _thin_flat(points, chosen, depth[first], noise, cell)
+    chosen = _thin_flat(points, chosen, counts, depth[first], noise, cell)
     above = above[first][chosen]
     points, normals = average_points(points, counts, noise, chosen)
     size, chosen = cell, np.arange(len(lost))
@@ -240,17 +243,20 @@ def _group_losses(
     return tuple(groups), lost_by
 
 
-def _thin_flat(points: Floats, chosen: Ints, depth: Floats, noise: float, cell: float) -> Ints:
+def _thin_flat(points: Floats, chosen: Ints, counts: Ints, depth: Floats, noise: float, cell: float) -> Ints:
     """Of the points ``chosen`` (M,), one in each larger cube where the surface is flat and not near the rim.
 
-    Flat are cubes of `FLAT_CUBE` cells in which the points (N,3) lie on a plane within their noise.
+    Flat are cubes of `FLAT_CUBE` cells in which the points (N,3) lie on a plane within their noise. Each is the mean
+    of ``counts`` (N,) scan points.
     """
     _, cube, size = group_integers(number_cubes(points, FLAT_CUBE * cell)[1])
     mean = np.stack([np.bincount(cube, points[:, axis]) for axis in range(3)], axis=1) / size[:, None]
     off = points - mean[cube]
     moments = np.stack([np.bincount(cube, off[:, i] * off[:, j]) for i in range(3) for j in range(3)], axis=1)
     thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(moments.reshape(-1, 3, 3) / size[:, None, None])[:, 0], 0))
-    plane = (size >= FEWEST_IN_CUBE) & (thickness < 1.2 * noise + 0.05 * cell)
+    expected = noise * np.sqrt(np.bincount(cube, 1 / counts) / size)
+    most = expected**2 * (1 + SURE * np.sqrt(2 / size)) + (BENT * cell) ** 2
+    plane = (size >= FEWEST_IN_CUBE) & (thickness**2 < most)
     flat = plane[cube[chosen]] & (depth[chosen] > RIM * cell)
     interior = chosen[flat]
     if not len(interior):
