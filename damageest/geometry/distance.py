@@ -12,9 +12,11 @@ from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
-from damageest.geometry.duplicates import list_used
+from damageest.geometry.duplicates import list_used, order_integers
+from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
 BYTES_OF_POINT, BYTES_OF_TRIANGLE = 230, 480
@@ -22,6 +24,9 @@ BYTES_OF_POINT, BYTES_OF_TRIANGLE = 230, 480
 
 LARGE = 16.0
 """Longest edge of a triangle, in medians of all, from which it is a large one."""
+
+ALONG = 32
+"""Cubes along the longest side of a cloud in whose order points are searched for; from 16 to 128 take the same time."""
 
 MOST_KEPT = 100_000
 """Triangles up to which the tree of a mesh is kept with the mesh: the result's checks ask one damage volume ten times.
@@ -95,7 +100,8 @@ class SurfaceTree:
 
     def closest(self, points: Floats) -> Closest:
         """The nearest place on the mesh for each of ``points`` (N,3), N at least 1, as `closest_on_mesh` gives it."""
-        query, found = np.ascontiguousarray(points, np.float64), []
+        order = _order_by_place(points)
+        query, found = np.ascontiguousarray(points[order], np.float64), []
         for tree, faces, numbers in self._trees:
             squared, face, place = tree.squared_distance(self.mesh.vertices, faces, query)
             found.append((np.reshape(squared, -1), numbers[np.reshape(face, -1)], np.reshape(place, (-1, 3))))
@@ -104,7 +110,21 @@ class SurfaceTree:
             nearer = other < squared
             squared, face = np.where(nearer, other, squared), np.where(nearer, its_face, face)
             place = np.where(nearer[:, None], its_place, place)
-        return Closest(np.sqrt(squared), face, place)
+        return Closest(*(_undo_order(order, column) for column in (np.sqrt(squared), face, place)))
+
+
+def _order_by_place(points: Floats) -> Ints:
+    """An order (N,) of points (N,3), N at least 1, in which most lie near the one before: they then need the same boxes
+    of a tree. Measured: searches in a tree take a quarter to a half less time than in random order."""
+    low, high = measure_bounds(points)
+    return order_integers(number_cubes(points, max(float((high - low).max()) / ALONG, 1e-300), low)[1])
+
+
+def _undo_order(order: Ints, values: NDArray[Any]) -> NDArray[Any]:
+    """The values (N,...) of ordered points, for the points as they were."""
+    result = np.empty_like(values)
+    result[order] = values
+    return result
 
 
 def _group_by_size(mesh: Mesh) -> list[Ints]:
@@ -159,7 +179,8 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     )
     centre = mesh.bounds.mean(axis=0)
     vertices = mesh.vertices - centre
-    query = points - centre
+    order = _order_by_place(points)
+    query = points[order] - centre
     flat, unreliable = _find_faults(mesh)
     # Without the flat triangles the surface is the same set of points, and each triangle has a normal.
     used = np.flatnonzero(~flat)
@@ -182,7 +203,7 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     if doubtful.any():
         winding = np.asarray(igl.fast_winding_number(vertices, mesh.faces, query[doubtful])).ravel()
         signed[doubtful] = np.where(winding > 0.5, -1.0, 1.0) * np.abs(signed[doubtful])
-    return signed, used[nearest]
+    return _undo_order(order, signed), _undo_order(order, used[nearest])
 
 
 def run_libigl_pass(points: Floats, mesh: Mesh) -> Floats:
