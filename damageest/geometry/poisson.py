@@ -95,7 +95,7 @@ def solve_poisson(
         points, normals: (N,3) points within the grid, and unit normals toward the positive side.
         areas: (N,) the area of surface that each point stands for, in the square of the points' unit.
         screening: weight of the condition that the field is 0 on the points; 0 leaves it out.
-        start: first guess, such as the refined solution of a coarser grid.
+        start: first guess, such as the refined solution of a coarser grid; it becomes the result.
         accuracy: norm of the residual, relative to the right side, at which the solver stops.
         most: largest number of conjugate-gradient steps.
     """
@@ -112,24 +112,31 @@ def solve_poisson(
     eigenvalues = _eigenvalues(grid) + shift
 
     def apply(x: GridValues) -> GridValues:
-        screened: GridValues = (back @ (pull * (look @ x.ravel()))).reshape(grid.shape)
-        return _laplacian(x) + screened
+        out = _laplacian(x)
+        out += (back @ (pull * (look @ x.ravel()))).reshape(grid.shape)
+        return out
 
-    x: GridValues = _precondition(right, eigenvalues) if start is None else start.copy()
-    r = right - apply(x)
+    # Arrays are changed in place where that is possible: on large grids they are most of a run's memory.
+    x: GridValues = _precondition(right, eigenvalues) if start is None else start
     goal = accuracy * float(np.sqrt(np.vdot(right, right)))
-    z = _precondition(r, eigenvalues)
-    p, rho = z, float(np.vdot(r, z))
+    r = right
+    r -= apply(x)
+    p = _precondition(r, eigenvalues)
+    rho = float(np.vdot(r, p))
     for _ in range(most):
         if float(np.sqrt(np.vdot(r, r))) <= goal or rho <= 0:
             break
         q = apply(p)
         step = np.float32(rho / float(np.vdot(p, q)))
         x += step * p
-        r -= step * q
+        q *= step
+        r -= q
+        del q
         z = _precondition(r, eigenvalues)
         rho, before = float(np.vdot(r, z)), rho
-        p = z + np.float32(rho / before) * p
+        p *= np.float32(rho / before)
+        p += z
+        del z
     return x
 
 
@@ -197,4 +204,6 @@ def _precondition(right: GridValues, eigenvalues: GridValues) -> GridValues:
     """The solution with the constant-coefficient part of the operator alone."""
     from scipy.fft import dctn, idctn
 
-    return np.asarray(idctn(dctn(right, workers=2) / eigenvalues, workers=2, overwrite_x=True), dtype=np.float32)
+    waves = dctn(right, workers=2)
+    waves /= eigenvalues
+    return np.asarray(idctn(waves, workers=2, overwrite_x=True), dtype=np.float32)
