@@ -40,7 +40,7 @@ class Scene:
 
     def without(self, hidden: np.ndarray[Any, Any]) -> Scene:
         """The same scene without the points that are ``hidden`` (N,)."""
-        return _seen(self.part, self.truth, self.aligned.points[~hidden])
+        return _seen(self.part, self.truth, self.aligned.points[~hidden], self.aligned.spacing)
 
 
 def block() -> Any:
@@ -86,9 +86,10 @@ def scene(name: str) -> Scene:
     left, lost = whole - tool(), whole ^ tool()
     mesh = Mesh(*to_arrays(left))
     rng = np.random.default_rng(7)
-    points, normals = spread(mesh, int(DENSITY.get(name, 12) * mesh.area), rng)
+    density = DENSITY.get(name, 12)
+    points, normals = spread(mesh, int(density * mesh.area), rng)
     points = points + NOISE * rng.normal(size=len(points))[:, None] * normals
-    return _seen(Part(*to_arrays(whole)), Solid(*to_arrays(lost)), points)
+    return _seen(Part(*to_arrays(whole)), Solid(*to_arrays(lost)), points, float(0.32 * np.sqrt(12 / density)))
 
 
 def spread(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -105,8 +106,8 @@ def _samples(part: Part) -> Samples:
     return EdgeAware().run(part=part, tolerance=TOLERANCE)
 
 
-def _seen(part: Part, truth: Solid, points: Floats) -> Scene:
-    aligned = Scan(points, noise=NOISE, spacing=0.32)
+def _seen(part: Part, truth: Solid, points: Floats, spacing: float) -> Scene:
+    aligned = Scan(points, noise=NOISE, spacing=spacing)
     deviation = MeshDistance().run(aligned=aligned, part=part, tolerance=TOLERANCE)
     sites = Dbscan().run(aligned=aligned, deviation=deviation, tolerance=TOLERANCE)
     return Scene(part, truth, aligned, deviation, sites, _samples(part))
