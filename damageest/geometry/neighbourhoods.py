@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.duplicates import group_integers, order_integers
-from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, measure_bounds, number_cubes
+from damageest.geometry.duplicates import group_integers
+from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, measure_bounds, number_cubes, order_by_place
 from damageest.isolation.foresee import FEWER_POINTS, require_memory
 
 BYTES_OF_PLACE = 60
@@ -22,8 +22,6 @@ MANY = 20_000
 """Points from which a tree and its queries are made for speed."""
 SOME = 200_000
 """Number of points that tell how dense a scan of more points is."""
-ALONG = 48
-"""Cubes along the longest side of the places asked, in whose order they are asked."""
 
 
 def find_nearby(points: Floats, places: Floats, reach: float) -> Ints:
@@ -119,9 +117,7 @@ def query_neighbours(tree: Any, points: Floats, count: int, reach: float = np.in
     if len(points) < MANY:
         distance, index = tree.query(points, k=count, distance_upper_bound=reach, workers=2)
         return np.reshape(distance, shape), np.reshape(index, shape)
-    # places that lie near one another are asked one after the other: the nodes that they need are in the cache then
-    low, high = measure_bounds(points[:, :3])
-    order = order_integers(number_cubes(points[:, :3], max(float((high - low).max()) / ALONG, 1e-300))[1])
+    order = order_by_place(points[:, :3])
     distance, index = np.empty(shape), np.empty(shape, np.intp)
     for start in range(0, len(order), CHUNK):
         some = order[start : start + CHUNK]

@@ -11,12 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.duplicates import order_integers
 
 MOST_ALONG = 320
 """Largest number of cubes of a `VoxelGrid` along an axis, so that one byte per cube takes 33 MB at most."""
 
 CHUNK = 1 << 18
 """Points looked up in a `VoxelGrid` at a time, so that intermediate arrays fit in the processor's cache."""
+
+ALONG = 48
+"""Cubes along the longest side of points that are ordered by place; from 16 to 128 take the same time."""
 
 
 def measure_bounds(points: Floats) -> Floats:
@@ -78,6 +82,16 @@ def number_cubes(points: Floats, edge: float, low: Floats | None = None) -> tupl
         number *= cell[axis].max() + 1
         number += cell[axis]
     return cell.T, number
+
+
+def order_by_place(points: Floats) -> Ints:
+    """An order (N,) of points (N,3), N at least 1, in which most lie near the one before.
+
+    Places that are searched for in this order need the same nodes of a tree, one after the other. Measured: a quarter
+    to a half less time than in random order.
+    """
+    low, high = measure_bounds(points)
+    return order_integers(number_cubes(points, max(float((high - low).max()) / ALONG, 1e-300), low)[1])
 
 
 def measure_area(points: Floats, edge: float, fewest: int = 1) -> float:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from damageest.geometry.voxels import VoxelGrid, measure_area, number_cubes, number_faced_cubes
+from damageest.geometry.voxels import VoxelGrid, measure_area, number_cubes, number_faced_cubes, order_by_place
 from tests.geometry.shapes import FAR
 
 
@@ -82,3 +83,12 @@ def test_area_is_that_of_cubes_with_enough_points(seed: int, fewest: int) -> Non
     every = np.vstack([cubes, [0, 0, 0], [4, 4, 4]])
     number = np.bincount(np.ravel_multi_index(tuple(every.T), (5, 5, 5)), weights=count)
     assert np.isclose(measure_area(points, 0.5, fewest), 0.25 * (number >= fewest).sum())
+
+
+@pytest.mark.parametrize("count", [1, 3000])
+def test_points_in_order_of_place_lie_near_the_one_before(count: int) -> None:
+    points = 40.0 + 7 * np.random.default_rng(3).random((count, 3))
+    order = order_by_place(points)
+    assert np.array_equal(np.sort(order), np.arange(count))
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    assert np.linalg.norm(np.diff(points[order], axis=0), axis=1).sum() <= 0.6 * steps

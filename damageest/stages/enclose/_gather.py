@@ -253,10 +253,10 @@ def _thin_flat(points: Floats, chosen: Ints, counts: Ints, depth: Floats, noise:
     mean = np.stack([np.bincount(cube, points[:, axis]) for axis in range(3)], axis=1) / size[:, None]
     off = points - mean[cube]
     moments = np.stack([np.bincount(cube, off[:, i] * off[:, j]) for i in range(3) for j in range(3)], axis=1)
-    thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(moments.reshape(-1, 3, 3) / size[:, None, None])[:, 0], 0))
-    expected = noise * np.sqrt(np.bincount(cube, 1 / counts) / size)
-    most = expected**2 * (1 + SURE * np.sqrt(2 / size)) + (BENT * cell) ** 2
-    plane = (size >= FEWEST_IN_CUBE) & (thickness**2 < most)
+    variance = np.linalg.eigvalsh(moments.reshape(-1, 3, 3) / size[:, None, None])[:, 0]
+    expected = noise**2 * np.bincount(cube, 1 / counts) / size
+    most = expected * (1 + SURE * np.sqrt(2 / size)) + (BENT * cell) ** 2
+    plane = (size >= FEWEST_IN_CUBE) & (variance < most)
     flat = plane[cube[chosen]] & (depth[chosen] > RIM * cell)
     interior = chosen[flat]
     if not len(interior):
