@@ -12,7 +12,7 @@ import numpy as np
 from damageest.artefacts import Part, Scan
 from damageest.errors import InputError, StageError
 from damageest.io.files import resolve_path
-from damageest.isolation import Limits
+from damageest.isolation import Limits, keep_one_thread
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
@@ -28,6 +28,7 @@ from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 
 
+@keep_one_thread()
 def run(
     job: str | Path | Mapping[str, Any] | Job,
     *,
@@ -45,6 +46,8 @@ def run(
     faces) and ``scan`` (a Scan, an (N,3) array, a trimesh mesh or point cloud) replace the job's files; both may
     also be in the mapping. ``settings`` are overrides such as ``"cluster.eps=0.4"``. Lengths are in the job's unit.
     ``limits`` of memory and time hold for stages that run in a process of their own, those that call a native library.
+    As long as it runs, the linear algebra of numpy and scipy uses one thread in this process, so that the same job
+    gives the same bytes on any number of cores.
 
     Raises JobError or InputError (job or input at fault) and StageError (a stage failed or refused).
     """

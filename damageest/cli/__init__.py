@@ -11,13 +11,10 @@ import typer
 
 from damageest import __version__
 from damageest.errors import DamageestError, describe_missing_library, is_interrupt
+from damageest.isolation.one_thread import ONE_THREAD
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells give it."""
-
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""Threads of linear algebra. The matrices are small: more threads take a tenth more processor time and no less time on
-the clock, and their number decides the last bits of a result."""
 
 app = typer.Typer(
     name="damageest",
@@ -72,8 +69,7 @@ def main() -> None:
     from damageest.cli import _process
 
     _process.is_command = True
-    for name in ONE_THREAD:
-        os.environ.setdefault(name, "1")
+    os.environ.update(ONE_THREAD)
     built_in = {command.name for command in app.registered_commands} | {group.name for group in app.registered_groups}
     word = next((argument for argument in sys.argv[1:] if not argument.startswith("-")), "")
     try:

@@ -4,9 +4,11 @@ from damageest.isolation.ends import ProcessError
 from damageest.isolation.foresee import require_memory
 from damageest.isolation.limits import Limits, format_bytes, limit_this_process, measure_free_memory, parse_memory
 from damageest.isolation.notes import at_work
+from damageest.isolation.one_thread import ONE_THREAD, keep_one_thread
 from damageest.isolation.worker import call_isolated, cpu_seconds, end_workers
 
 __all__ = [
+    "ONE_THREAD",
     "Limits",
     "ProcessError",
     "at_work",
@@ -14,6 +16,7 @@ __all__ = [
     "cpu_seconds",
     "end_workers",
     "format_bytes",
+    "keep_one_thread",
     "limit_this_process",
     "measure_free_memory",
     "parse_memory",

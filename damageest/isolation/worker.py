@@ -21,6 +21,7 @@ from damageest.errors import StageError
 from damageest.isolation import serve
 from damageest.isolation.ends import ProcessError, RemoteTraceback, blame_authors, describe_end, describe_memory
 from damageest.isolation.limits import Limits, format_bytes, measure_free_memory, own_memory
+from damageest.isolation.one_thread import ONE_THREAD
 from damageest.isolation.transfer import receive, send
 
 T = TypeVar("T")
@@ -127,6 +128,7 @@ class _Worker:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 pass_fds=(other.fileno(), leash),
+                env={**os.environ, **ONE_THREAD},
                 start_new_session=True,  # Ctrl-C reaches the caller alone, which then ends the worker
             )
         os.close(leash)

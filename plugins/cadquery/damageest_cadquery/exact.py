@@ -21,6 +21,7 @@ import numpy as np
 from damageest.artefacts import Deposit, Floats, Mesh, Solid
 from damageest.errors import InputError
 from damageest.geometry.units import MILLIMETRES
+from damageest.isolation import ONE_THREAD
 from damageest.result import Result
 from damageest.stages.export import Body, DepositForm, ExactForm, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
@@ -149,7 +150,7 @@ def _run(request: Request, seconds: float) -> tuple[dict[str, Any], int, str]:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env={**os.environ, "PYTHONWARNINGS": "ignore"},
+            env={**os.environ, **ONE_THREAD, "PYTHONWARNINGS": "ignore"},
         )
         try:
             return _follow(process, seconds)
