@@ -1,11 +1,14 @@
-"""What a test needs from this machine: where a plugin cannot be used, its tests are skipped, with the reason.
+"""What a test needs from this machine: where a plugin or a terminal cannot be used, its tests are skipped, with the
+reason.
 
-Only a system library that is missing counts as a reason. A plugin that is broken in another way fails its tests.
+For a plugin only a system library that is missing counts as a reason. A plugin that is broken in another way fails its
+tests.
 """
 
 from __future__ import annotations
 
 import importlib
+import os
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -32,6 +35,23 @@ def needs_plugin(*plugins: str) -> pytest.MarkDecorator:
     """Skips a test, or with ``pytestmark`` a file of tests, where one of the plugins cannot be used."""
     obstacles = [find_obstacle(plugin) for plugin in plugins]
     return pytest.mark.skipif(any(obstacles), reason="; ".join(filter(None, obstacles)))
+
+
+@cache
+def find_terminal_obstacle() -> str:
+    """Why no terminal can be opened here; empty where one can."""
+    try:
+        for end in os.openpty():
+            os.close(end)
+    except OSError as error:
+        return f"no terminal can be opened here ({error}): mount /dev/pts (devpts)"
+    return ""
+
+
+def needs_terminal() -> pytest.MarkDecorator:
+    """Skips a test where no terminal can be opened, as in containers without /dev/pts."""
+    obstacle = find_terminal_obstacle()
+    return pytest.mark.skipif(bool(obstacle), reason=obstacle)
 
 
 def import_for(plugin: str, module: str) -> Any:

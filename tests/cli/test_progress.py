@@ -16,6 +16,7 @@ import pytest
 from damageest.artefacts import Sites
 from damageest.cli._progress import Progress
 from tests import damaged_box
+from tests.needs import needs_terminal
 
 MAIN = [sys.executable, "-c", "from damageest.cli import main; main()"]
 
@@ -51,6 +52,7 @@ def test_an_interrupt_says_what_is_kept_and_leaves_nothing_hidden(tmp_path: Path
     assert again.stderr.count("from an earlier run") >= 6
 
 
+@needs_terminal()
 def test_on_a_terminal_sites_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     master, slave = pty.openpty()
     monkeypatch.setattr(sys, "stderr", os.fdopen(slave, "w"))

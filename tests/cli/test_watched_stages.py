@@ -16,6 +16,7 @@ import pytest
 
 import damageest
 from tests import damaged_box
+from tests.needs import needs_terminal
 from tests.registry.test_registry import Site, site
 
 __all__ = ["site"]
@@ -144,6 +145,7 @@ def test_an_observer_that_exits_is_a_warning(site: Site, tmp_path: Path) -> None
         assert damageest.run(damaged_box.write(tmp_path), registry=Registry.discover([watcher])).sites
 
 
+@needs_terminal()
 @pytest.mark.parametrize("how", ["terminal", "killed"])
 def test_the_process_that_works_ends_with_the_one_that_watches(how: str, site: Site, tmp_path: Path) -> None:
     """Ctrl-C on a terminal reaches both; SIGKILL only the one that watches."""
