@@ -20,6 +20,8 @@ _MOST_PAIRS = 5000
 def _pair_neighbours(faces: Ints) -> tuple[Ints, Ints, Ints]:
     """Pairs of triangles (P,), (P,) over edges that exactly two share, and whether their windings disagree (P,), 0 or
     1."""
+    if not len(faces):
+        return faces[:, 0], faces[:, 0], faces[:, 0]
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     owner = np.tile(np.arange(len(faces)), 3)
     low, high = directed.min(1), directed.max(1)
@@ -62,6 +64,8 @@ def orient_faces(faces: Ints) -> tuple[Ints, int | None]:
     Each triangle has two nodes in a graph, one as read and one reversed. An edge of the mesh connects the nodes that
     agree over it. Each component of the graph then is one consistent choice.
     """
+    if not len(faces):
+        return faces, 0
     a, b, differ = _pair_neighbours(faces)
     n = len(faces)
     label, _ = _label_components(
@@ -89,6 +93,8 @@ def signed_volumes(vertices: Floats, faces: Ints, label: Ints, count: int) -> Fl
 
     In the cube of the vertices' unit; by the divergence theorem about the centre of all vertices' bounds.
     """
+    if not len(faces):
+        return np.zeros(count)
     centre = (vertices.min(0) + vertices.max(0)) / 2
     a, b, c = np.moveaxis((vertices - centre)[faces], 1, 0)
     each = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
@@ -140,6 +146,8 @@ def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Flo
 
     Raises InputError where no body has volume, or where bodies overlap but cannot be united.
     """
+    if not len(faces):
+        raise InputError("encloses no volume: it has no triangles; a part must be a solid")
     label, count = label_bodies(faces)
     volumes = signed_volumes(vertices, faces, label, count)
     size = float(np.prod(np.maximum(np.ptp(vertices, axis=0), 1e-300)))

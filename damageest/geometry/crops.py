@@ -128,7 +128,7 @@ class PieceCrop(Crop):
     def contains(self, points: Floats) -> Flags:
         """Whether each of the points (N,3) is inside the shape."""
         gap = self.gap or DEFAULT_GAP * measure_noise_and_spacing(points)[1]
-        if not gap > 0:
+        if not gap > 0 or not len(points):
             return np.ones(len(points), dtype=bool)
         piece = number_pieces(points, gap)
         return np.asarray(piece == np.bincount(piece).argmax())
@@ -169,6 +169,8 @@ def crop_points(scan: Scan, crops: Sequence[Crop]) -> Scan:
         inside = crop.contains(scan.points)
         kept = inside if crop.keep else ~inside
         name = f"crop {number} ({crop.describe()})"
+        if not len(kept):
+            raise InputError(f"scan: {name} leaves no points; there were none before it")
         if not kept.any():
             low, high = scan.points.min(axis=0), scan.points.max(axis=0)
             reach = ", ".join(f"{a:.4g} to {b:.4g} in {axis}" for a, b, axis in zip(low, high, "xyz", strict=True))

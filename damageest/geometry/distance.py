@@ -43,9 +43,13 @@ class Closest(NamedTuple):
 
 
 def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
-    """The nearest place on a mesh for each of ``points`` (N,3). The mesh may be open; it must have a triangle."""
+    """The nearest place on a mesh for each of ``points`` (N,3). The mesh may be open.
+
+    Raises ValueError where the mesh has no triangle.
+    """
     if not len(points):
         return _find_none()
+    _require_some(mesh.faces, "triangle")
     centre = mesh.bounds.mean(axis=0)
     if (tree := _centred.get(mesh)) is None:
         tree = SurfaceTree(Mesh(mesh.vertices - centre, mesh.faces))
@@ -56,17 +60,23 @@ def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
 
 
 def distance_to_mesh(points: Floats, mesh: Mesh) -> Floats:
-    """Distance (N,), not signed, of ``points`` (N,3) to a mesh, which may be open and must have a triangle."""
+    """Distance (N,), not signed, of ``points`` (N,3) to a mesh, which may be open.
+
+    Raises ValueError where the mesh has no triangle.
+    """
     return closest_on_mesh(points, mesh).distance
 
 
 def distance_to_edges(points: Floats, vertices: Floats, edges: Ints) -> Floats:
     """Distance (N,) of ``points`` (N,3) to the nearest of the straight ``edges`` (E,2) between ``vertices`` (V,3).
 
-    At least one edge is needed. Coordinates are moved to the mean of the vertices.
+    Coordinates are moved to the mean of the vertices. Raises ValueError where there is no edge.
     """
     import igl
 
+    if not len(points):
+        return np.empty(0)
+    _require_some(edges, "edge")
     centre = vertices.mean(axis=0)
     squared, _, _ = igl.point_mesh_squared_distance(
         np.ascontiguousarray(points - centre), np.ascontiguousarray(vertices - centre), np.array(edges)
@@ -96,9 +106,13 @@ class SurfaceTree:
         return trees
 
     def closest(self, points: Floats) -> Closest:
-        """The nearest place on the mesh for each of ``points`` (N,3), as `closest_on_mesh` gives it."""
+        """The nearest place on the mesh for each of ``points`` (N,3), as `closest_on_mesh` gives it.
+
+        Raises ValueError where the mesh has no triangle.
+        """
         if not len(points):
             return _find_none()
+        _require_some(self.mesh.faces, "triangle")
         order = order_by_place(points)
         query, found = np.ascontiguousarray(points[order], np.float64), []
         for tree, faces, numbers in self._trees:
@@ -110,6 +124,12 @@ class SurfaceTree:
             squared, face = np.where(nearer, other, squared), np.where(nearer, its_face, face)
             place = np.where(nearer[:, None], its_place, place)
         return Closest(*(_undo_order(order, column) for column in (np.sqrt(squared), face, place)))
+
+
+def _require_some(rows: Ints, what: str) -> None:
+    """Raises ValueError where there are no rows. libigl ends the process by a segmentation fault there."""
+    if not len(rows):
+        raise ValueError(f"no distance: what it is measured to has no {what}; ask only where there is one")
 
 
 def _find_none() -> Closest:
@@ -140,12 +160,12 @@ def winding_number(points: Floats, mesh: Mesh) -> Floats:
     """Winding number (N,) of a mesh about ``points`` (N,3), without unit: 1 inside a closed mesh, 0 outside.
 
     It lies between 0 and 1 for an open mesh, and is negative inside a mesh whose faces point inward. By the fast
-    approximation of Barill et al. 2018, exact to about 0.01.
+    approximation of Barill et al. 2018, exact to about 0.01. About a mesh without triangles it is 0.
     """
     import igl
 
-    if not len(points):
-        return np.empty(0)
+    if not len(points) or not len(mesh.faces):
+        return np.zeros(len(points))
     centre = mesh.bounds.mean(axis=0)
     number = igl.fast_winding_number(
         np.ascontiguousarray(mesh.vertices - centre), np.array(mesh.faces), np.ascontiguousarray(points - centre)
@@ -164,11 +184,14 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     The sign is that of the angle-weighted pseudonormal (Baerentzen and Aanaes 2005), exact on a clean watertight mesh.
     Where the nearest place lies on an edge or corner of a flat or slender triangle, or on a vertex that exists twice,
     as CAD tessellations have, the pseudonormal is unreliable and the winding number gives the sign instead.
+
+    Raises ValueError where the mesh has no triangle with an area.
     """
     import igl
 
     if not len(points):
         return np.empty(0), np.empty(0, np.int64)
+    _require_some(mesh.faces, "triangle")
     require_memory(
         BYTES_OF_POINT * len(points) + BYTES_OF_TRIANGLE * len(mesh.faces),
         f"the distances of {len(points):,} points to {len(mesh.faces):,} triangles",
@@ -181,6 +204,7 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     flat, unreliable = _find_faults(mesh)
     # Without the flat triangles the surface is the same set of points, and each triangle has a normal.
     used = np.flatnonzero(~flat)
+    _require_some(used, "triangle with an area")
     faces = mesh.faces[used]
     kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
     signed, nearest, foot, pseudo = igl.signed_distance(query, vertices, faces, sign_type=kind)
@@ -208,9 +232,13 @@ def run_libigl_pass(points: Floats, mesh: Mesh) -> Floats:
     `signed_distance` and without moving coordinates to the origin.
 
     Evaluations use its time as a reference: the least work of a method that compares a scan with CAD point by point.
+    Raises ValueError where the mesh has no triangle.
     """
     import igl
 
+    if not len(points):
+        return np.empty(0)
+    _require_some(mesh.faces, "triangle")
     kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
     return np.asarray(igl.signed_distance(points, mesh.vertices, mesh.faces, sign_type=kind)[0])
 

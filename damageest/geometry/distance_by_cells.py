@@ -46,12 +46,14 @@ def signed_distance_by_cells(points: Floats, part: Mesh, near: float, exact: Exa
     its two sides, if that side is within ``near``.
 
     Args:
-        points: (N,3), N at least 1, in the frame of the part.
+        points: (N,3) in the frame of the part.
         part: the triangles that ``exact`` measures to.
         near: length, in the unit of the points.
         exact: gives signed distance and nearest triangle of some of the points, as
             `damageest.geometry.distance.signed_distance` does with the part given.
     """
+    if not len(points):
+        return np.empty(0), np.empty(0, np.int64)
     needed = BYTES_OF_POINT * len(points) + BYTES_OF_TRIANGLE * len(part.faces)
     require_memory(needed, f"the distances of {len(points):,} points to the part", FEWER_POINTS)
     low, high = part.bounds

@@ -20,8 +20,12 @@ def fit_height_plane(surface: Mesh) -> tuple[Floats, float]:
 
     Returns:
         (3,3) two directions in the plane and its normal; the share of the area that faces away.
+
+    Raises ValueError where the surface has no area.
     """
     area = np.linalg.norm(surface.cross, axis=1)
+    if not area.sum() > 0:
+        raise ValueError(f"no plane for a surface without area ({len(area)} triangles)")
     unit = surface.cross / np.maximum(area, 1e-300)[:, None]
     weight, best, least = area / area.sum(), np.zeros(3), np.inf
     for _ in range(20):  # faces at a steep angle get more weight, so that the normal turns toward them
@@ -43,7 +47,8 @@ def fit_height_plane(surface: Mesh) -> tuple[Floats, float]:
 def fit_height_spline(data: Floats, spans: int, margin: float = _MARGIN) -> tuple[tuple[Floats, Floats], Floats]:
     """Knots in both directions and poles (U,V,3) of the height spline nearest to points (N,3), by least squares.
 
-    Its parameters are x and y. ``spans``: of the longer side. It ends ``margin`` of that side beyond the points.
+    Its parameters are x and y. ``spans``: of the longer side. It ends ``margin`` of that side beyond the points. Raises
+    ValueError where the points have fewer than two places over the plane.
     """
     knots, heights = fit_parametric_spline(data[:, :2], data[:, 2:], spans, margin)
     poles = np.dstack([*np.meshgrid(*map(_place_poles, knots), indexing="ij"), heights])
@@ -56,8 +61,10 @@ def fit_parametric_spline(
     """Knots in both directions and poles (U,V,K) of the spline nearest to values (N,K) at parameters (N,2).
 
     By least squares. ``spans``: of the longer side. It ends ``margin`` of that side beyond the parameters, and goes on
-    as straight as it can where there are none.
+    as straight as it can where there are none. Raises ValueError where there are fewer than two different parameters.
     """
+    if not len(uv) or not np.ptp(uv, axis=0).any():
+        raise ValueError(f"no spline for {len(uv)} points at fewer than two places")
     low, high = uv.min(axis=0), uv.max(axis=0)
     edge = margin * (high - low).max()
     long = (high - low).max()

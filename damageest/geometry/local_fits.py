@@ -37,10 +37,12 @@ def smooth_points(points: Floats, noise: float, count: int = 32) -> tuple[Floats
     at most three times the noise.
 
     Args:
-        points: (N,3); at least 6, and more than ``count`` for useful fits.
+        points: (N,3); at least 6, and more than ``count``, for useful fits; fewer stay about where they are.
         noise: standard deviation of the points from the surface.
         count: neighbours of each fit; its radius is the distance to the farthest.
     """
+    if not len(points):
+        return np.empty((0, 3)), np.empty((0, 3)), np.empty(0)
     _require_memory(points, count)
     distance, index = find_neighbours(points, count)
     normals, weights = _fit_planes(points, index, distance, noise)
@@ -62,6 +64,8 @@ def average_points(points: Floats, counts: Ints, noise: float, chosen: Ints) -> 
         noise: standard deviation of one scan point from the surface.
         chosen: (M,) indices of the points to move.
     """
+    if not len(chosen):
+        return np.empty((0, 3)), np.empty((0, 3))
     _require_memory(points, SCALES[0])
     tree = make_tree(points)
     distance, index = query_neighbours(tree, points, min(SCALES[0], len(points)))

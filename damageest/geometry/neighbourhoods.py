@@ -49,8 +49,10 @@ def gather_around(points: Floats, places: Floats, count: int, rng: np.random.Gen
     """Ascending indices of points (N,3) that include the ``count`` nearest ones of nearly every one of the few places
     (M,3); for a tree over very many points, which takes seconds.
 
-    How far these are is estimated from `SOME` points drawn at random.
+    How far these are is estimated from `SOME` points drawn at random; of few points, all are taken.
     """
+    if len(points) <= 10 * count or not len(places):
+        return np.arange(len(points) if len(places) else 0)
     some = points[rng.integers(0, len(points), SOME)]
     enough = max(3, math.ceil(1.3 * count * len(some) / len(points)))
     reach = query_neighbours(make_tree(some), places, enough + 1)[0][:, -1]
@@ -101,7 +103,7 @@ def find_neighbours(
 
 
 def make_tree(points: Floats) -> Any:
-    """A k-d tree over points (N,D), at least 1, for `query_neighbours`.
+    """A k-d tree over points (N,D) for `query_neighbours`.
 
     Of many points it is built by halving cells, not by medians: that takes half the time.
     """
@@ -114,6 +116,8 @@ def make_tree(points: Floats) -> Any:
 def query_neighbours(tree: Any, points: Floats, count: int, reach: float = np.inf) -> tuple[Floats, Ints]:
     """As `find_neighbours`, among the points of a tree of `make_tree` that has at least ``count``."""
     shape = (len(points), count)
+    if not count:
+        return np.empty(shape), np.empty(shape, np.int64)
     if len(points) < MANY:
         distance, index = tree.query(points, k=count, distance_upper_bound=reach, workers=2)
         return np.reshape(distance, shape), np.reshape(index, shape)

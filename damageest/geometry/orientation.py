@@ -38,6 +38,8 @@ def turn_toward_void(
     """
     from scipy.spatial import cKDTree
 
+    if not len(points):
+        return np.empty((0, 3))
     viewpoints = points[pick_one_per_cube(points, 2 * cell)] if len(points) > 1500 else points
     toward_lost = _sum_solid_angles(viewpoints, lost, lost_normals, areas, cell) + _sum_missed_above(
         viewpoints, lost, lost_normals, areas, cell
@@ -58,11 +60,12 @@ def _find_signs(points: Floats, normals: Floats, evidence: Floats) -> Floats:
     # the two, is that of the other; after Koenig and Gumhold (2009), who transport normals along curves.
     across = normals[first] - 2 * np.einsum("ij,ij->i", normals[first], step)[:, None] * step
     agree = np.einsum("ij,ij->i", across, normals[second])
-    near = 1 / (1 + (distance[:, 1:].ravel() / np.median(distance[:, -1])) ** 2)
+    typical = max(float(np.median(distance[:, -1])), 1e-300)  # 0 where points coincide
+    near = 1 / (1 + (distance[:, 1:].ravel() / typical) ** 2)
 
     # Patches are small, so that the few wrong couplings (across a thin fin, a narrow slot) are outweighed by the many
     # right ones along the borders.
-    block = number_cubes(points, max(3 * float(np.median(distance[:, -1])), 1e-9 * float(np.ptp(points)), 1e-300))[1]
+    block = number_cubes(points, max(3 * typical, 1e-9 * float(np.ptp(points)), 1e-300))[1]
     strong = (np.abs(agree) > SMOOTH) & (block[first] == block[second])
     sign, patch = _span_trees(len(points), first[strong], second[strong], agree[strong])
     strength = near * agree * np.abs(agree)

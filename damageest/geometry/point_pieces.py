@@ -22,6 +22,8 @@ def number_pieces(points: Floats, gap: float) -> Ints:
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial.distance import cdist
 
+    if not len(points):
+        return np.empty(0, np.int64)
     cell, number = number_cubes(points, gap / np.sqrt(3) * (1 - 1e-9))
     order = order_integers(number)
     cubes, first, cube = np.unique(number[order], return_index=True, return_inverse=True)

@@ -110,6 +110,8 @@ def solve_poisson(
     back = csr_array(look.T)
     shift = float(pull.sum()) / grid.size
     eigenvalues = _eigenvalues(grid) + shift
+    if not shift:  # nothing fixes the mean of the field: it is 0
+        eigenvalues[0, 0, 0] = np.inf
 
     def apply(x: GridValues) -> GridValues:
         out = _laplacian(x)

@@ -45,8 +45,8 @@ class RayCaster:
         needed = BYTES_OF_TRIANGLE * len(mesh.faces) + BYTES_OF_FIRST * (not _started)
         require_memory(needed, f"rays through {len(mesh.faces):,} triangles", "more memory (--memory)")
         _started[:] = [True]
-        self._centre = mesh.bounds.mean(axis=0)
-        self._scale = mesh.diagonal
+        self._centre = mesh.bounds.mean(axis=0) if len(mesh.vertices) else np.zeros(3)
+        self._scale = mesh.diagonal if len(mesh.vertices) else 0.0
         self._scene = EmbreeScene()
         TriangleMesh(self._scene, np.ascontiguousarray(mesh.triangles - self._centre, np.float32))
 

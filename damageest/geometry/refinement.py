@@ -35,7 +35,7 @@ def refine_at(mesh: Mesh, face: Ints, foot: Floats, edge: float) -> tuple[Mesh, 
 
     Args:
         mesh: conforming: no vertex lies within an edge of another face.
-        face: (N,) the face that each point lies on, N at least 1.
+        face: (N,) the face that each point lies on.
         foot: (N,3) the points, as `find_nearest` gives them.
         edge: longest edge allowed.
     """
@@ -88,6 +88,8 @@ def bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, I
 
     Gives vertices, faces, and the face (F,) that each of them came from.
     """
+    if not len(wanted):
+        return vertices, faces, np.arange(len(faces))
     needed = BYTES_OF_FACE * (len(faces) + 3 * len(wanted))
     require_memory(needed, f"a mesh of {len(faces):,} triangles that is refined", "a larger tolerance")
     corners = vertices[faces]

@@ -17,12 +17,16 @@ def sample_by_area(mesh: Mesh, count: int, rng: np.random.Generator, faces: Ints
         mesh: open or closed.
         count: number of points.
         rng: source of the random numbers; the same state gives the same points.
-        faces: (K,) the triangles to use, all by default; their total area must not be 0.
+        faces: (K,) the triangles to use, all by default.
 
-    Unit and frame are those of the mesh.
+    Unit and frame are those of the mesh. Raises ValueError where points are wanted and the triangles have no area.
     """
     faces = np.arange(len(mesh.faces)) if faces is None else faces
     total = np.cumsum(np.linalg.norm(mesh.cross[faces], axis=1))
+    if not count:
+        return np.empty((0, 3)), np.empty(0, np.int64)
+    if not len(total) or not total[-1] > 0:
+        raise ValueError(f"no place for {count} points on {len(total)} triangles without area")
     at = (np.arange(count) + rng.random(count)) / count * total[-1]
     face = faces[np.minimum(np.searchsorted(total, at), len(total) - 1)]
     u, v = rng.random((2, count, 1))

@@ -19,12 +19,15 @@ BALANCE = 1e-7
 
 
 def to_manifold(mesh: Mesh, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
-    """A ``manifold3d.Manifold`` of a watertight mesh, its coordinates relative to ``origin`` (3,).
+    """A ``manifold3d.Manifold`` of a watertight mesh, its coordinates relative to ``origin`` (3,); an empty one of a
+    mesh without triangles.
 
     Raises ValueError where manifold3d rejects the mesh because it is not closed, or its windings are not consistent.
     """
     from manifold3d import Error, Manifold, Mesh64
 
+    if not len(mesh.faces):
+        return Manifold()
     vertices = np.array(mesh.vertices - np.asarray(origin, dtype=np.float64), dtype=np.float64, order="C")
     body = Manifold(Mesh64(vertices, np.array(mesh.faces, dtype=np.uint64, order="C")))
     if body.status() != Error.NoError:
@@ -56,10 +59,12 @@ def to_solid(body: Any, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Solid | None:
 def concatenate_meshes(meshes: Sequence[Mesh]) -> tuple[Floats, Ints, Ints]:
     """Several meshes as one: vertices (V,3), faces (F,3), and the index (F,) of the mesh that each face came from.
 
-    Equal vertices of two meshes are not merged. At least one mesh is needed; raises ValueError without any.
+    Equal vertices of two meshes are not merged.
     """
+    if not meshes:
+        return np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty(0, np.int64)
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    vertices = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.empty((0, 3))
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
     faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)])
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
     return vertices, faces, owner
@@ -101,8 +106,10 @@ def subtract_lost(whole: Any, lost: Any) -> Any:
 def iou(first: Mesh | None, second: Mesh | None) -> float:
     """Intersection over union of two solids by volume, from 0 to 1.
 
-    None stands for no solid: 1 where both are None, 0 where one is. Raises ValueError where manifold3d rejects one.
+    None and a mesh without triangles stand for no solid: 1 where there is none twice, 0 where once. Raises ValueError
+    where manifold3d rejects one.
     """
+    first, second = (mesh if mesh is not None and len(mesh.faces) else None for mesh in (first, second))
     if first is None or second is None:
         return float(first is second)
     origin = first.bounds.mean(axis=0)

@@ -51,6 +51,8 @@ def remove_rigid(points: Floats, displacement: Floats, weights: Floats) -> Float
 
     To first order in the angle, which is small.
     """
+    if not len(points):
+        return np.empty((0, 3))
     at = points - points.mean(axis=0)
     size = max(float(np.abs(at).max()), 1e-300)
     zero, (x, y, z) = np.zeros(len(at)), at.T / size

@@ -80,6 +80,8 @@ def _spread_directions(count: int = 200) -> Floats:
 
 def _measure_size(points: Floats, clip: float) -> float:
     """The largest width of the points over all directions, without the share ``clip`` of points at either end."""
+    if not len(points):
+        return 0.0
     points = points[:: max(1, len(points) // 5000)]
     along = (points - points.mean(0)) @ _spread_directions().T
     low, high = np.quantile(along, [clip, 1 - clip], axis=0) if clip else (along.min(axis=0), along.max(axis=0))
@@ -174,6 +176,8 @@ def diagnose_size(part_vertices: Floats, unit: str) -> str | None:
     micrometres may have a part of any size.
     """
     here = canonical_unit(unit)
+    if not len(part_vertices):
+        return None
     across = float(np.ptp(part_vertices, axis=0).max()) * MILLIMETRES[here]
     if here == "um" or SMALLEST <= across <= LARGEST:
         return None

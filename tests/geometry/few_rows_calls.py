@@ -1,0 +1,290 @@
+"""A call of each public function of the toolbox with a few rows, and what refuses them.
+
+Whoever adds a function to the toolbox adds a line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from damageest.artefacts import Samples, Sites
+from damageest.geometry import (
+    bodies,
+    body_repair,
+    complement,
+    cutting,
+    depth_steps,
+    distance,
+    duplicates,
+    far_points,
+    healing,
+    height_spline,
+    local_fits,
+    loops,
+    make_part,
+    neighbourhoods,
+    noise,
+    open_surfaces,
+    pieces,
+    point_pieces,
+    poisson,
+    rays,
+    refinement,
+    solids,
+    touching,
+    transforms,
+    units,
+    vectors,
+    views,
+    voxels,
+)
+from tests.geometry.few_rows import (
+    CUBE,
+    PART,
+    Rows,
+    call_both,
+    call_by_cells,
+    call_crop_points,
+    call_crops,
+    call_extract_contour,
+    call_fit_contour,
+    call_gather,
+    call_grid,
+    call_insert_points,
+    call_join_pieces,
+    call_neighbours,
+    call_orientation,
+    call_poisson,
+    call_query,
+    call_rays,
+    call_refine_at,
+    call_sampling,
+    call_selector,
+    call_signed,
+    call_threads,
+    call_tree,
+    call_voxel_grid,
+    expect,
+    surface,
+)
+
+CALLS: dict[str, Callable[[Rows], None]] = {
+    "bodies.label_pieces": lambda r: expect(bodies.label_pieces(r.mesh.faces), (len(r.mesh.faces),)),
+    "body_repair.label_bodies": lambda r: expect(body_repair.label_bodies(r.mesh.faces)[0], (len(r.mesh.faces),)),
+    "body_repair.orient_faces": lambda r: expect(body_repair.orient_faces(r.mesh.faces)[0], (len(r.mesh.faces), 3)),
+    "body_repair.signed_volumes": lambda r: expect(
+        body_repair.signed_volumes(r.mesh.vertices, r.mesh.faces, np.zeros(len(r.mesh.faces), int), 1), (1,)
+    ),
+    "body_repair.split_pinches": lambda r: expect(
+        body_repair.split_pinches(r.mesh.vertices, r.mesh.faces, []), (None, 3), (None, 3)
+    ),
+    "body_repair.resolve_bodies": lambda r: expect(
+        body_repair.resolve_bodies(r.mesh.vertices, r.mesh.faces, []), (None, 3), (None, 3)
+    ),
+    "complement.complement_part": lambda r: expect(complement.complement_part(PART, r.points, 1.0).faces, (24, 3)),
+    "complement.complement_deviation": lambda r: expect(
+        complement.complement_deviation(r.deviation).distance, (r.count,)
+    ),
+    "complement.complement_samples": lambda r: expect(
+        complement.complement_samples(Samples(r.points, r.normals, r.numbers, r.numbers, 1.0)).normals, (r.count, 3)
+    ),
+    "complement.label_strays": lambda r: expect(
+        complement.label_strays(r.deviation, 1, Sites(np.zeros(r.count, int), 0)).label, (r.count,)
+    ),
+    "contour.extract_contour": call_extract_contour,
+    "contour.fit_contour": call_fit_contour,
+    "crops.Crop": call_crops,
+    "crops.BoxCrop": call_crops,
+    "crops.CylinderCrop": call_crops,
+    "crops.AboveCrop": call_crops,
+    "crops.PieceCrop": call_crops,
+    "crops.crop_points": call_crop_points,
+    "cutting.cut_triangles": lambda r: expect(
+        cutting.cut_triangles(r.mesh.vertices, r.mesh.faces, r.mesh.vertices[:, 0]),
+        (None, 3),
+        (None, 3),
+        (None,),
+        (None,),
+    ),
+    "depth_steps.measure_depth_step": lambda r: expect(np.asarray(depth_steps.measure_depth_step(r.points)), ()),
+    "distance.SurfaceTree": call_tree,
+    "distance.closest_on_mesh": call_both(lambda points, mesh: distance.closest_on_mesh(points, mesh).distance),
+    "distance.distance_to_mesh": call_both(distance.distance_to_mesh),
+    "distance.distance_to_edges": lambda r: expect(
+        distance.distance_to_edges(CUBE.vertices, r.mesh.vertices, r.mesh.faces[:, :2]), (8,)
+    ),
+    "distance.winding_number": call_both(distance.winding_number),
+    "distance.is_inside": call_both(distance.is_inside),
+    "distance.signed_distance": call_signed,
+    "distance.run_libigl_pass": call_both(distance.run_libigl_pass),
+    "distance_by_cells.signed_distance_by_cells": call_by_cells,
+    "duplicates.list_distinct": lambda r: expect(duplicates.list_distinct(r.numbers), (None,)),
+    "duplicates.order_integers": lambda r: expect(duplicates.order_integers(r.numbers), (r.count,)),
+    "duplicates.group_integers": lambda r: expect(duplicates.group_integers(r.numbers), (None,), (r.count,), (None,)),
+    "duplicates.find_members": lambda r: expect(duplicates.find_members(np.arange(5), r.numbers), (5,)),
+    "duplicates.list_used": lambda r: expect(duplicates.list_used(r.mesh.faces), (3 * len(r.mesh.faces),)),
+    "duplicates.find_duplicates": lambda r: expect(duplicates.find_duplicates(r.points), (None,), (r.count,)),
+    "far_points.find_far": lambda r: expect(far_points.find_far(r.points, 1.0), (r.count,)),
+    "healing.heal": lambda r: expect(healing.heal(r.mesh.vertices, r.mesh.faces)[1], (None, 3)),
+    "height_spline.fit_height_plane": lambda r: expect(height_spline.fit_height_plane(r.mesh)[0], (3, 3)),
+    "height_spline.fit_height_spline": lambda r: expect(
+        height_spline.fit_height_spline(r.points, 2)[1], (None, None, 3)
+    ),
+    "height_spline.fit_parametric_spline": lambda r: expect(
+        height_spline.fit_parametric_spline(r.points[:, :2], r.points, 2)[1], (None, None, 3)
+    ),
+    "local_fits.smooth_points": lambda r: expect(
+        local_fits.smooth_points(r.points, 0.1), (r.count, 3), (r.count, 3), (r.count,)
+    ),
+    "local_fits.average_points": lambda r: expect(
+        local_fits.average_points(r.points, r.ones, 0.1, np.arange(r.count)), (r.count, 3), (r.count, 3)
+    ),
+    "loops.trace_loops": lambda r: [expect(loop, (3,)) for loop in loops.trace_loops(r.mesh.faces)] and None,
+    "loops.trace_rims": lambda r: [expect(loop, (None,)) for loop in loops.trace_rims(surface(r))] and None,
+    "make_part.make_part": lambda r: expect(make_part.make_part(r.mesh.vertices, r.mesh.faces).faces, (None, 3)),
+    "neighbourhoods.find_nearby": lambda r: expect(
+        (
+            neighbourhoods.find_nearby(r.points, CUBE.vertices, 1.0),
+            neighbourhoods.find_nearby(CUBE.vertices, r.points, 1.0),
+        ),
+        (None,),
+        (None,),
+    ),
+    "neighbourhoods.gather_around": call_gather,
+    "neighbourhoods.find_in_box": lambda r: expect(
+        neighbourhoods.find_in_box(r.points, np.full(3, -1e9), np.full(3, 1e9)), (r.count,)
+    ),
+    "neighbourhoods.thin_points": lambda r: expect(
+        neighbourhoods.thin_points(r.points, 0.1), (None, 3), (None,), (None,)
+    ),
+    "neighbourhoods.pick_one_per_cube": lambda r: expect(neighbourhoods.pick_one_per_cube(r.points, 0.1), (None,)),
+    "neighbourhoods.find_neighbours": call_neighbours,
+    "neighbourhoods.make_tree": call_query,
+    "neighbourhoods.query_neighbours": call_query,
+    "neighbourhoods.measure_local_areas": lambda r: expect(neighbourhoods.measure_local_areas(r.points), (r.count,)),
+    "noise.measure_noise_and_spacing": lambda r: expect(np.array(noise.measure_noise_and_spacing(r.points)), (2,)),
+    "open_surfaces.centre_points": lambda r: expect(open_surfaces.centre_points(r.points), (3,)),
+    "open_surfaces.thin_for_surface": lambda r: expect(open_surfaces.thin_for_surface(r.points, 1.0), (None, 3)),
+    "open_surfaces.orient_points": lambda r: expect(
+        open_surfaces.orient_points(r.points, PART, 1.0, 0.1), (None, 3), (None, 3)
+    ),
+    "open_surfaces.trim_surface": lambda r: expect(
+        open_surfaces.trim_surface(r.mesh.vertices, r.mesh.faces, r.points, 1e6, PART, 1e6).faces, (None, 3)
+    ),
+    "open_surfaces.take_largest_piece": lambda r: expect(open_surfaces.take_largest_piece(r.mesh.faces), (None, 3)),
+    "open_surfaces.faces_skin": lambda r: expect(np.asarray(open_surfaces.faces_skin(surface(r), PART)), ()),
+    "orientation.turn_toward_void": call_orientation,
+    "pieces.find_pieces": lambda r: expect(np.asarray(pieces.find_pieces(CUBE, r.points, r.numbers, 0.5)[1]), ()),
+    "pieces.join_pieces": call_join_pieces,
+    "point_pieces.number_pieces": lambda r: expect(point_pieces.number_pieces(r.points, 1.0), (r.count,)),
+    "poisson.Grid": call_grid,
+    "poisson.solve_poisson": call_poisson(poisson.solve_poisson),
+    "poisson.solve_coarse_to_fine": call_poisson(poisson.solve_coarse_to_fine),
+    "rays.RayCaster": call_rays,
+    "refinement.find_nearest": lambda r: expect(refinement.find_nearest(CUBE, r.points), (r.count,), (r.count, 3)),
+    "refinement.refine_at": call_refine_at,
+    "refinement.halve_edges": lambda r: expect(refinement.halve_edges(r.mesh, 5.0).faces, (None, 3)),
+    "refinement.cut_into_cells": lambda r: expect(refinement.cut_into_cells(r.mesh, 5.0)[1], (None,)),
+    "refinement.bisect_faces": lambda r: expect(
+        refinement.bisect_faces(r.mesh.vertices, r.mesh.faces, np.arange(len(r.mesh.faces))),
+        (None, 3),
+        (None, 3),
+        (None,),
+    ),
+    "refinement.insert_points": call_insert_points,
+    "sampling.sample_by_area": call_sampling,
+    "selectors.Selector": call_selector,
+    "solids.to_manifold": lambda r: expect(np.asarray(solids.to_manifold(r.mesh).num_tri()), ()),
+    "solids.concatenate_meshes": lambda r: expect(
+        solids.concatenate_meshes([CUBE] * r.count), (8 * r.count, 3), (12 * r.count, 3), (12 * r.count,)
+    ),
+    "solids.unite": lambda r: expect(np.asarray(solids.unite([CUBE] * r.count).volume()), ()),
+    "solids.iou": lambda r: expect(np.asarray(solids.iou(r.mesh, CUBE)), ()),
+    "threads.cut_evenly": call_threads,
+    "threads.map_in_threads": call_threads,
+    "touching.merge_close": lambda r: expect(
+        touching.merge_close(r.mesh.vertices, r.mesh.faces, 0.1), (None, 3), (None, 3)
+    ),
+    "transforms.move_points": lambda r: expect(transforms.move_points(r.points, np.eye(4)), (r.count, 3)),
+    "transforms.make_motions": lambda r: expect(
+        transforms.make_motions(np.hstack([r.points, r.points])), (r.count, 4, 4)
+    ),
+    "transforms.move_mesh": lambda r: expect(transforms.move_mesh(r.mesh, np.eye(4)).faces, (len(r.mesh.faces), 3)),
+    "transforms.remove_rigid": lambda r: expect(transforms.remove_rigid(r.points, r.points, r.ones), (r.count, 3)),
+    "units.diagnose_scale": lambda r: units.diagnose_scale(r.points, CUBE.vertices) and None,
+    "units.diagnose_size": lambda r: units.diagnose_size(r.points, "mm") and None,
+    "vectors.normalise": lambda r: expect(vectors.normalise(r.points), (r.count, 3)),
+    "views.choose_view": lambda r: expect(
+        views.choose_view(rays.RayCaster(CUBE), r.mesh, CUBE.bounds, 10.0).direction, (3,)
+    ),
+    "voxels.VoxelGrid": call_voxel_grid,
+    "voxels.measure_bounds": lambda r: expect(voxels.measure_bounds(r.points), (2, 3)),
+    "voxels.number_cubes": lambda r: expect(voxels.number_cubes(r.points, 0.5), (r.count, 3), (r.count,)),
+    "voxels.order_by_place": lambda r: expect(voxels.order_by_place(r.points), (r.count,)),
+    "voxels.measure_area": lambda r: expect(np.asarray(voxels.measure_area(r.points, 0.5)), ()),
+    "voxels.number_faced_cubes": lambda r: expect(
+        voxels.number_faced_cubes(r.points, r.normals, 0.5), (r.count, 3), (r.count,)
+    ),
+}
+"""What is called, by module and name; it checks the shapes of what comes back."""
+
+WITHOUT_ROWS: dict[str, str] = {
+    **dict.fromkeys(
+        (
+            "bodies.split_bodies", "bodies.split_shells", "rounding.round_to_single", "simplification.simplify_within",
+            "skin.extract_ids", "skin.find_inner_faces", "touching.separate_touching",
+        ),
+        "takes solids, which have at least four triangles",
+    ),
+    **dict.fromkeys(
+        ("solids.subtract_lost", "solids.to_arrays", "solids.to_solid", "touching.separate_sheets"),
+        "takes bodies of manifold3d",
+    ),
+    **dict.fromkeys(
+        ("isosurface.extract_region", "poisson.make_grid", "poisson.refine_field"),
+        "takes the values or sides of a grid",
+    ),
+    **dict.fromkeys(
+        (
+            "open_surfaces.choose_cell", "selectors.Facing", "selectors.HalfSpace", "selectors.StrictMapping",
+            "selectors.find_face", "threads.count_cores", "threads.count_threads", "transforms.invert_pose",
+            "units.canonical_unit", "units.unit_factor",
+        ),
+        "takes single values",
+    ),
+    **dict.fromkeys(
+        ("distance.Closest", "pieces.JoinedPieces", "pieces.Piece", "rays.Crossings", "views.View"), "is a result"
+    ),
+}  # fmt: skip
+"""Why a public name takes no number of rows."""
+
+NO_TRIANGLE = r"no distance: what it is measured to has no (triangle|edge)"
+FEW_POINTS = r"no inner damage surface could be reconstructed from \d points"
+NO_VOLUME = r"holds no triangles|encloses no volume"
+REFUSALS: dict[str, str] = {
+    "body_repair.resolve_bodies": NO_VOLUME,
+    "crops.crop_points": r"leaves no points; there were none before it",
+    "distance.SurfaceTree": NO_TRIANGLE,
+    "distance.closest_on_mesh": NO_TRIANGLE,
+    "distance.distance_to_mesh": NO_TRIANGLE,
+    "distance.distance_to_edges": NO_TRIANGLE,
+    "distance.signed_distance": NO_TRIANGLE,
+    "distance.run_libigl_pass": NO_TRIANGLE,
+    "healing.heal": NO_VOLUME,
+    "height_spline.fit_height_plane": r"no plane for a surface without area",
+    "height_spline.fit_height_spline": r"no spline for \d points",
+    "height_spline.fit_parametric_spline": r"no spline for \d points",
+    "loops.trace_rims": r"the damage surface has no rim",
+    "make_part.make_part": NO_VOLUME,
+    "open_surfaces.centre_points": FEW_POINTS,
+    "open_surfaces.thin_for_surface": FEW_POINTS,
+    "open_surfaces.orient_points": FEW_POINTS,
+    "open_surfaces.trim_surface": r"no inner damage surface near the points",
+    "sampling.sample_by_area": r"no place for \d points on \d triangles",
+    "solids.to_manifold": r"manifold3d rejects the mesh",
+    "solids.iou": r"manifold3d rejects the mesh",
+    "voxels.measure_bounds": r"nothing has no bounds",
+}
+"""What a function that has no answer for so few rows says, as a regular expression."""
