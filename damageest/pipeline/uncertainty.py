@@ -11,6 +11,7 @@ from damageest.artefacts import Flags, Floats, Ints
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
 from damageest.checks.pose_error import PoseError, measure_pose_error
+from damageest.checks.scan_quality import describe_few, is_sparse
 from damageest.checks.uncertainty import (
     WIDTH,
     SiteError,
@@ -37,12 +38,12 @@ def measure_uncertainty(engine: Engine, work: Work) -> Work:
 
     A site that is doubtful has none: what contradicts it is not an error that has a size. The total has one where each
     accepted site has one, and no damage was left without a volume. Doubtful sites that are not accepted make it wide:
-    they may be damage, too.
+    they may be damage, too. Where no site was found in a scan that could not show one, it is not known either.
     """
     state = work.job
     if not work.sites:
-        total = None if work.failures else (0.0, 0.0)
-        return replace(work, job=state.with_value(JobState.volume_95, total, digest("no sites", bool(work.failures))))
+        total = None if work.failures or _may_hide_loss(state) else (0.0, 0.0)
+        return replace(work, job=state.with_value(JobState.volume_95, total, digest("no sites", total is None)))
     free = _list_free_motions(state)
     pose = measure_pose_error(state.part, state.aligned, state.deviation, state.tolerance, free)
     sites, errors, taken = [], [], _TakenSkin(state, work.sites)
@@ -112,6 +113,15 @@ def _measure_site(
         reasons=tuple(reasons),
     )
     return uncertainty, error
+
+
+def _may_hide_loss(state: JobState) -> bool:
+    """Whether there are too few points to say that nothing is lost: next to none, or far apart for the tolerance, or so
+    far that the only points on a loss are taken for noise, and there are such points."""
+    scan, tolerance = state.aligned, state.tolerance
+    if describe_few(scan) or is_sparse(scan, tolerance):
+        return True
+    return scan.spacing > tolerance and bool((state.deviation.distance < -tolerance).any())
 
 
 def _list_free_motions(state: JobState) -> Floats | None:
