@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from damageest.batches.tasks import run_tasks
 from damageest.batches.work import compute_key, load_job, release, work
 from damageest.errors import DamageestError, Fault, JobError
 from damageest.geometry.threads import count_cores
-from damageest.io.files import expand_home
+from damageest.io.files import expand_home, read_json
 from damageest.isolation import measure_free_memory
 from damageest.isolation.limits import STAGE_SECONDS
 
@@ -134,7 +133,7 @@ def _run(
 def _find_done(jobs: Sequence[BatchJob], folder: Path) -> dict[str, Row]:
     """The rows of an earlier batch that stand: with a result that is there, of the same job, files and code."""
     try:
-        stored = [read_row(values) for values in json.loads((folder / "batch.json").read_text())["jobs"]]
+        stored = [read_row(values) for values in read_json(folder / "batch.json")["jobs"]]
     except (OSError, ValueError, KeyError, TypeError):
         return {}
     known = {row.name: row for row in stored if row.has_result and (Path(row.output) / "result.json").is_file()}

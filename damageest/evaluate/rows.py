@@ -94,7 +94,7 @@ def read_rows(out: Path | None) -> list[Row]:
         return []
     rows, lines = [], out.read_text().splitlines(keepends=True)
     for text in lines:
-        with contextlib.suppress(json.JSONDecodeError):
+        with contextlib.suppress(ValueError, RecursionError):
             rows.append(json.loads(text))
     if len(rows) < len(lines) or (lines and not lines[-1].endswith("\n")):
         out.write_text("".join(json.dumps(row) + "\n" for row in rows))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from pathlib import Path
+from typing import Any
 
 from damageest.errors import DamageestError, InputError, describe_missing_library, is_interrupt
 
@@ -30,6 +32,23 @@ def check_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
     if start.lstrip().lower().startswith((b"<!doctype html", b"<html")):
         raise InputError(f"{path}: the file is a web page, not {what}; {valid}\n  try: download the file again")
     return suffix
+
+
+def read_json(path: Path) -> Any:
+    """The content of a JSON file. Raises OSError, and ValueError for what is no JSON, or far too deep to be ours."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError("its values are inside each other too often") from None
+
+
+def working_folder() -> Path:
+    """The working directory. Raises InputError where it was deleted."""
+    try:
+        return Path.cwd()
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"the working directory cannot be used: {reason}; change to another folder") from None
 
 
 def file_sha256(path: Path) -> str:

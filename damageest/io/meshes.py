@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,11 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
     import trimesh
 
     try:
-        scene = trimesh.load_scene(path, process=False, **({"maintain_order": True} if suffix == ".obj" else {}))
+        options: dict[str, Any] = {"maintain_order": True} if suffix == ".obj" else {}
+        if suffix == ".ply":
+            scene = trimesh.load_scene(_open_ply(path), file_type="ply", process=False)
+        else:
+            scene = trimesh.load_scene(path, process=False, **options)
         placed = [(*scene.graph[node],) for node in scene.graph.nodes_geometry]
         bodies = [(scene.geometry[name], np.asarray(T, dtype=np.float64)) for T, name in placed]
         meshes = [
@@ -54,6 +59,16 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(f"{path}: a triangle refers to a vertex that is not in the file; the file may be truncated")
     return vertices, faces, unit
+
+
+def _open_ply(path: Path) -> io.BytesIO:
+    """A PLY file without the comments in front of its format, which are valid, but which trimesh does not expect."""
+    data = path.read_bytes()
+    start, found, rest = data[: 1 << 16].partition(b"format ")
+    lines = start.splitlines(keepends=True)
+    if found and all(line.startswith((b"comment", b"obj_info")) or not line.strip() for line in lines[1:]):
+        data = lines[0] + found + rest + data[1 << 16 :]
+    return io.BytesIO(data)
 
 
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from collections import Counter
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ MOST_RATIO = 100
 """Largest ratio of the unpacked size to the file's. XML of meshes has 5 to 20."""
 ALWAYS_ALLOWED = 16 * 2**20
 """Bytes that a file may have unpacked whatever the ratio."""
+MOST_DEPTH = 100
+"""Largest number of objects inside each other. Assemblies have some ten; the reader's time grows with its cube."""
 MOST_BODIES = 1000
 """Largest number of bodies, with each object counted as often as it is placed."""
 
@@ -37,11 +40,7 @@ def check_archive(path: Path) -> None:
         raise
     except Exception:  # of zipfile, its decompressors and lxml
         return  # the reader says what is wrong
-    total = 0
-    known: dict[str, int] = {}
-    for name, times in placed.items():
-        total += times * _count_parts(name, parts, known)
-    if total > MOST_BODIES:
+    if _count_placed(path, placed, parts) > MOST_BODIES:
         raise InputError(
             f"{path}: its objects stand for more than {MOST_BODIES} bodies; export the part alone, as one solid"
         )
@@ -77,11 +76,26 @@ def _count_bodies(
                     del element.getparent()[0]
 
 
-def _count_parts(name: str, parts: dict[str, Counter[str]], known: dict[str, int]) -> int:
-    """The bodies that an object stands for; more than is allowed where it contains itself."""
-    if name not in known:
-        known[name] = MOST_BODIES + 1  # until it is known: what is met again inside itself has no end
+def _count_placed(path: Path, placed: Counter[str], parts: dict[str, Counter[str]]) -> int:
+    """The bodies that the placed objects stand for, `MOST_BODIES` + 1 for more. Raises InputError for an object that
+    contains itself, and for too many inside each other: it does not call itself, since there may be any number."""
+    used, open_names = set(placed), list(placed)
+    while open_names:
+        new = set(parts.get(open_names.pop(), ())) - used
+        used |= new
+        open_names += new
+    try:
+        order = list(TopologicalSorter({name: parts.get(name, ()) for name in used}).static_order())
+    except CycleError:
+        raise InputError(f"{path}: one of its objects contains itself; export the part alone, as one solid") from None
+    known, depth = dict[str, int](), dict[str, int]()
+    for name in order:  # what an object contains comes before it
         inside = parts.get(name, Counter())
-        count = sum(times * _count_parts(one, parts, known) for one, times in inside.items()) if len(known) < 900 else 0
-        known[name] = min(max(count, 1), MOST_BODIES + 1)
-    return known[name]
+        known[name] = min(max(sum(times * known[one] for one, times in inside.items()), 1), MOST_BODIES + 1)
+        depth[name] = 1 + max((depth[one] for one in inside), default=0)
+    if max(depth.values(), default=0) > MOST_DEPTH:
+        raise InputError(
+            f"{path}: {max(depth.values())} of its objects are inside each other, more than the {MOST_DEPTH} that are "
+            "read; export the part alone, as one solid"
+        )
+    return min(sum(times * known[name] for name, times in placed.items()), MOST_BODIES + 1)

@@ -7,7 +7,7 @@ import contextlib
 import json
 import os
 import pickle
-import select
+import selectors
 import signal
 import socket
 import subprocess
@@ -159,15 +159,17 @@ class _Worker:
     def _wait(self, seconds: float) -> None:
         """Waits for an answer. Raises _Ended where there is none in time, or the process has ended."""
         end = time.monotonic() + seconds if seconds else float("inf")
-        while True:
-            left = end - time.monotonic()
-            if select.select([self._channel], [], [], max(0.0, min(left, 0.5)))[0]:
-                return
-            # a process that the worker started may hold the channel open
-            if self._process is None or self._process.poll() is not None:
-                raise _Ended
-            if left <= 0:
-                raise _Ended(late=True)
+        with selectors.PollSelector() as selector:  # not select(): it takes no file numbers above 1023
+            selector.register(self._channel, selectors.EVENT_READ)
+            while True:
+                left = end - time.monotonic()
+                if selector.select(max(0.0, min(left, 0.5))):
+                    return
+                # a process that the worker started may hold the channel open
+                if self._process is None or self._process.poll() is not None:
+                    raise _Ended
+                if left <= 0:
+                    raise _Ended(late=True)
 
     def end(self) -> bool:
         """Ends the process, from any thread. Gives whether no call was in progress; one that was raises then."""

@@ -12,6 +12,7 @@ import json
 import os
 import shutil
 import zipfile
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +22,7 @@ import numpy as np
 
 from damageest import artefacts
 from damageest.errors import Fault, JobError
-from damageest.io.files import file_sha256
+from damageest.io.files import file_sha256, read_json
 
 _KINDS = {
     name: kind
@@ -84,9 +85,10 @@ def _decode(value: Any, arrays: Mapping[str, Any]) -> Any:
     return _KINDS[value["kind"]](**fields)
 
 
-def _seal(arrays: Path, meta: Any) -> str:
-    """The hash of an entry: of its file of arrays, and of the rest as JSON."""
-    return hashlib.sha256((file_sha256(arrays) + json.dumps(meta)).encode()).hexdigest()
+def _seal(stem: str, arrays: Path, meta: Any) -> str:
+    """The hash of an entry: of its name, so that one entry is not taken for another, of its file of arrays, and of the
+    rest as JSON."""
+    return hashlib.sha256(f"{stem}\n{file_sha256(arrays)}{json.dumps(meta)}".encode()).hexdigest()
 
 
 def describe_unwritable(error: OSError, place: Path) -> JobError:
@@ -106,13 +108,13 @@ class Cache:
         stem = f"{name}-{key}"
         for folder in (self.folder, *self.older):
             try:
-                meta = json.loads((folder / f"{stem}.json").read_text())
-                if meta["sha256"] != _seal(folder / f"{stem}.npz", meta["value"]):
+                meta = read_json(folder / f"{stem}.json")
+                if meta["sha256"] != _seal(stem, folder / f"{stem}.npz", meta["value"]):
                     continue
                 with np.load(folder / f"{stem}.npz", allow_pickle=False) as stored:
                     arrays = {n: stored[n] for n in stored.files}
                 value = _decode(meta["value"], arrays)
-            except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+            except (OSError, EOFError, ValueError, LookupError, TypeError, zipfile.BadZipFile, zlib.error):
                 continue
             if folder != self.folder:
                 self._carry_over(folder, stem)
@@ -137,10 +139,10 @@ class Cache:
         scratch = self.folder / f".{stem}.npz"
         with scratch.open("wb") as stream:
             np.savez(stream, **arrays)
-        seal = _seal(scratch, meta)
+        seal = _seal(stem, scratch, meta)
         os.replace(scratch, self.folder / f"{stem}.npz")
         scratch = self.folder / f".{stem}.json"
-        scratch.write_text(json.dumps({"sha256": seal, "value": meta}))
+        scratch.write_text(json.dumps({"sha256": seal, "value": meta}), encoding="utf-8")
         os.replace(scratch, self.folder / f"{stem}.json")
 
     def keep_only(self, stems: Iterable[str]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Mesh
 from damageest.errors import InputError
+from damageest.io.files import read_json
 from damageest.io.meshes import read_mesh
 
 PLY_TYPES = {"double": "<f8", "float": "<f4", "uchar": "u1", "int": "<i4"}
@@ -114,9 +114,9 @@ def open_output(folder: Path) -> OutputFolder:
             "wrote, as out/<name>"
         )
     try:
-        content = json.loads(path.read_text())
+        content = read_json(path)
         return OutputFolder(folder, {**content, "sites": list(content["sites"]), "units": content["units"]})
-    except (ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: cannot be read as a result: {error}; run the job again") from None
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from tests.faults import seeds
 from tests.faults.run import Row, Worker
@@ -62,6 +63,25 @@ def nest(model: bytes) -> bytes:
     )
 
 
+def nest_in_a_chain(model: bytes, count: int = 3000) -> bytes:
+    """Objects that each place the one before once: one body."""
+    last = re.findall(rb'<object id="(\d+)"', model)[-1]
+    objects = b""
+    for number in range(1000, 1000 + count):
+        inside = b'<components><component objectid="%s"/></components>' % last
+        objects += b'<object id="%d" type="model">%s</object>' % (number, inside)
+        last = b"%d" % number
+    model = model.replace(b"</resources>", objects + b"</resources>")
+    return re.sub(rb"<item [^>]*/>", b'<item objectid="%s"/>' % last, model, count=1)
+
+
+def nest_in_itself(model: bytes) -> bytes:
+    last = re.findall(rb'<object id="(\d+)"', model)[-1]
+    inside = b'<components><component objectid="7"/><component objectid="%s"/></components>' % last
+    model = model.replace(b"</resources>", b'<object id="7" type="model">%s</object></resources>' % inside)
+    return model.replace(b"</build>", b'<item objectid="7"/></build>')
+
+
 def declare(model: bytes) -> bytes:
     """The same with XML entities."""
     entities = b"".join(b'<!ENTITY %c "%s">' % (98 + k, b"&%c;" % (97 + k) * 10) for k in range(9))
@@ -93,6 +113,8 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
         "more than 1000 bodies",
     ),
     "3MF of nested objects": ("part.3mf", lambda: repack(nest), "more than 1000 bodies"),
+    "3MF of 3,000 objects inside each other": ("part.3mf", lambda: repack(nest_in_a_chain), "3001 of its objects"),
+    "3MF of an object inside itself": ("part.3mf", lambda: repack(nest_in_itself), "contains itself"),
     "3MF of nested entities": ("part.3mf", lambda: repack(declare), "declares entities"),
     "NPY of 10^18 points": ("a.npy", lambda: npy("(1000000000000000000, 3)"), "its header has the shape"),
     "NPY of fewer than no points": ("a.npy", lambda: npy("(-4, 3)"), "its header has the shape"),
@@ -142,6 +164,46 @@ def test_a_file_with_holes_is_refused(worker: Worker, tmp_path: Path) -> None:
     assert row["outcome"] == "refused"
     assert "were ever written" in row["words"]
     assert row["peak"] < 500e6
+
+
+def comment(name: str) -> bytes:
+    """The sound PLY with comments before the format."""
+    return seeds.seed(name).replace(b"format", b"comment made by hand\nobj_info no format\nformat", 1)
+
+
+UNUSUAL: dict[str, tuple[str, Callable[[], bytes], str]] = {
+    "LAZ with one piece of any size": ("a.laz", lambda: _put_piece(4294967294), "scan.laz"),
+    "3MF of 50 objects inside each other": ("part.3mf", lambda: repack(lambda m: nest_in_a_chain(m, 50)), "part.3mf"),
+    "scan as PLY text, comment first": ("a.ply", lambda: comment("ascii.ply"), "ascii.ply"),
+    "scan as PLY, comment first": ("a.ply", lambda: comment("little.ply"), "little.ply"),
+    "part as PLY, comment first": ("part.ply", lambda: comment("part.ply"), "part.ply"),
+    "part as PLY text, comment first": ("part.ply", lambda: _as_text().replace(b"format", b"comment\nformat", 1), ""),
+}
+
+
+def _put_piece(size: int) -> bytes:
+    """The sound LAZ, whose pieces are said to have ``size`` points."""
+    return put("scan.laz", seeds.seed("scan.laz").index(b"laszip encoded") + 64, struct.pack("<I", size))
+
+
+def _as_text() -> bytes:
+    mesh = trimesh.load(io.BytesIO(seeds.seed("part.ply")), file_type="ply", process=False)
+    return bytes(mesh.export(file_type="ply", encoding="ascii"))
+
+
+@pytest.mark.parametrize("name", UNUSUAL)
+def test_unusual_files_are_read(name: str, worker: Worker, tmp_path: Path) -> None:
+    file, make, sound = UNUSUAL[name]
+    row = try_file(worker, tmp_path, file, make())
+    assert row["outcome"] == "done", row
+    usual = try_file(worker, tmp_path, sound or file, seeds.seed(sound) if sound else _as_text())
+    assert (row["points"], row["volume"]) == (usual["points"], usual["volume"])
+
+
+@pytest.mark.parametrize("size", [0, 1, 7, 599, 2**31 - 1, 2**32 - 2, 2**32 - 1])
+def test_pieces_of_any_size_in_a_laz_file(size: int, worker: Worker, tmp_path: Path) -> None:
+    row = try_file(worker, tmp_path, "a.laz", _put_piece(size))
+    assert row["outcome"] in ("done", "refused"), row
 
 
 def _shuffle(data: bytes) -> bytes:

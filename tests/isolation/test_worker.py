@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -123,6 +124,27 @@ def test_an_exception_that_cannot_pass_keeps_its_name() -> None:
         call(faults.raise_odd)
     assert type(caught.value).__name__ == "OddError"
     assert "raise_odd" in str(caught.value.__cause__)
+
+
+CROWDED = """
+import os, resource
+from damageest.isolation import call_isolated
+from damageest.isolation.supervise import supervise
+from tests.isolation import faults
+most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, 4096), most))
+held = [os.open(os.devnull, os.O_RDONLY) for _ in range(1100)]
+parent = os.getpid()
+assert call_isolated(faults.tell_process, {}) != parent
+end = supervise(lambda: 7)
+print(end.status)
+"""
+
+
+@pytest.mark.skipif(resource.getrlimit(resource.RLIMIT_NOFILE)[1] < 2000, reason="at most 2000 files may be open here")
+def test_a_caller_with_more_than_a_thousand_open_files() -> None:
+    done = subprocess.run([sys.executable, "-c", CROWDED], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, "7\n"), done.stderr
 
 
 CALLER = """

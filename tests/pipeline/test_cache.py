@@ -190,3 +190,26 @@ def test_keys_tell_apart_what_differs(tmp_path: Path) -> None:
     before = digest(tmp_path / "a")
     (tmp_path / "a").write_text("y")
     assert digest(tmp_path / "a") != before
+
+
+def test_an_entry_under_another_name_is_not_found(tmp_path: Path) -> None:
+    """Two whole entries that were swapped: each is what it was, but not what its name says."""
+    cache = Cache(tmp_path)
+    cache.put("align", "a", Pose(TURN))
+    cache.put("align", "b", Pose(np.eye(4)))
+    for suffix in (".npz", ".json"):
+        one, other = tmp_path / f"align-a{suffix}", tmp_path / f"align-b{suffix}"
+        one.rename(tmp_path / "held")
+        other.rename(one)
+        (tmp_path / "held").rename(other)
+    assert cache.get("align", "a") == cache.get("align", "b") == (False, None)
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000 + "]" * 100_000, '{"a":' * 50_000, "\xff", "", "[]", "3", '{"sha256": 1}']
+)
+def test_a_json_file_that_is_not_ours_is_no_entry(text: str, tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    cache.put("align", "a", Pose(TURN))
+    (tmp_path / "align-a.json").write_bytes(text.encode("latin-1"))
+    assert cache.get("align", "a") == (False, None)

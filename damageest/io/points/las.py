@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
 from damageest.io.points import FormatError, PointFile
+
+if TYPE_CHECKING:
+    from laspy import LasReader
 
 HEAD = 375
 """Bytes of the longest header, that of LAS 1.4."""
@@ -16,23 +21,32 @@ HEAD = 375
 
 def read(path: Path, columns: str | None = None) -> PointFile:
     """All points of the file. laspy gives no unit."""
+    with open_las(path) as reader:
+        count = reader.header.point_count
+        las = reader.read()
+    points = np.column_stack([np.asarray(las.x), np.asarray(las.y), np.asarray(las.z)])
+    if len(points) < count:
+        raise FormatError(f"the file is truncated: it has {len(points)} of {count} points")
+    return PointFile(points)
+
+
+@contextmanager
+def open_las(path: Path) -> Iterator[LasReader]:
+    """laspy's reader of a file, after its header was checked. Raises FormatError for numbers that cannot be."""
     import laspy
 
     size = path.stat().st_size
     with path.open("rb") as stream:
         _check_header(stream.read(HEAD), stream, size)
         stream.seek(0)
-        with laspy.open(stream, closefd=False) as reader:
+        # the parallel decompressor allocates what a wrong size or table of the pieces says, and aborts where that fails
+        with laspy.open(stream, closefd=False, laz_backend=laspy.LazBackend.Lazrs) as reader:
             count, width = reader.header.point_count, reader.header.point_format.size
             packed = reader.header.are_points_compressed
             # a wrong count in the header would fill the memory
             if count * width > size * (1000 if packed else 1):
                 raise FormatError(f"the file is truncated: it is too small for the {count} points in its header")
-            las = reader.read()
-    points = np.column_stack([np.asarray(las.x), np.asarray(las.y), np.asarray(las.z)])
-    if len(points) < count:
-        raise FormatError(f"the file is truncated: it has {len(points)} of {count} points")
-    return PointFile(points)
+            yield reader
 
 
 def _check_header(head: bytes, stream: BinaryIO, size: int) -> None:

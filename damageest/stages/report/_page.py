@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,8 @@ from damageest.stages.report._sites import MOST_DRAWN, Shown
 from damageest.stages.report._values import list_fit, list_freedom, show_total_interval
 
 FOLDER = Path(__file__).parent / "page"
+DEFINE = "window.define = (name, needs, make) => { window.k3d = make(); };"
+"""The script that takes the library of the 3D view over."""
 LABELS = {
     "intact": "on the nominal surface",
     "damage": "in a site",
@@ -61,6 +65,7 @@ def fill_page(
         "size": scene.size,
         "unit": result.units,
     }
+    scripts = [DEFINE, _read_library(), (FOLDER / "report.js").read_text(encoding="utf-8")]
     return environment.get_template("report.html").render(
         title=result.name,
         unit=result.units,
@@ -76,8 +81,8 @@ def fill_page(
         layers=[(name, *LAYERS[name]) for name in _used_layers(scene)],
         view=view,
         snapshot=scene.snapshot,
-        script=_read_library(),
-        own_script=(FOLDER / "report.js").read_text(encoding="utf-8"),
+        scripts=scripts,
+        policy=make_policy(scripts),
         look=(FOLDER / "report.css").read_text(encoding="utf-8"),
         map_colours=_sample_map(),
         histogram=draw_histogram(result),
@@ -91,6 +96,13 @@ def fill_page(
         seconds=sum(record.seconds for record in result.stages),
         cached=sum(record.cached for record in result.stages),
     )
+
+
+def make_policy(scripts: Sequence[str]) -> str:
+    """The content security policy of the page: these scripts run and no others, and nothing is fetched."""
+    allowed = " ".join(f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in scripts)
+    fixed = "default-src 'none'; img-src data: blob:; font-src data:; style-src 'unsafe-inline'; worker-src blob:"
+    return f"{fixed}; script-src {allowed}"
 
 
 def describe_run(result: Result) -> str:

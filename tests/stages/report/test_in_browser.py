@@ -62,6 +62,19 @@ def test_no_fault_and_no_request(shown: browser.Shown) -> None:
     assert not shown.faults
 
 
+def test_no_other_script_runs_and_nothing_is_fetched(chromium: Any) -> None:
+    """What a text of a plugin could bring into the page: a script, a handler, a picture from elsewhere."""
+    path = pages.write(pages.two_sites())
+    page = path.read_text(encoding="utf-8")
+    foreign = "<script>window.ran = 1</script><img src='file:///nothing.png' onerror='window.ran = 2'>"
+    assert page.count("<header>") == 1
+    path.write_text(page.replace("<header>", f"<header>{foreign}"), encoding="utf-8")
+    shown = browser.Shown(chromium, path)
+    assert shown.page.evaluate("window.ran") is None
+    assert sum("Content Security Policy" in text for text in shown.faults) == 2, shown.faults
+    shown.page.close()
+
+
 def test_each_layer_draws_and_switches(shown: browser.Shown) -> None:
     for box in shown.page.locator("input.layer").all():
         box.uncheck()
