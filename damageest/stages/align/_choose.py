@@ -34,6 +34,9 @@ FIRST_POINTS, SECOND_POINTS = 1500, 10_000
 """Number of points for the first comparison of poses and the fits before it, and for the second comparison."""
 
 
+SAME = 0.002
+"""Distance, in diagonals, up to which places of two surfaces are the same for a symmetry, where the scan is coarser."""
+
 RIVAL, MAX_RIVALS = 0.15, 8
 """How much more, for each point, a pose may cost than the best one for them to be compared by patches, and how
 many are."""
@@ -274,8 +277,12 @@ def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[str, ...]:
     if not len(choice.others):
         return ()
     surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
-    motions = choice.others @ np.linalg.inv(choice.pose)
-    apart = max(float((np.abs(target.closest(move_points(surface, D))[0]) > choice.band).mean()) for D in motions)
+    motions, band = choice.others @ np.linalg.inv(choice.pose), choice.band
+    if band > 2 * SAME:
+        # poses of a coarse scan are less exact than the part: the motions are fitted, and a hole that is larger counts
+        moved = [fit(target, move_points(surface, D), np.eye(4), band, SAME / 4, 12).pose @ D for D in motions]
+        motions, band = np.array(moved), max(SAME, 0.25 * band)
+    apart = max(float((np.abs(target.closest(move_points(surface, D))[0]) > band).mean()) for D in motions)
     if apart <= 0.002:
         return ()
     return (
