@@ -17,10 +17,12 @@ class Verdict:
 
     `proven`: all that could contradict it was asked, and agrees. `likely`: nothing contradicts it, but not all could be
     asked. `doubtful`: something contradicts it, or what it rests on cannot be told from errors of the scan.
+    ``is_by_form``: whether skin that deviates (by pose, form or scanner) may be all that a doubtful one shows.
     """
 
     level: Literal["proven", "likely", "doubtful"] = "proven"
     reasons: tuple[str, ...] = ()
+    is_by_form: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,10 +124,11 @@ class ModelFit:
     ``axes`` (3,3, as rows); those of a model that is `ok` are within their errors and the scanner's. ``deformation``:
     kinds and amounts: the largest displacement of the seen skin beyond the rigid motion nearest to it, with
     ``amount`` for all together and ``amount_error``. ``waviness``: standard deviation of what no form explains.
-    ``corrected_scale``: the scale that was taken out of the scan, 1 where none was. ``words`` say it all.
+    ``corrected_scale``: the scale that was taken out of the scan, 1 where none was. ``words`` say it all. `open`: no
+    form was found, and something else speaks against the part as designed in this pose.
     """
 
-    model: Literal["ok", "scaled", "deformed", "views disagree", "wavy"]
+    model: Literal["ok", "scaled", "deformed", "views disagree", "wavy", "open"]
     words: str
     deviations: tuple[PatchDeviation, ...]
     scale: float

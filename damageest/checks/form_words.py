@@ -11,10 +11,12 @@ from damageest.findings import ModelFit, ViewFit
 DONE = {"bend": "bent", "twist": "twisted", "shear": "sheared", "stretch": "stretched", "scale": "scaled"}
 
 
-def describe_fit(fit: ModelFit, unit: str, tolerance: float) -> ModelFit:
-    """The fit with its ``words``: the model with its amounts, in the job's ``unit``."""
+def describe_fit(fit: ModelFit, unit: str, tolerance: float, doubts: tuple[str, ...] = ()) -> ModelFit:
+    """The fit with its ``words``: the model with its amounts, in the job's ``unit``. ``doubts``: what makes it open
+    whether the part as designed explains the skin."""
     words = {
         "ok": "the part as designed explains the intact skin",
+        "open": f"whether the part as designed explains the intact skin is open: {'; '.join(doubts)}",
         "scaled": _describe_scale(fit, unit),
         "deformed": _describe_deformation(fit, unit),
         "views disagree": _describe_views(fit, unit),
@@ -32,6 +34,7 @@ def name_model(fit: ModelFit) -> str:
     """The model in a few words, for a sentence about a site."""
     return {
         "ok": "the part as designed",
+        "open": "no form was found",
         "scaled": f"the scale is wrong by {100 * (fit.scale - 1):+.3g} %",
         "deformed": "the part is " + " and ".join(DONE[kind] for kind, _ in fit.deformation),
         "views disagree": "the views of the scan disagree",

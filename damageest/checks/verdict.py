@@ -131,9 +131,15 @@ class _Reasons:
 
     against: list[str]
     questions: list[str]
+    is_by_form: bool = False
 
     def add(self, is_against: bool, text: str) -> None:
         (self.against if is_against else self.questions).append(text)
+
+    def add_form(self, is_against: bool, text: str) -> None:
+        """As `add`, where skin that deviates would explain the site."""
+        self.add(is_against, text)
+        self.is_by_form |= is_against
 
 
 def judge_site(
@@ -162,7 +168,7 @@ def judge_site(
         _ask_inner_surface(found, evidence, limits)
         _ask_points(found, evidence, depth, limits)
     if found.against:
-        return Verdict("doubtful", (*found.against, *found.questions))
+        return Verdict("doubtful", (*found.against, *found.questions), found.is_by_form)
     return Verdict("likely" if found.questions else "proven", tuple(found.questions))
 
 
@@ -190,22 +196,24 @@ def _ask_depth(found: _Reasons, depth: Floats, area: float, limits: ScanLimits) 
     typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95))
     unit = limits.unit
     if limits.systematic > SMALL * limits.tolerance and typical < SYSTEMATIC * limits.systematic:
-        found.add(
+        found.add_form(
             deepest < SYSTEMATIC * limits.systematic,
             f"it is {deepest:.3g} {unit} deep, and intact skin deviates by {limits.systematic:.3g} {unit} over whole "
             "areas (pose, form of the part, or scanner)",
         )
     if limits.outward_area > OUTWARD * area and typical < ALIKE * limits.outward_height:
-        found.add(
+        found.add_form(
             deepest < ALIKE * limits.outward_height,
             f"it is {deepest:.3g} {unit} deep, and {limits.outward_area:.3g} {unit}² of the scan lie up to "
             f"{limits.outward_height:.3g} {unit} outside the part: both may come from one error (scale, pose, form of "
             "the part, or scanner)",
         )
     if limits.between_views and typical < 1.5 * limits.between_views:
-        found.add(True, f"the views of the scan differ by up to {limits.between_views:.3g} {unit} where they overlap")
+        found.add_form(
+            True, f"the views of the scan differ by up to {limits.between_views:.3g} {unit} where they overlap"
+        )
     if limits.is_fitted and area > WIDE * limits.seen_area and typical < THIN * limits.tolerance:
-        found.add(
+        found.add_form(
             True,
             f"it covers {area / limits.seen_area:.0%} of the skin that the scan shows, {typical:.3g} {unit} deep, and "
             "the pose was fitted to the scan: worn or deviating skin moves the pose, and the loss may lie elsewhere; "

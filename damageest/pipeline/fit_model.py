@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats, Scan
-from damageest.checks.form_words import name_model
+from damageest.checks.fit_doubts import find_fit_doubts
+from damageest.checks.form_words import describe_fit, name_model
 from damageest.checks.model_fit import FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import fit_views
@@ -133,6 +134,25 @@ def question_sites(engine: Engine, work: Work) -> Work:
             site = replace(site, questions=(*site.questions, text))
         sites.append(site)
     return replace(work, sites=tuple(sites))
+
+
+def question_fit(engine: Engine, work: Work) -> Work:
+    """Takes back that the part as designed explains the intact skin, where something speaks against it."""
+    state = work.job
+    if state.fitted is None or state.fitted.fit.model != "ok":
+        return work
+    clusters = {number for item in state.surplus if item.kind == "displaced piece" for number in item.clusters}
+    displaced = frozenset(site.number for site in work.sites if clusters & set(site.clusters))
+    verdicts = {site.number: site.verdict for site in work.sites}
+    doubts = find_fit_doubts(state.pose, verdicts, state.surplus, displaced, state.aligned, state.deviation, state.skin)
+    if not doubts:
+        return work
+    before = state.fitted.fit
+    fit = describe_fit(replace(before, model="open"), state.unit, state.tolerance, doubts)
+    key = digest("questioned", state.key("fitted"), doubts)
+    state = state.with_value(JobState.fitted, replace(state.fitted, fit=fit), key)
+    warnings = tuple(text for text in work.warnings if text != before.words)
+    return replace(work, job=state, warnings=(*warnings, fit.words))
 
 
 def measure_at_site(state: JobState, site: FoundSite) -> float:

@@ -48,7 +48,7 @@ class ViewReport(_Model):
 class FitReport(_Model):
     """How well the part as designed, in one rigid pose, explains the intact skin."""
 
-    model: Literal["ok", "scaled", "deformed", "views disagree", "wavy"]
+    model: Literal["ok", "scaled", "deformed", "views disagree", "wavy", "open"]
     words: str = Field(description="the model with its amounts")
     deviations: list[PatchReport] = Field(description="at widths of 20, 50 and 100 tolerances, where the part has them")
     scale: ScaleReport

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
 from damageest.geometry.transforms import make_motions, move_points
+from damageest.stages.align._counterparts import turn_poses
+from damageest.stages.align._evidence import DECISIVE, weigh_poses
 from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._fine import fit, robust_cost
 from damageest.stages.align._points import OrientedPoints, orient_surface
@@ -32,6 +34,14 @@ FIRST_POINTS, SECOND_POINTS = 1500, 10_000
 """Number of points for the first comparison of poses and the fits before it, and for the second comparison."""
 
 
+SAME = 0.002
+"""Distance, in diagonals, up to which places of two surfaces are the same for a symmetry, where the scan is coarser."""
+
+RIVAL, MAX_RIVALS = 0.15, 8
+"""How much more, for each point, a pose may cost than the best one for them to be compared by patches, and how
+many are."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """The best ``pose`` (4,4); the ``others`` (K,4,4) that fit as well; the ``axis`` about which the part may be turned
@@ -41,6 +51,15 @@ class Choice:
     others: Floats
     axis: Axis | None
     band: float
+
+    @property
+    def poses(self) -> Floats:
+        """The pose and the others (K,4,4)."""
+        return np.concatenate([self.pose[None], self.others])
+
+    def keep(self, poses: Floats) -> Choice:
+        """The choice with some of its poses (K,4,4), in their order."""
+        return replace(self, pose=poses[0], others=poses[1:])
 
 
 def choose_pose(
@@ -63,7 +82,9 @@ def choose_pose(
             found = _compare(heads, axis, target, field, points, noise)
             if found.axis is not None:
                 return found
-    return _compare(poses[:MAX_POSES], axis, target, field, points, noise)
+    poses = poses[:MAX_POSES]
+    turned = turn_poses(poses, target, field, scan)
+    return _compare(np.concatenate([poses, turned]), axis, target, field, points, noise)
 
 
 def _compare(
@@ -77,6 +98,7 @@ def _compare(
     costs = [robust_cost(distance, band) for distance in distances]
     first = select_distinct(poses, -np.array([cost.sum() for cost in costs]), 0.25 * COARSE, MAX_POSES)
     poses, costs = poses[first], [costs[k] for k in first]
+    fitted, means = poses, np.array([cost.mean() for cost in costs])
     for start, stop in ((FIRST_POINTS, SECOND_POINTS), (SECOND_POINTS, len(points))):
         kept = np.flatnonzero(_select_equal(costs))
         poses, more = poses[kept], points[start:stop]
@@ -95,7 +117,33 @@ def _compare(
         heads = candidates[group_turns(candidates, axis, 8)]
         quarter = axis.make_turns(np.radians([0, 90.0, 180.0, 270.0]))
         others = (quarter[:, None] @ heads[None]).reshape(-1, 4, 4)[1:]
-    return Choice(pose, others, axis, band)
+    rivals = fitted[means < means.min() + RIVAL]
+    return Choice(pose, _add_rivals(pose, others, rivals, axis, target, points, noise, band), axis, band)
+
+
+def _add_rivals(
+    pose: Floats,
+    others: Floats,
+    rivals: Floats,
+    axis: Axis | None,
+    target: PartSurface,
+    points: Floats,
+    noise: float,
+    band: float,
+) -> Floats:
+    """The ``others`` (K,4,4) and those of the ``rivals`` (R,4,4) that the scan does not exclude.
+
+    On a part that is nearly symmetric, a scanner's steps and waves make a pose that is turned the better one as often
+    as not, where only the sums of all points are compared.
+    """
+    known = np.concatenate([pose[None], others])
+    together = np.concatenate([known, rivals])
+    kept = select_distinct(together, -np.arange(len(together), dtype=np.float64), max(APART, 6 * band), MAX_POSES)
+    rivals = together[kept[kept >= len(known)]][:MAX_RIVALS]
+    if axis is not None and len(rivals):
+        rivals = rivals[~np.array([axis.is_turn(known @ np.linalg.inv(one)).any() for one in rivals])]
+    open_ = [weigh_poses(target, points, pose, one, noise) < DECISIVE for one in rivals]
+    return np.concatenate([others, rivals[np.array(open_, bool)]])
 
 
 def _is_continuous(
@@ -229,12 +277,16 @@ def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[str, ...]:
     if not len(choice.others):
         return ()
     surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
-    motions = choice.others @ np.linalg.inv(choice.pose)
-    apart = max(float((np.abs(target.closest(move_points(surface, D))[0]) > choice.band).mean()) for D in motions)
+    motions, band = choice.others @ np.linalg.inv(choice.pose), choice.band
+    if band > 2 * SAME:
+        # poses of a coarse scan are less exact than the part: the motions are fitted, and a hole that is larger counts
+        moved = [fit(target, move_points(surface, D), np.eye(4), band, SAME / 4, 12).pose @ D for D in motions]
+        motions, band = np.array(moved), max(SAME, 0.25 * band)
+    apart = max(float((np.abs(target.closest(move_points(surface, D))[0]) > band).mean()) for D in motions)
     if apart <= 0.002:
         return ()
     return (
         f"the poses that fit are not all symmetries of the part (up to {apart:.1%} of its surface differs): the "
-        "surface that would distinguish them is missing or was not seen, so the damage found depends on the pose; "
-        "where the pose is known, give it to align: icp or align: none",
+        "surface that would distinguish them is missing, was not seen, or does so by no more than the errors of the "
+        "scan, so the damage found depends on the pose; where the pose is known, give it to align: icp or align: none",
     )

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
-from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, PoseCheck, check_pose
+from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, NEAR, PoseCheck, check_pose
 from damageest.stages.align._choose import COARSE
-from damageest.stages.align._field import PartSurface, PlaneGrid
+from damageest.stages.align._evidence import DECISIVE, weigh_poses
 from damageest.stages.align._fine import Fit, fit
 from damageest.stages.align._pairs import propose_poses
-from damageest.stages.align._points import OrientedPoints, orient_surface
+from damageest.stages.align._points import OrientedPoints
 from damageest.stages.align._prepare_part import PreparedPart
 from damageest.stages.align._search import search
 
@@ -25,106 +25,184 @@ STEP = 5.0
 """Angle between the mirror planes that are tried, in degrees."""
 
 FITTED = 3
-"""Number of mirror planes whose poses are fitted."""
+"""Number of mirror planes of each point whose poses are fitted."""
 
 LESS, LARGE_GAIN = 0.6, 0.04
 """For the mirrored scan to be the better one: the share of the points off the part that it may keep, or the share of
 the points near the part that lies on it only where the scan is mirrored."""
 
 SUSPECT = 0.82
-"""Share of the points near the part on its surface below which a mirrored scan is searched for from the beginning."""
+"""Share of the points near the part on its surface below which poses are searched for from the beginning once more, of
+the mirrored scan and of the scan as it is."""
 
 MIN_GAIN = 0.015
 """Least such share in any case. Where less of the scan is off the part, it is not searched for mirrored."""
 
-SYMMETRIC, NEAR = 0.005, 0.004
-"""Share of the part's surface that a reflection may take off it, by more than the second, for the part to be symmetric:
-then a scan and its mirror image show the same."""
+SYMMETRIC, OFF = 0.005, 0.004
+"""Share of the skin seen that a reflection may take off the part, by more than the second, for it to be symmetric: then
+a scan and its mirror image show the same."""
+
+LITTLE = 0.3
+"""Share of the part's surface below which a scan that fits better mirrored is doubted and not refused: a few faces have
+a mirror image that fits another place of the part."""
 
 
-def fit_reflections(target: PartSurface, field: PlaneGrid, points: Floats, best: Fit, noise: float) -> Fit:
-    """The best fit of the points (N,3), mirrored from their pose ``best`` at planes through the part's middle that
-    contain one of its axes. The ``pose`` of the result mirrors.
+NONE = np.zeros((0, 4, 4))
+"""No pose."""
+
+
+@dataclass(frozen=True)
+class MirrorTest:
+    """What poses of a scan and of its mirror image are found and compared with.
+
+    ``points`` (N,3): spread evenly over the scan, in random order; ``raw`` (M,3): any unbiased subset of it;
+    ``oriented``: oriented points of it; ``noise``, ``tolerance`` in diagonals; ``trials``: number of candidate poses.
+    """
+
+    part: PreparedPart
+    oriented: OrientedPoints
+    points: Floats
+    raw: Floats
+    noise: float
+    tolerance: float
+    trials: int
+
+    def check(self, pose: Fit, band: float) -> PoseCheck:
+        """How well a pose explains the scan, with points on the part up to one and the same ``band`` from it."""
+        return check_pose(self.part.surface, replace(pose, band=band), self.points, self.raw, self.tolerance)
+
+    def weigh(self, pose: Fit, other: Fit) -> float:
+        """As `weigh_poses`."""
+        return weigh_poses(self.part.surface, self.points, pose.pose, other.pose, self.noise)
+
+
+@dataclass(frozen=True)
+class Handedness:
+    """What came of the test: a pose of the scan as it is that explains it better than the one given, or None, and
+    ``others`` (K,4,4) that the scan does not exclude beside it, and ``doubts`` for the user."""
+
+    better: Fit | None = None
+    others: Floats = field(default_factory=lambda: NONE)
+    doubts: tuple[str, ...] = ()
+
+
+def ask_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random.Generator) -> Handedness:
+    """Compares the scan in its pose ``best`` with its mirror image, which is fitted no harder than the scan itself.
+
+    Raises StageError where the scan shows enough of the part and is a mirror image of it.
+    """
+    proper: list[Fit] = []
+    if check.agreement < SUSPECT:
+        proper, mirrored = [_search_again(test, rng, 1.0)], _search_again(test, rng, -1.0)
+    else:
+        mirrored = max(_fit_reflections(test, best), key=lambda one: _measure_share_on(test, one, best.band))
+    of_mirrored = test.check(mirrored, best.band)
+    if _is_better(of_mirrored, check):
+        # a mirror image of the mirrored scan is a pose of the scan: of skin that is symmetric it fits as well
+        proper += _fit_reflections(test, mirrored)
+    result = Handedness()
+    if proper:
+        found = max(proper, key=lambda one: _measure_share_on(test, one, best.band))
+        of_found = test.check(found, best.band)
+        if of_found.agreement > check.agreement + MIN_GAIN:
+            is_open = test.weigh(found, best) < DECISIVE and check.is_acceptable
+            result = Handedness(found, best.pose[None] if is_open else NONE)
+            best, check = found, of_found
+    if not (of_mirrored.is_acceptable and _is_better(of_mirrored, check)) or _shows_symmetric(test, best, mirrored):
+        return result
+    if test.weigh(mirrored, best) < DECISIVE:
+        return result
+    if check.cover < LITTLE and of_mirrored.cover < LITTLE:
+        return replace(result, doubts=(_describe_doubt(check, of_mirrored),))
+    raise _build_error(check, of_mirrored)
+
+
+def _is_better(mirrored: PoseCheck, check: PoseCheck) -> bool:
+    """Whether the mirrored scan lies on the part clearly more than the scan as it is."""
+    gain = mirrored.agreement - check.agreement
+    return gain > LARGE_GAIN or (gain > MIN_GAIN and 1 - mirrored.agreement < LESS * (1 - check.agreement))
+
+
+def _fit_reflections(test: MirrorTest, best: Fit) -> list[Fit]:
+    """Fits of the scan, mirrored from its pose ``best``, at planes that contain the direction of an axis of the part's
+    frame, through the part's middle and through that of the skin seen. Where ``best`` mirrors the results do not.
 
     A part that nearly has such a plane of symmetry fits its mirror image nearly as well; its holes and bosses do not.
     """
-    at = move_points(points[:POINTS], best.pose)
+    target, grid = test.part.surface, test.part.grid
+    at = move_points(test.points[:POINTS], best.pose)
     few = at[:1500]
-    mirrors = _make_reflections()
-    on = [
-        float((np.abs(field.distance[field.find_cell(move_points(few, mirror).astype(np.float32))]) < COARSE).mean())
-        for mirror in mirrors
-    ]
     fits = []
-    for k in np.argsort(-np.array(on), kind="stable")[:FITTED]:
-        one = fit(target, move_points(at, mirrors[k]), np.eye(4), 3 * COARSE, noise, 30)
-        fits.append(Fit(one.pose @ mirrors[k] @ best.pose, one.band, one.residue))
-    return max(fits, key=lambda one: _measure_share_on(target, points[:POINTS], one.pose, best.band))
+    for middle in (np.zeros(3), np.median(few, axis=0)):
+        mirrors = _make_reflections(middle)
+        on = [
+            float((np.abs(grid.distance[grid.find_cell(move_points(few, one).astype(np.float32))]) < COARSE).mean())
+            for one in mirrors
+        ]
+        for k in np.argsort(-np.array(on), kind="stable")[:FITTED]:
+            one = fit(target, move_points(at, mirrors[k]), np.eye(4), 3 * COARSE, test.noise, 30)
+            fits.append(Fit(one.pose @ mirrors[k] @ best.pose, one.band, one.residue))
+    return fits
 
 
-def search_mirrored(
-    part: PreparedPart, scan: OrientedPoints, points: Floats, noise: float, trials: int, rng: np.random.Generator
-) -> Fit:
-    """The best fit of the mirrored scan, searched for from the beginning. The ``pose`` of the result mirrors.
-
-    ``scan``: oriented points of it; ``points`` (N,3): for the fit; ``trials``: number of candidate poses.
-    """
-    flip = np.array([1.0, 1.0, -1.0])
+def _search_again(test: MirrorTest, rng: np.random.Generator, side: float) -> Fit:
+    """The best fit of the scan, searched for from the beginning; mirrored where ``side`` is -1. The ``pose`` of the
+    result mirrors then."""
+    flip = np.array([1.0, 1.0, side])
+    scan = test.oriented
     mirrored = OrientedPoints(scan.points * flip, scan.normals * flip, scan.signed)
-    pose = search(propose_poses(mirrored, part.pairs, trials, rng), mirrored, part.grid, rng)[0]
-    found = fit(part.surface, points * flip, pose, COARSE, noise, 30)
+    pose = search(propose_poses(mirrored, test.part.pairs, test.trials, rng), mirrored, test.part.grid, rng)[0]
+    found = fit(test.part.surface, test.points * flip, pose, COARSE, test.noise, 30)
     return replace(found, pose=found.pose @ np.diag([*flip, 1.0]))
 
 
-def _make_reflections() -> Floats:
-    """Reflections (K,4,4) at planes that contain one of the coordinate axes."""
+def _make_reflections(middle: Floats) -> Floats:
+    """Reflections (K,4,4) at planes through ``middle`` (3,) that contain the direction of one of the axes."""
     angle = np.radians(np.arange(0, 180, STEP))
     normals = [np.roll(np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]), k, axis=1) for k in range(3)]
     normal = np.concatenate(normals)
     result = np.tile(np.eye(4), (len(normal), 1, 1))
     result[:, :3, :3] -= 2 * normal[:, :, None] * normal[:, None, :]
+    result[:, :3, 3] = 2 * (normal @ middle)[:, None] * normal
     return result
 
 
-def _measure_share_on(target: PartSurface, points: Floats, pose: Floats, band: float) -> float:
-    return float((np.abs(target.closest(move_points(points, pose))[0]) < band).mean())
+def _measure_share_on(test: MirrorTest, one: Fit, band: float) -> float:
+    distance = test.part.surface.closest(move_points(test.points[:POINTS], one.pose))[0]
+    return float((np.abs(distance) < band).mean())
 
 
-def refuse_mirrored(
-    target: PartSurface,
-    points: Floats,
-    raw: Floats,
-    pose: Floats,
-    best: PoseCheck,
-    mirrored: Fit,
-    tolerance: float,
-) -> None:
-    """Raises StageError where the scan fits clearly better when mirrored.
+def _shows_symmetric(test: MirrorTest, best: Fit, mirrored: Fit) -> bool:
+    """Whether the skin that the scan shows in the pose ``best`` has a mirror image on the part where ``mirrored`` has
+    the scan: then a scan and its mirror image show the same."""
+    target = test.part.surface
+    distance, seen, _ = target.closest(move_points(test.points[:POINTS], best.pose))
+    seen = move_points(seen[np.abs(distance) < NEAR], mirrored.pose @ np.linalg.inv(best.pose))
+    if not len(seen):
+        return True
+    # Fitted: the reflection of a scan with damage is inexact, and the skin may be symmetric by one nearby.
+    onto = fit(target, seen, np.eye(4), 3 * COARSE, 1e-5, 30).pose
+    return bool((np.abs(target.closest(move_points(seen, onto))[0]) > OFF).mean() < SYMMETRIC)
 
-    ``pose`` (4,4): its best pose; ``best``: the check of that; ``mirrored``: a pose that mirrors; ``points`` and
-    ``raw`` as for `check_pose`.
-    """
-    surface = orient_surface(target.mesh, 4000, np.random.default_rng(0)).points
-    surface = move_points(surface, mirrored.pose @ np.linalg.inv(pose))
-    # Fitted: the reflection of a scan with damage is inexact, and the part may be symmetric by one nearby.
-    onto = fit(target, surface, np.eye(4), 3 * COARSE, 1e-5, 30).pose
-    off = np.abs(target.closest(move_points(surface, onto))[0]) > NEAR
-    if off.mean() < SYMMETRIC:
-        return
-    check = check_pose(target, mirrored, points, raw, tolerance)
-    gain = check.agreement - best.agreement
-    if not check.is_acceptable:  # another part altogether
-        return
-    if gain > LARGE_GAIN or (gain > MIN_GAIN and 1 - check.agreement < LESS * (1 - best.agreement)):
-        if check.agreement < DOUBTFUL_AGREEMENT:
-            raise StageError(
-                f"in the best pose only {best.agreement:.0%} of what the scan shows near the part lies on its surface, "
-                f"and {check.agreement:.0%} of it if it were mirrored: it shows a mirrored part, another size, a "
-                "bent one, or another part",
-                "scan: {scale: auto} if the scale may be wrong; otherwise check which part was scanned",
-            )
-        raise StageError(
-            f"the scan is a mirror image of the part: {check.agreement:.0%} of what it shows near the part would lie "
-            f"on its surface if it were mirrored, {best.agreement:.0%} does in the best pose",
-            "check for a left-hand and a right-hand version of the part, and for an axis that an export reversed",
+
+def _describe_doubt(check: PoseCheck, mirrored: PoseCheck) -> str:
+    return (
+        f"{mirrored.agreement:.0%} of what the scan shows near the part would lie on its surface if it were mirrored, "
+        f"{check.agreement:.0%} does in the best pose: it may show a mirror image of the part; it covers only "
+        f"{check.cover:.0%} of the part's surface, which is too little to tell: scan more of the part"
+    )
+
+
+def _build_error(check: PoseCheck, mirrored: PoseCheck) -> StageError:
+    if mirrored.agreement < DOUBTFUL_AGREEMENT:
+        return StageError(
+            f"in the best pose only {check.agreement:.0%} of what the scan shows near the part lies on its surface, "
+            f"and {mirrored.agreement:.0%} of it if it were mirrored: it shows a mirrored part, another size, a "
+            "bent one, or another part",
+            "scan: {scale: auto} if the scale may be wrong; otherwise check which part was scanned",
         )
+    return StageError(
+        f"the scan is a mirror image of the part: {mirrored.agreement:.0%} of what it shows near the part would lie "
+        f"on its surface if it were mirrored, {check.agreement:.0%} does in the best pose",
+        "check for a left-hand and a right-hand version of the part, and for an axis that an export reversed",
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -37,9 +38,9 @@ class Register(Align):
         """The fitted pose. Raises StageError where no pose explains the scan: it shows another part, has another unit,
         or most of it is not the part."""
         from damageest.errors import StageError
-        from damageest.stages.align._check_worn import check_with_wear
         from damageest.stages.align._choose import (
             COARSE,
+            Choice,
             choose_pose,
             describe_choice,
             note_ambiguity,
@@ -47,51 +48,52 @@ class Register(Align):
         )
         from damageest.stages.align._datum import DatumSkin
         from damageest.stages.align._fine import fit
-        from damageest.stages.align._finish import finish_pose
         from damageest.stages.align._frame import MIN_POINTS, Frame
-        from damageest.stages.align._largest_piece import prefer_largest_piece
-        from damageest.stages.align._mirror import (
-            MIN_GAIN,
-            SUSPECT,
-            fit_reflections,
-            refuse_mirrored,
-            search_mirrored,
-        )
+        from damageest.stages.align._last_fit import LastFit
+        from damageest.stages.align._mirror import MIN_GAIN, MirrorTest, ask_handedness
+        from damageest.stages.align._normals import SignedNormals, note_inward, prefer_outward
         from damageest.stages.align._pairs import propose_poses
         from damageest.stages.align._points import draw_evenly, draw_stratified, orient_scan
         from damageest.stages.align._prepare_part import prepare_part
-        from damageest.stages.align._refine_pose import refine_pose
         from damageest.stages.align._search import search
 
         datum = DatumSkin.find(part, self.datum)
         frame = Frame.build(scan, part)
         target, noise = frame.target, scan.noise / frame.size
         rng = np.random.default_rng(self.seed)
-        dense, weights, oriented = orient_scan(frame.scale_points(scan), scan.normals, noise, 3000, rng)
-        if len(oriented.points) < MIN_POINTS // 4:
+        normals = SignedNormals.read(scan)
+        dense, weights, given = orient_scan(frame.scale_points(scan), normals.normals, noise, 3000, rng)
+        if len(given.points) < MIN_POINTS // 4:
             raise StageError(
-                f"only {len(oriented.points)} places of the scan have a clear normal (at least {MIN_POINTS // 4} are "
+                f"only {len(given.points)} places of the scan have a clear normal (at least {MIN_POINTS // 4} are "
                 "needed): it is too sparse or too noisy",
                 "give a denser scan; where the pose is known, give it to align: none",
             )
         prepared = prepare_part(target, self.seed)
         target, field = prepared.surface, prepared.grid
+        # Signs that nothing vouches for: poses are searched for without them first, and then with them.
+        oriented = replace(given, signed=given.signed and normals.is_proven)
         rough = propose_poses(oriented, prepared.pairs, self.trials, rng)
         few = oriented.take(draw_stratified(len(oriented.points), 1500, rng))
         fine = rng.permutation(dense[draw_evenly(dense, weights, self.points, rng)])
-        choice = choose_pose(search(rough, oriented, field, rng), target, field, few, fine, noise)
-        best = fit(target, fine, choice.pose, COARSE / 2, noise, 30)
-        best = refine_pose(target, fine, prefer_largest_piece(target, fine, best, noise))
-        finish = finish_pose(frame, fine, best, noise, tolerance / frame.size, part.unit, datum)
-        best = finish.fit
-        check = check_with_wear(target, best, fine, dense, tolerance / frame.size, finish.worn_depth)
+        poses = search(rough, oriented, field, rng)
+        if given.signed and not oriented.signed:
+            more = search(propose_poses(given, prepared.pairs, self.trials, rng), given, field, rng)
+            poses = np.concatenate([poses, more])
+        choice = choose_pose(poses, target, field, few, fine, noise)
+        if given.signed:
+            choice = choice.keep(prefer_outward(target, given, choice.poses, choice.band))
+        last = LastFit(frame, fine, dense, noise, tolerance / frame.size, part.unit, datum)
+        finish, check = last.run(fit(target, fine, choice.pose, COARSE / 2, noise, 30))
+        doubts: tuple[str, ...] = ()
         if check.agreement < 1 - MIN_GAIN:  # else no mirrored pose can be that much better
-            mirrored = (
-                search_mirrored(prepared, oriented, fine, noise, self.trials, rng)
-                if check.agreement < SUSPECT
-                else fit_reflections(target, field, fine, best, noise)
-            )
-            refuse_mirrored(target, fine, dense, best.pose, check, mirrored, tolerance / frame.size)
+            test = MirrorTest(prepared, oriented, fine, dense, noise, tolerance / frame.size, self.trials)
+            hand = ask_handedness(test, finish.fit, check, rng)
+            doubts = hand.doubts
+            if hand.better is not None:
+                choice = Choice(hand.better.pose, hand.others, None, choice.band)
+                finish, check = last.run(hand.better)
+        best = finish.fit
         if not check.is_acceptable:
             raise check.build_error(_advise(scan))
         others = None
@@ -101,9 +103,13 @@ class Register(Align):
             poses = turns @ best.pose if finish.is_changed else choice.others
             others = np.array([frame.unscale_pose(pose) for pose in poses])
         doubts = (
-            check.note_doubts() + note_ambiguity(choice, target) + note_free_motion(best.pose, target, fine, best.band)
+            check.note_doubts()
+            + doubts
+            + note_ambiguity(choice, target)
+            + note_free_motion(best.pose, target, fine, best.band)
         )
-        notes = describe_choice(choice) + doubts + finish.notes
+        told = note_inward(target, frame, scan, best)
+        notes = describe_choice(choice) + told + doubts + finish.notes
         pose = frame.unscale_pose(best.pose)
         rms = check.rms * frame.size
         return Pose(pose, rms, check.inliers, others, notes, doubts, finish.free, finish.is_held)

@@ -1,0 +1,54 @@
+"""Whether a run may say that the part as designed explains the intact skin.
+
+That no bend, twist or scale was found says little where the pose is doubtful, or where much lies outside the part: a
+wrong pose, or another part, has no such form either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from damageest.artefacts import ADDED, Deviation, Pose, Scan
+from damageest.checks.coverage import SkinView
+from damageest.checks.verdict import FEWEST_OUTSIDE
+from damageest.findings import Surplus, Verdict
+from damageest.geometry.voxels import measure_area
+
+LARGE = 0.1
+"""Area outside the part, as a share of the skin that the scan shows, from which it is no weld bead or dirt on skin that
+is as designed otherwise."""
+
+
+def find_fit_doubts(
+    pose: Pose, verdicts: Mapping[int, Verdict], surplus: tuple[Surplus, ...], displaced: frozenset[int],
+    aligned: Scan, deviation: Deviation, skin: SkinView,
+) -> tuple[str, ...]:  # fmt: skip
+    """What speaks against the statement that the part as designed explains the intact skin, in words; empty where
+    nothing does.
+
+    Args:
+        verdicts: of the sites, by their numbers. displaced: the numbers of sites beside a piece that may be displaced.
+        aligned, deviation, skin: the scan in the part's frame, its points' labels after strays were taken out, and
+            what it shows of the skin.
+    """
+    found = []
+    if pose.doubts:
+        found.append("the pose is doubtful")
+    by_form = sorted(
+        number
+        for number, verdict in verdicts.items()
+        if verdict.level == "doubtful" and (verdict.is_by_form or number in displaced)
+    )
+    if by_form:
+        names = f"site{'s' if len(by_form) > 1 else ''} {', '.join(map(str, by_form))}"
+        found.append(f"{names} may be skin that deviates and no damage")
+    outside = deviation.label == ADDED
+    for one in surplus:
+        if one.kind == "surroundings":
+            outside[one.points] = False
+    seen = float(skin.cells.areas[skin.perhaps_seen].sum())
+    if outside.any():
+        area = measure_area(aligned.points[outside], skin.cells.edge, FEWEST_OUTSIDE)
+        if area > LARGE * max(seen, 1e-300):
+            found.append(f"an area of {area / max(seen, 1e-300):.0%} of the skin seen lies outside the part")
+    return tuple(found)

@@ -1,0 +1,69 @@
+"""That the part as designed explains the intact skin is said only where nothing speaks against it."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+import damageest
+from damageest.artefacts import Floats, Part, Scan
+from damageest.geometry.solids import to_arrays
+from damageest.result import Result
+from tests import surplus_scenes as scenes
+
+TOLERANCE = 0.2
+SAID = "the part as designed explains"
+SETTINGS = ["align=none", "allowance=none", f"tolerance={TOLERANCE}"]
+
+
+def run(points: Floats, settings: list[str] = SETTINGS, part: Part | None = None) -> Result:
+    return damageest.run({"version": 1}, part=part or scenes.part(), scan=Scan(points), settings=settings)
+
+
+@pytest.fixture(scope="module")
+def dented() -> Floats:
+    return scenes.scan(scenes.block() - scenes.ball(2.5, 5, 4, 6))
+
+
+def test_it_is_said_of_a_damaged_part(dented: Floats) -> None:
+    result = run(dented)
+    assert result.fit is not None
+    assert (result.fit.model, result.fit.words) == ("ok", "the part as designed explains the intact skin")
+    assert len(result.sites) == 1
+
+
+def test_it_is_said_beside_a_weld_bead() -> None:
+    result = run(scenes.scan(scenes.block() + scenes.slab((6, 3, 2), 0, 0, 6.8)))
+    assert result.fit is not None
+    assert len(result.surplus) == 1
+    assert result.fit.model == "ok"
+
+
+def test_it_is_not_said_beside_sites_that_the_pose_makes(dented: Floats) -> None:
+    result = run(dented + [0.196, 0, 0])
+    assert result.fit is not None
+    shallow = [site.id for site in result.sites if site.verdict.level == "doubtful"]
+    assert shallow
+    assert result.fit.model == "open"
+    assert not result.fit.words.startswith(SAID)
+    assert re.search(rf"site.* {shallow[-1]}\b.* may be skin that deviates", result.fit.words)
+    assert result.fit.words in result.warnings
+
+
+def test_it_is_not_said_beside_a_large_surplus() -> None:
+    result = run(scenes.scan(scenes.block() + scenes.slab((22, 16, 3), 0, 0, 7)))
+    assert result.fit is not None
+    assert result.fit.model == "open"
+    assert "outside the part" in result.fit.words
+
+
+def test_it_is_not_said_of_a_doubtful_pose() -> None:
+    """The pocket in the bottom was not seen: poses that are no symmetries of the part fit as well."""
+    part = Part(*to_arrays(scenes.block() - scenes.slab((6, 5, 4), 5, 3, scenes.TOP - 12)))
+    points = scenes.scan(scenes.block(), count=8000)
+    result = run(points[points[:, 2] > 2], ["allowance=none", f"tolerance={TOLERANCE}"], part)
+    assert result.pose.doubts
+    assert result.fit is not None
+    assert result.fit.model == "open"
+    assert "the pose is doubtful" in result.fit.words
