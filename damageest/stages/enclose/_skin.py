@@ -6,10 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Part, Samples, Scan, Sites
+from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Part, Samples, Scan, Sites
 from damageest.geometry.distance import closest_on_mesh, signed_distance
-from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.neighbourhoods import find_in_box, find_neighbours, pick_one_per_cube
 from damageest.geometry.voxels import VoxelGrid, measure_bounds
+
+
+NEARER = 0.4
+"""Skin is held where an intact point is nearer than this share of the distance to the damaged points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,39 @@ def sample_skin_near(
     among, asked = (np.concatenate([at, weight * way], axis=1) for at, way in ((hit, outward), (points, normals)))
     gap = find_neighbours(asked, 1, among, float(clear.max()) * 1.001)[0][:, 0]
     return SkinSamples(points, normals, gap > clear, usual)
+
+
+def find_held(
+    part: Part, aligned: Scan, deviation: Deviation, damaged: Ints, skin: SkinSamples, asked: Ints, tolerance: float
+) -> Flags:
+    """Which of the skin samples ``asked`` (K,) an intact scan point shows to be there, though damaged points are near.
+
+    In a sparse scan the rim lies somewhere in a gap between damaged and intact points, and skin beyond the intact ones
+    is not free. Compared are distances along the skin. ``damaged``: the numbers of the damaged points in the scan.
+    """
+    if not len(asked):
+        return np.zeros(0, bool)
+    width = float(np.median(skin.usual[asked]))
+    on_skin = (deviation.label == INTACT) & (deviation.distance >= -max(2 * aligned.noise, 0.1 * tolerance))
+    on_skin[damaged] = False
+    low, high = measure_bounds(skin.points[asked]) + 2 * width * np.array([[-1.0], [1.0]])
+    near = find_in_box(aligned.points, low, high)
+    intact = near[on_skin[near]]
+    shallow = damaged[-deviation.distance[damaged] < width]
+    if not len(intact) or not len(shallow):
+        return np.zeros(len(asked), bool)
+    # The normals are further coordinates: points on the far side of a thin wall do not show this side.
+    places, seen = (
+        np.concatenate([at, width * way], axis=1)
+        for at, way in (
+            (skin.points[asked], skin.normals[asked]),
+            (aligned.points[intact], part.face_normals[deviation.face[intact]]),
+        )
+    )
+    feet = aligned.points[shallow] - deviation.distance[shallow, None] * part.face_normals[deviation.face[shallow]]
+    to_intact = find_neighbours(places, 1, seen)[0][:, 0]
+    to_damaged = find_neighbours(skin.points[asked], 1, feet)[0][:, 0]
+    return np.asarray(to_intact < NEARER * to_damaged)
 
 
 def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:
