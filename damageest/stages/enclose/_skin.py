@@ -11,9 +11,10 @@ from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours, pick_one_per_cube
 from damageest.geometry.voxels import VoxelGrid, measure_bounds
 
-
 NEARER = 0.4
 """Skin is held where an intact point is nearer than this share of the distance to the damaged points."""
+DEEP = 3.0
+"""How far deep points are from skin that is held, in gaps; those are deep that lie deeper than a gap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,8 @@ def find_held(
     """Which of the skin samples ``asked`` (K,) an intact scan point shows to be there, though damaged points are near.
 
     In a sparse scan the rim lies somewhere in a gap between damaged and intact points, and skin beyond the intact ones
-    is not free. Compared are distances along the skin. ``damaged``: the numbers of the damaged points in the scan.
+    is not free. Compared are distances along the skin. Beside a deep loss none is held: the points on its wall show
+    where the rim is. ``damaged``: the numbers of the damaged points in the scan.
     """
     if not len(asked):
         return np.zeros(0, bool)
@@ -75,8 +77,9 @@ def find_held(
     low, high = measure_bounds(skin.points[asked]) + 2 * width * np.array([[-1.0], [1.0]])
     near = find_in_box(aligned.points, low, high)
     intact = near[on_skin[near]]
-    shallow = damaged[-deviation.distance[damaged] < width]
-    if not len(intact) or not len(shallow):
+    is_deep = -deviation.distance[damaged] >= width
+    feet = aligned.points[damaged] - deviation.distance[damaged, None] * part.face_normals[deviation.face[damaged]]
+    if not len(intact) or is_deep.all():
         return np.zeros(len(asked), bool)
     # The normals are further coordinates: points on the far side of a thin wall do not show this side.
     places, seen = (
@@ -86,10 +89,12 @@ def find_held(
             (aligned.points[intact], part.face_normals[deviation.face[intact]]),
         )
     )
-    feet = aligned.points[shallow] - deviation.distance[shallow, None] * part.face_normals[deviation.face[shallow]]
     to_intact = find_neighbours(places, 1, seen)[0][:, 0]
-    to_damaged = find_neighbours(skin.points[asked], 1, feet)[0][:, 0]
-    return np.asarray(to_intact < NEARER * to_damaged)
+    to_damaged = find_neighbours(skin.points[asked], 1, feet[~is_deep])[0][:, 0]
+    held = to_intact < NEARER * to_damaged
+    if is_deep.any():
+        held &= ~np.isfinite(find_neighbours(skin.points[asked], 1, feet[is_deep], DEEP * width)[0][:, 0])
+    return np.asarray(held)
 
 
 def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:
