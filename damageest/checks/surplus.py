@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from damageest.artefacts import Deviation, Floats, Ints, Part, Scan, Sites, Solid
+from damageest.checks.beyond_points import ask_beyond_points
 from damageest.findings import Surplus
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
@@ -27,6 +28,8 @@ NEAR = 10.0
 """Distance in tolerances up to which a loss is beside a surplus."""
 UNSEEN = 0.1
 """Share of a solid's surface without scan points from which a note says so."""
+OPEN = 0.5
+"""The same share from which the volume is not known."""
 DISPLACED = "it may be a displaced piece of the part"
 MOST = 20_000
 """Points of a cluster looked at."""
@@ -97,23 +100,33 @@ def join_surplus(items: Sequence[Surplus]) -> Surplus:
     )
 
 
-def close_surplus(surplus: Surplus, solid: Solid, aligned: Scan, part: Part, tolerance: float) -> Surplus | None:
+def close_surplus(
+    surplus: Surplus, solid: Solid, aligned: Scan, part: Part, tolerance: float, unit: str
+) -> Surplus | None:
     """The surplus with its volume and the skin that it covers; None where its points are not on the solid's surface.
 
-    A note says so where much of the solid's surface has no scan points.
+    A note says so where much of the solid's surface has no scan points. Without a solid where the solid holds more than
+    its points show; a note says how much.
     """
     points = aligned.points[surplus.points]
+    beyond = ask_beyond_points(solid, part, points, aligned.points, aligned.noise, aligned.spacing, tolerance, unit)
+    if beyond.is_contradicted:
+        return replace(surplus, notes=(*surplus.notes, f"its volume is not known: {beyond.reason}"))
     points = points[:: max(1, len(points) // 5000)]
     if float(np.quantile(distance_to_mesh(points, solid), 0.95)) > 3 * tolerance + aligned.spacing:
         return None
     outer = find_inner_faces(solid, part)
     area = np.linalg.norm(solid.cross, axis=1) / 2
-    notes = surplus.notes
+    notes = (*surplus.notes, *([beyond.reason] if beyond.reason else []))
     if outer.any():
         places = sample_by_area(solid, 4000, np.random.default_rng(0), np.flatnonzero(outer))[0]
         far = max(3 * tolerance, 2 * aligned.spacing)
         gap = find_neighbours(places, 1, aligned.points[find_nearby(aligned.points, places, far)], far)[0]
-        if (unseen := float(np.isinf(gap).mean())) > UNSEEN:
+        unseen = float(np.isinf(gap).mean())
+        if unseen > OPEN:
+            note = f"its volume is not known: {unseen:.0%} of its surface has no scan point nearby"
+            return replace(surplus, notes=(*surplus.notes, note))
+        if unseen > UNSEEN:
             notes = (*notes, f"{unseen:.0%} of its surface has no scan point nearby: its volume is interpolated there")
     on_skin = float(area[~outer].sum())
     return replace(surplus, solid=solid, area=on_skin or surplus.area, notes=notes)

@@ -29,12 +29,16 @@ FLAT, SMOOTH = 0.05, 30.0
 """Angles in degrees between triangles that are chords of one curved face."""
 ASKED = 2000
 """Scan points among which the deepest ones of a site are looked for."""
+MOST = 50_000
+"""Scan points whose largest depth is taken."""
 
 
 class _Place(NamedTuple):
-    """``depth`` below the skin of a place ``at`` (3,), and the outward ``normal`` (3,) of the skin nearest to it."""
+    """``depth`` below the skin of a place ``at`` (3,), and the outward ``normal`` (3,) of the skin nearest to it;
+    ``measured``: the largest depth of a scan point."""
 
     depth: float
+    measured: float
     at: Floats
     normal: Floats
 
@@ -45,7 +49,8 @@ class SiteError:
 
     ``pose`` (K,): signed, by the columns of `PoseError.spread`; ``excess``: by how much the volume is too large on
     average; ``inside``, ``beside``, ``fading``: by how much the loss may be larger. ``depth``: of the damage volume,
-    corrected for its mean error; ``depth_error``: one standard deviation.
+    corrected for its mean error; ``depth_error``: one standard deviation. ``measured``: the largest depth of a scan
+    point, with what its noise, the pose and the skin may be off.
     """
 
     volume: float
@@ -61,7 +66,7 @@ class SiteError:
     fading: float = 0.0
     depth: float = 0.0
     depth_error: float = 0.0
-    deeper: float = 0.0
+    measured: float = np.inf
 
 
 def measure_site_error(
@@ -88,6 +93,8 @@ def measure_site_error(
     hole = evidence.ids_gap if evidence.ids_gap > GAP * max(tolerance, aligned.spacing) ** 2 else 0.0
     deepest = _find_deepest(damage, inner, part, members, 3 * max(surface.gap, tolerance))
     by_pose = pose.of_distance(deepest.at, deepest.normal)
+    beside = by_pose**2 + systematic**2 + part.tessellation_error**2 / 3
+    by_point = float(np.sqrt(aligned.noise**2 + beside))
     return SiteError(
         volume=damage.volume,
         noise=surface.noise,
@@ -100,16 +107,16 @@ def measure_site_error(
         form=float(max(form * skin_area, pose.systematic * skin_area / np.sqrt(patches))),
         inside=HOLE * hole**1.5,
         depth=deepest.depth - surface.depth_excess,
-        depth_error=float(np.sqrt(surface.depth**2 + by_pose**2 + systematic**2 + part.tessellation_error**2 / 3)),
-        deeper=HOLE * float(np.sqrt(hole)),
+        depth_error=float(np.sqrt(surface.depth**2 + beside)),
+        measured=deepest.measured + WIDTH * by_point,
     )
 
 
 def combine_site(error: SiteError) -> tuple[Interval, Interval]:
-    """The 95 % intervals of volume and depth of one site."""
-    depth_low = error.depth - WIDTH * error.depth_error
-    depth_high = error.depth + WIDTH * error.depth_error + error.deeper
-    return combine_total(error.volume, [error]), (max(depth_low, 0.0), depth_high)
+    """The 95 % intervals of volume and depth of one site. No depth is beyond what its scan points show."""
+    depth = min(error.depth, error.measured)
+    depth_high = min(depth + WIDTH * error.depth_error, error.measured)
+    return combine_total(error.volume, [error]), (max(depth - WIDTH * error.depth_error, 0.0), depth_high)
 
 
 def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 0.0) -> Interval:
@@ -164,7 +171,9 @@ def _find_deepest(damage: Solid, inner: Flags, part: Part, members: Floats, reac
     near = vertices[find_nearby(vertices, deep, reach)]
     distance, face, _ = closest_on_mesh(near if len(near) else vertices, part)
     at = int(distance.argmax())
-    return _Place(float(distance[at]), (near if len(near) else vertices)[at], part.face_normals[face[at]])
+    # the maximum of a part of many points would be less than what was measured
+    measured = float(distance_to_mesh(members[:: max(1, len(members) // MOST)], part).max())
+    return _Place(float(distance[at]), measured, (near if len(near) else vertices)[at], part.face_normals[face[at]])
 
 
 def _measure_curved(damage: Solid, skin: Flags, area: Floats) -> float:

@@ -146,7 +146,7 @@ def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: S
     left = dict(enumerate(metal, 1))
     for piece in pieces:
         item = join_surplus([metal[number - 1] for number in piece.clusters])
-        solid = close_surplus(item, piece.damage, turned.aligned, turned.part, turned.tolerance)
+        solid = close_surplus(item, piece.damage, turned.aligned, turned.part, turned.tolerance, turned.unit)
         if solid is not None:
             done.append(solid)
             left = {number: other for number, other in left.items() if number not in piece.clusters}

@@ -94,7 +94,7 @@ def _measure_site(
     if error.inside > 0:
         reasons.append(
             f"its inner surface has no scan points in one piece of {site.evidence.ids_gap:.3g} {state.unit}²: the loss "
-            f"may be larger there by up to {error.inside:.3g} {state.unit}³"
+            f"may be larger there by up to {error.inside:.3g} {state.unit}³, and deeper than any scan point shows"
         )
     if fading:
         reasons.append(describe_fading(fading, error.volume, state.unit, state.tolerance))

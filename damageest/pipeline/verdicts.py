@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import ask_free_pose, measure_dependence
@@ -67,6 +68,13 @@ def judge_sites(engine: Engine, work: Work) -> Work:
         by_rays = _is_proven_by_rays(state.skin, site)
         at_rim = ask_unseen_rim(site.damage, state.part, state.coverage, reach)
         against, questions = (*against, *at_rim[0]), (*questions, *at_rim[1])
+        if not by_rays:
+            beyond = ask_beyond_points(
+                site.damage, state.part, state.aligned.points[site.members], state.aligned.points,
+                state.aligned.noise, state.aligned.spacing, state.tolerance, state.unit,
+            )  # fmt: skip
+            told = (beyond.reason,) if beyond.reason else ()
+            against, questions = (*against, *told) if beyond.is_contradicted else against, (*questions, *told)
         verdict = judge_site(
             site.evidence, -state.deviation.distance[site.members], area, state.pose, limits,
             by_rays, site.damage.area, (*site.questions, *questions), (*site.doubts, *against),

@@ -21,7 +21,8 @@ from damageest.geometry.neighbourhoods import (
 from damageest.geometry.orientation import turn_toward_void
 from damageest.geometry.poisson import Grid, GridValues, refine_field
 from damageest.geometry.voxels import measure_bounds, number_cubes
-from damageest.stages.enclose._skin import SkinSamples, push_outward, sample_skin_near
+from damageest.stages.enclose._fill_gaps import fill_gaps
+from damageest.stages.enclose._skin import SkinSamples, find_held, push_outward, sample_skin_near
 
 APART = 0.75
 """Edge of the cubes with one averaged point each, in cells of the surface."""
@@ -119,7 +120,10 @@ def sort_losses(
     points, label, grown, of_scan = _grow_to_rim(aligned, deviation, sites, tolerance)
     skin = sample_skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
     beside = np.maximum(band * tolerance, 1.6 * skin.usual)
-    free = find_neighbours(skin.points, 1, points, float(beside.max(initial=0.0)))[0][:, 0] < beside
+    away = find_neighbours(skin.points, 1, points, float(beside.max(initial=0.0)))[0][:, 0]
+    free = away < beside
+    asked = np.flatnonzero(free & (away >= band * tolerance))
+    free[asked[find_held(part, aligned, deviation, of_scan, skin, asked, tolerance)]] = False
     above, depth = part.face_normals[deviation.face[of_scan]], -deviation.distance[of_scan]
     groups, lost_by = _group_losses(points, above, depth, label, skin, free, tolerance, aligned.spacing, aligned.noise)
     kept = np.flatnonzero((lost_by < 0) & ~free)
@@ -192,6 +196,7 @@ def _build_surface(
         chosen = pick_one_per_cube(lost, size)
     places = lost[chosen]
     normals = turn_toward_void(points, normals, above, places, lost_normals[chosen], measure_local_areas(places), cell)
+    points, normals = fill_gaps(points, normals, cell)
     return points, normals, measure_local_areas(points)
 
 

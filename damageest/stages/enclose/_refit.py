@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from damageest.artefacts import Floats, Solid
+from damageest.artefacts import Flags, Floats, Ints, Solid
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.solids import to_manifold, to_solid
 
@@ -12,6 +14,18 @@ NEIGHBOURS = 12
 """Points that each vertex is fitted to."""
 SAME_VOLUME = 0.003
 """Share by which the volume may change where triangles are joined."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacesOnSurface:
+    """For V places near a surface through points: its unit ``normals`` (V,3) there; how far each place is to ``move``
+    (V,) along them; how ``lopsided`` (V,) its neighbours are: the distance of their mean beside it, in distances of the
+    farthest. ``is_known`` (V,): whether any neighbour faces as the place does."""
+
+    normals: Floats
+    move: Floats
+    lopsided: Floats
+    is_known: Flags
 
 
 def refit_region(region: Solid, points: Floats, normals: Floats, most: float) -> Solid:
@@ -25,30 +39,38 @@ def refit_region(region: Solid, points: Floats, normals: Floats, most: float) ->
     vertices = region.vertices
     distance, index = find_neighbours(vertices, NEIGHBOURS, points)
     near = np.flatnonzero(distance[:, 0] < 2 * most + np.median(distance[:, 0]))
-    distance, index, at = distance[near], index[near], vertices[near]
-    own = region.vertex_normals[near]
-    facing = -np.einsum("ij,ikj->ik", own, normals[index])
+    fit = fit_places(vertices[near], region.vertex_normals[near], points, -normals, distance[near], index[near])
+    # Beyond the border of the points the fit would extrapolate: a vertex with points on one side only moves less.
+    fade = np.clip(2 - 4 * fit.lopsided, 0, 1) * np.clip(2 - np.abs(fit.move) / most, 0, 1) * fit.is_known
+    moved = vertices.copy()
+    moved[near] += (np.clip(fit.move, -most, most) * fade)[:, None] * fit.normals
+    try:
+        return Solid(moved, region.faces)
+    except ValueError:
+        return region
+
+
+def fit_places(
+    at: Floats, own: Floats, points: Floats, normals: Floats, distance: Floats, index: Ints
+) -> PlacesOnSurface:
+    """Where places (V,3) come to lie on the surface through the points (N,3) with unit normals (N,3).
+
+    ``own`` (V,3): the normal at each place; points that face another way do not count. ``distance`` and ``index``
+    (V,K): the neighbours of each place among the points, as `find_neighbours` gives them.
+    """
+    facing = np.einsum("ij,ikj->ik", own, normals[index])
     reach = distance[:, -1:]
     weights = np.exp(-3 * (distance / reach) ** 2) * np.maximum(facing, 0) ** 2
     total = weights.sum(axis=1)
-    known = total > 1e-3
     share = weights / np.maximum(total, 1e-12)[:, None]
     way = np.einsum("ik,ikj->ij", share, normals[index])
     way /= np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None]
     chord = points[index] - at[:, None]
     height = 0.5 * np.einsum("ikj,ikj->ik", chord, normals[index] + way[:, None])
-    move = np.einsum("ik,ik->i", share, height)
-    # Beyond the border of the points the fit would extrapolate: a vertex with points on one side only moves less.
     aside = np.einsum("ik,ikj->ij", share, chord)
     aside -= np.einsum("ij,ij->i", aside, way)[:, None] * way
     lopsided = np.linalg.norm(aside, axis=1) / reach[:, 0]
-    fade = np.clip(2 - 4 * lopsided, 0, 1) * np.clip(2 - np.abs(move) / most, 0, 1) * known
-    moved = vertices.copy()
-    moved[near] += (np.clip(move, -most, most) * fade)[:, None] * way
-    try:
-        return Solid(moved, region.faces)
-    except ValueError:
-        return region
+    return PlacesOnSurface(way, np.einsum("ik,ik->i", share, height), lopsided, total > 1e-3)
 
 
 def thin_region(region: Solid, most: float) -> Solid:

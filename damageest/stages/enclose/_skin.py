@@ -6,10 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Part, Samples, Scan, Sites
+from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Part, Samples, Scan, Sites
 from damageest.geometry.distance import closest_on_mesh, signed_distance
-from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.neighbourhoods import find_in_box, find_neighbours, pick_one_per_cube
 from damageest.geometry.voxels import VoxelGrid, measure_bounds
+
+NEARER = 0.4
+"""Skin is held where an intact point is nearer than this share of the distance to the damaged points."""
+DEEP = 3.0
+"""How far deep points are from skin that is held, in gaps; those are deep that lie deeper than a gap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +58,43 @@ def sample_skin_near(
     among, asked = (np.concatenate([at, weight * way], axis=1) for at, way in ((hit, outward), (points, normals)))
     gap = find_neighbours(asked, 1, among, float(clear.max()) * 1.001)[0][:, 0]
     return SkinSamples(points, normals, gap > clear, usual)
+
+
+def find_held(
+    part: Part, aligned: Scan, deviation: Deviation, damaged: Ints, skin: SkinSamples, asked: Ints, tolerance: float
+) -> Flags:
+    """Which of the skin samples ``asked`` (K,) an intact scan point shows to be there, though damaged points are near.
+
+    In a sparse scan the rim lies somewhere in a gap between damaged and intact points, and skin beyond the intact ones
+    is not free. Compared are distances along the skin. Beside a deep loss none is held: the points on its wall show
+    where the rim is. ``damaged``: the numbers of the damaged points in the scan.
+    """
+    if not len(asked):
+        return np.zeros(0, bool)
+    width = float(np.median(skin.usual[asked]))
+    on_skin = (deviation.label == INTACT) & (deviation.distance >= -max(2 * aligned.noise, 0.1 * tolerance))
+    on_skin[damaged] = False
+    low, high = measure_bounds(skin.points[asked]) + 2 * width * np.array([[-1.0], [1.0]])
+    near = find_in_box(aligned.points, low, high)
+    intact = near[on_skin[near]]
+    is_deep = -deviation.distance[damaged] >= width
+    feet = aligned.points[damaged] - deviation.distance[damaged, None] * part.face_normals[deviation.face[damaged]]
+    if not len(intact) or is_deep.all():
+        return np.zeros(len(asked), bool)
+    # The normals are further coordinates: points on the far side of a thin wall do not show this side.
+    places, seen = (
+        np.concatenate([at, width * way], axis=1)
+        for at, way in (
+            (skin.points[asked], skin.normals[asked]),
+            (aligned.points[intact], part.face_normals[deviation.face[intact]]),
+        )
+    )
+    to_intact = find_neighbours(places, 1, seen)[0][:, 0]
+    to_damaged = find_neighbours(skin.points[asked], 1, feet[~is_deep])[0][:, 0]
+    held = to_intact < NEARER * to_damaged
+    if is_deep.any():
+        held &= ~np.isfinite(find_neighbours(skin.points[asked], 1, feet[is_deep], DEEP * width)[0][:, 0])
+    return np.asarray(held)
 
 
 def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:

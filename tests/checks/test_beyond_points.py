@@ -1,0 +1,71 @@
+"""A volume that its scan points do not show is found, and one that they show is not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from damageest.artefacts import Floats
+from damageest.checks.beyond_points import BeyondPoints, ask_beyond_points
+from damageest.geometry.distance import distance_to_mesh
+from tests.sparse_scenes import GAP, as_part, as_solid, block, pad, pocket, scan
+
+DEPTH, TOLERANCE = 0.35, 0.15
+
+
+def ask(volume: Any, lost: Any, points: Floats | None = None) -> BeyondPoints:
+    """Of a ``volume`` found, where ``lost`` is what is gone."""
+    points = scan(block() - lost) if points is None else points
+    own = points[distance_to_mesh(points, as_part(block())) > TOLERANCE]
+    return ask_beyond_points(as_solid(block() ^ volume), as_part(block()), own, points, 0.0, GAP, TOLERANCE, "mm")
+
+
+@pytest.mark.parametrize(
+    "lost",
+    [
+        pocket(DEPTH),
+        Manifold.cube((30, 40, 4), True).rotate((0, 12, 0)).translate((14, 0, 5)),
+        Manifold.sphere(3, 96).translate((0, 0, 4.5)),
+        Manifold.cylinder(6, 1.5, 1.5, 64).translate((2, 2, -1)),
+    ],
+    ids=["pocket", "edge", "pit", "deep hole"],
+)
+def test_the_truth_is_shown(lost: Any) -> None:
+    assert not ask(lost, lost).reason
+
+
+def test_an_undercut_is_shown_by_the_points_on_it() -> None:
+    keyhole = Manifold.cylinder(2, 1, 1, 64).translate((0, 0, 2.5)) + Manifold.sphere(2.8, 96)
+    assert not ask(keyhole, keyhole, scan(block() - keyhole)[:, :]).is_contradicted
+
+
+def test_a_surface_below_its_points_is_contradicted() -> None:
+    found = ask(pocket(2 * DEPTH), pocket(DEPTH))
+    assert found.is_contradicted
+    assert found.amount == pytest.approx(0.45 * found.amount / found.share, rel=0.3)
+    assert found.depth == pytest.approx(DEPTH, abs=0.02)
+
+
+def test_more_than_skin_times_depth_is_contradicted() -> None:
+    points = scan(block() - pocket(DEPTH))
+    found = ask(pocket(5.0), pocket(DEPTH), points)
+    assert found.is_contradicted
+    assert "the skin under it times the depth" in found.reason
+
+
+def test_added_metal_is_asked_as_well() -> None:
+    points = scan(block() + pad(DEPTH))
+    own = points[points[:, 2] > 4 + TOLERANCE]
+    rest = (points, 0.0, GAP, TOLERANCE, "mm")
+    assert not ask_beyond_points(as_solid(pad(DEPTH)), as_part(block()), own, *rest).reason
+    assert ask_beyond_points(as_solid(pad(4 * DEPTH)), as_part(block()), own, *rest).is_contradicted
+
+
+def test_without_points_of_its_own_nothing_is_said() -> None:
+    found = ask_beyond_points(
+        as_solid(pad(1.0)), as_part(block()), np.empty((0, 3)), scan(block()), 0.0, GAP, TOLERANCE, "mm"
+    )
+    assert not found.reason
