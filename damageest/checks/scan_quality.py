@@ -12,8 +12,6 @@ AUTO_TOLERANCE = 4.0
 
 FEW_POINTS = 100
 """Number of points below which a scan shows next to nothing of a part."""
-SPARSE = 5.0
-"""Point spacing, in tolerances, above which the surface between the points is a guess."""
 
 LEAST_TOLERANCE = 1e-6
 """Least tolerance in diagonals of the part; coordinates in single precision, as in STL, have no more digits."""
@@ -70,17 +68,12 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
             f"the part's triangles deviate from the CAD surface by up to {part.tessellation_error:.3g}, more than half "
             f"the tolerance {tolerance:.3g}; ask for a finer part.chord, or for a smaller part.angle if that is no help"
         )
-    if is_sparse(scan, tolerance):
+    if scan.spacing > 5 * tolerance:
         warnings.append(
             f"the scan's points lie {scan.spacing:.3g} apart, far more than the tolerance {tolerance:.3g}: the damage "
             "surface between them is interpolated"
         )
     return tolerance, warnings
-
-
-def is_sparse(scan: Scan, tolerance: float) -> bool:
-    """Whether the points lie so far apart that the surface between them is a guess, at this tolerance."""
-    return scan.spacing > SPARSE * tolerance
 
 
 def describe_few(scan: Scan) -> list[str]:

@@ -11,7 +11,7 @@ from damageest.artefacts import Flags, Floats, Ints
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
 from damageest.checks.pose_error import PoseError, measure_pose_error
-from damageest.checks.scan_quality import describe_few, is_sparse
+from damageest.checks.scan_quality import describe_few
 from damageest.checks.uncertainty import (
     WIDTH,
     SiteError,
@@ -29,6 +29,8 @@ from damageest.pipeline.fit_model import measure_at_site
 from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.stages.allowance import Allowance
 
+COARSE = 0.05
+"""Point spacing, in diagonals of the part, from which a loss between the points can be of any size."""
 BESIDE = 2.0
 """Distance from a damage volume, in reaches, within which unseen skin may be part of the same loss."""
 
@@ -116,12 +118,12 @@ def _measure_site(
 
 
 def _may_hide_loss(state: JobState) -> bool:
-    """Whether there are too few points to say that nothing is lost: next to none, or far apart for the tolerance, or so
-    far that the only points on a loss are taken for noise, and there are such points."""
+    """Whether there are too few points to say that nothing is lost: so few or so far apart that they do not show the
+    part, or far apart for the tolerance with points too deep for noise, which are in no site."""
     scan, tolerance = state.aligned, state.tolerance
-    if describe_few(scan) or is_sparse(scan, tolerance):
+    if describe_few(scan) or scan.spacing > COARSE * state.part.diagonal:
         return True
-    return scan.spacing > tolerance and bool((state.deviation.distance < -tolerance).any())
+    return scan.spacing > tolerance and bool((state.deviation.distance < -2 * tolerance).any())
 
 
 def _list_free_motions(state: JobState) -> Floats | None:
