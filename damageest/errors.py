@@ -11,6 +11,27 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+MOST_TEXT = 2000
+"""Characters of a message from a plugin or a library that are shown; the rest is cut."""
+_UNSHOWN = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+"""What a terminal or a page does not show but obeys, and what no file can hold: control characters other than the end
+of a line, marks that turn the direction of writing, and halves of surrogate pairs."""
+
+
+def clean_message(text: object, most: int = MOST_TEXT) -> str:
+    """A text that is not damageest's own, fit to be shown: of at most ``most`` characters and a note that it was cut;
+    a tab is a space, and other control characters are written out, as ``\\x1b``. Line ends stay.
+
+    What has no text, as an exception whose ``__str__`` raises, is named by its type.
+    """
+    try:
+        whole = str(text)
+    except Exception:
+        whole = f"(a {type(text).__name__} without text)"
+    kept = whole[:most].replace("\r\n", "\n").replace("\t", " ")
+    kept = _UNSHOWN.sub(lambda found: ascii(found[0])[1:-1], kept)
+    return kept if len(whole) <= most else f"{kept} ... (cut: {len(whole):,} characters)"
+
 
 class DamageestError(Exception):
     """Base of all errors that damageest raises on purpose; its text is meant for the user."""
