@@ -15,7 +15,7 @@ def test_what_a_terminal_obeys_is_written_out(code: int) -> None:
     text = clean_message(f"a{chr(code)}b")
     assert text.startswith("a")
     assert text.endswith("b")
-    assert text in ("a b", "a\nb") or (chr(code) not in text and f"{code:x}" in text)
+    assert text in ("a b", "a\nb") or text == f"a{ascii(chr(code))[1:-1]}b"
     assert not any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in text.replace("\n", ""))
     text.encode()
 
