@@ -91,6 +91,7 @@ class DepositPath(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_shape("points", self.points, "N", 3)
         count = len(self.points)
         for name in ("points", "axes", "normals"):
             require_shape(name, getattr(self, name), count, 3)

@@ -132,8 +132,8 @@ class Samples(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        count = len(self.points)
         require_shape("points", self.points, "N", 3)
+        count = len(self.points)
         require_shape("normals", self.normals, count, 3)
         require_shape("face", self.face, count)
         require_shape("kind", self.kind, count)
