@@ -132,7 +132,10 @@ class StageContract:
         assert isinstance(self.get_result(), tuple if typing.get_origin(expected) is tuple else expected)
 
     def test_fits_its_inputs(self) -> None:
-        self.run()
+        if "folder" in type(self.stage).takes():  # what it wrote before is in the folder of another check
+            self.run()
+        else:
+            self.check_fits(self.get_result(), self.make_inputs())
 
     def test_same_bytes_twice(self) -> None:
         first = to_named_bytes(self.get_result())
