@@ -18,8 +18,8 @@ def _guard_numbers(schema: Any) -> Any:
     if not isinstance(schema, dict):
         return schema
     if schema.get("type") in ("int", "float"):
-        return core_schema.no_info_before_validator_function(_require_number, schema)  # type: ignore[arg-type]
-    if schema.get("type") == "function-before" and schema["function"].get("function") is _require_number:
+        return core_schema.no_info_before_validator_function(require_number, schema)  # type: ignore[arg-type]
+    if schema.get("type") == "function-before" and schema["function"].get("function") is require_number:
         return schema
     return {key: value if key in _FIXED else _guard_numbers(value) for key, value in schema.items()}
 
@@ -28,7 +28,7 @@ _FIXED = ("metadata", "config", "serialization", "default", "expected", "functio
 """Parts of a schema that describe no value of a job."""
 
 
-def _require_number(value: Any) -> Any:
+def require_number(value: Any) -> Any:
     """Refuses what Python or pydantic would read as a number, but a reader of the job file would not."""
     if isinstance(value, (bool, np.bool_, str, bytes)):
         raise PydanticCustomError("number", "expected a number")

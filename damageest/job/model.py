@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, FiniteFloat, PositiveInt
+from pydantic import BeforeValidator, Field, FiniteFloat, PositiveInt
 
 from damageest.errors import Fault
-from damageest.options import Options
+from damageest.options import Options, require_number
 from damageest.registry.contracts import DEFAULTS, SURFACE_ONLY, Contract
 from damageest.registry.registry import Implementation
 from damageest.stages import Stage
@@ -43,7 +43,7 @@ class SiteChoice(Options):
 class Header(Options):
     """The fields of a job that are not stages."""
 
-    version: Literal[1] = Field(description="version of the job format")
+    version: Annotated[Literal[1], BeforeValidator(require_number)] = Field(description="version of the job format")
     name: str = Field("", pattern=r"^[^/\\\x00]*$", description="name of the job; default: the file's stem")
     units: Unit = Field("mm", description="unit of every length in the job, and of files that carry none")
     tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] | Literal["auto"] = Field(
