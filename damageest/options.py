@@ -18,7 +18,7 @@ def _guard_numbers(schema: Any) -> Any:
     if not isinstance(schema, dict):
         return schema
     if schema.get("type") in ("int", "float"):
-        return core_schema.no_info_before_validator_function(require_number, schema)  # type: ignore[arg-type]
+        return core_schema.no_info_before_validator_function(require_number, schema)
     if schema.get("type") == "function-before" and schema["function"].get("function") is require_number:
         return schema
     return {key: value if key in _FIXED else _guard_numbers(value) for key, value in schema.items()}

@@ -105,7 +105,9 @@ class DepositPath(Checked):
             require_finite(name, getattr(self, name))
         if self.tightest is not None:
             require_shape("tightest", self.tightest, 2, 3)
-        if count and not np.allclose(np.linalg.norm(self.axes, axis=1), 1, atol=1e-6):
+        with np.errstate(over="ignore"):
+            is_unit = np.allclose(np.linalg.norm(self.axes, axis=1), 1, atol=1e-6)
+        if not is_unit:
             raise ArtefactError("axes: not all have the length 1")
         if count and not (self.feed > 0).all():
             raise ArtefactError("feed: not all above 0")

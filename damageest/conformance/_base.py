@@ -85,7 +85,7 @@ class StageContract:
         try:
             check_output(contract, result, {**given, "folder": getattr(self, "folder", None)}.__getitem__)
         except ArtefactError as error:
-            pytest.fail(f"a job refuses this result: {error}")
+            raise AssertionError(f"a job refuses this result: {error}") from error
 
     def get_result(self) -> Any:
         """The result for the unchanged scene. It is computed once."""

@@ -40,13 +40,13 @@ def call_implementation(
     owner = f"{item.provider}"
     if not item.cls.isolated:
         with at_work(what, limits.seconds, owner):
-            return _call_guarded(lambda: function(**arguments), owner)
+            return call_guarded(lambda: function(**arguments), owner)
     worker = f"{item.provider.module.partition('.')[0]} {item.provider.fingerprint}"
     if item.cls.reads:
         limits = replace(limits, seconds=limits.seconds * READERS_SHARE)
     try:
         with at_work(what, limits.seconds and limits.seconds + WAIT, owner):
-            return _call_guarded(
+            return call_guarded(
                 lambda: call_isolated(function, arguments, worker=worker, owner=owner, limits=limits), owner
             )
     except ProcessError as error:
@@ -59,7 +59,7 @@ def call_implementation(
         ) from error
 
 
-def _call_guarded(function: Callable[[], T], owner: str) -> T:
+def call_guarded(function: Callable[[], T], owner: str) -> T:
     """What a function of ``owner`` gives. An error of Python's that would end more than the stage, as SystemExit or
     GeneratorExit, becomes a StageError; Ctrl-C stays what it is."""
     try:

@@ -25,7 +25,7 @@ from damageest.errors import (
 from damageest.isolation import Limits, at_work
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache, describe_unwritable, digest
-from damageest.pipeline.calls import run_stage
+from damageest.pipeline.calls import call_guarded, run_stage
 from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
 from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.outputs import check_output
@@ -36,6 +36,7 @@ from damageest.stages import Stage
 MORE_MEMORY = "a larger tolerance, fewer scan points (scan.most_points), or a larger --memory"
 
 S = TypeVar("S", JobState, Candidate, FoundSite)
+T = TypeVar("T")
 
 
 @dataclass
@@ -98,6 +99,22 @@ class Engine:
         self.records.append(StageRecord(*where[:2], str(item.provider), state.number, round(seconds, 3), cached))
         tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
         return state.with_named(contract.gives, value, key)
+
+    def ask(self, contract: Contract, function: Callable[[], T], kind: type) -> T:
+        """What another method of the job's implementation gives than ``run``; of the type ``kind``.
+
+        Raises as `call` does: an error says the stage and whose code it is.
+        """
+        item = self.job.implementations[contract]
+        try:
+            value = call_guarded(function, f"{item.provider}")
+            if not isinstance(value, kind):
+                raise ArtefactError(f"expected {kind.__name__}, got {type(value).__name__}")
+        except Exception as error:
+            if is_interrupt(error):
+                raise KeyboardInterrupt from error
+            raise _locate(error, item, JobState()) from error
+        return value
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
         """(was it known, value): from this run's memory, else from the cache, else computed and kept."""

@@ -31,8 +31,9 @@ from damageest.artefacts import (
 from damageest.conformance import _scene
 from damageest.errors import StageError
 from damageest.job import Job
-from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import Candidate, JobState
+from damageest.pipeline.engine import Engine, follow
+from damageest.pipeline.sites import take_enclosures
+from damageest.pipeline.state import Candidate, JobState, Work
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.loading import Provider
@@ -90,8 +91,10 @@ def make_valid(folder: Path) -> dict[str, Any]:
     }
 
 
-def call(contract: Contract, make: Callable[[], Any], registry: Registry, folder: Path) -> Any:
-    """What the engine gives for a stage whose ``run`` gives ``make()``."""
+def call(
+    contract: Contract, make: Callable[[], Any], registry: Registry, folder: Path, give_engine: bool = False
+) -> Any:
+    """What the engine gives for a stage whose ``run`` gives ``make()``; or the engine."""
     fields = {"use": (Literal["fake"], "fake"), "make": (Any, Field(None, exclude=True))}
     annotations = {name: kind for name, (kind, _) in fields.items()}
     defaults = {name: default for name, (_, default) in fields.items()}
@@ -107,6 +110,8 @@ def call(contract: Contract, make: Callable[[], Any], registry: Registry, folder
     keys = dict.fromkeys(given, "k")
     state = Candidate({}, {}, job=JobState(given, keys), number=1)
     engine = Engine(job, registry)
+    if give_engine:
+        return engine
     done: Any = engine.call(contract, state if contract.per_site else state.job)
     return done.get(contract.gives)
 
@@ -329,3 +334,35 @@ def test_a_pose_is_rigid(place: str, pose: Any, text: str, registry: Registry, f
     told = str(caught.value)
     assert text in told.replace("(1, 3, 3)", "(3, 3)"), told
     assert told.startswith("align: fake: gave a result that is not valid"), told
+
+
+def test_other_methods_of_a_plugin_are_asked_with_its_name(registry: Registry, folder: Path) -> None:
+    """As the reader's pieces, and the rank of a site."""
+    engine = call(NAMES["Path"], lambda: make_valid(folder)["Path"], registry, folder, give_engine=True)
+    assert engine.ask(NAMES["Path"], lambda: 3, int) == 3
+    wrong: list[tuple[Any, str]] = [
+        (lambda: "3", "expected int, got str"),
+        (raise_exit, "GeneratorExit"),
+        (lambda: 1 // 0, "Zero"),
+    ]
+    for ask, text in wrong:
+        with pytest.raises(StageError, match=rf"(?s)path: fake: .*{text}.*acme 1\.2"):
+            engine.ask(NAMES["Path"], ask, int)
+
+
+def raise_exit() -> int:
+    raise GeneratorExit
+
+
+def test_a_site_without_an_enclosure_is_a_failure(registry: Registry, folder: Path) -> None:
+    """It would be missing in the result else, without a word."""
+    value = Enclosures((Enclosure(make_given(folder)["background"], (2,)),))
+    engine = call(NAMES["EncloseAll"], lambda: value, registry, folder, give_engine=True)
+    given = make_given(folder)
+    state = JobState(given, dict.fromkeys(given, "k"))
+    work = follow((NAMES["EncloseAll"], take_enclosures), engine, Work(state))
+    assert [candidate.clusters for candidate in work.candidates] == [(2,)]
+    (failure,) = work.failures
+    assert str(failure).startswith("enclose: fake (")
+    assert "gave no enclosure of its points" in str(failure)
+    assert failure.site == 1
