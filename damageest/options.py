@@ -46,5 +46,5 @@ class Options(BaseModel):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        schema = handler(source)
-        return _guard_numbers(schema)
+        schema: CoreSchema = _guard_numbers(handler(source))
+        return schema
