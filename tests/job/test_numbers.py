@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,17 +36,25 @@ def find_numbers(schema: Any, shared: Any, place: str = "", kinds: frozenset[str
             for where, make, allowed in find_numbers(item, shared, f"{place}.{k}"):
                 yield (
                     where,
-                    lambda bad, k=k, make=make: [make(bad) if k == i else 1 for i in range(len(fixed))],
+                    partial(_put_item, len(fixed), k, make),
                     allowed,
                 )
     elif "items" in schema:
         for where, make, allowed in find_numbers(schema["items"], shared, f"{place}.0"):
-            yield where, lambda bad, make=make: [make(bad)], allowed
+            yield where, partial(_put_item, 1, 0, make), allowed
     elif "properties" in schema:
         tags = find_tags(schema["properties"])
         for name, part in schema["properties"].items():
             for where, make, allowed in find_numbers(part, shared, f"{place}.{name}"):
-                yield where, lambda bad, name=name, make=make: {**tags, name: make(bad)}, allowed
+                yield where, partial(_put_key, tags, name, make), allowed
+
+
+def _put_item(count: int, at: int, make: Make, bad: Any) -> list[Any]:
+    return [make(bad) if k == at else 1 for k in range(count)]
+
+
+def _put_key(tags: dict[str, Any], name: str, make: Make, bad: Any) -> dict[str, Any]:
+    return {**tags, name: make(bad)}
 
 
 def find_tags(properties: Any) -> dict[str, Any]:

@@ -112,7 +112,8 @@ def call(
     engine = Engine(job, registry)
     if give_engine:
         return engine
-    done: Any = engine.call(contract, state if contract.per_site else state.job)
+    place: Any = state if contract.per_site else state.job
+    done: Any = engine.call(contract, place)
     return done.get(contract.gives)
 
 
