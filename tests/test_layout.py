@@ -38,7 +38,7 @@ def test_no_folder_imports_another_folders_underscore(path: Path) -> None:
 
 def test_few_modules_lie_at_the_top() -> None:
     top = {path.name for path in (ROOT / "damageest").glob("*.py")}
-    assert top == {"__init__.py", "api.py", "errors.py", "findings.py", "result.py"}
+    assert top == {"__init__.py", "api.py", "errors.py", "findings.py", "options.py", "result.py"}
 
 
 def test_the_package_is_typed() -> None:

@@ -7,8 +7,9 @@ after `align` is in the part's. ``T_part_scan`` takes a point from the scanner's
 
 from __future__ import annotations
 
-from damageest.artefacts.arrays import ArtefactError, Flags, Floats, Ints, Vector
+from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
 from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, EvidenceCause, Rims
+from damageest.artefacts.fields import ArtefactError
 from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
 from damageest.artefacts.paths import BeadFill, DepositPath, Unreached
 from damageest.artefacts.scans import (

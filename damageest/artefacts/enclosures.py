@@ -3,35 +3,59 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
+
+import numpy as np
 
 from damageest.artefacts.arrays import Ints
+from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, make_array, require_shape
 from damageest.artefacts.meshes import Solid
 
 EvidenceCause = Literal["residual", "inside", "contradicted", "bare", "shallow", "unseen"]
 
 
 @dataclass(frozen=True, eq=False)
-class Rims:
+class Rims(Checked):
     """Closed loops of vertex indices of an IDS, each following the surface's own boundary edges, longest first."""
 
     loops: tuple[Ints, ...]
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.loops, (tuple, list)):
+            raise ArtefactError(f"loops: expected a tuple of arrays, got a {type(self.loops).__name__}")
+        object.__setattr__(self, "loops", tuple(make_array(loop, np.int64, "loops") for loop in self.loops))
+        for loop in self.loops:
+            require_shape("loops", loop, "N")
+            if len(loop) < 3 or loop.min() < 0 or len(np.unique(loop)) < len(loop):
+                raise ArtefactError("loops: each needs three or more vertices, from 0 up, and each of them once")
+
 
 @dataclass(frozen=True, eq=False)
-class Enclosure:
+class Enclosure(Checked):
     """A solid that contains the damage of ``sites`` and no intact metal; ``notes`` say what is doubtful about it."""
 
     solid: Solid
     sites: tuple[int, ...]
     notes: tuple[str, ...] = ()
+    _ranges: ClassVar[dict[str, Range]] = {"sites": (1, MOST)}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.sites:
+            raise ArtefactError("sites: an enclosure is that of one site or more")
 
 
 @dataclass(frozen=True, eq=False)
-class Enclosures:
+class Enclosures(Checked):
     """The enclosures of all sites of a job: disjoint, each site in one of them."""
 
     items: tuple[Enclosure, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        sites = [site for item in self.items for site in item.sites]
+        if twice := sorted({site for site in sites if sites.count(site) > 1}):
+            raise ArtefactError(f"items: site {twice[0]} is in more than one enclosure, or twice in one")
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from damageest.artefacts.arrays import Arrays, ArtefactError, Floats, Ints
+from damageest.artefacts.arrays import Floats, Ints
+from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh(Arrays):
+class Mesh(Checked):
     """A triangle mesh: ``vertices`` (V,3) float64, ``faces`` (F,3) int64, counter-clockwise from outside."""
 
     vertices: Floats
@@ -21,14 +22,10 @@ class Mesh(Arrays):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.vertices.ndim != 2 or self.vertices.shape[1] != 3:
-            raise ArtefactError(f"vertices: expected (V,3), got {self.vertices.shape}")
-        if self.faces.ndim != 2 or self.faces.shape[1] != 3:
-            raise ArtefactError(f"faces: expected (F,3), got {self.faces.shape}")
-        if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= len(self.vertices)):
-            raise ArtefactError(f"faces: index outside the {len(self.vertices)} vertices")
-        if not np.isfinite(self.vertices).all():
-            raise ArtefactError("vertices: not all finite")
+        require_shape("vertices", self.vertices, "V", 3)
+        require_shape("faces", self.faces, "F", 3)
+        require_index("faces", self.faces, len(self.vertices), "vertices")
+        require_finite("vertices", self.vertices)
 
     @property
     def triangles(self) -> Floats:
@@ -138,6 +135,14 @@ class Deposit(Solid):
     heights: tuple[tuple[int, float], ...] = ()
     overlap: float = 0.0
     notes: tuple[str, ...] = ()
+    _ranges: ClassVar[dict[str, Range]] = dict.fromkeys(
+        ("stock_volume", "cut_back_volume", "thickness", "overlap"), (0.0, MOST)
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.thickness and list(self.thickness) != sorted(self.thickness):
+            raise ArtefactError(f"thickness: expected least, mean and largest, got {self.thickness}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,3 +170,12 @@ class Part(Solid):
     notes: tuple[str, ...] = ()
     cad_scale: float = 0.0
     _dtypes: ClassVar[dict[str, Any]] = {**Mesh._dtypes, "faces_brep": np.int64}
+    _ranges: ClassVar[dict[str, Range]] = {"tessellation_error": (0.0, MOST), "cad_scale": (0.0, MOST)}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.faces_brep is not None:
+            require_shape("faces_brep", self.faces_brep, len(self.faces))
+            for name in ("face_names", "face_kinds"):
+                if known := getattr(self, name):
+                    require_index("faces_brep", self.faces_brep, len(known), name)

@@ -8,20 +8,22 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from damageest.artefacts.arrays import Arrays, ArtefactError, Flags, Floats, Ints
+from damageest.artefacts.arrays import Flags, Floats, Ints
+from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_shape
 from damageest.artefacts.meshes import Mesh, Solid
 
 
 @dataclass(frozen=True)
-class Unreached:
+class Unreached(Checked):
     """Deposit that no pass fills: its ``volume`` and ``why``."""
 
     volume: float
     why: str
+    _ranges: ClassVar[dict[str, Range]] = {"volume": (0.0, MOST)}
 
 
 @dataclass(frozen=True)
-class BeadFill:
+class BeadFill(Checked):
     """The union of a path's beads against the deposit, on voxels with the edge ``voxel``.
 
     ``filled``: share of the reachable deposit that is filled. ``gap``: volume of the reachable deposit that is not;
@@ -41,7 +43,7 @@ class BeadFill:
 
 
 @dataclass(frozen=True, eq=False)
-class DepositPath(Arrays):
+class DepositPath(Checked):
     """Moves of the tool that build up one site's deposit, in the part's frame.
 
     ``points`` (N,3): where the tool works, on the top of the bead. ``axes`` (N,3): the tool axis, a unit vector away
@@ -82,20 +84,37 @@ class DepositPath(Arrays):
         "layer": np.int64, "number": np.int64, "part": np.int64, "directions": np.float64, "heights": np.float64,
         "section": np.float64, "tightest": np.float64,
     }  # fmt: skip
+    _ranges: ClassVar[dict[str, Range]] = {
+        "width": (0.0, MOST), "standoff": (0.0, MOST), "deposit_volume": (0.0, MOST),
+        "clearance": (-MOST, np.inf), "travel_clearance": (-MOST, np.inf),
+    }  # fmt: skip
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_shape("points", self.points, "N", 3)
         count = len(self.points)
         for name in ("points", "axes", "normals"):
-            if getattr(self, name).shape != (count, 3):
-                raise ArtefactError(f"{name}: expected {(count, 3)}, got {getattr(self, name).shape}")
+            require_shape(name, getattr(self, name), count, 3)
+            require_finite(name, getattr(self, name))
         for name in ("feed", "on", "layer", "number", "part"):
-            if getattr(self, name).shape != (count,):
-                raise ArtefactError(f"{name}: expected {(count,)}, got {getattr(self, name).shape}")
-        if count and not np.allclose(np.linalg.norm(self.axes, axis=1), 1, atol=1e-6):
+            require_shape(name, getattr(self, name), count)
+        require_shape("directions", self.directions, "P", 3)
+        for name in ("heights", "section"):
+            require_shape(name, getattr(self, name), len(self.directions))
+        for name in ("feed", "directions", "heights", "section"):
+            require_finite(name, getattr(self, name))
+        if self.tightest is not None:
+            require_shape("tightest", self.tightest, 2, 3)
+        with np.errstate(over="ignore"):
+            is_unit = np.allclose(np.linalg.norm(self.axes, axis=1), 1, atol=1e-6)
+        if not is_unit:
             raise ArtefactError("axes: not all have the length 1")
-        if count and not (np.isfinite(self.points).all() and (self.feed > 0).all()):
-            raise ArtefactError("points: not all finite, or a feed is not above 0")
+        if count and not (self.feed > 0).all():
+            raise ArtefactError("feed: not all above 0")
+        if count and min(self.layer.min(), self.number.min(), self.part.min()) < 1:
+            raise ArtefactError("layer, number, part: expected numbers from 1 up")
+        if count and self.part.max() > len(self.directions):
+            raise ArtefactError(f"part: number {self.part.max()} of the {len(self.directions)} parts")
         if count and self.on[0]:
             raise ArtefactError("on: the first move has no start, so it cannot deposit")
 

@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts.arrays import Arrays, ArtefactError, Flags, Floats, Ints, Vector
+from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
+from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
 from damageest.artefacts.meshes import Solid
 
 INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
@@ -16,8 +17,26 @@ INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
 tolerance (weld bead, dirt, fixture); deviating, but in no site (noise)."""
 
 
+RIGID = 1e-6
+"""Largest error of a pose's numbers, of the rotation and of the last row."""
+
+
+def _require_rigid(name: str, poses: Floats) -> None:
+    """Raises ArtefactError where one of the poses (4,4) or (K,4,4) is no rotation and shift."""
+    require_finite(name, poses)
+    turn = poses[..., :3, :3]
+    if (np.abs(poses[..., 3, :] - [0.0, 0.0, 0.0, 1.0]) > RIGID).any():
+        raise ArtefactError(f"{name}: the last row of a pose is 0, 0, 0, 1")
+    with np.errstate(over="ignore", invalid="ignore"):
+        product = turn @ np.swapaxes(turn, -1, -2)
+        if not (np.abs(product - np.eye(3)) <= RIGID).all():
+            raise ArtefactError(f"{name}: not rigid: its upper left 3x3 has scale or shear")
+        if (np.linalg.det(turn) < 0).any():
+            raise ArtefactError(f"{name}: not rigid: its upper left 3x3 mirrors (its determinant is -1)")
+
+
 @dataclass(frozen=True, eq=False)
-class Truth(Arrays):
+class Truth(Checked):
     """The truth of a virtual scan: the true ``damage`` in the part's frame (None if there is none), the pose, and the
     metal ``added`` outside the part, in the part's frame (None if there is none)."""
 
@@ -26,9 +45,14 @@ class Truth(Arrays):
     added: Solid | None = None
     _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64}
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_shape("T_part_scan", self.T_part_scan, 4, 4)
+        _require_rigid("T_part_scan", self.T_part_scan)
+
 
 @dataclass(frozen=True, eq=False)
-class Scan(Arrays):
+class Scan(Checked):
     """Points (N,3) on the damaged part; ``normals`` (N,3) outward, or None.
 
     ``noise`` is the measured standard deviation of the points off the local surface and ``spacing`` the median distance
@@ -55,22 +79,20 @@ class Scan(Arrays):
         "viewpoints": np.float64,
         "view": np.int32,
     }
+    _ranges: ClassVar[dict[str, Range]] = {"noise": (0.0, MOST), "spacing": (0.0, MOST), "total": (0, MOST)}
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.points.ndim != 2 or self.points.shape[1] != 3:
-            raise ArtefactError(f"points: expected (N,3), got {self.points.shape}")
-        if self.normals is not None and self.normals.shape != self.points.shape:
-            raise ArtefactError(f"normals: expected {self.points.shape}, got {self.normals.shape}")
+        require_shape("points", self.points, "N", 3)
+        if self.normals is not None:
+            require_shape("normals", self.normals, len(self.points), 3)
         if (self.viewpoints is None) != (self.view is None):
             raise ArtefactError("viewpoints and view: give both or none")
         if self.viewpoints is not None and self.view is not None:
-            if self.viewpoints.ndim != 2 or self.viewpoints.shape[1] != 3:
-                raise ArtefactError(f"viewpoints: expected (V,3), got {self.viewpoints.shape}")
-            if self.view.shape != (len(self.points),):
-                raise ArtefactError(f"view: expected ({len(self.points)},), got {self.view.shape}")
-            if len(self.view) and not -1 <= self.view.min() <= self.view.max() < len(self.viewpoints):
-                raise ArtefactError(f"view: number outside the {len(self.viewpoints)} viewpoints")
+            require_shape("viewpoints", self.viewpoints, "V", 3)
+            require_finite("viewpoints", self.viewpoints)
+            require_shape("view", self.view, len(self.points))
+            require_index("view", self.view, len(self.viewpoints), "viewpoints", least=-1)
 
     def move(self, T: Floats) -> Scan:
         """The same scan in another frame; T is 4x4, rigid."""
@@ -90,7 +112,7 @@ class Scan(Arrays):
 
 
 @dataclass(frozen=True, eq=False)
-class Samples(Arrays):
+class Samples(Checked):
     """CAD points: ``points`` (N,3) exactly on the part, ``normals`` (N,3) of the face that each lies on (bisecting
     ones on edges and corners), ``face`` (N,) the triangle, ``kind`` (N,): 0 on a face, 1 on a sharp edge, 2 on a
     corner. ``spacing`` is the largest intended gap."""
@@ -106,10 +128,24 @@ class Samples(Arrays):
         "face": np.int64,
         "kind": np.uint8,
     }
+    _ranges: ClassVar[dict[str, Range]] = {"spacing": (0.0, MOST)}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_shape("points", self.points, "N", 3)
+        count = len(self.points)
+        require_shape("normals", self.normals, count, 3)
+        require_shape("face", self.face, count)
+        require_shape("kind", self.kind, count)
+        require_finite("points", self.points)
+        require_finite("normals", self.normals)
+        require_index("kind", self.kind, 3, "kinds")
+        if count and self.face.min() < 0:
+            raise ArtefactError(f"face: expected numbers of triangles, got {self.face.min()}")
 
 
 @dataclass(frozen=True)
-class FreeMotion:
+class FreeMotion(Checked):
     """A motion that unworn skin does not exclude: after it the scan fits the part as well.
 
     ``direction``: unit vector of a shift, or of the axis of a turn through ``point`` (None: a shift), in the part's
@@ -133,7 +169,7 @@ class FreeMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose(Arrays):
+class Pose(Checked):
     """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
 
     ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is
@@ -152,10 +188,19 @@ class Pose(Arrays):
     free: tuple[FreeMotion, ...] = ()
     is_held: bool = False
     _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64}
+    _ranges: ClassVar[dict[str, Range]] = {"rms": (0.0, MOST), "inliers": (0.0, 1.0)}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_shape("T_part_scan", self.T_part_scan, 4, 4)
+        _require_rigid("T_part_scan", self.T_part_scan)
+        if self.alternatives is not None:
+            require_shape("alternatives", self.alternatives, "K", 4, 4)
+            _require_rigid("alternatives", self.alternatives)
 
 
 @dataclass(frozen=True, eq=False)
-class Deviation(Arrays):
+class Deviation(Checked):
     """Per scan point, in the part's frame: ``distance`` (N,) signed to the part's surface, positive outside; ``face``
     (N,) the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER. ``notes`` say what the scan
     does not show."""
@@ -168,18 +213,32 @@ class Deviation(Arrays):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if wrong := int((~np.isfinite(self.distance)).sum()):
-            raise ArtefactError(f"distance: {wrong} of {len(self.distance)} are not finite numbers")
+        require_shape("distance", self.distance, "N")
+        require_shape("face", self.face, len(self.distance))
+        require_shape("label", self.label, len(self.distance))
+        require_finite("distance", self.distance)
+        require_index("label", self.label, OUTLIER + 1, "labels")
+        if len(self.face) and self.face.min() < 0:
+            raise ArtefactError(f"face: expected numbers of triangles, got {self.face.min()}")
 
 
 @dataclass(frozen=True, eq=False)
-class Sites(Arrays):
+class Sites(Checked):
     """``label`` (N,) int32 per scan point: the number of its site from 1 up, 0 for a point of none. ``count`` sites."""
 
     label: NDArray[np.int32]
     count: int
     notes: tuple[str, ...] = ()
     _dtypes: ClassVar[dict[str, Any]] = {"label": np.int32}
+    _ranges: ClassVar[dict[str, Range]] = {"count": (0, MOST)}
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_shape("label", self.label, "N")
+        if len(self.label) and not 0 <= self.label.min() <= self.label.max() <= self.count:
+            raise ArtefactError(
+                f"label: expected 0 to {self.count}, the count of sites, got {self.label.min()} to {self.label.max()}"
+            )
 
     def members(self, site: int) -> Ints:
         """Indices of the scan points of one site."""

@@ -16,7 +16,7 @@ from typing import Any
 
 from damageest.batches.jobs import MATRIX
 from damageest.batches.rows import describe_result
-from damageest.errors import DamageestError, StageError
+from damageest.errors import DamageestError, StageError, clean_message
 from damageest.isolation import Limits, ProcessError, call_isolated, end_workers
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
@@ -44,8 +44,8 @@ def work(task: dict[str, Any]) -> dict[str, Any]:
             done = call_isolated(run_job, {"task": task}, worker=process, limits=limits, show=False)
     except ProcessError as error:
         done = {"outcome": _OUTCOMES[error.why], "error": _describe_end(error, limits)}
-    except Exception as error:
-        done = {"outcome": "failed", "error": f"{type(error).__name__}: {' '.join(str(error).split())[:400]}"}
+    except BaseException as error:  # also an interrupt: Ctrl-C reaches the batch, not this thread of a worker
+        done = {"outcome": "failed", "error": f"{type(error).__name__}: {' '.join(clean_message(error, 400).split())}"}
     return row | done | {"seconds": round(time.perf_counter() - start, 3)}
 
 

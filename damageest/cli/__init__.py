@@ -10,7 +10,7 @@ from typing import NoReturn
 import typer
 
 from damageest import __version__
-from damageest.errors import DamageestError, describe_missing_library, is_interrupt
+from damageest.errors import DamageestError, clean_message, describe_missing_library, is_interrupt
 from damageest.isolation.one_thread import ONE_THREAD
 
 INTERRUPTED = 130
@@ -91,6 +91,8 @@ def main() -> None:
         if is_interrupt(error):
             _stop_interrupted()
         fail(describe_missing_library(error) or error)
+    finally:
+        _process.bound_end(sys.exc_info()[1])
 
 
 def _stop_interrupted() -> NoReturn:
@@ -108,7 +110,9 @@ def fail(error: Exception) -> None:
         typer.echo(f"error: {error}", err=True)
     else:
         typer.echo(
-            f"error: unexpected {type(error).__name__}: {error}\n  try: add --debug to see the traceback", err=True
+            f"error: unexpected {type(error).__name__}: {clean_message(error)}\n"
+            "  try: add --debug to see the traceback",
+            err=True,
         )
     sys.exit(getattr(error, "exit_status", 1))
 

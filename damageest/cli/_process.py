@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 import typer
 
 from damageest.errors import StageError
+from damageest.isolation import supervise as watching
 from damageest.isolation.supervise import IS_POSSIBLE, end_alike, supervise
 
+LATE = "note: the work is done, but a thread of a plugin or a library went on; its process was ended\n"
 is_command = False
 """Whether this process runs the command line alone. In another program, such as one with tests, it must not fork."""
 
@@ -42,6 +46,8 @@ def end_with_each(
         start = first
         end = supervise(lambda: work(start))  # noqa: B023  (called at once)
         if end.error is None:
+            if end.late:
+                sys.stderr.write(LATE)
             end_alike(end.status if end.status < 0 else max(status, end.status))
         if sys.stderr.isatty():
             sys.stderr.write("\x1b[?25h")  # a live display hides the cursor
@@ -49,3 +55,24 @@ def end_with_each(
         status = max(status, report(end.error, names[start + max(end.job, 0)]))
         first = start + end.job + 1 if end.job >= 0 else len(names)
     end_alike(status)
+
+
+def bound_end(error: BaseException | None) -> None:
+    """Ends this process after `END_SECONDS` where it does not end by itself, since a thread that is no daemon goes on.
+
+    ``error``: the exception that ends it. A fork that is watched needs no such end: who watches it has a limit.
+    """
+    others = [one for one in threading.enumerate() if not one.daemon and one is not threading.main_thread()]
+    if watching.is_watched or not others:
+        return
+    code = error.code if isinstance(error, SystemExit) else int(error is not None)
+    status = code if isinstance(code, int) else int(code is not None)
+
+    def end() -> None:
+        time.sleep(watching.END_SECONDS)
+        sys.stderr.write(LATE)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+
+    threading.Thread(target=end, daemon=True).start()

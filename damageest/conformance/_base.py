@@ -13,10 +13,11 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from damageest.artefacts import Floats
+from damageest.artefacts import ArtefactError, Floats
 from damageest.conformance import _scene
 from damageest.errors import InputError, StageError
 from damageest.registry.contracts import contract_of
+from damageest.registry.outputs import check_output
 from damageest.stages import Stage
 
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
@@ -71,8 +72,20 @@ class StageContract:
         return type(self.stage).model_validate({**options, **grown})
 
     def run(self, **changes: Any) -> Any:
-        """The result with some inputs replaced by ``changes``."""
-        return self.call(self.stage, {**self.make_inputs(), **changes})
+        """The result with some inputs replaced by ``changes``, checked as a run of a job checks it."""
+        given = {**self.make_inputs(), **changes}
+        result = self.call(self.stage, given)
+        self.check_fits(result, given)
+        return result
+
+    def check_fits(self, result: Any, given: dict[str, Any]) -> None:
+        """Asserts that the result fits its inputs in lengths, ranges and indices; a job would be refused with it."""
+        contract = contract_of(type(self.stage))
+        assert contract is not None
+        try:
+            check_output(contract, result, {**given, "folder": getattr(self, "folder", None)}.__getitem__)
+        except ArtefactError as error:
+            raise AssertionError(f"a job refuses this result: {error}") from error
 
     def get_result(self) -> Any:
         """The result for the unchanged scene. It is computed once."""
@@ -117,6 +130,12 @@ class StageContract:
     def test_gives_its_type(self) -> None:
         expected = typing.get_type_hints(contract_of(type(self.stage)).run)["return"]  # type: ignore[union-attr]
         assert isinstance(self.get_result(), tuple if typing.get_origin(expected) is tuple else expected)
+
+    def test_fits_its_inputs(self) -> None:
+        if "folder" in type(self.stage).takes():  # what it wrote before is in the folder of another check
+            self.run()
+        else:
+            self.check_fits(self.get_result(), self.make_inputs())
 
     def test_same_bytes_twice(self) -> None:
         first = to_named_bytes(self.get_result())

@@ -8,12 +8,13 @@ from dataclasses import replace
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, PositiveFloat, Tag, model_validator
+from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, PositiveFloat, Tag, model_validator
 
 from damageest.artefacts import Flags, Floats, Scan
 from damageest.errors import InputError
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.point_pieces import number_pieces
+from damageest.options import Options
 
 Place = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
@@ -21,10 +22,10 @@ DEFAULT_GAP = 10.0
 """Largest gap within a piece where the job gives none, in point spacings."""
 
 
-class Crop(BaseModel, ABC):
+class Crop(Options, ABC):
     """Base of the crops: ``keep`` removes the points outside the shape, ``drop`` those inside."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(defer_build=True)
     keep: str | None
 
     @abstractmethod

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 from damageest.artefacts import Floats, Ints, Part
 from damageest.errors import StageError, suggest
 from damageest.geometry.cutting import cut_triangles
+from damageest.options import Options
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Mask = NDArray[np.bool_]
@@ -40,10 +41,10 @@ Direction = Annotated[Vector, AfterValidator(_check_direction)]
 Corners = Annotated[tuple[Vector, Vector], AfterValidator(_check_order)]
 
 
-class StrictMapping(BaseModel):
+class StrictMapping(Options):
     """Base of mappings in a job: an unknown key is refused with a list of the valid ones."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, serialize_by_alias=True)
+    model_config = ConfigDict(populate_by_name=True, serialize_by_alias=True)
 
     @model_validator(mode="before")
     @classmethod

@@ -69,9 +69,9 @@ def note_job(number: int) -> None:
     _change(job=number)
 
 
-def close_entry(status: int) -> None:
-    """Notes that the process comes to its end by itself, with this exit status."""
-    _change(open=False, seconds=0.0, status=status)
+def close_entry(status: int, seconds: float = 0.0) -> None:
+    """Notes that the process comes to its end by itself, with this exit status, within so many seconds."""
+    _change(open=False, seconds=seconds, status=status)
 
 
 def _change(**values: Any) -> None:

@@ -24,17 +24,24 @@ PASSED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 TICK = 0.5
 """Seconds between two looks at the clock. A process that is stopped for longer, as by Ctrl-Z, loses no time by it."""
 IS_POSSIBLE = hasattr(os, "fork") and hasattr(signal, "sigtimedwait")
+END_SECONDS = 10.0
+"""Seconds from the end of the work, when all is written, to that of its process. Until then threads that a plugin has
+left, and what libraries do at the end, may finish; then the process is ended."""
+is_watched = False
+"""Whether this process is a fork that another process watches."""
 _USER = 0
 """How the system marks a signal of another process; those of a terminal reach the whole group."""
 
 
 @dataclass(frozen=True)
 class End:
-    """``status``: the exit status of the fork; ``error``: what ended it where it did not end by itself, in ``job``."""
+    """``status``: the exit status of the fork; ``error``: what ended it where it did not end by itself, in ``job``.
+    ``late``: its work was done, but it did not end, and was ended."""
 
     status: int
     error: StageError | None = None
     job: int = -1
+    late: bool = False
 
 
 def supervise(work: Callable[[], int]) -> End:
@@ -43,6 +50,7 @@ def supervise(work: Callable[[], int]) -> End:
     In the fork this never returns: it raises SystemExit, or what ``work`` raises. The fork is killed where it stays in
     what it notes (`at_work`) for longer than the time limit noted with it, and where this process ends.
     """
+    global is_watched
     share_page()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     leash, held = os.pipe()
@@ -51,6 +59,7 @@ def supervise(work: Callable[[], int]) -> End:
     sys.stderr.flush()
     child = os.fork()
     if child == 0:
+        is_watched = True
         os.close(held)
         end_with_parent(leash)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -58,7 +67,7 @@ def supervise(work: Callable[[], int]) -> End:
         try:
             status = work()
         finally:
-            close_entry(status)
+            close_entry(status, END_SECONDS)
         sys.exit(status)
     os.close(leash)
     try:
@@ -101,8 +110,8 @@ def _describe(status: int, late: bool, entry: Entry) -> End:
     """How the fork ended. A crash after it had come to its end, as of a library that is unloaded, is none."""
     if not late and -status in PASSED:
         return End(status)
-    if not late and not entry.open:
-        return End(status if status >= 0 else entry.status)
+    if not entry.open:
+        return End(status if status >= 0 else entry.status, late=late)
     remedy = f"another implementation; report it to the authors of {entry.owner}, with job and inputs"
     if late:
         message = f"was ended: not finished after {entry.seconds:g} s, the time limit of a stage"

@@ -257,6 +257,8 @@ def _unpack(kind: str, value: Any, memory: int | None, limits: Limits, owner: st
         raise describe_memory(memory, limits)
     packed, name, text, trace = value
     error = pickle.loads(packed) if packed else type(name, (Exception,), {})(text)
+    if not isinstance(error, (Exception, KeyboardInterrupt)):  # as GeneratorExit: it would end more than the call
+        error = ProcessError("exit", f"raised {name}{f' ({text})' if text else ''}", blame_authors(owner))
     raise error from RemoteTraceback(trace)
 
 

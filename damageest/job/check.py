@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from damageest.errors import Fault, JobError, PluginError, suggest
+from damageest.errors import Fault, JobError, PluginError, clean_message, suggest
 from damageest.io.files import describe_no_file, resolve_path
 from damageest.job import yamlfile
 from damageest.job.model import Header, Job, find_paths
@@ -256,6 +256,12 @@ class _Check:
                         place = (*place, step)
                 told.append(((key, *(place or fault["loc"])), describe_fault(fault, options, valid, item.name)))
             self.add_faults(told)
+            return None
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # of a plugin's own check of its options
+            text = f"{type(error).__name__}: {clean_message(error, 400)}"
+            self.add_fault(f"{item.provider} failed when it checked the options of '{item.name}': {text}", key)
             return None
         for place, path in find_paths(stage.model_dump()):
             if wrong := describe_no_file(path):

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt
+from pydantic import BeforeValidator, Field, FiniteFloat, PositiveInt
 
 from damageest.errors import Fault
+from damageest.options import Options, require_number
 from damageest.registry.contracts import DEFAULTS, SURFACE_ONLY, Contract
 from damageest.registry.registry import Implementation
 from damageest.stages import Stage
@@ -22,18 +23,16 @@ Unit = Literal["um", "mm", "cm", "m", "in", "ft"]
 Corner = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
-class Box(BaseModel):
+class Box(Options):
     """A box along the axes of the part's frame."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     min: Corner = Field(description="lowest corner, in the job's unit")
     max: Corner = Field(description="highest corner, in the job's unit")
 
 
-class SiteChoice(BaseModel):
+class SiteChoice(Options):
     """What a person decides about the sites, by their numbers in the table of a run without these decisions."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     drop: tuple[PositiveInt, ...] = Field((), description="numbers of sites that are no damage")
     merge: tuple[tuple[PositiveInt, ...], ...] = Field(
         (), description="lists of numbers of sites that are one; the site gets the lowest number"
@@ -41,11 +40,10 @@ class SiteChoice(BaseModel):
     keep: Box | None = Field(None, description="only sites whose centre of mass is in this box; default: all")
 
 
-class Header(BaseModel):
+class Header(Options):
     """The fields of a job that are not stages."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    version: Literal[1] = Field(description="version of the job format")
+    version: Annotated[Literal[1], BeforeValidator(require_number)] = Field(description="version of the job format")
     name: str = Field("", pattern=r"^[^/\\\x00]*$", description="name of the job; default: the file's stem")
     units: Unit = Field("mm", description="unit of every length in the job, and of files that carry none")
     tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] | Literal["auto"] = Field(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from damageest.errors import InputError, StageError
+from damageest.errors import InputError, StageError, clean_message
 from damageest.isolation import Limits, ProcessError, at_work, call_isolated
 from damageest.registry.registry import Implementation
 from damageest.stages import Stage
@@ -40,27 +40,39 @@ def call_implementation(
     owner = f"{item.provider}"
     if not item.cls.isolated:
         with at_work(what, limits.seconds, owner):
-            return _call_here(function, arguments, owner)
+            return call_guarded(lambda: function(**arguments), owner)
     worker = f"{item.provider.module.partition('.')[0]} {item.provider.fingerprint}"
     if item.cls.reads:
         limits = replace(limits, seconds=limits.seconds * READERS_SHARE)
     try:
         with at_work(what, limits.seconds and limits.seconds + WAIT, owner):
-            return call_isolated(function, arguments, worker=worker, owner=owner, limits=limits)
+            return call_guarded(
+                lambda: call_isolated(function, arguments, worker=worker, owner=owner, limits=limits), owner
+            )
     except ProcessError as error:
         if not item.cls.reads:
             raise
         raise InputError(
-            f"{getattr(stage, 'path', item.contract.stage)}: the program that reads it {error.message}\n  try: "
+            f"{getattr(stage, 'path', item.contract.stage)}: the program that reads it "
+            f"{clean_message(error.message)}\n  try: "
             f"export the file again, since it is damaged; or report it to the authors of {owner}"
         ) from error
 
 
-def _call_here(function: Callable[..., T], arguments: Mapping[str, Any], owner: str) -> T:
+def call_guarded(function: Callable[[], T], owner: str) -> T:
+    """What a function of ``owner`` gives. An error of Python's that would end more than the stage, as SystemExit or
+    GeneratorExit, becomes a StageError; Ctrl-C stays what it is."""
     try:
-        return function(**arguments)
+        return function()
+    except (Exception, KeyboardInterrupt):
+        raise
     except SystemExit as end:
-        raise StageError(
-            f"called sys.exit({'' if end.code is None else end.code}), which would end the run",
-            f"another implementation; report it to the authors of {owner}",
-        ) from end
+        what = f"called sys.exit({'' if end.code is None else clean_message(end.code, 200)})"
+        raise StageError(f"{what}, which would end the run", _blame(owner)) from end
+    except BaseException as end:
+        what = f"raised {type(end).__name__}{f' ({clean_message(end, 400)})' if end.args else ''}"
+        raise StageError(f"{what}, which would end the run", _blame(owner)) from end
+
+
+def _blame(owner: str) -> str:
+    return f"another implementation; report it to the authors of {owner}"

@@ -13,13 +13,22 @@ from typing import Any, TypeVar
 import numpy as np
 
 from damageest.artefacts import ArtefactError
-from damageest.errors import DamageestError, InputError, StageError, describe_missing_library, is_interrupt
+from damageest.errors import (
+    DamageestError,
+    InputError,
+    JobError,
+    StageError,
+    clean_message,
+    describe_missing_library,
+    is_interrupt,
+)
 from damageest.isolation import Limits, at_work
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache, describe_unwritable, digest
-from damageest.pipeline.calls import run_stage
+from damageest.pipeline.calls import call_guarded, run_stage
 from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
 from damageest.registry.contracts import DEFAULTS, Contract
+from damageest.registry.outputs import check_output
 from damageest.registry.registry import Implementation, Registry
 from damageest.result import StageRecord
 from damageest.stages import Stage
@@ -27,6 +36,7 @@ from damageest.stages import Stage
 MORE_MEMORY = "a larger tolerance, fewer scan points (scan.most_points), or a larger --memory"
 
 S = TypeVar("S", JobState, Candidate, FoundSite)
+T = TypeVar("T")
 
 
 @dataclass
@@ -73,9 +83,10 @@ class Engine:
             cached, value = self.remember(
                 contract.stage + (f"-{state.number}" if state.number else ""),
                 key,
-                lambda: _check_type(
+                lambda: _check_value(
                     run_stage(stage, item, {name: state.get(name) for name in needs}, self.limits, state.number),
                     contract,
+                    state,
                 ),
                 keep=contract.stage not in ("export", "report"),
             )
@@ -88,6 +99,22 @@ class Engine:
         self.records.append(StageRecord(*where[:2], str(item.provider), state.number, round(seconds, 3), cached))
         tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
         return state.with_named(contract.gives, value, key)
+
+    def ask(self, contract: Contract, function: Callable[[], T], kind: type) -> T:
+        """What another method of the job's implementation gives than ``run``; of the type ``kind``.
+
+        Raises as `call` does: an error says the stage and whose code it is.
+        """
+        item = self.job.implementations[contract]
+        try:
+            value = call_guarded(function, f"{item.provider}")
+            if not isinstance(value, kind):
+                raise ArtefactError(f"expected {kind.__name__}, got {type(value).__name__}")
+        except Exception as error:
+            if is_interrupt(error):
+                raise KeyboardInterrupt from error
+            raise _locate(error, item, JobState()) from error
+        return value
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
         """(was it known, value): from this run's memory, else from the cache, else computed and kept."""
@@ -155,8 +182,10 @@ def _tell(hook: Callable[..., Any], **what: Any) -> None:
     """Calls observers. A failing one becomes a warning: it changes nothing of what is computed."""
     try:
         hook(**what)
-    except (Exception, SystemExit) as error:
-        text = f"a plugin that observes stage {what['stage']} failed: {type(error).__name__}: {error}"
+    except BaseException as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        text = f"a plugin that observes stage {what['stage']} failed: {type(error).__name__}: {clean_message(error)}"
         warnings.warn(text, RuntimeWarning, stacklevel=2)
 
 
@@ -164,8 +193,8 @@ def _tell_nobody(hook: Callable[..., Any], **what: Any) -> None:
     """For calls that are not the job's own."""
 
 
-def _check_type(value: Any, contract: Contract) -> Any:
-    """The value, if it is of the type that the contract promises."""
+def _check_value(value: Any, contract: Contract, state: JobState | Candidate | FoundSite) -> Any:
+    """The value, if it is of the type that the contract promises and fits the stage's inputs."""
     expected = contract.gives_type()
     kinds = typing.get_args(expected) or (expected,)
     kinds = (tuple,) if typing.get_origin(expected) is tuple else kinds
@@ -174,21 +203,26 @@ def _check_type(value: Any, contract: Contract) -> Any:
         raise StageError(
             f"gave a {type(value).__name__} where its contract promises {names}", "update the plugin that it is from"
         )
+    check_output(contract, value, state.get)
     return value
 
 
 def _locate(error: Exception, item: Implementation, state: JobState | Candidate | FoundSite) -> DamageestError:
     """The error with the stage it came from. One of another kind becomes a StageError that names the provider."""
     stage = item.contract.stage
+    if isinstance(error, JobError):
+        return error
     if isinstance(error, DamageestError) and not isinstance(error, StageError):
+        error.args = (clean_message(error),)
         return error
     if not isinstance(error, StageError) and (missing := describe_missing_library(error)):
         error = missing
     if isinstance(error, OSError) and stage in ("part", "scan"):
-        return InputError(f"{stage}: {item.name}: {error}")
+        return InputError(f"{stage}: {item.name}: {clean_message(error)}")
     if isinstance(error, OSError) and stage in ("export", "report") and error.errno:
         return describe_unwritable(error, Path("the output"))
     placed = error if isinstance(error, StageError) else _explain(error, f"{item.provider}")
+    placed.message, placed.remedy = clean_message(placed.message), clean_message(placed.remedy)
     placed.stage, placed.use, placed.site = stage, item.name, state.number
     if isinstance(state, Candidate):
         placed.place = describe_points(state.job, state.clusters)
@@ -208,7 +242,7 @@ def describe_points(state: JobState, clusters: tuple[int, ...]) -> str:
 
 def _explain(error: Exception, provider: str) -> StageError:
     """An error that a stage did not raise on purpose, in words for the user and the author."""
-    first = str(error).splitlines()[0][:400] if str(error) else ""
+    first = next(iter(clean_message(error, 400).splitlines()), "")
     if isinstance(error, MemoryError):
         return StageError("ran out of memory", MORE_MEMORY)
     if isinstance(error, ArtefactError):

@@ -53,7 +53,7 @@ def add_points_near_damage(engine: Engine, work: Work) -> Work:
     place = _Place(state.part, state.pose.T_part_scan, state.tolerance)
     unit, most = engine.job.units, max(len(scan.points), 1_000_000)
     _, more = engine.remember(
-        "near-damage", key, lambda: _gather(lambda: _crop(stage.read_pieces(unit), stage.crop), place, most, scan)
+        "near-damage", key, lambda: _gather(lambda: _crop(_read(engine, stage, unit), stage.crop), place, most, scan)
     )
     state = state.derive(JobState.scan, more, *sources)
     state = state.derive(JobState.aligned, more.move(state.pose.T_part_scan), JobState.scan, JobState.pose)
@@ -99,6 +99,14 @@ class _Place:
         inside = ((cell >= 1) & (cell < self._shape - 1)).all(axis=1)
         x, y, z = np.where(inside[:, None], cell, 0).astype(np.int64).T
         return at, np.where(inside, (x * self._shape[1] + y) * self._shape[2] + z, -1)
+
+
+def _read(engine: Engine, stage: ReadScan, unit: str) -> Iterator[Scan]:
+    """The pieces that the job's reader gives, one after the other."""
+    pieces = engine.ask(ReadScan, lambda: iter(stage.read_pieces(unit)), Iterator)
+    end = Scan(np.empty((0, 3)))
+    while (piece := engine.ask(ReadScan, lambda: next(pieces, end), Scan)) is not end:
+        yield piece
 
 
 def _crop(pieces: Iterator[Scan], crops: tuple[Crop, ...]) -> Iterator[Scan]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from damageest.artefacts import Deposit, Solid
 from damageest.errors import StageError
@@ -28,7 +29,8 @@ def plan_paths(path: Contract) -> Step:
         done: dict[int, FoundSite] = {}
         failures: list[StageError] = []
         before: list[FoundSite] = []
-        for site in sorted(chosen, key=lambda each: (stage.rank_site(each.number), each.number)):
+        ranks = {each.number: engine.ask(path, partial(stage.rank_site, each.number), int) for each in chosen}
+        for site in sorted(chosen, key=lambda each: (ranks[each.number], each.number)):
             body = site.deposit or site.damage
             source = "deposit" if site.deposit else "damage"
             built = _unite_built(before, work.job) if "built" in needs else None

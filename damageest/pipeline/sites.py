@@ -44,14 +44,20 @@ def take_clusters(engine: Engine, work: Work) -> Work:
 
 
 def take_enclosures(engine: Engine, work: Work) -> Work:
-    """Makes a candidate of each enclosure."""
+    """Makes a candidate of each enclosure. Sites that none of them names are failures."""
     state, method = work.job, engine.job.stages[EncloseAll].use
     candidates = []
     for number, item in enumerate(state.enclosures.items, 1):
         candidate = Candidate(job=state, number=number, clusters=item.sites, method=method, notes=item.notes)
         key = digest("solid", number, state.key("enclosures"))
         candidates.append(candidate.with_value(Candidate.solid, item.solid, key))
-    return replace(work, candidates=tuple(candidates))
+    failures = []
+    for number in sorted(set(range(1, state.sites.count + 1)) - {site for c in candidates for site in c.clusters}):
+        error = StageError("gave no enclosure of its points", "the other method, or a smaller tolerance")
+        error.stage, error.use, error.site = EncloseAll.stage, method, number
+        error.place = describe_points(state, (number,))
+        failures.append(error)
+    return replace(work, candidates=tuple(candidates), failures=(*work.failures, *failures))
 
 
 def gather_sites(engine: Engine, work: Work) -> Work:

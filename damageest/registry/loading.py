@@ -16,7 +16,7 @@ from typing import Any
 
 import pluggy
 
-from damageest.errors import PluginError, find_missing_library, is_interrupt
+from damageest.errors import PluginError, clean_message, find_missing_library, is_interrupt
 from damageest.isolation import at_work
 from damageest.registry import hookspecs
 
@@ -68,7 +68,7 @@ def load(observers: Iterable[object] = ()) -> tuple[pluggy.PluginManager, list[t
             with ignore_shadow_warnings(), at_work(f"the import of {provider}", owner=f"{provider}"):
                 plugin = point.load()
             manager.register(plugin, f"{provider.name}:{point.name}")
-        except (Exception, SystemExit) as error:
+        except BaseException as error:
             broken.append(describe_broken(error, provider))
         else:
             loaded.append((plugin, provider))
@@ -107,7 +107,8 @@ def describe_broken(error: BaseException, provider: Provider) -> Broken:
     if is_interrupt(error):
         raise KeyboardInterrupt from error
     kind = "" if type(error) is PluginError else f"{type(error).__name__}: "
-    return Broken(provider, f"{kind}{error}{_locate(error, provider)}", _suggest_remedy(error, provider))
+    text = f"{kind}{clean_message(error)}{_locate(error, provider)}"
+    return Broken(provider, text, clean_message(_suggest_remedy(error, provider)))
 
 
 def _locate(error: BaseException, provider: Provider) -> str:

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import pluggy
 from pydantic import ValidationError
 
-from damageest.errors import PluginError, suggest
+from damageest.errors import PluginError, clean_message, suggest
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
 from damageest.registry.loading import Broken, Provider, describe_broken, ignore_shadow_warnings, load
 from damageest.stages import Stage
@@ -70,7 +70,7 @@ class Registry:
                     classes = _read_offered(plugin)
                     added = _read_writers(plugin, "damageest_writers", Writer, writers)
                     added_paths = _read_writers(plugin, "damageest_path_writers", PathWriter, path_writers)
-            except (Exception, SystemExit) as error:
+            except BaseException as error:
                 broken.append(describe_broken(error, provider))
                 continue
             writers |= added
@@ -80,8 +80,8 @@ class Registry:
                 try:
                     found.append(_check_implementation(stage, provider))
                 except PluginError as error:
-                    broken.append(Broken(provider, str(error), f"update or uninstall {provider.name}"))
-                except Exception as error:
+                    broken.append(Broken(provider, clean_message(error), f"update or uninstall {provider.name}"))
+                except BaseException as error:
                     broken.append(describe_broken(error, provider))
         names = [(item.contract.stage, item.name) for item in found]
         groups = {key: tuple(i for i, n in zip(found, names, strict=True) if n == key) for key in dict.fromkeys(names)}

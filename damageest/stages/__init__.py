@@ -21,6 +21,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
 
 from damageest.errors import PluginError
 from damageest.io.files import resolve_path
+from damageest.options import Options
 
 if TYPE_CHECKING:
     from damageest.geometry.selectors import Selector
@@ -46,7 +47,7 @@ JobPath = Annotated[Path, AfterValidator(_resolve_beside_job)]
 """Type of an option that is a path. A job gives it relative to the job file's folder; the check makes it absolute."""
 
 
-class Stage(BaseModel):
+class Stage(Options):
     """Base of all contracts.
 
     A contract sets ``stage``, its name in a job; ``gives``, the name under which later stages get the result; and
@@ -56,7 +57,7 @@ class Stage(BaseModel):
     this stage. Its class has to be in a module that can be imported.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings", defer_build=True)
+    model_config = ConfigDict(ser_json_inf_nan="strings", defer_build=True)
     stage: ClassVar[str] = ""
     gives: ClassVar[str] = ""
     per_site: ClassVar[bool] = False

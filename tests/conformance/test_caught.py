@@ -184,7 +184,7 @@ def test_an_edited_file(tmp_path: Path) -> None:
 def test_chance(name: str, tmp_path: Path) -> None:
     np.random.seed(1)  # noqa: NPY002
     made = make_checks(name, tmp_path, lambda result, given: spoil(result, 1e-5 * np.random.random()))  # noqa: NPY002
-    with pytest.raises(AssertionError, match=r"the second run (gave|wrote) other bytes"):
+    with pytest.raises(AssertionError, match=r"the second run (gave|wrote) other bytes|a job refuses this result"):
         made.test_same_bytes_twice()
 
 
@@ -222,6 +222,24 @@ def test_a_crash_on_bad_input(name: str, kind: type[Exception], tmp_path: Path) 
     check, arguments = BAD_INPUT[name]
     with pytest.raises(kind, match="zero-size"):
         getattr(made, check)(*arguments)
+
+
+UNFIT: dict[str, Callable[[Any], Any]] = {
+    "Sample": lambda value: replace(value, face=value.face + 10**6),
+    "Segment": lambda value: replace(value, face=value.face + 10**6),
+    "Cluster": lambda value: Sites(value.label[1:], value.count),
+    "Boundary": lambda value: Rims(tuple(loop[::2] for loop in value.loops)),
+    "Boolean": lambda value: spoil(value, 3.0),
+    "Export": lambda value: replace(value, files=(*value.files, "../elsewhere.txt")),
+    "Report": lambda value: replace(value, files=("missing.html",)),
+}
+
+
+@pytest.mark.parametrize("name", UNFIT)
+def test_a_result_that_does_not_fit_its_inputs(name: str, tmp_path: Path) -> None:
+    made = make_checks(name, tmp_path, lambda result, given: UNFIT[name](result))
+    with pytest.raises(AssertionError, match="a job refuses this result"):
+        made.test_fits_its_inputs()
 
 
 def test_a_crash_on_a_broken_file(tmp_path: Path) -> None:

@@ -43,8 +43,8 @@ UP = np.tile([0.0, 0.6, 0.8], (7, 1))
 UNREACHED = Unreached(1 / 3, "unsupported")
 FILL = BeadFill(0.1, 0.99, 1 / 3, 0.2, 0.3, 0.4, 0.5, 0.6)
 PATH = DepositPath(
-    POINTS, UP, -UP, np.arange(7) + 1 / 3, np.arange(7) > 2, np.arange(7), np.arange(7), np.ones(7, np.int64),
-    UP[:1], POINTS[0, :1], 2.0, POINTS[:, 1], 1 / 3, 10.0, SOLID, 0.1, np.inf,
+    POINTS, UP, -UP, np.arange(7) + 1 / 3, np.arange(7) > 2, np.arange(1, 8), np.arange(1, 8), np.ones(7, np.int64),
+    UP[:1], POINTS[0, :1], 2.0, POINTS[1, :1], 1 / 3, 10.0, SOLID, 0.1, np.inf,
 )  # fmt: skip
 ARTEFACTS: list[Any] = [
     UNREACHED,
@@ -57,9 +57,20 @@ ARTEFACTS: list[Any] = [
     Mesh(BOX.vertices, BOX.faces),
     SOLID,
     Surface(BOX.vertices, BOX.faces[:5]),
-    Deposit(SOLID.vertices, SOLID.faces, SOLID, 0.5, 1 / 3, (0.1, 0.2, 0.3), (4, 7), ("clipped",)),
+    Deposit(SOLID.vertices, SOLID.faces, SOLID, 0.5, 1 / 3, (0.1, 0.2, 0.3), (4, 7), ((4, 1 / 3),), 0.1, ("clipped",)),
     Deposit(SOLID.vertices, SOLID.faces),
-    Part(BOX.vertices, BOX.faces, "in", "a/b.stl", "0f", np.arange(12), ("top", "é"), ("plane",), 0.1, ("mended",)),
+    Part(
+        BOX.vertices,
+        BOX.faces,
+        "in",
+        "a/b.stl",
+        "0f",
+        np.arange(12) % 2,
+        ("top", "é"),
+        ("plane", "cone"),
+        0.1,
+        ("mended",),
+    ),
     Part(BOX.vertices, BOX.faces),
     Truth(None, TURN),
     Truth(SOLID, TURN),

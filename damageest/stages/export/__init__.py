@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import ClassVar
 
 from damageest.artefacts import DepositPath, Floats, Solid
+from damageest.artefacts.fields import Checked
 from damageest.result import Result
 from damageest.stages import Stage, asked_by_name
 
 
 @dataclass(frozen=True)
-class ExportedFiles:
+class ExportedFiles(Checked):
     """What an export wrote.
 
     ``files``: paths relative to the output folder. ``notes``: what was written otherwise than asked for, or left out.

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from damageest.artefacts import DepositPath, Floats, Mesh, Solid, Vector
 from damageest.errors import StageError
+from damageest.options import Options
 from damageest.stages import JobPath
 from damageest.stages.path import Path
 
@@ -21,10 +22,9 @@ def _check_direction(value: Literal["auto", "normal"] | Vector) -> Literal["auto
     return value
 
 
-class Nozzle(BaseModel):
+class Nozzle(Options):
     """A nozzle that is a solid of revolution, or a closed mesh with its tip at 0 and its axis along z."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     tip_radius: float | None = Field(None, ge=0, allow_inf_nan=False, description="of the flat tip, in the job's unit")
     cone_angle: float = Field(30.0, ge=0, lt=85, description="between the axis and the side of the cone, in degrees")
     length: Length | None = Field(None, description="of the whole nozzle from the tip, in the job's unit")
@@ -43,10 +43,9 @@ class Nozzle(BaseModel):
         return self
 
 
-class Machine(BaseModel):
+class Machine(Options):
     """Limits of the machine."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     tilt: float = Field(
         60.0, ge=0, lt=90, description="largest angle between tool axis and build direction, in degrees"
     )

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from damageest.artefacts.fields import Checked
 from damageest.result import Result
 from damageest.stages import Stage, asked_by_name
 
 
 @dataclass(frozen=True)
-class ReportFiles:
+class ReportFiles(Checked):
     """What a report wrote. ``files``: paths relative to the output folder. ``notes``: what was left out, and why."""
 
     files: tuple[str, ...] = ()

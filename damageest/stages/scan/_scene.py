@@ -8,19 +8,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays, to_manifold
+from damageest.options import Options
 from damageest.stages.scan.scanner import DUST, apply_tools, build_tool, make_missed_error
 from damageest.stages.scan.tools import AnyTool, CylinderTool, Direction, SolidTool, Tool, Vector
 
 
-class DetachedPiece(BaseModel):
+class DetachedPiece(Options):
     """A piece of the part that is moved rather than removed: a displaced fragment."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(defer_build=True)
     piece: AnyTool = Field(description="the piece: what of the part lies within this tool")
     shift: Vector = Field((0.0, 0.0, 0.0), description="how far the piece is moved along x, y and z, in the job's unit")
     rotation: Vector = Field(
@@ -30,10 +31,10 @@ class DetachedPiece(BaseModel):
     )
 
 
-class Table(BaseModel):
+class Table(Options):
     """A plane plate that the part stands on. Only its upper side has points."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(defer_build=True)
     direction: Direction = Field(
         (0.0, 0.0, -1.0), description="direction from the part to the table; its length does not matter"
     )

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import ConfigDict, Field, FiniteFloat
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.transforms import remove_rigid
+from damageest.options import Options
 from damageest.stages.scan.tools import Direction
 
 SAMPLES = 4000
 """Points of the skin that the amount of a deformation is measured with."""
 
 
-class Deformation(BaseModel):
+class Deformation(Options):
     """How a part is deformed. Amounts are the largest displacement of its skin beyond the nearest rigid motion (least
     squares over the skin), in the job's unit."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(defer_build=True)
     bend: FiniteFloat = Field(0.0, description="amount by which its axis is bent to an arc")
     twist: FiniteFloat = Field(0.0, description="amount by which its cross-sections are turned about its axis")
     along: Direction | None = Field(None, description="direction of the axis; default: the longest edge of its box")

@@ -6,23 +6,24 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
+from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
 
 from damageest.artefacts import Scan
 from damageest.geometry.units import UnitOption
 from damageest.io.large_scans import LargeScan, open_large_scan
 from damageest.io.points import READERS
 from damageest.io.scans import read_scan
+from damageest.options import Options
 from damageest.stages import JobPath
 from damageest.stages.scan import ReadScan
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
-class ViewFile(BaseModel):
+class ViewFile(Options):
     """One file of several, with the position of its scanner."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(defer_build=True)
     path: JobPath = Field(description="the file, relative to the job's folder")
     viewpoint: Vector | None = Field(
         None,

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 from pydantic import types as kinds
 
 from damageest.artefacts import Floats, Ints, Part, Scan, Truth
 from damageest.geometry.units import canonical_unit
+from damageest.options import Options
 from damageest.stages.scan import ReadScan, _errors, _random_field, _views
 from damageest.stages.scan._scene import DetachedPiece, Scene, Table, build_scene
 from damageest.stages.scan.deformation import Deformation, deform
@@ -18,10 +19,10 @@ from damageest.stages.scan.scanner import sample_seen
 from damageest.stages.scan.tools import AnyTool, Direction, RigidMatrix, SolidTool, Vector
 
 
-class UnseenRegion(BaseModel):
+class UnseenRegion(Options):
     """A region of the surface that the virtual scanner does not see."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(defer_build=True)
     direction: Direction = Field(description="direction in the part's frame; its length does not matter")
     angle: float = Field(
         60.0,

@@ -7,9 +7,10 @@ from abc import ABC, abstractmethod
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, PositiveFloat
+from pydantic import AfterValidator, ConfigDict, Field, FiniteFloat, PositiveFloat
 
 from damageest.artefacts import Floats
+from damageest.options import Options
 from damageest.stages import JobPath
 from damageest.stages.scan import _random_field
 
@@ -41,10 +42,10 @@ RigidMatrix = Annotated[Matrix, AfterValidator(_check_rigid)]
 Seed = Annotated[int, Field(ge=0, description="seed of the random shape; the same seed gives the same shape")]
 
 
-class Tool(BaseModel, ABC):
+class Tool(Options, ABC):
     """Base of the tools."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(defer_build=True)
     tool: str
 
     @abstractmethod
