@@ -2,6 +2,7 @@
 
 from damageest.isolation.ends import ProcessError
 from damageest.isolation.foresee import require_memory
+from damageest.isolation.leash import end_with_parent
 from damageest.isolation.limits import Limits, format_bytes, limit_this_process, measure_free_memory, parse_memory
 from damageest.isolation.notes import at_work
 from damageest.isolation.worker import call_isolated, cpu_seconds, end_workers
@@ -12,6 +13,7 @@ __all__ = [
     "at_work",
     "call_isolated",
     "cpu_seconds",
+    "end_with_parent",
     "end_workers",
     "format_bytes",
     "limit_this_process",

@@ -97,13 +97,13 @@ def _format_point(point: Floats) -> str:
 
 
 def _split_bodies(solid: Any) -> list[Any]:
-    """The solid's connected bodies, each with the cavities inside it."""
+    """The solid's connected bodies, each with the cavities inside it; shells that no body holds are rounding errors."""
     from manifold3d import Manifold
 
     shells = solid.decompose()
     outer = [s for s in shells if s.volume() > 0]
     inner = [s for s in shells if s.volume() <= 0]
-    if not inner:
+    if not inner or not outer:
         return list(outer)
     boxes = np.array([s.bounding_box() for s in outer])
     owned: list[list[Any]] = [[s] for s in outer]
@@ -111,7 +111,8 @@ def _split_bodies(solid: Any) -> list[Any]:
         box = np.array(cavity.bounding_box())
         holds = (boxes[:, :3] <= box[:3]).all(1) & (boxes[:, 3:] >= box[3:]).all(1)
         size = np.where(holds, np.prod(boxes[:, 3:] - boxes[:, :3], axis=1), np.inf)
-        owned[int(np.argmin(size))].append(cavity)
+        if holds.any():
+            owned[int(np.argmin(size))].append(cavity)
     return [Manifold.compose(group) if len(group) > 1 else group[0] for group in owned]
 
 
