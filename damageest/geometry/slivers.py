@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest.geometry.bodies import label_pieces
+from damageest.geometry.bodies import ROUNDING, label_pieces
 
-ROUNDING = 1e-9
-"""Thickness of a piece, in diagonals of all, below which it is a rounding error."""
 SPECK = 1e-12
-"""Its volume, in volumes of the bounds of all, likewise."""
+"""Volume of a piece, in volumes of the bounds of all, below which it is a rounding error."""
 GAP = 1e-5
 """Thickness of a cavity, in diagonals of all, below which it is the gap between two triangulations of one surface."""
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from damageest_cadquery._canonical import canonicalise
-from damageest_cadquery._read import explore
 from damageest_cadquery._header import set_header
+from damageest_cadquery._read import explore
 from damageest_cadquery._step import UNITS
 
 Colour = tuple[int, int, int]

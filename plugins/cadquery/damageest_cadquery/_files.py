@@ -1,7 +1,7 @@
 """Writes named shapes to a STEP file that holds them when it is read back.
 
-Tried in this order: as they are, without curves in the parameters of faces, with offset faces as splines, after a repair;
-last, only the solids that no way can write get facets.
+Tried in this order: as they are, without curves in the parameters of faces, with offset faces as splines, after a
+repair; last, only the solids that no way can write get facets.
 """
 
 from __future__ import annotations
@@ -48,17 +48,18 @@ def write_shapes(
 
 
 def _list_ways(name: str, shapes: Sequence[NamedShape], unit: str) -> list[Way]:
-    plain, original = partial(_write, name, unit, True), _gather(shapes)
+    plain, bare = (partial(_write, name, unit, curves) for curves in (True, False))
+    original = _gather(shapes)
 
     def change(how: Callable[[Any], Any]) -> list[NamedShape]:
         return [_change(each, how) for each in shapes]
 
     return [
         Way("as it is", lambda: shapes, plain, lambda _: original),
-        Way("without curves in the faces' parameters", lambda: shapes, partial(_write, name, unit, False), lambda _: original),
+        Way("without curves in the faces' parameters", lambda: shapes, bare, lambda _: original),
         Way("with its offset faces as splines", lambda: change(_turn_offsets), plain, lambda _: original),
         Way("after a repair (ShapeFix)", lambda: change(_repair), plain, lambda _: original),
-    ]  # fmt: skip
+    ]
 
 
 def _write(name: str, unit: str, curves: bool, path: Path, shapes: Sequence[NamedShape]) -> None:
@@ -121,9 +122,14 @@ def _secure(each: NamedShape, scratch: Path, unit: str, chord: float) -> NamedSh
     colours: list[Any] = []
     for solid in explore(each.shape, TopAbs_SOLID):
         count = _count_faces(solid)
-        own = NamedShape(each.name, solid, each.colour, each.names[start : start + count], each.colours[start : start + count])
+        own = NamedShape(
+            each.name, solid, each.colour, each.names[start : start + count], each.colours[start : start + count]
+        )
         start += count
-        made = next((found for found in (_try(way, scratch, solid) for way in _list_ways(each.name, [own], unit)) if found), None)
+        made = next(
+            (found for found in (_try(way, scratch, solid) for way in _list_ways(each.name, [own], unit)) if found),
+            None,
+        )
         if made is None:
             made = replace(own, shape=make_facets(solid, chord), names=(), colours=())
         count = _count_faces(made.shape)

@@ -43,7 +43,9 @@ def cut_facets(rest: Sequence[Piece], damage: Solid, part: Part, tolerance: floa
         left = to_solid(whole - cutter, origin)
         bodies = [] if left is None else [body for body in split_bodies(left) if body.volume > SPECK * damage.volume]
         kept = sum(body.volume for body in bodies)
-        room = VOLUME * whole.volume() + (chord + part.tessellation_error) * float(np.linalg.norm(damage.cross, axis=1).sum())
+        room = VOLUME * whole.volume() + (chord + part.tessellation_error) * float(
+            np.linalg.norm(damage.cross, axis=1).sum()
+        )
         if abs(whole.volume() - common - kept) > room:
             return None
         pieces += [_build(body, piece) for body in bodies]
@@ -58,7 +60,7 @@ def _build(body: Solid, piece: Piece) -> Piece:
 
 
 def _thicken(damage: Solid, part: Part, step: float) -> Solid:
-    """The damage volume with its skin moved outward, but for its rim: the skin of two meshes of one CAD face differs."""
+    """The damage volume with its skin moved outward, but for its rim: two meshes of one CAD face differ."""
     inner = find_inner_faces(damage, part)
     free = np.ones(len(damage.vertices), bool)
     free[damage.faces[inner]] = False

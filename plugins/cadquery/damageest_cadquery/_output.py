@@ -73,14 +73,18 @@ def write_all(
         stock[stem] = _name(deposit.pieces, name, request.bodies[stem].colour, facts, f"damage site-{number}")
     left = _find_left(writing, found, rest)
     for place, T in request.places.items():
-        here = {}
+        here: dict[str, NamedShape] = {}
         for stem, shape in {**sites, **stock}.items():
             made, fault = writing.save(f"{place}{stem}", shape.name, [_move(shape, T)])
-            here |= {stem: each for each in made}
+            here.update((stem, each) for each in made)
             if fault:
                 _take_fault(writing, stem, fault)
         writing.exact = [number for number in found if number not in writing.reasons]
-        union = [_move(shape, T) for shape in _gather_lost(request, sites)] if any(s.accepted for s in request.sites) else []
+        union = (
+            [_move(shape, T) for shape in _gather_lost(request, sites)]
+            if any(s.accepted for s in request.sites)
+            else []
+        )
         if left and union:
             here |= _save_whole(writing, place, [_move(shape, T) for shape in left], union)
         everything = _collect(request.bodies, here, T)
@@ -146,7 +150,7 @@ def _save_whole(
     whole = join_named("undamaged part", left, bodies["undamaged"].colour)
     made, _ = writing.save(f"{place}undamaged", whole.name, [whole])
     if len(left) == 1 or not made:
-        return {"undamaged": each for each in made}
+        return {"undamaged": made[0]} if made else {}
     return {f"undamaged#{number}": each for number, each in enumerate(left)}
 
 

@@ -15,7 +15,8 @@ from damageest_cadquery._step import Way, call_in_process, write_first, write_sh
 
 
 def write_patch(path: Path, name: str, patch: Patch, unit: str) -> str:
-    """Writes the patch, with its product ``name``, in ``unit``; gives what is to be said of the file, empty for nothing.
+    """Writes the patch, with its product ``name``, in ``unit``; gives what is to be said of the file, empty for
+    nothing.
 
     Raises OSError where the file cannot be written.
     """

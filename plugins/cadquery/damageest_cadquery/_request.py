@@ -18,9 +18,9 @@ class Request:
     """All lengths in millimetres, in the part's frame. ``scale``: millimetres of one length of the CAD file as read.
 
     ``folder``: where to write, and ``scratch``: where files are until they have been read back; ``places``: prefixes of
-    the files with the transform (4,4) to their frame; ``unit``: of the files; ``bodies``: what has no exact form, by the
-    stem of its file, for the assembly; ``skipped``: sites that stopped this process before, and why; their deposits by
-    the negative of the number; ``left_out``: files that stopped it, by their stem.
+    the files with the transform (4,4) to their frame; ``unit``: of the files; ``bodies``: what has no exact form, by
+    the stem of its file, for the assembly; ``skipped``: sites that stopped this process before, and why; their deposits
+    by the negative of the number; ``left_out``: files that stopped it, by their stem.
     """
 
     part: Part

@@ -14,8 +14,8 @@ import numpy as np
 from damageest.artefacts import Floats, Solid
 from damageest.errors import InputError
 from damageest_cadquery._facets import Facet
-from damageest_cadquery._read import explore
 from damageest_cadquery._planar import build_shell
+from damageest_cadquery._read import explore
 
 Origin = tuple[int, int]
 """Where a face comes from: (number of the part's CAD face, -1), or (-1, number of the tool's face)."""

@@ -26,6 +26,7 @@ UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
 MAX_FACES = 100_000
 """Largest number of planar faces in a STEP file; 60,000 took 11 s to write, 22 s to read, and 67 MB."""
 
+
 @dataclass(frozen=True, eq=False)
 class Way:
     """How a file may be written. ``said``: in words that follow "written"; ``make``: makes what is to be written, and
@@ -99,6 +100,7 @@ def write_facets(scratch: Path, path: Path, solid: Solid, name: str, unit: str, 
     volumes = [
         (outer.volume - sum(cavity.volume for cavity in cavities)) * scale**3 for outer, cavities in split_shells(solid)
     ]
+
     def write(place: Path, shape: Any) -> None:
         write_shape(place, shape, name, unit)
 
@@ -134,7 +136,11 @@ def write_first(scratch: Path, path: Path, ways: Iterable[Way], volumes: Sequenc
             fault = str(error).removeprefix(f"{scratch}: ")
         if not fault:
             shutil.move(scratch, path)
-            return Outcome(made, f"was written {way.said}: read back before, {faults[0]}", faults[0]) if faults else Outcome(made)
+            return (
+                Outcome(made, f"was written {way.said}: read back before, {faults[0]}", faults[0])
+                if faults
+                else Outcome(made)
+            )
         faults.append(fault)
         if fault == INVALID and doubtful.made is None:
             shutil.move(scratch, spare)

@@ -25,8 +25,8 @@ from damageest.result import Result
 from damageest.stages.export import Body, DepositForm, ExactForm, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._read import read
-from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
 from damageest_cadquery._request import Request, describe_missing
+from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
 
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
