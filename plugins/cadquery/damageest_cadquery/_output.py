@@ -105,8 +105,14 @@ def _find_left(writing: Writing, found: Mapping[int, Exact], rest: Sequence[Piec
     """What is left of each solid of the CAD file. Where an accepted site has no exact form, the solids that it touches
     have facets; empty where these cannot be made."""
     request = writing.request
-    for site in request.sites:
-        if not site.accepted or site.number in found:
+    accepted = [site for site in request.sites if site.accepted]
+    if not accepted or not {"damage", "undamaged"} <= set(request.bodies):
+        return []
+    if len({piece.owner for piece in rest}) == 1 and not any(site.number in found for site in accepted):
+        writing.notes.append("damage.step and undamaged.step have facets too")
+        return []
+    for site in accepted:
+        if site.number in found:
             continue
         cut = cut_facets(rest, site.damage, request.part, request.tolerance)
         if cut is None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import pickle
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -98,6 +99,12 @@ def _describe_deposit(deposit: ExactDeposit) -> DepositForm:
     )
 
 
+def start(arguments: Sequence[str]) -> None:
+    """Serves the request that the first argument names, on the leash of the second."""
+    path, leash = arguments
+    end_with_parent(int(leash))
+    main(Path(path))
+
+
 if __name__ == "__main__":
-    end_with_parent(int(sys.argv[2]))
-    main(Path(sys.argv[1]))
+    start(sys.argv[1:])
