@@ -11,7 +11,10 @@ PLUGINS = Path(__file__).parent.parent / "plugins"
 FILES = sorted(path for path in PLUGINS.glob("*/damageest_*/**/*.py") if path.parent.name != "evaluate")
 """All but evaluations, which run jobs and draw random damages as those of damageest do."""
 
-PUBLIC_NAMES = {"damageest": {"hookimpl"}, "damageest.isolation": {"require_memory"}}
+PUBLIC_NAMES = {
+    "damageest": {"hookimpl"},
+    "damageest.isolation": {"call_isolated", "end_with_parent", "require_memory"},
+}
 """Modules of which only some names are public."""
 PUBLIC_MODULES = {
     "damageest.artefacts",

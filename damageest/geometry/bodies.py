@@ -7,6 +7,9 @@ import numpy as np
 from damageest.artefacts import ArtefactError, Floats, Ints, Solid
 from damageest.geometry.distance import is_inside
 
+ROUNDING = 1e-9
+"""Thickness of a piece, twice its volume over its area, in diagonals of the solid, below which it has no volume."""
+
 
 def split_bodies(solid: Solid) -> list[Solid]:
     """The connected bodies of a solid, in the order of their first vertices.
@@ -23,10 +26,9 @@ def split_bodies(solid: Solid) -> list[Solid]:
         return [solid]
     found = []
     for vertices, faces in pieces:
-        try:
-            found.append(Solid(vertices, faces))
-        except ArtefactError:  # a cavity, or a sliver whose volume is zero or negative within rounding
-            continue
+        body = _take_body(vertices, faces, solid.diagonal)
+        if body is not None:
+            found.append(body)
     return found
 
 
@@ -41,17 +43,26 @@ def split_shells(solid: Solid) -> list[tuple[Solid, list[Solid]]]:
     cavities: list[Solid] = []
     for vertices, faces in _split_pieces(solid):
         for found, turned in ((outer, faces), (cavities, faces[:, ::-1])):
-            try:
-                found.append(Solid(vertices, turned))
+            body = _take_body(vertices, turned, solid.diagonal)
+            if body is not None:
+                found.append(body)
                 break
-            except ArtefactError:  # facing the other way, or flat
-                continue
     out: list[tuple[Solid, list[Solid]]] = [(body, []) for body in outer]
     for cavity in cavities:
         holding = [pair for pair in out if len(out) == 1 or is_inside(cavity.vertices[:1], pair[0])[0]]
         if holding:
             min(holding, key=lambda pair: pair[0].volume)[1].append(cavity)
     return out
+
+
+def _take_body(vertices: Floats, faces: Ints, diagonal: float) -> Solid | None:
+    """A piece as a solid; None where it faces the other way, or is flat within rounding."""
+    try:
+        body = Solid(vertices, faces)
+    except ArtefactError:
+        return None
+    area = float(np.linalg.norm(body.cross, axis=1).sum()) / 2
+    return body if 2 * body.volume > ROUNDING * diagonal * area else None
 
 
 def label_pieces(faces: Ints) -> Ints:

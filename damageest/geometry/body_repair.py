@@ -11,7 +11,9 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, open_edges
 from damageest.errors import InputError
+from damageest.geometry.bodies import label_pieces
 from damageest.geometry.duplicates import list_used
+from damageest.geometry.slivers import find_slivers
 
 _MOST_PAIRS = 5000
 """Pairs of bodies with overlapping bounds up to which each pair is compared; above it all bodies are united at once."""
@@ -138,11 +140,12 @@ def split_pinches(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floa
     return new_vertices, new_faces
 
 
-def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
+def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str], gap: float = 0.0) -> tuple[Floats, Ints]:
     """A mesh (V,3), (F,3) of the same bodies with faces outward, cavities inward and overlapping bodies united.
 
     The mesh given must be closed, with consistent windings in each body. Bodies without volume are dropped. ``notes``
-    gets a line for each change, and one on separate bodies and cavities that are kept.
+    gets a line for each change, and one on separate bodies and cavities that are kept. ``gap``: how far the triangles
+    may lie off the surface that they stand for: a union leaves no cavities that are thinner.
 
     Raises InputError where no body has volume, or where bodies overlap but cannot be united.
     """
@@ -176,7 +179,7 @@ def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Flo
             if cavities:
                 notes.append(f"{cavities} inner cavit{'ies' if cavities > 1 else 'y'}, kept")
             return _drop_unused_vertices(vertices, faces)
-    return _unite(vertices, faces, label, volumes, notes)
+    return _unite(vertices, faces, label, volumes, notes, gap)
 
 
 def _reverse_faces(faces: Ints, which: Any) -> Ints:
@@ -241,7 +244,9 @@ def _find_nesting(vertices: Floats, faces: Ints, label: Ints, count: int) -> tup
     return depth, False
 
 
-def _unite(vertices: Floats, faces: Ints, label: Ints, volumes: Floats, notes: list[str]) -> tuple[Floats, Ints]:
+def _unite(
+    vertices: Floats, faces: Ints, label: Ints, volumes: Floats, notes: list[str], gap: float
+) -> tuple[Floats, Ints]:
     """The union of the bodies that face outward, minus the union of those that face inward. The faces of each body are
     those with its ``label`` (F,); ``volumes`` are signed."""
     import manifold3d as m3
@@ -268,4 +273,11 @@ def _unite(vertices: Floats, faces: Ints, label: Ints, volumes: Floats, notes: l
         raise InputError("its overlapping bodies could not be united; unite them in the CAD system and export again")
     new_vertices, new_faces = _to_arrays(result)
     notes.append(f"united {len(volumes)} bodies that overlap, touch or lie in one another into one part")
+    slivers = find_slivers(new_vertices, new_faces, gap)
+    if slivers.all():
+        raise InputError("encloses no volume: all its bodies are flat; a part must be a solid")
+    if slivers.any():
+        count = len(np.unique(label_pieces(new_faces)[slivers]))
+        notes.append(f"dropped {count} slivers between them, thinner than their triangles are exact")
+        new_vertices, new_faces = _drop_unused_vertices(new_vertices, new_faces[~slivers])
     return new_vertices + origin, new_faces

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from damageest.artefacts import Ints, Part, open_edges
+from damageest.artefacts import Ints, Mesh, Part, open_edges
 from damageest.errors import InputError
+from damageest.geometry.face_labels import carry_labels
 from damageest.geometry.healing import heal
 from damageest.geometry.units import FARTHEST
 
@@ -37,8 +38,8 @@ def make_part(
         unit: name of the unit of length; it is noted, nothing is converted.
         path, sha256: the file that the part was read from, and its checksum, for messages and the report.
         repair: False refuses a mesh that is not watertight instead of repairing it.
-        faces_brep: (F,) number of the CAD face of each triangle; dropped, with the two names below, where a repair
-            changes the triangles, because the numbers would then be those of other triangles.
+        faces_brep: (F,) number of the CAD face of each triangle; a repair that divides triangles, as a union of bodies
+            does, keeps it; dropped, with the two names below, where one adds a triangle that lies on none of them.
         face_names, face_kinds: what the CAD file calls these faces.
         tessellation_error: bound of the distance between CAD surface and triangles, in ``unit``.
         notes: what was converted before; the repairs are added.
@@ -61,12 +62,15 @@ def make_part(
         raise InputError(f"{name}: {error}") from None
     try:
         if repair:
-            given = f
-            v, f, made = heal(v, f)
+            given = Mesh(v, f) if faces_brep is not None and len(f) and np.isfinite(v).all() else None
+            v, f, made = heal(v, f, tessellation_error)
             notes = (*notes, *made)
-            if faces_brep is not None and not np.array_equal(given, f):
-                faces_brep, face_names, face_kinds = None, (), ()
-                notes = (*notes, "the repair changed the triangles: the CAD face of each triangle is no longer known")
+            if given is not None and faces_brep is not None and not np.array_equal(given.faces, f):
+                faces_brep = carry_labels(v, f, given, faces_brep)
+                if faces_brep is None:
+                    face_names, face_kinds = (), ()
+                    lost = "the repair changed the triangles: the CAD face of each triangle is no longer known"
+                    notes = (*notes, lost)
         elif open_edges(f):
             raise InputError("not watertight, and 'repair' is off; set repair: true, or export the part as a solid")
         return Part(v, f, unit, path, sha256, faces_brep, face_names, face_kinds, tessellation_error, notes, cad_scale)

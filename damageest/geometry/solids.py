@@ -56,6 +56,21 @@ def to_solid(body: Any, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Solid | None:
         return None
 
 
+def compose_shells(shells: Sequence[Any]) -> Any:
+    """Shells as ``decompose`` gives them, with cavities of negative volume, as one Manifold; empty without any.
+
+    ``Manifold.compose`` fills the cavities.
+    """
+    from manifold3d import Manifold, Mesh64
+
+    body = Manifold.compose([shell for shell in shells if shell.volume() > 0])
+    for cavity in (shell for shell in shells if shell.volume() < 0):
+        mesh = cavity.to_mesh64()
+        turned = np.array(np.asarray(mesh.tri_verts)[:, ::-1], order="C")
+        body -= Manifold(Mesh64(np.array(mesh.vert_properties), turned))
+    return body
+
+
 def concatenate_meshes(meshes: Sequence[Mesh]) -> tuple[Floats, Ints, Ints]:
     """Several meshes as one: vertices (V,3), faces (F,3), and the index (F,) of the mesh that each face came from.
 

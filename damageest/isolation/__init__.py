@@ -2,6 +2,7 @@
 
 from damageest.isolation.ends import ProcessError
 from damageest.isolation.foresee import require_memory
+from damageest.isolation.leash import end_with_parent
 from damageest.isolation.limits import Limits, format_bytes, limit_this_process, measure_free_memory, parse_memory
 from damageest.isolation.notes import at_work
 from damageest.isolation.one_thread import ONE_THREAD, keep_one_thread
@@ -14,6 +15,7 @@ __all__ = [
     "at_work",
     "call_isolated",
     "cpu_seconds",
+    "end_with_parent",
     "end_workers",
     "format_bytes",
     "keep_one_thread",

@@ -23,9 +23,23 @@ def test_a_solid_stays_as_it_is_with_its_cad_faces() -> None:
     assert part.face_names == BREP["face_names"]
 
 
-def test_a_repair_that_changes_the_triangles_drops_the_cad_faces() -> None:
+def test_a_repair_that_keeps_the_surface_keeps_the_cad_faces() -> None:
     part = make_part(BOX.vertices, BOX.faces[:, ::-1], **BREP)
     assert part.volume == pytest.approx(1000)
+    assert part.faces_brep is not None
+    assert part.faces_brep.tolist() == BREP["faces_brep"].tolist()
+    assert part.face_names == BREP["face_names"]
+
+
+def test_a_repair_that_adds_a_surface_drops_the_cad_faces() -> None:
+    pit = np.vstack(
+        [BOX.vertices, [BOX.vertices[BOX.faces[0]].mean(axis=0) + 2 * BOX.cross[0] / np.linalg.norm(BOX.cross[0])]]
+    )
+    a, b, c = BOX.faces[0]
+    roof = [[a, b, 8], [b, c, 8]]  # its third triangle is missing
+    brep = {**BREP, "faces_brep": np.arange(13) // 2 % 6}
+    part = make_part(pit, np.concatenate([BOX.faces[1:], roof]), **brep)
+    assert part.volume > 1000
     assert part.faces_brep is None
     assert part.face_names == part.face_kinds == ()
     assert "CAD face" in part.notes[-1]

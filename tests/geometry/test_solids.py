@@ -7,9 +7,11 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from manifold3d import Manifold
 
 from damageest.artefacts import Mesh, Solid
 from damageest.geometry.solids import (
+    compose_shells,
     concatenate_meshes,
     iou,
     subtract_lost,
@@ -106,3 +108,12 @@ def test_a_manifold_comes_back_as_the_solid_where_it_was() -> None:
     assert made is not None
     assert made.volume == pytest.approx(torus().volume)
     assert made.bounds == pytest.approx(ring.bounds, abs=1e-9)
+
+
+def test_shells_are_put_together_with_their_cavities() -> None:
+    ball_in_it = Manifold.cube((4, 4, 4)) - Manifold.sphere(1, 16).translate((2, 2, 2))
+    body = ball_in_it + Manifold.cube((1, 1, 1)).translate((9, 0, 0))
+    shells = body.decompose()
+    assert sorted(np.sign([shell.volume() for shell in shells])) == [-1, 1, 1]
+    assert compose_shells(shells).volume() == pytest.approx(body.volume(), rel=1e-12)
+    assert compose_shells([]).is_empty()

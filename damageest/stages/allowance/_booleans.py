@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from damageest.geometry.solids import compose_shells
+
 SLACK = 1e-5
 """Largest accepted change of a solid's volume, as a share of it; a tenth of what the check of a deposit accepts."""
 DUST = 1e-9
@@ -24,13 +26,11 @@ def simplify_exactly(body: Any, diagonal: float) -> Any:
 def keep_touching(stock: Any, filled: Any, tolerance: float) -> Any:
     """The pieces of ``stock`` that touch the cavity ``filled``; others, cut off by a thin wall, are dropped, and
     so are rounding errors of the Boolean operation."""
-    from manifold3d import Manifold
-
     least = DUST * stock.volume()
     pieces = [piece for piece in stock.decompose() if abs(piece.volume()) > least]
     if len(pieces) > 1:  # a cavity has a negative volume and belongs to the piece around it
         pieces = [p for p in pieces if p.volume() < 0 or p.min_gap(filled, tolerance) <= 1e-3 * tolerance]
-    return Manifold.compose(pieces) if pieces else Manifold()
+    return compose_shells(pieces)
 
 
 def join(filled: Any, stock: Any) -> Any:

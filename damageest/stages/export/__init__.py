@@ -134,7 +134,8 @@ class Writer:
 
     ``write``: writes solids. ``one_file``: whether all solids of a result go into one file. ``simplify``: whether it
     gets simplified solids, because each facet makes the file much larger. ``patch``: writes a spline, with the
-    arguments ``path, name, patch, unit``; None where the format cannot hold one. ``exact``: writes solids whose outer
+    arguments ``path, name, patch, unit``, and gives what is to be said of the file in words that follow its name, empty
+    for nothing; None where the format cannot hold one. ``exact``: writes solids whose outer
     faces are those of the part's CAD file; None where the format has only facets.
     ``single``: whether readers round coordinates to single precision; it then gets solids that this does not open, with
     the same triangles in each frame.
@@ -143,7 +144,7 @@ class Writer:
     write: WriteFunction
     one_file: bool = False
     simplify: bool = False
-    patch: Callable[[Path, str, Patch, str], None] | None = None
+    patch: Callable[[Path, str, Patch, str], str | None] | None = None
     exact: ExactFunction | None = None
     single: bool = False
 

@@ -123,7 +123,8 @@ class Files(Export):
         files = dict.fromkeys(f for one in done for f in one.files)  # the writer of STL may have written a PLY already
         notes = tuple(n for one in done for n in one.notes)
         fits = {number: spline for number, (_, spline) in splines.items()}
-        return ExportedFiles(tuple(files), notes, fits, ready.exact, ready.warnings)
+        warnings = tuple(n for one in done for n in one.warnings)
+        return ExportedFiles(tuple(files), notes, fits, ready.exact, warnings)
 
     def _write_exact(
         self,
@@ -230,8 +231,10 @@ def _write_patches(
     for number, patch in patches.items():
         name = f"{place}surface/site-{number}.{suffix}"
         here = patch if T is None else replace(patch, poles=move_points(patch.poles, T))
-        write(_make_folder(folder, name), f"damage surface site-{number}", here, unit)
-        done.append(ExportedFiles((name,)))
+        path = _make_folder(folder, name)
+        said = write(path, f"damage surface site-{number}", here, unit)
+        notes = (f"{name} {said}",) if said else ()
+        done.append(ExportedFiles((name,) if path.is_file() else (), notes, warnings=notes))
     return done
 
 

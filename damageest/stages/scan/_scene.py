@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field
 
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
-from damageest.geometry.solids import to_arrays, to_manifold
+from damageest.geometry.solids import compose_shells, to_arrays, to_manifold
 from damageest.options import Options
 from damageest.stages.scan.scanner import DUST, apply_tools, build_tool, make_missed_error
 from damageest.stages.scan.tools import AnyTool, CylinderTool, Direction, SolidTool, Tool, Vector
@@ -128,7 +128,5 @@ def _move_pieces(body: Any, detached: Sequence[DetachedPiece], part: Part, origi
 
 def _keep_real(body: Any, origin: Floats, volume: float) -> Solid | None:
     """A Manifold as Solid without pieces that are rounding errors; None where nothing else is left."""
-    from manifold3d import Manifold
-
     pieces = [piece for piece in body.decompose() if abs(piece.volume()) > DUST * volume]
-    return Solid(*to_arrays(Manifold.compose(pieces), origin)) if pieces else None
+    return Solid(*to_arrays(compose_shells(pieces), origin)) if pieces else None

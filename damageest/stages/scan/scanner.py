@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh, Part, Solid
 from damageest.errors import StageError
-from damageest.geometry.solids import to_arrays, to_manifold
+from damageest.geometry.solids import compose_shells, to_arrays, to_manifold
 from damageest.stages.scan.tools import Tool
 
 DUST = 1e-9
@@ -38,12 +38,13 @@ def apply_tools(part: Part, tools: Sequence[Tool]) -> tuple[Solid, Solid | None,
         cuts.append(cut)
     cutter = Manifold.batch_boolean(cuts, OpType.Add)
     kept, lost, loose, cavities = [], [], [], 0
-    for body in _split_bodies(whole):
+    least = DUST * part.volume
+    for body in _split_bodies(whole, least):
         inside, outside = body.split(cutter)
         lost.append(inside)
         cavities -= sum(piece.volume() < 0 for piece in body.decompose())
         cavities += sum(piece.volume() < -DUST * part.volume for piece in outside.decompose())
-        pieces = [p for p in _split_bodies(outside) if p.volume() > DUST * part.volume]
+        pieces = [p for p in _split_bodies(outside, least) if p.volume() > least]
         if pieces:
             pieces.sort(key=lambda p: p.volume(), reverse=True)
             kept.append(pieces[0])
@@ -96,14 +97,15 @@ def _format_point(point: Floats) -> str:
     return "(" + ", ".join(f"{value:.4g}" for value in point) + ")"
 
 
-def _split_bodies(solid: Any) -> list[Any]:
-    """The solid's connected bodies, each with the cavities inside it."""
-    from manifold3d import Manifold
+def _split_bodies(solid: Any, least: float) -> list[Any]:
+    """The solid's connected bodies, each with the cavities inside it.
 
-    shells = solid.decompose()
+    Shells of no more than the volume ``least`` are rounding errors, and cavities that no body holds.
+    """
+    shells = [s for s in solid.decompose() if abs(s.volume()) > least]
     outer = [s for s in shells if s.volume() > 0]
     inner = [s for s in shells if s.volume() <= 0]
-    if not inner:
+    if not inner or not outer:
         return list(outer)
     boxes = np.array([s.bounding_box() for s in outer])
     owned: list[list[Any]] = [[s] for s in outer]
@@ -111,18 +113,17 @@ def _split_bodies(solid: Any) -> list[Any]:
         box = np.array(cavity.bounding_box())
         holds = (boxes[:, :3] <= box[:3]).all(1) & (boxes[:, 3:] >= box[3:]).all(1)
         size = np.where(holds, np.prod(boxes[:, 3:] - boxes[:, :3], axis=1), np.inf)
-        owned[int(np.argmin(size))].append(cavity)
-    return [Manifold.compose(group) if len(group) > 1 else group[0] for group in owned]
+        if holds.any():
+            owned[int(np.argmin(size))].append(cavity)
+    return [compose_shells(group) if len(group) > 1 else group[0] for group in owned]
 
 
 def _drop_dust(body: Any, origin: Floats, volume: float) -> Solid:
     """A Manifold as Solid, without the small pieces that rounding errors leave."""
-    from manifold3d import Manifold
-
     shells = body.decompose()
     real = [s for s in shells if abs(s.volume()) > DUST * volume]
     if len(real) < len(shells):
-        body = Manifold.compose(real)
+        body = compose_shells(real)
     return Solid(*to_arrays(body, origin))
 
 

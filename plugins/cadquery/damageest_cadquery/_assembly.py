@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from damageest_cadquery._canonical import canonicalise
+from damageest_cadquery._header import set_header
 from damageest_cadquery._read import explore
-from damageest_cadquery._step import UNITS, fix_header
+from damageest_cadquery._step import UNITS
 
 Colour = tuple[int, int, int]
 SCHEMA = "AP242DIS"
@@ -39,8 +40,11 @@ class NamedShape:
             object.__setattr__(self, "shape", moved.Shape())
 
 
-def write_assembly(path: Path, name: str, shapes: Sequence[NamedShape], unit: str) -> None:
-    """Writes one product, or where there are several an assembly called ``name``. Raises OSError."""
+def write_assembly(path: Path, name: str, shapes: Sequence[NamedShape], unit: str, curves: bool = True) -> None:
+    """Writes one product, or where there are several an assembly called ``name``.
+
+    ``curves``: also write edges as curves in the parameters of the faces. Raises OSError.
+    """
     from OCP.Message import Message
     from OCP.STEPCAFControl import STEPCAFControl_Controller, STEPCAFControl_Writer
     from OCP.STEPControl import STEPControl_AsIs
@@ -57,7 +61,7 @@ def write_assembly(path: Path, name: str, shapes: Sequence[NamedShape], unit: st
     labels = [_add(tool, colours, each) for each in shapes]
     if len(shapes) != 1:
         _join(tool, name, shapes, labels)
-    with _set_options(unit, len(shapes) == 1):
+    with _set_options(unit, len(shapes) == 1, curves):
         writer = STEPCAFControl_Writer()
         writer.SetColorMode(True)
         writer.SetNameMode(True)
@@ -67,11 +71,11 @@ def write_assembly(path: Path, name: str, shapes: Sequence[NamedShape], unit: st
             raise OSError(f"{path}: OpenCASCADE could not translate it")
         for each in shapes:
             _name_faces(writer, each)
+        set_header(writer.ChangeWriter().Model())
         from OCP.IFSelect import IFSelect_RetDone
 
         if writer.Write(str(path)) != IFSelect_RetDone:
             raise OSError(f"{path}: OpenCASCADE could not write it")
-    fix_header(path)
     canonicalise(path)
 
 
@@ -96,16 +100,24 @@ def _add(tool: Any, colours: Any, each: NamedShape) -> Any:
 
 
 def _name_faces(writer: Any, each: NamedShape) -> None:
-    """Names the faces in the file. OpenCASCADE 7.9 does not write the names that sub-shapes have in its document."""
+    """Names the faces in the file. OpenCASCADE 7.9 does not write the names that sub-shapes have in its document.
+
+    They are counted off in their shells: a face that its location moves is not found by itself.
+    """
     from OCP.STEPConstruct import STEPConstruct
     from OCP.TCollection import TCollection_HAsciiString
-    from OCP.TopAbs import TopAbs_FACE
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
+    from OCP.TopLoc import TopLoc_Location
 
-    finder = writer.Writer().WS().TransferWriter().FinderProcess()
-    for face, name in zip(explore(each.shape, TopAbs_FACE), each.names, strict=False):
-        entity = STEPConstruct.FindEntity_s(finder, face) if name else None
-        if entity is not None:
-            entity.SetName(TCollection_HAsciiString(name))
+    finder, names = writer.Writer().WS().TransferWriter().FinderProcess(), list(each.names)
+    for shell in explore(each.shape, TopAbs_SHELL) if names else ():
+        count = len(explore(shell, TopAbs_FACE))
+        own, names = names[:count], names[count:]
+        unmoved = shell.Located(TopLoc_Location())
+        entity = STEPConstruct.FindEntity_s(finder, shell) or STEPConstruct.FindEntity_s(finder, unmoved)
+        if entity is not None and entity.NbCfsFaces() == count:  # else one is missing, and the file is written again
+            for number, name in enumerate(own, 1):
+                entity.CfsFacesValue(number).SetName(TCollection_HAsciiString(name))
 
 
 def _join(tool: Any, name: str, shapes: Sequence[NamedShape], labels: Sequence[Any]) -> None:
@@ -130,11 +142,11 @@ def _make_colour(colour: Colour) -> Any:
 class _set_options:  # noqa: N801
     """OpenCASCADE's settings for writing, which are global, set for a while."""
 
-    def __init__(self, unit: str, alone: bool) -> None:
+    def __init__(self, unit: str, alone: bool, curves: bool) -> None:
         self.wanted: dict[str, str | int] = {
             "write.step.unit": UNITS[unit],
             "write.step.schema": SCHEMA,
-            "write.surfacecurve.mode": 1,
+            "write.surfacecurve.mode": int(curves),
             "write.step.assembly": 0 if alone else 1,
         }
         self.before: dict[str, str | int] = {}

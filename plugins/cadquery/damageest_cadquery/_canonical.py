@@ -14,6 +14,7 @@ from pathlib import Path
 
 _ENTITY = re.compile(r"#(\d+)\s*=\s*((?:'(?:[^']|'')*'|[^';])*);")
 _TOKEN = re.compile(r"('(?:[^']|'')*'|#\d+)")
+_STRING = re.compile(r"('(?:[^']|'')*')")
 _BREAK = re.compile(r"\s*\n\s*")
 _UNORDERED = "MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION"
 DEPTH = 8
@@ -54,7 +55,11 @@ def _leave_out_plane_curves(tokens: Tokens, uses: dict[int, list[int]]) -> None:
 
 
 def _join_lines(entity: str) -> str:
-    return _BREAK.sub("", entity) if "\n" in entity else entity
+    if "\n" not in entity:
+        return entity
+    # in a string, OpenCASCADE breaks the line between any two characters, and spaces beside the break belong to it
+    parts = _STRING.split(entity)
+    return "".join([part.replace("\n", "") if part[:1] == "'" else _BREAK.sub("", part) for part in parts])
 
 
 def _number(roots: Iterable[int], uses: Mapping[int, list[int]], order: dict[int, int]) -> None:

@@ -103,7 +103,7 @@ def find_exact(
     if cut is None:
         return None, ("no surface is known that cuts it out of the part",)
     inner_before = measure_inner_area(solids)
-    bodies = sum(body.volume > SPECK * site.damage.volume for body in split_bodies(site.damage))
+    bodies = _count_bodies(site.damage, solids, tolerance)
     refused = ""
     for form, make, fuzzies in _list_tools(cut, part, tolerance):
         if form.split()[0] == refused:
@@ -133,6 +133,22 @@ def find_exact(
                 refused = "shapes"
                 break  # it is sound but not near enough, and another fuzzy value does not change that
     return None, tuple(tried) or ("no surface could be built that cuts it out of the part",)
+
+
+def _count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> int:
+    """How many solids a damage volume is: in a part of several, which its mesh may have united, one or more in each."""
+    least, origin = SPECK * damage.volume, damage.bounds.mean(axis=0)
+    alone = sum(body.volume > least for body in split_bodies(damage))
+    if len({piece.owner for piece in solids}) < 2:
+        return alone
+    lost, count = to_manifold(damage, origin), 0
+    for piece in solids:
+        try:
+            common = to_manifold(triangulate(piece.shape, tolerance / 16), origin) ^ lost
+        except (InputError, ValueError):
+            return alone
+        count += sum(body.volume() > least for body in common.decompose())
+    return count
 
 
 def _list_tools(cut: Cut, part: Part, tolerance: float) -> Iterator[Attempt]:

@@ -54,6 +54,8 @@ def find_facets(solid: Solid) -> list[Facet]:
     other = _find_neighbours(edges, len(vertices))
     label = _find_flat_regions(solid, other, tolerance)
     label = _split_ambiguous(label, edges, other, len(vertices))
+    # a piece that is flat within rounding, as a sliver between two bodies, is one region without an outline
+    label = _split_off(label, ~np.isin(label, _find_outline(label, edges, other)[0]))
     loops, owner = _trace_loops(label, edges, other, len(vertices))
     loops = straighten(loops, vertices, tolerance)
     normal = np.zeros((label.max() + 1, 3))
@@ -67,6 +69,14 @@ def find_facets(solid: Solid) -> list[Facet]:
     for region in np.flatnonzero(np.linalg.norm(normal, axis=1) < 0.5):  # without area: any plane through its line
         normal[region] = _find_perpendicular(vertices[found[int(region)][0]])
     return [Facet(normal[region], tuple(mine)) for region, mine in found.items()]
+
+
+def take_triangles(solid: Solid) -> list[Facet]:
+    """The solid's triangles, each as a face."""
+    normals = normalise(solid.cross)
+    for row in np.flatnonzero(np.linalg.norm(normals, axis=1) < 0.5):
+        normals[row] = _find_perpendicular(solid.triangles[row])
+    return [Facet(normal, (corners,)) for normal, corners in zip(normals, solid.faces, strict=True)]
 
 
 def _find_perpendicular(loop: Floats) -> Floats:
@@ -158,6 +168,8 @@ def _trace_loops(label: Ints, edges: Ints, other: Ints, count: int) -> tuple[lis
 
 def straighten(loops: list[Ints], vertices: Floats, tolerance: float) -> list[Ints]:
     """The loops without vertices in the middle of a straight edge between two faces."""
+    if not loops:
+        return []
     at = np.concatenate(loops)
     size = np.array([len(loop) for loop in loops])
     first = np.cumsum(size) - size

@@ -8,14 +8,33 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.errors import StageError
 from damageest.geometry.units import MILLIMETRES
 from damageest.stages.export import Patch
-from damageest_cadquery._step import write_shape
+from damageest_cadquery._step import Way, call_in_process, write_first, write_shape
 
 
-def write_patch(path: Path, name: str, patch: Patch, unit: str) -> None:
-    """Writes the patch, with its product ``name``, in ``unit``. Raises OSError where the file cannot be written."""
-    write_shape(path, _build_face(patch, MILLIMETRES[unit]), name, unit, curves=True)
+def write_patch(path: Path, name: str, patch: Patch, unit: str) -> str:
+    """Writes the patch, with its product ``name``, in ``unit``; gives what is to be said of the file, empty for
+    nothing.
+
+    Raises OSError where the file cannot be written.
+    """
+    try:
+        return call_in_process(write_face, path, name, patch, unit)
+    except StageError as error:
+        return f"was not written: the process that writes it {error.message}"
+
+
+def write_face(scratch: Path, path: Path, name: str, patch: Patch, unit: str) -> str:
+    """Writes the patch in this process, and reads it back."""
+    shape = _build_face(patch, MILLIMETRES[unit])
+
+    def write(curves: bool) -> Way:
+        said = "with the curves of its rims in its parameters" if curves else "without curves in its parameters"
+        return Way(said, lambda: shape, lambda place, face: write_shape(place, face, name, unit, curves))
+
+    return write_first(scratch, path, (write(True), write(False))).said
 
 
 def _build_face(patch: Patch, scale: float) -> Any:

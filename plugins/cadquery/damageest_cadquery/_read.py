@@ -42,6 +42,17 @@ def read(path: Path, suffix: str) -> Model:
     return Model(solids, unit, MILLIMETRES[unit] if unit else 1.0, name_of, notes, solid_names=names)
 
 
+def read_shape(path: Path) -> Any:
+    """All that a STEP file holds as one shape, in millimetres. Raises InputError where it is unreadable or empty."""
+    from OCP.Message import Message
+
+    Message.DefaultMessenger_s().ChangePrinters().Clear()
+    shape, _, _ = _step(path)
+    if shape is None or shape.IsNull():
+        raise InputError("holds no shape")
+    return shape
+
+
 def _no_name(face: Any) -> str:
     return ""
 

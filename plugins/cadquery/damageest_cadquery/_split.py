@@ -14,8 +14,8 @@ import numpy as np
 from damageest.artefacts import Floats, Solid
 from damageest.errors import InputError
 from damageest_cadquery._facets import Facet
+from damageest_cadquery._planar import build_shell
 from damageest_cadquery._read import explore
-from damageest_cadquery._step import build_shell
 
 Origin = tuple[int, int]
 """Where a face comes from: (number of the part's CAD face, -1), or (-1, number of the tool's face)."""
@@ -181,20 +181,6 @@ def find_corners(shape: Any) -> Floats:
 
     points = [BRep_Tool.Pnt_s(TopoDS.Vertex_s(item)).Coord() for item in explore(shape, TopAbs_VERTEX)]
     return np.unique(np.array(points), axis=0)
-
-
-def join_pieces(pieces: Sequence[Piece]) -> Any:
-    """The solid, or a compound of several."""
-    if len(pieces) == 1:
-        return pieces[0].shape
-    from OCP.BRep import BRep_Builder
-    from OCP.TopoDS import TopoDS_Compound
-
-    builder, whole = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(whole)
-    for piece in pieces:
-        builder.Add(whole, piece.shape)
-    return whole
 
 
 def is_opencascade_error(error: Exception) -> bool:

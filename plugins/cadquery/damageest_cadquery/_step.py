@@ -1,51 +1,154 @@
-"""Writes solids as STEP: planar faces, the job's unit, a product name, and the same bytes each time."""
+"""Writes solids as STEP: planar faces, the job's unit, a product name, and the same bytes each time.
+
+It is done in a process of its own, since OpenCASCADE can crash; each file is read back there before it is moved into
+place.
+"""
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Sequence
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from damageest.artefacts import Floats, Solid
+from damageest.artefacts import Solid
+from damageest.errors import InputError, StageError
 from damageest.geometry.bodies import split_shells
 from damageest.geometry.units import MILLIMETRES
+from damageest.isolation import call_isolated
 from damageest.stages.export import Body, ExportedFiles
-from damageest_cadquery._facets import FLAT, Facet, find_facets, weld
+from damageest_cadquery._header import set_header
+from damageest_cadquery._planar import build_shape, count_faces, find_shells
 
 UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
 MAX_FACES = 100_000
 """Largest number of planar faces in a STEP file; 60,000 took 11 s to write, 22 s to read, and 67 MB."""
 
 
+@dataclass(frozen=True, eq=False)
+class Way:
+    """How a file may be written. ``said``: in words that follow "written"; ``make``: makes what is to be written, and
+    ``write`` writes it to a path; ``gather``: all of it as one shape."""
+
+    said: str
+    make: Callable[[], Any]
+    write: Callable[[Path, Any], None]
+    gather: Callable[[Any], Any] = lambda made: made
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """``made``: what was written, None where there is no file. ``said``: what is to be said of the file, in words that
+    follow its name; empty where the first way served. ``fault``: why the first way did not."""
+
+    made: Any
+    said: str = ""
+    fault: str = ""
+
+
+class TooManyFacesError(Exception):
+    """A solid has more planar faces than a STEP file is to hold; the message is their number."""
+
+
 def write_step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> ExportedFiles:
-    """Writes one solid as faceted STEP; with too many faces the file is left out, and a note says so."""
+    """Writes one solid as faceted STEP. With too many faces, or where it cannot be read back, the file is left out, and
+    a note says so."""
     (body,) = solids
-    parts = [[_find_planar_faces(each) for each in (outer, *cavities)] for outer, cavities in split_shells(body.solid)]
-    count = sum(len(shell[1]) for part in parts for shell in part)
-    if count > MAX_FACES:
-        return ExportedFiles(
-            notes=(
-                f"{stem}.step was not written: {count} planar faces are more than the limit of {MAX_FACES}; "
-                "set a larger  detail , or use 3mf",
-            )
+    try:
+        said = call_in_process(write_facets, folder / f"{stem}.step", body.solid, body.name, unit, MAX_FACES)
+    except TooManyFacesError as error:
+        note = (
+            f"{stem}.step was not written: {error} planar faces are more than the limit of {MAX_FACES}; "
+            "set a larger  detail , or use 3mf"
         )
-    write_shape(folder / f"{stem}.step", _build_shape(parts, MILLIMETRES[unit]), body.name, unit)
-    return ExportedFiles((f"{stem}.step",))
+        return ExportedFiles(notes=(note,))
+    except StageError as error:
+        said = f"was not written: the process that writes it {error.message}"
+    notes = (f"{stem}.step {said}",) if said else ()
+    return ExportedFiles((f"{stem}.step",) if (folder / f"{stem}.step").is_file() else (), notes, warnings=notes)
 
 
-def build_solid(solid: Solid) -> tuple[Any, int]:
-    """An OpenCASCADE solid with planar faces, or a compound of several, and its number of faces. In millimetres."""
-    parts = [[_find_planar_faces(each) for each in (outer, *cavities)] for outer, cavities in split_shells(solid)]
-    return _build_shape(parts, 1.0), sum(len(shell[1]) for part in parts for shell in part)
+def call_in_process(function: Callable[..., str], path: Path, *values: Any) -> str:
+    """What ``function`` gives for a scratch file, ``path`` and the ``values``, called in a process of its own."""
+    with tempfile.TemporaryDirectory(prefix="damageest-step-") as place:
+        arguments = {"scratch": Path(place) / "a.step", "path": path, "values": values}
+        return call_isolated(_call, {"function": function, **arguments}, worker="damageest_cadquery step", owner=OWNER)
 
 
-def _find_planar_faces(solid: Solid) -> tuple[Floats, list[Facet]]:
-    solid = weld(solid)
-    return solid.vertices, find_facets(solid)
+OWNER = "damageest-cadquery"
+
+
+def _call(function: Callable[..., str], scratch: Path, path: Path, values: Sequence[Any]) -> str:
+    return function(scratch, path, *values)
+
+
+def write_facets(scratch: Path, path: Path, solid: Solid, name: str, unit: str, most: int) -> str:
+    """Writes a solid with planar faces; gives what is to be said of the file, empty where it is as it is to be.
+
+    Raises TooManyFacesError where it has more than ``most``.
+    """
+    scale = MILLIMETRES[unit]
+
+    def make(joined: bool) -> Any:
+        shells = find_shells(solid, joined)
+        if count_faces(shells) > most:
+            raise TooManyFacesError(str(count_faces(shells)))
+        return build_shape(shells, scale)
+
+    volumes = [
+        (outer.volume - sum(cavity.volume for cavity in cavities)) * scale**3 for outer, cavities in split_shells(solid)
+    ]
+
+    def write(place: Path, shape: Any) -> None:
+        write_shape(place, shape, name, unit)
+
+    ways = (
+        Way("with planar faces", lambda: make(True), write),
+        Way("with a face for each triangle", lambda: make(False), write),
+    )
+    return write_first(scratch, path, ways, volumes).said
+
+
+def write_first(scratch: Path, path: Path, ways: Iterable[Way], volumes: Sequence[float] = ()) -> Outcome:
+    """Writes a file in the first of several ways in which it holds what it is to hold when it is read back.
+
+    Where there is none, the first is taken in which only OpenCASCADE's check of the geometry fails; else there is no
+    file. ``scratch``: where files are written and read back; ``volumes``: of the solids, where they are known better
+    than from the shape.
+    """
+    from damageest_cadquery._readback import INVALID, find_fault  # imported late: the caller does not need it
+
+    faults: list[str] = []
+    doubtful, spare = Outcome(None), scratch.with_name("doubtful.step")
+    for way in ways:
+        try:
+            made = way.make()
+        except (TooManyFacesError, InputError):
+            if not faults:
+                raise
+            break
+        try:
+            way.write(scratch, made)
+            fault = find_fault(scratch, way.gather(made), volumes)
+        except OSError as error:
+            fault = str(error).removeprefix(f"{scratch}: ")
+        if not fault:
+            shutil.move(scratch, path)
+            return (
+                Outcome(made, f"was written {way.said}: read back before, {faults[0]}", faults[0])
+                if faults
+                else Outcome(made)
+            )
+        faults.append(fault)
+        if fault == INVALID and doubtful.made is None:
+            shutil.move(scratch, spare)
+            doubtful = Outcome(made, f"may be refused by other programs: read back, {INVALID}", fault)
+    if doubtful.made is None:
+        return Outcome(None, f"was not written: read back, {faults[0]}", faults[0])
+    shutil.move(spare, path)
+    return doubtful
 
 
 def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = False) -> None:
@@ -61,7 +164,7 @@ def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = Fal
 
     Message.DefaultMessenger_s().ChangePrinters().Clear()  # else OpenCASCADE prints to the terminal
     STEPControl_Controller.Init_s()
-    wanted = {"write.step.unit": UNITS[unit], "write.step.product.name": name}
+    wanted = {"write.step.unit": UNITS[unit], "write.step.product.name": "damageest"}
     before = {key: Interface_Static.CVal_s(key) for key in wanted}
     numbers = {"write.surfacecurve.mode": int(curves), "write.step.assembly": 0}  # the latter: one product
     earlier = {key: Interface_Static.IVal_s(key) for key in numbers}
@@ -72,6 +175,7 @@ def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = Fal
             Interface_Static.SetIVal_s(key, number)
         writer = STEPControl_Writer()
         writer.Transfer(shape, STEPControl_AsIs)
+        set_header(writer.Model(), name)
         if writer.Write(str(path)) != IFSelect_RetDone:
             raise OSError(f"{path}: OpenCASCADE could not write it")
     finally:
@@ -79,95 +183,3 @@ def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = Fal
             Interface_Static.SetCVal_s(key, value)
         for key, number in earlier.items():
             Interface_Static.SetIVal_s(key, number)
-    fix_header(path)
-
-
-def fix_header(path: Path) -> None:
-    """Removes from a STEP file the date, and the numbers that OpenCASCADE gives to products."""
-    data = path.read_bytes()
-    head, rest = data[:4096], data[4096:]
-    head = re.sub(rb"'\d{4}-\d\d-\d\dT[\d:]+[^']*'", b"'1970-01-01T00:00:00'", head)
-    # OpenCASCADE numbers the products that a process writes, and breaks the line by the length of the number
-    product = rb"PRODUCT\('(.*?) \d+',\s*'.*? \d+',\s*'',\s*\(\s*(#\d+)\s*\)\s*\);"
-    head = re.sub(product, rb"PRODUCT('\1','\1','',(\2));", head, flags=re.DOTALL)
-    data, number = head + rest, iter(range(1, 1_000_000))
-    # it numbers the components of assemblies too
-    use = rb"(NEXT_ASSEMBLY_USAGE_OCCURRENCE\(\s*)'\d+'"
-    path.write_bytes(re.sub(use, lambda found: found[1] + b"'%d'" % next(number), data))
-
-
-def _build_shape(parts: list[list[tuple[Floats, list[Facet]]]], scale: float) -> Any:
-    """A solid, or a compound of several; the first shell of each is the outer one."""
-    from OCP.BRep import BRep_Builder
-    from OCP.TopoDS import TopoDS_Compound, TopoDS_Solid
-
-    builder = BRep_Builder()
-    made = []
-    for part in parts:
-        solid = TopoDS_Solid()
-        builder.MakeSolid(solid)
-        for number, (vertices, planar) in enumerate(part):
-            shell = build_shell(vertices * scale, planar)
-            builder.Add(solid, shell if number == 0 else shell.Reversed())
-        made.append(solid)
-    if len(made) == 1:
-        return made[0]
-    compound = TopoDS_Compound()
-    builder.MakeCompound(compound)
-    for solid in made:
-        builder.Add(compound, solid)
-    return compound
-
-
-def build_shell(vertices: Floats, planar: Sequence[Facet], closed: bool = True) -> Any:
-    """A shell whose faces share their edges, and its edges their corners. Lengths in millimetres."""
-    from OCP.BRep import BRep_Builder
-    from OCP.Geom import Geom_Line, Geom_Plane
-    from OCP.gp import gp_Dir, gp_Pnt
-    from OCP.TopAbs import TopAbs_REVERSED
-    from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shell, TopoDS_Vertex, TopoDS_Wire
-
-    builder = BRep_Builder()
-    close = max(1e-7, 4 * FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0))))
-    places = vertices.tolist()
-    corners: dict[int, Any] = {}
-    edges: dict[tuple[int, int], Any] = {}
-
-    def corner(index: int) -> Any:
-        if index not in corners:
-            corners[index] = TopoDS_Vertex()
-            builder.MakeVertex(corners[index], gp_Pnt(*places[index]), close)
-        return corners[index]
-
-    def edge(start: int, end: int) -> Any:
-        key = (min(start, end), max(start, end))
-        if key not in edges:
-            (x, y, z), (u, v, w) = places[key[0]], places[key[1]]
-            made, length = TopoDS_Edge(), math.dist(places[key[0]], places[key[1]])
-            line = Geom_Line(gp_Pnt(x, y, z), gp_Dir(u - x, v - y, w - z))
-            builder.MakeEdge(made, line, close)
-            builder.Add(made, corner(key[0]))
-            builder.Add(made, corner(key[1]).Oriented(TopAbs_REVERSED))
-            builder.Range(made, 0.0, length)
-            edges[key] = made
-        return edges[key] if start < end else edges[key].Reversed()
-
-    shell = TopoDS_Shell()
-    builder.MakeShell(shell)
-    for facet in planar:
-        face = TopoDS_Face()
-        loops = [loop.tolist() for loop in facet.loops]
-        corners_here = [places[index] for index in loops[0]]
-        at = (sum(values) / len(corners_here) for values in zip(*corners_here, strict=True))
-        builder.MakeFace(face, Geom_Plane(gp_Pnt(*at), gp_Dir(*facet.normal.tolist())), close)
-        for indices in loops:
-            wire = TopoDS_Wire()
-            builder.MakeWire(wire)
-            for start, end in zip(indices, indices[1:] + indices[:1], strict=True):
-                if places[start] != places[end]:  # no length, no direction
-                    builder.Add(wire, edge(start, end))
-            wire.Closed(True)
-            builder.Add(face, wire)
-        builder.Add(shell, face)
-    shell.Closed(closed)
-    return shell

@@ -164,7 +164,7 @@ def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]
 def _build_hull(hull: ConvexHull) -> Any:
     """A convex polyhedron with one face for each plane."""
     from damageest.artefacts import Solid
-    from damageest_cadquery._step import build_solid
+    from damageest_cadquery._planar import build_solid
 
     used, faces = np.unique(hull.simplices, return_inverse=True)
     faces = faces.reshape(-1, 3)

@@ -12,7 +12,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +26,8 @@ from damageest.result import Result
 from damageest.stages.export import Body, DepositForm, ExactForm, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._read import read
+from damageest_cadquery._request import Request, describe_missing
 from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
-from damageest_cadquery._worker import Request, describe_missing
 
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
@@ -50,15 +50,17 @@ def write_exact(
         return ExportedFiles()
     said: dict[str, Any] = {}
     for _ in range(MOST_STARTS):
-        said, site, reason = _run(request, seconds)
+        said, at, reason = _run(request, seconds)
         if said:
             break
-        if site == 0:  # while it wrote the files
-            request = replace(request, skipped={each.number: reason for each in request.sites})
-        elif site in request.skipped:
+        if at.file in request.left_out or (not at.file and at.site in request.skipped):
             break
+        if at.file:
+            request = replace(request, left_out={**request.left_out, at.file: reason})
+        elif at.site:
+            request = replace(request, skipped={**request.skipped, at.site: reason})
         else:
-            request = replace(request, skipped={**request.skipped, site: reason})
+            request = replace(request, skipped={each.number: reason for each in request.sites})
     forms = {int(number): _read_form(form) for number, form in said.get("forms", {}).items()}
     for site_input in request.sites:
         why = (request.skipped.get(site_input.number, "the process for exact solids stopped"),)
@@ -68,13 +70,12 @@ def write_exact(
         for number, form in sorted(forms.items())
         if form.form == "none"
     )
-    if notes:
-        notes = (*notes, "damage.step and undamaged.step have facets too")
     notes += tuple(
         f"deposit/site-{number}.step has facets, not offsets of the CAD's faces: {form.deposit.reason}"
         for number, form in sorted(forms.items())
         if form.deposit is not None and form.deposit.reason
     )
+    notes += tuple(said.get("notes", () if not notes else ("damage.step and undamaged.step have facets too",)))
     files = tuple(said.get("files", ()))
     return ExportedFiles(files, notes, exact=dict(sorted(forms.items())), warnings=notes)
 
@@ -96,6 +97,7 @@ def make_request(
         sites=tuple(_take_site(result, number, factor) for number in range(len(result.sites))),
         bodies={stem: replace(body, solid=_scale(body.solid, factor)) for stem, body in bodies.items()},
         folder=str(folder),
+        scratch="",
         places=moved,
         skipped={},
     )
@@ -139,27 +141,42 @@ def _read_form(values: dict[str, Any]) -> ExactForm:
     return ExactForm(**{**values, "tried": tuple(values["tried"]), "deposit": deposit})
 
 
-def _run(request: Request, seconds: float) -> tuple[dict[str, Any], int, str]:
-    """Starts the process once. Gives what it said at its end; or the number of the site, 0 for none, at which it
-    stopped, the negative of it for its deposit, and why."""
+@dataclass(frozen=True)
+class _Place:
+    """Where the process was: the number of a site, the negative of it for its deposit, or the stem of a ``file``."""
+
+    site: int = 0
+    file: str = ""
+
+
+def _run(request: Request, seconds: float) -> tuple[dict[str, Any], _Place, str]:
+    """Starts the process once. Gives what it said at its end; or where it stopped, and why."""
     with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
         path = Path(place) / "request.pkl"
-        path.write_bytes(pickle.dumps(request))
-        process = subprocess.Popen(
-            [sys.executable, "-m", "damageest_cadquery._worker", str(path)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, **ONE_THREAD, "PYTHONWARNINGS": "ignore"},
-        )
+        path.write_bytes(pickle.dumps(replace(request, scratch=place)))
+        leash, held = os.pipe()
         try:
-            return _follow(process, seconds)
+            process = subprocess.Popen(
+                [sys.executable, "-m", "damageest_cadquery._worker", str(path), str(leash)],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                pass_fds=(leash,),
+                start_new_session=True,  # Ctrl-C reaches this process alone, with which the other one ends
+                env={**os.environ, **ONE_THREAD, "PYTHONWARNINGS": "ignore"},
+            )
+            try:
+                return _follow(process, seconds)
+            finally:
+                process.kill()
+                process.wait()
         finally:
-            process.kill()
-            process.wait()
+            os.close(leash)
+            os.close(held)
 
 
-def _follow(process: subprocess.Popen[str], seconds: float) -> tuple[dict[str, Any], int, str]:
+def _follow(process: subprocess.Popen[str], seconds: float) -> tuple[dict[str, Any], _Place, str]:
     lines: queue.Queue[str | None] = queue.Queue()
     errors: list[str] = []
 
@@ -176,26 +193,27 @@ def _follow(process: subprocess.Popen[str], seconds: float) -> tuple[dict[str, A
     threads = [threading.Thread(target=each, daemon=True) for each in (listen, listen_to_errors)]
     for thread in threads:
         thread.start()
-    site, clock = 0, _Clock(process.pid)
+    at, clock = _Place(), _Clock(process.pid)
     while True:
         try:
             line = lines.get(timeout=min(seconds, 0.5))
         except queue.Empty:
             if clock.has_passed(seconds):
-                return {}, site, f"OpenCASCADE took longer than {seconds:g} s"
+                return {}, at, f"OpenCASCADE took longer than {seconds:g} s"
             continue
         clock = _Clock(process.pid)
         if line is None:
             process.wait()
             threads[1].join(timeout=5)
             last = errors[-1].strip()[:200] if errors else f"exit status {process.returncode}"
-            return {}, site, f"OpenCASCADE stopped ({last})"
+            return {}, at, f"OpenCASCADE stopped ({last})"
         if not line.startswith("{"):
             continue
         said = json.loads(line)
         if "forms" in said:
-            return said, site, ""
-        site = said.get("start", site)
+            return said, at, ""
+        if "start" in said:
+            at = _Place(said["start"], said.get("file", ""))
 
 
 class _Clock:

@@ -184,12 +184,12 @@ def test_a_crash_of_opencascade_costs_only_the_exact_form(
         "import os, sys\nfrom pathlib import Path\nfrom damageest_cadquery import _worker\nfind = _worker.find_exact\n"
         "def fall(site, *rest):\n    if site.number == 2:\n        os.abort()\n    return find(site, *rest)\n"
         "_worker.find_exact = fall\nimport pickle\n"
-        "_worker.main(Path(sys.argv[1]))\n"
+        "_worker.start(sys.argv[1:])\n"
     )
     start = subprocess.Popen
 
     def start_other(command: list[str], **options: Any) -> Any:
-        return start([command[0], str(tmp_path / "crash.py"), command[-1]], **options)
+        return start([command[0], str(tmp_path / "crash.py"), *command[-2:]], **options)
 
     monkeypatch.setattr(subprocess, "Popen", start_other)
     told = export_again(done.result, tmp_path / "out")

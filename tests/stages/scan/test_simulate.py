@@ -10,13 +10,17 @@ import igl
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 from pydantic import ValidationError
 
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.errors import StageError
 from damageest.evaluate.parts import PARTS
-from damageest.geometry.solids import to_arrays, to_manifold
+from damageest.geometry.bodies import split_shells
+from damageest.geometry.solids import to_arrays, to_manifold, to_solid
+from damageest.stages.scan.scanner import apply_tools
 from damageest.stages.scan.simulate import Simulate
+from damageest.stages.scan.tools import PlaneTool
 
 SPHERE = {"tool": "sphere", "centre": (35, 25, 15), "radius": 10}
 
@@ -179,6 +183,26 @@ def test_far_from_the_origin_nothing_is_lost() -> None:
     tool = {**SPHERE, "centre": tuple(1e6 + np.array(SPHERE["centre"]))}
     volumes = [simulate(near, SPHERE).truth.damage.volume, simulate(far, tool).truth.damage.volume]
     assert volumes[1] == pytest.approx(volumes[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("sliver", [None, 1e-12, 0.0, -1e-12])
+def test_a_cavity_stays_one_also_beside_slivers(sliver: float | None) -> None:
+    """A sliver without volume, as a union of bodies can leave, whose box holds the cavity, does not own it."""
+    block = to_solid(Manifold.cube((10, 10, 10)) - Manifold.cube((1, 1, 1)).translate((1, 1, 1)))
+    assert block is not None
+    vertices, faces = block.vertices, block.faces
+    if sliver is not None:
+        flat = [[-1, 4, 4], [4, -1, 4], [4, 4, -1], [7 / 3, 7 / 3, 7 / 3 + sliver]]
+        around = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]) + len(vertices)
+        vertices, faces = np.concatenate([vertices, flat]), np.concatenate([faces, around])
+    part = Part(vertices, faces, unit="mm")
+    for reach in (6.6, 7.5):
+        tool = PlaneTool(point=(reach, 0, 0), normal=(1, 1, 1))
+        left, damage, _ = apply_tools(part, [tool])
+        assert damage is not None
+        assert left.volume == pytest.approx(reach**3 / 6 - 1, rel=1e-9)
+        assert damage.volume == pytest.approx(1000 - reach**3 / 6, rel=1e-9)
+        assert len(split_shells(left)) == 1
 
 
 @pytest.mark.parametrize(

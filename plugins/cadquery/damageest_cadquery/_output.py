@@ -1,0 +1,228 @@
+"""Writes exact solids, what is left of the part, and an assembly of all; with facets where there is no exact form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from damageest.artefacts import Floats
+from damageest.stages.export import Body, DepositForm
+from damageest_cadquery._assembly import Colour, NamedShape
+from damageest_cadquery._deposit import STOCK, ExactDeposit
+from damageest_cadquery._exact import Exact, scale_shape
+from damageest_cadquery._files import join_shapes, write_shapes
+from damageest_cadquery._left import FACET, cut_facets
+from damageest_cadquery._planar import build_solid
+from damageest_cadquery._read import explore
+from damageest_cadquery._request import CadFacts, Request, tell
+from damageest_cadquery._split import Piece
+
+INNER: Colour = (215, 50, 40)
+TOP: Colour = (40, 130, 205)
+SIDE: Colour = (140, 185, 225)
+PLAIN: Colour = (150, 155, 165)
+
+
+@dataclass(eq=False)
+class Writing:
+    """What was written so far. ``reasons``: by site, why it has no exact form; ``exact``: sites whose file has one;
+    ``forms``: of deposits by site; ``notes``: what is to be said of files."""
+
+    request: Request
+    facts: CadFacts
+    reasons: dict[int, tuple[str, ...]]
+    forms: dict[int, DepositForm | None]
+    exact: list[int] = field(default_factory=list)
+    files: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def save(self, stem: str, name: str, shapes: Sequence[NamedShape]) -> tuple[Sequence[NamedShape], str]:
+        """Writes a file; gives its shapes as they were written, none where there is no file, and why."""
+        tell(start=0, file=stem)  # each file has the time of a site
+        if stem in self.request.left_out:
+            self.notes.append(f"{stem}.step was not written with the CAD's faces: {self.request.left_out[stem]}")
+            return (), self.request.left_out[stem]
+        path = Path(self.request.folder) / f"{stem}.step"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        chord = self.request.tolerance / 16
+        done = write_shapes(Path(self.request.scratch) / "a.step", path, name, shapes, self.request.unit, chord)
+        if done.said:
+            self.notes.append(f"{stem}.step {done.said}")
+        if done.made is None:
+            return (), done.fault
+        self.files.append(f"{stem}.step")
+        return done.made, ""
+
+
+def write_all(
+    writing: Writing, found: Mapping[int, Exact], deposits: Mapping[int, ExactDeposit], rest: Sequence[Piece]
+) -> None:
+    """Writes the exact solids, and the assembly of all."""
+    request, facts = writing.request, writing.facts
+    stems = {number: f"damage/site-{number}" for number in found}
+    stems |= {site.number: f"doubtful/site-{site.number}" for site in request.sites if not site.accepted}
+    names = {number: stem.replace("/", " ") for number, stem in stems.items()}
+    sites = {
+        stems[number]: _name(exact.pieces, names[number], request.bodies[stems[number]].colour, facts, names[number])
+        for number, exact in found.items()
+    }
+    stock = {}
+    for number, deposit in deposits.items():
+        stem, name = f"deposit/site-{number}", f"deposit site-{number}"
+        stock[stem] = _name(deposit.pieces, name, request.bodies[stem].colour, facts, f"damage site-{number}")
+    left = _find_left(writing, found, rest)
+    for place, T in request.places.items():
+        here: dict[str, NamedShape] = {}
+        for stem, shape in {**sites, **stock}.items():
+            made, fault = writing.save(f"{place}{stem}", shape.name, [_move(shape, T)])
+            here.update((stem, each) for each in made)
+            if fault:
+                _take_fault(writing, stem, fault)
+        writing.exact = [number for number in found if number not in writing.reasons]
+        union = (
+            [_move(shape, T) for shape in _gather_lost(request, sites)]
+            if any(s.accepted for s in request.sites)
+            else []
+        )
+        if left and union:
+            here |= _save_whole(writing, place, [_move(shape, T) for shape in left], union)
+        everything = _collect(request.bodies, here, T)
+        if everything:
+            writing.save(f"{place}result", "result", everything)
+
+
+def _take_fault(writing: Writing, stem: str, fault: str) -> None:
+    """Notes that a file with CAD faces could not be written."""
+    folder, _, number = stem.partition("/site-")
+    if folder == "deposit":
+        writing.forms[int(number)] = DepositForm(reason=f"read back, {fault}")
+    else:
+        writing.reasons[int(number)] = (*writing.reasons.get(int(number), ()), f"read back, {fault}")
+
+
+def _find_left(writing: Writing, found: Mapping[int, Exact], rest: Sequence[Piece]) -> list[NamedShape]:
+    """What is left of each solid of the CAD file. Where an accepted site has no exact form, the solids that it touches
+    have facets; empty where these cannot be made."""
+    request = writing.request
+    accepted = [site for site in request.sites if site.accepted]
+    if not accepted or not {"damage", "undamaged"} <= set(request.bodies):
+        return []
+    if len({piece.owner for piece in rest}) == 1 and not any(site.number in found for site in accepted):
+        writing.notes.append("damage.step and undamaged.step have facets too")
+        return []
+    for site in accepted:
+        if site.number in found:
+            continue
+        cut = cut_facets(rest, site.damage, request.part, request.tolerance)
+        if cut is None:
+            writing.notes.append(f"damage.step and undamaged.step have facets too, because site {site.number} has")
+            return []
+        titles = [_call_solid(writing.facts, piece.owner) for piece in cut if (-1, FACET) in piece.origins]
+        writing.notes.append(
+            f"undamaged.step has facets on {', '.join(dict.fromkeys(titles))}, which site {site.number} touches; "
+            "its other solids have the CAD's faces"
+            if len({piece.owner for piece in cut}) > len(set(titles))
+            else f"undamaged.step has facets, because site {site.number} has"
+        )
+        rest = cut
+    return _name_rest(rest, request.bodies, writing.facts)
+
+
+def _call_solid(facts: CadFacts, owner: int) -> str:
+    return facts.solids[owner] or f"solid {owner + 1}"
+
+
+def _gather_lost(request: Request, sites: Mapping[str, NamedShape]) -> list[NamedShape]:
+    """The accepted damage volumes, with facets where they have no exact form."""
+    lost = []
+    for site in request.sites:
+        stem = f"damage/site-{site.number}"
+        if site.accepted and stem in sites:
+            lost.append(sites[stem])
+        elif site.accepted:
+            body = request.bodies[stem]
+            lost.append(NamedShape(body.name, build_solid(body.solid)[0], body.colour))
+    return lost
+
+
+def _save_whole(
+    writing: Writing, place: str, left: Sequence[NamedShape], union: Sequence[NamedShape]
+) -> dict[str, NamedShape]:
+    """Writes the union of the damage volumes and what is left of the part; gives the latter for the assembly, solid by
+    solid where there are several."""
+    bodies = writing.request.bodies
+    writing.save(f"{place}damage", "damage", [join_named("damage", union, bodies["damage"].colour)])
+    whole = join_named("undamaged part", left, bodies["undamaged"].colour)
+    made, _ = writing.save(f"{place}undamaged", whole.name, [whole])
+    if len(left) == 1 or not made:
+        return {"undamaged": made[0]} if made else {}
+    return {f"undamaged#{number}": each for number, each in enumerate(left)}
+
+
+def _collect(bodies: Mapping[str, Body], shapes: Mapping[str, NamedShape], T: Floats | None) -> list[NamedShape]:
+    """What the assembly holds: what is left of the part, damage volumes and deposits, with facets where they have no
+    exact form."""
+    from damageest.geometry.transforms import move_mesh
+    from damageest_cadquery._step import MAX_FACES
+
+    found = []
+    for stem, body in bodies.items():
+        if stem == "damage" or stem.startswith("doubtful/"):
+            continue
+        apart = [shape for name, shape in shapes.items() if name.startswith(f"{stem}#")]
+        if apart or stem in shapes:
+            found += apart or [shapes[stem]]
+            continue
+        solid = body.solid if T is None else move_mesh(body.solid, T)
+        shape, count = build_solid(solid)
+        if count <= MAX_FACES:
+            found.append(NamedShape(body.name, shape, body.colour))
+    return found
+
+
+def _name(pieces: Sequence[Piece], name: str, colour: Colour, facts: CadFacts, inner: str) -> NamedShape:
+    """One shape of pieces, whose faces have the names and colours of the CAD faces that they come from."""
+    names, colours = [], []
+    for piece in pieces:
+        for number, tool in piece.origins:
+            if tool == STOCK:
+                names.append(f"stock on {facts.names[number]}" if number >= 0 else "side of the stock")
+                colours.append(TOP if number >= 0 else SIDE)
+                continue
+            if tool == FACET:
+                names.append("facet")
+                colours.append(PLAIN)
+                continue
+            names.append(facts.names[number] if number >= 0 else f"{inner} inner {tool + 1}")
+            colours.append((facts.colours[number] or PLAIN) if number >= 0 else INNER)
+    return NamedShape(name, join_shapes([piece.shape for piece in pieces]), colour, names, colours)
+
+
+def _name_rest(rest: Sequence[Piece], bodies: Mapping[str, Body], facts: CadFacts) -> list[NamedShape]:
+    """What is left of each solid of the CAD file."""
+    colour, shapes = bodies["undamaged"].colour, []
+    for owner in sorted({piece.owner for piece in rest}):
+        own = [piece for piece in rest if piece.owner == owner]
+        title = f"undamaged {_call_solid(facts, owner)}" if len(facts.solids) > 1 else "undamaged part"
+        shapes.append(_name(own, title, colour, facts, "undamaged"))
+    return shapes
+
+
+def join_named(name: str, shapes: Sequence[NamedShape], colour: Colour) -> NamedShape:
+    """Several shapes as one; a face without a name keeps none."""
+    if len(shapes) == 1:
+        return replace(shapes[0], name=name)
+    from OCP.TopAbs import TopAbs_FACE
+
+    names: list[str] = []
+    colours: list[Colour | None] = []
+    for each in shapes:
+        count = len(explore(each.shape, TopAbs_FACE))
+        names += each.names or [""] * count
+        colours += each.colours or [None] * count
+    return NamedShape(name, join_shapes([each.shape for each in shapes]), colour, names, colours)
+
+
+def _move(shape: NamedShape, T: Floats | None) -> NamedShape:
+    return shape if T is None else replace(shape, shape=scale_shape(shape.shape, 1.0, T))

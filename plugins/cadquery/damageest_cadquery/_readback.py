@@ -1,0 +1,79 @@
+"""Reads a written STEP file back and compares it with the shape that it was to hold.
+
+OpenCASCADE's writer leaves out a face that it cannot translate, and its reader one that it cannot make: a file that was
+written without an error can hold an open shell. So each file is measured as another program would find it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damageest.errors import InputError
+from damageest_cadquery._check import measure_area
+from damageest_cadquery._read import explore, read_shape
+from damageest_cadquery._split import measure_volume
+
+SAME = 1e-3
+"""Largest relative difference between a solid's volume, or a surface's area, in the file and before."""
+INVALID = "a solid in it is not valid (BRepCheck)"
+
+
+def find_fault(path: Path, shape: Any, volumes: Sequence[float] = ()) -> str:
+    """What is wrong with a file that was to hold ``shape``, in words; empty where nothing is.
+
+    ``volumes``: of the solids in mm³, where they are known better than from the shape.
+    """
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
+    from OCP.TopoDS import TopoDS
+
+    try:
+        found = read_shape(path)
+    except InputError as error:
+        return f"it cannot be read: {error}"
+    solids, wanted = explore(found, TopAbs_SOLID), explore(shape, TopAbs_SOLID)
+    if len(solids) != len(wanted):
+        return f"it holds {len(solids)} of {len(wanted)} solids"
+    shells = [shell for solid in solids for shell in explore(solid, TopAbs_SHELL)]
+    if not all(BRep_Tool.IsClosed_s(TopoDS.Shell_s(shell)) for shell in shells):
+        return "a solid in it is open"
+    if not solids:
+        areas = [[sum(map(measure_area, explore(each, TopAbs_FACE)))] for each in (found, shape)]
+        fault = _compare(areas[0], areas[1], "area of the surface")
+    elif volumes:
+        fault = _compare_volumes(solids, [], volumes, measure_quickly)
+    else:
+        # over long splines the quick integrals are wrong, but by the same share where the faces are the same
+        fault = _compare_volumes(solids, wanted, (), measure_quickly)
+        fault = fault and _compare_volumes(solids, wanted, (), measure_volume)
+    if fault:
+        return fault
+    return "" if BRepCheck_Analyzer(found).IsValid() else INVALID
+
+
+def _compare_volumes(
+    solids: Sequence[Any], wanted: Sequence[Any], volumes: Sequence[float], measure: Callable[[Any], float]
+) -> str:
+    before = list(volumes) or [measure(solid) for solid in wanted]
+    return _compare(sorted(map(measure, solids)), sorted(before), "volume of a solid")
+
+
+def _compare(found: Sequence[float], wanted: Sequence[float], what: str) -> str:
+    before = np.asarray(wanted)
+    off = np.abs(np.asarray(found) - before) / np.maximum(np.abs(before), 1e-300)
+    return "" if (off <= SAME).all() else f"the {what} in it differs by {off.max():.2%}"
+
+
+def measure_quickly(solid: Any) -> float:
+    """A volume by OpenCASCADE's fixed number of points."""
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    sizes = GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid, sizes)
+    return float(sizes.Mass())
