@@ -10,11 +10,11 @@ import igl
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.parts import PARTS
 from pydantic import ValidationError
 
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.errors import StageError
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.scan.simulate import Simulate
 
