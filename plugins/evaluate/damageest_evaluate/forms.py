@@ -24,9 +24,9 @@ from damageest.registry import Registry
 from damageest.stages.align.register import Register
 from damageest.stages.scan.simulate import Simulate
 from damageest_evaluate.case import load_part, simulate_scan
-from damageest_evaluate.honesty.parts import NOISE, TOLERANCE, make_named_part
 from damageest_evaluate.parts import PARTS
 from damageest_evaluate.suite import make_cases
+from damageest_evaluate.troubles.parts import NOISE, TOLERANCE, make_named_part
 from damageest_evaluate.variants import VariationRequest
 
 SHAPES = ("plate", "blade", "lever", "ribbed_plate", "keyed_shaft", "rib_bracket")

@@ -39,11 +39,11 @@ def command(
     misplaced views, and others. A result is silent where it is wrong and nothing in it says so.
     """
     from damageest.registry import Registry
-    from damageest_evaluate.honesty.report import describe_case, format_trouble_row, make_trouble_tables
-    from damageest_evaluate.honesty.suite import make_trouble_cases
     from damageest_evaluate.job import fingerprint_code
     from damageest_evaluate.readme import replace_between_marks
     from damageest_evaluate.rows import run_all
+    from damageest_evaluate.troubles.report import describe_case, format_trouble_row, make_trouble_tables
+    from damageest_evaluate.troubles.suite import make_trouble_cases
 
     if write:
         replace_between_marks(write, None, "honesty")  # fails before the runs start if the marks are missing

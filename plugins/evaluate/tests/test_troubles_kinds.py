@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from damageest_evaluate.honesty.case import TroubleCase, make_scan, make_scene
-from damageest_evaluate.honesty.kinds import TROUBLES
-from damageest_evaluate.honesty.parts import NAMES, make_named_part
-from damageest_evaluate.honesty.report import format_trouble_row, make_trouble_tables
-from damageest_evaluate.honesty.suite import make_trouble_cases
-from damageest_evaluate.honesty.views import measure_seen_share, place_scanners, scan_surface
+from damageest_evaluate.troubles.case import TroubleCase, make_scan, make_scene
+from damageest_evaluate.troubles.kinds import TROUBLES
+from damageest_evaluate.troubles.parts import NAMES, make_named_part
+from damageest_evaluate.troubles.report import format_trouble_row, make_trouble_tables
+from damageest_evaluate.troubles.suite import make_trouble_cases
+from damageest_evaluate.troubles.views import measure_seen_share, place_scanners, scan_surface
 
 from damageest.artefacts import Mesh
 from damageest.errors import InputError

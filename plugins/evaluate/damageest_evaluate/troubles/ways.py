@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from damageest_evaluate.honesty.scene import Scanning, TroubleScene
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Mesh
-from damageest_evaluate.honesty.parts import make_named_part
-from damageest_evaluate.honesty.scene import Scanning, TroubleScene
+from damageest_evaluate.troubles.parts import make_named_part
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene
 
 
 def scan_other_part(case: Scanning) -> TroubleScene:

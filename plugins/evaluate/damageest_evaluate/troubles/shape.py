@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
-from damageest_evaluate.honesty.scene import Scanning, TroubleScene
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene
 
 
 def scale_scan(case: Scanning) -> TroubleScene:

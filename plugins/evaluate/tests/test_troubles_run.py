@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from damageest_evaluate.honesty.case import run_case
-from damageest_evaluate.honesty.suite import make_trouble_cases
 from damageest_evaluate.rows import read_rows
+from damageest_evaluate.troubles.case import run_case
+from damageest_evaluate.troubles.suite import make_trouble_cases
 from evaluate_calls import evaluate
 from typer.testing import CliRunner
 

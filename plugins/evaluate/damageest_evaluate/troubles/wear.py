@@ -9,10 +9,10 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.geometry.solids import to_manifold
-from damageest_evaluate.honesty.lost import make_box
-from damageest_evaluate.honesty.names import SHALLOW
-from damageest_evaluate.honesty.scene import Scanning, TroubleScene
-from damageest_evaluate.honesty.ways import Trouble, TroubleWay
+from damageest_evaluate.troubles.lost import make_box
+from damageest_evaluate.troubles.names import SHALLOW
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene
+from damageest_evaluate.troubles.ways import Trouble, TroubleWay
 
 FAR = 1000.0
 """Half the edge of a box that stands for half of space, in mm."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Solid
 from damageest.stages.scan.deformation import Deformation, deform
-from damageest_evaluate.honesty.names import BENT, NOISE, SCALE, VIEWS
-from damageest_evaluate.honesty.scanner import make_wavy
-from damageest_evaluate.honesty.scene import Scanning, TroubleScene
-from damageest_evaluate.honesty.ways import Trouble, TroubleWay
+from damageest_evaluate.troubles.names import BENT, NOISE, SCALE, VIEWS
+from damageest_evaluate.troubles.scanner import make_wavy
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene
+from damageest_evaluate.troubles.ways import Trouble, TroubleWay
 
 
 def scale_part(case: Scanning) -> TroubleScene:

@@ -9,8 +9,8 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.rays import RayCaster
-from damageest_evaluate.honesty.lost import bite_wall, lose_rib
-from damageest_evaluate.honesty.scene import Scanning, TroubleScene, evaluate_waves, make_random_waves
+from damageest_evaluate.troubles.lost import bite_wall, lose_rib
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene, evaluate_waves, make_random_waves
 
 
 def scan_intact(case: Scanning) -> TroubleScene:

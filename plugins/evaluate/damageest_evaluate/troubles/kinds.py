@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from damageest_evaluate.honesty import clutter, frame, lost, scanner, shape, wear
-from damageest_evaluate.honesty.form import FORM_TROUBLES
-from damageest_evaluate.honesty.names import (
+from damageest_evaluate.troubles import clutter, frame, lost, scanner, shape, wear
+from damageest_evaluate.troubles.form import FORM_TROUBLES
+from damageest_evaluate.troubles.names import (
     BENT,
     CLUTTER,
     COARSE,
@@ -20,7 +20,7 @@ from damageest_evaluate.honesty.names import (
     UNSEEN,
     VIEWS,
 )
-from damageest_evaluate.honesty.ways import Trouble, TroubleWay, scan_from_few, scan_partly, spread_over
+from damageest_evaluate.troubles.ways import Trouble, TroubleWay, scan_from_few, scan_partly, spread_over
 
 TROUBLES: dict[str, Trouble] = {
     "ordinary damage": Trouble(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from damageest.errors import InputError, suggest
-from damageest_evaluate.honesty.case import TroubleCase
-from damageest_evaluate.honesty.kinds import TROUBLES
-from damageest_evaluate.honesty.parts import NAMES
+from damageest_evaluate.troubles.case import TroubleCase
+from damageest_evaluate.troubles.kinds import TROUBLES
+from damageest_evaluate.troubles.parts import NAMES
 
 POINTS = 50_000
 """Points of a scan."""

@@ -1,6 +1,6 @@
 """One case of the suite, from the trouble to the judgement, as a row of values that JSON can hold.
 
-``python -m damageest_evaluate.honesty.case CASE`` runs one case, given as JSON, and prints its row.
+``python -m damageest_evaluate.troubles.case CASE`` runs one case, given as JSON, and prints its row.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from damageest.geometry.transforms import invert_pose
 from damageest.isolation import cpu_seconds
 from damageest.registry import Registry
 from damageest.result import Result
-from damageest_evaluate.honesty.classify import (
+from damageest_evaluate.processes import MARK
+from damageest_evaluate.troubles.classify import (
     TrueState,
     collect_texts,
     judge,
     judge_error,
     measure_seen_error,
 )
-from damageest_evaluate.honesty.kinds import TROUBLES
-from damageest_evaluate.honesty.scene import Scanning, TroubleScene
-from damageest_evaluate.processes import MARK
+from damageest_evaluate.troubles.kinds import TROUBLES
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class TroubleCase:
     ``number``: the case's place in the whole suite, from 1. ``source``: digest of the code.
     """
 
-    module: ClassVar[str] = "damageest_evaluate.honesty.case"
+    module: ClassVar[str] = "damageest_evaluate.troubles.case"
     kind: str
     part: str
     seed: int

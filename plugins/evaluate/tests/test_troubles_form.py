@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damageest_evaluate.honesty.form import FORM_TROUBLES
-from damageest_evaluate.honesty.kinds import TROUBLES
-from damageest_evaluate.honesty.scene import Scanning
+from damageest_evaluate.troubles.form import FORM_TROUBLES
+from damageest_evaluate.troubles.kinds import TROUBLES
+from damageest_evaluate.troubles.scene import Scanning
 
 from damageest.geometry.distance import distance_to_mesh
 

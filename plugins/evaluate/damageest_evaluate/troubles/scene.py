@@ -12,8 +12,8 @@ from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.stages.scan.scanner import apply_tools
 from damageest_evaluate.damages import make_random_damage
-from damageest_evaluate.honesty.parts import NOISE, TOLERANCE, make_named_part
-from damageest_evaluate.honesty.views import measure_seen_share, place_scanners, scan_surface
+from damageest_evaluate.troubles.parts import NOISE, TOLERANCE, make_named_part
+from damageest_evaluate.troubles.views import measure_seen_share, place_scanners, scan_surface
 
 
 @dataclass(frozen=True, eq=False)

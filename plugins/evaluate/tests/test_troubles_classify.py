@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_evaluate.honesty.classify import (
+from damageest_evaluate.troubles.classify import (
     TrueState,
     find_motion,
     find_name,

@@ -11,9 +11,9 @@ from damageest.artefacts import Flags, Solid
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
-from damageest_evaluate.honesty.parts import WALL_HEIGHT
-from damageest_evaluate.honesty.scene import Scanning, TroubleScene
-from damageest_evaluate.honesty.views import place_scanners, scan_surface
+from damageest_evaluate.troubles.parts import WALL_HEIGHT
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene
+from damageest_evaluate.troubles.views import place_scanners, scan_surface
 
 
 def make_box(low: tuple[float, ...], high: tuple[float, ...]) -> Any:

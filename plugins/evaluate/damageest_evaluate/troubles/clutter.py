@@ -10,9 +10,9 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh, Solid
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import concatenate_meshes, to_solid
-from damageest_evaluate.honesty.scanner import find_normals
-from damageest_evaluate.honesty.scene import Scanning, TroubleScene
-from damageest_evaluate.honesty.views import DISTANCE, scan_surface
+from damageest_evaluate.troubles.scanner import find_normals
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene
+from damageest_evaluate.troubles.views import DISTANCE, scan_surface
 
 
 def leave_table(case: Scanning) -> TroubleScene:
