@@ -12,7 +12,7 @@ import pytest
 from damageest.errors import InputError, StageError
 from damageest.io import file_memory
 from damageest.io.points import read_points
-from damageest.isolation import foresee
+from damageest.isolation import memory
 from tests.faults import seeds
 
 SCRIPT = """
@@ -143,21 +143,21 @@ def test_an_estimate_is_right_within_a_factor_of_two(what: tuple[str, ...]) -> N
 
 
 def test_too_much_is_refused_with_both_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(foresee, "measure_free_memory", lambda: 3 * 10**9)
-    foresee.require_memory(2.9e9, "a grid", "a larger tolerance")
+    monkeypatch.setattr(memory, "measure_free_memory", lambda: 3 * 10**9)
+    memory.require_memory(2.9e9, "a grid", "a larger tolerance")
     with pytest.raises(
         StageError, match=r"would need about 3\.1 GB of memory for a grid, but 3 GB are free"
     ) as refused:
-        foresee.require_memory(3.1e9, "a grid", "a larger tolerance")
+        memory.require_memory(3.1e9, "a grid", "a larger tolerance")
     assert "try: a larger tolerance" in str(refused.value)
-    monkeypatch.setattr(foresee, "measure_free_memory", lambda: None)
-    foresee.require_memory(1e15, "a grid on a system that tells nothing", "")
+    monkeypatch.setattr(memory, "measure_free_memory", lambda: None)
+    memory.require_memory(1e15, "a grid on a system that tells nothing", "")
 
 
 def test_the_limit_of_the_process_counts() -> None:
     """As --memory and ``ulimit -v`` set it."""
     script = (
-        "import resource; from damageest.isolation.foresee import require_memory\n"
+        "import resource; from damageest.isolation.memory import require_memory\n"
         "resource.setrlimit(resource.{}, (600 * 10**6,) * 2)\n"
         "require_memory(1e8 + 1, 'little', ''); require_memory(7e8, 'much', '')"
     )
@@ -170,9 +170,9 @@ def test_the_limit_of_the_process_counts() -> None:
 def test_a_file_that_does_not_fit_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "scan.ply"
     path.write_bytes(seeds.seed("little.ply"))
-    monkeypatch.setattr(foresee, "measure_free_memory", lambda: 10_000)
+    monkeypatch.setattr(memory, "measure_free_memory", lambda: 10_000)
     assert len(read_points(path).points) == seeds.POINTS, "little is not asked for"
-    monkeypatch.setattr(foresee, "WORTH_ASKING", 1000)
+    monkeypatch.setattr(memory, "WORTH_ASKING", 1000)
     with pytest.raises(InputError, match=r"scan\.ply: would need about .* are free\n  try: a machine with more memory"):
         read_points(path)
     assert set(file_memory.TIMES) >= {".ply", ".e57", ".laz", ".3mf"}
