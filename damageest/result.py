@@ -1,4 +1,4 @@
-"""What a run found, as values; `report/` has what result.json says of them."""
+"""What a run found, as values; `output/` has what result.json says of them."""
 
 from __future__ import annotations
 

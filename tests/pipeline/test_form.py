@@ -12,7 +12,7 @@ import damageest
 from damageest.artefacts import Scan
 from damageest.errors import DamageestError
 from damageest.io.meshes import write_points, write_stl
-from damageest.report.result_json import build_report
+from damageest.output.result_json import build_report
 from damageest.stages.scan.deformation import Deformation, deform
 from tests.checks.form_scenes import TOLERANCE, add_noise, draw_skin, get_part
 

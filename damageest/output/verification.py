@@ -8,7 +8,7 @@ from typing import Any
 
 from damageest.errors import InputError
 from damageest.io.files import file_sha256
-from damageest.report.provenance import describe_system, list_packages, seal
+from damageest.output.provenance import describe_system, list_packages, seal
 
 DATED = ("job.yaml", "report.html")
 """Files that are not compared after a repeated run: they contain paths, the report its date as well."""

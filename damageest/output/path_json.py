@@ -7,7 +7,7 @@ import math
 from pydantic import Field
 
 from damageest.artefacts import DepositPath, Vector
-from damageest.report.base import JsonModel
+from damageest.output.base import JsonModel
 from damageest.result import Site
 from damageest.stages.export import ExportedFiles
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from damageest.findings import Interval
-from damageest.report.base import JsonModel
+from damageest.output.base import JsonModel
 from damageest.result import Site
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import ADDED, DAMAGE, INTACT, OUTLIER, Deviation, Floats
-from damageest.report.base import JsonModel
+from damageest.output.base import JsonModel
 
 PERCENTILES = (1, 5, 25, 50, 75, 95, 99)
 

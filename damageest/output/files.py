@@ -8,8 +8,8 @@ from typing import Any
 
 from damageest.job import yamlfile
 from damageest.job.model import Job, to_plain
-from damageest.report.provenance import build_provenance, seal
-from damageest.report.result_json import build_report
+from damageest.output.provenance import build_provenance, seal
+from damageest.output.result_json import build_report
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 

@@ -8,9 +8,9 @@ from typing import Literal
 from pydantic import Field
 
 from damageest.artefacts import Deposit, Vector
-from damageest.report.base import JsonModel
-from damageest.report.path_json import PathReport, report_path
-from damageest.report.uncertainty_json import UncertaintyReport, report_interval, report_uncertainty
+from damageest.output.base import JsonModel
+from damageest.output.path_json import PathReport, report_path
+from damageest.output.uncertainty_json import UncertaintyReport, report_interval, report_uncertainty
 from damageest.result import Site
 from damageest.stages.export import ExactForm, ExportedFiles
 

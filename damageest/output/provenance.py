@@ -18,7 +18,7 @@ from pydantic import Field
 from damageest.artefacts import Part, Scan
 from damageest.io.files import file_sha256
 from damageest.job.model import Job, find_paths, to_plain
-from damageest.report.base import JsonModel
+from damageest.output.base import JsonModel
 
 
 class FileReport(JsonModel):

@@ -15,7 +15,7 @@ from damageest.geometry.rays import RayCaster
 from damageest.geometry.solids import concatenate_meshes
 from damageest.geometry.views import DIRECTIONS, OVERVIEWS, choose_view
 from damageest.io import colours
-from damageest.report.output_folder import OutputFolder
+from damageest.output.folder import OutputFolder
 
 Look = Literal["damage", "points", "deviation", "deposit", "stock"]
 LOOKS: tuple[Look, ...] = ("damage", "points", "deviation", "deposit", "stock")

@@ -7,14 +7,14 @@ from typing import Any, Literal
 from pydantic import Field
 
 from damageest.artefacts import Floats, Vector
-from damageest.report.base import JsonModel
-from damageest.report.deviation_json import DeviationReport, report_deviation
-from damageest.report.fit_json import FitReport, report_fit
-from damageest.report.free_json import FreeMotionReport, report_free_motion
-from damageest.report.provenance import ProvenanceReport
-from damageest.report.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
-from damageest.report.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
-from damageest.report.uncertainty_json import report_interval
+from damageest.output.base import JsonModel
+from damageest.output.deviation_json import DeviationReport, report_deviation
+from damageest.output.fit_json import FitReport, report_fit
+from damageest.output.free_json import FreeMotionReport, report_free_motion
+from damageest.output.provenance import ProvenanceReport
+from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
+from damageest.output.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
+from damageest.output.uncertainty_json import report_interval
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from damageest.artefacts import Vector
 from damageest.findings import Coverage, Surplus
-from damageest.report.base import JsonModel
+from damageest.output.base import JsonModel
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
