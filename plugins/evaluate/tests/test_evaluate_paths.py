@@ -3,39 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
 from damageest_evaluate.paths.check import count_crossings, measure_nozzle
 from damageest_evaluate.paths.run import evaluate_scene, make_table
 from damageest_evaluate.paths.scenes import MAKERS, make_random
-from damageest_paths.layers import Layers, Nozzle
-from manifold3d import Manifold
 
-from damageest.artefacts import DepositPath, Solid
-from damageest.geometry.solids import to_arrays
-
-BLOCK = Manifold.cube((40, 30, 20)).translate((-20, -15, -20))
-DENT = Manifold.sphere(14, 64).translate((0, 0, 10))
-LOST, LEFT = Solid(*to_arrays(BLOCK ^ DENT)), Solid(*to_arrays(BLOCK - DENT))
-
-
-@cache
-def plan_dent() -> DepositPath:
-    """The path for a shallow dent in the top of a block, open upward."""
-    nozzle = Nozzle(tip_radius=1.0, cone_angle=25.0, length=60.0, body_radius=12.0)
-    options: dict[str, Any] = {
-        "height": 1.0,
-        "width": 2.0,
-        "feed": 600.0,
-        "standoff": 3.0,
-        "direction": (0.0, 0.0, 1.0),
-    }
-    path = Layers(nozzle=nozzle, simulate=False, **options).run(body=LOST, left=LEFT, built=None, tolerance=0.05)
-    assert path is not None
-    return path
+from tests.path_shapes import dent, plan
 
 
 @pytest.mark.slow
@@ -51,14 +26,15 @@ def test_a_tooth_is_built_up_with_five_axes_and_nothing_is_touched() -> None:
 
 
 def test_the_check_sees_a_nozzle_in_metal() -> None:
-    path = plan_dent()
-    assert measure_nozzle(path, LEFT, 0.2) >= 0.75 * min(path.clearance, path.travel_clearance)
+    loss = dent()
+    path = plan(loss, direction=(0.0, 0.0, 1.0), simulate=False)
+    assert measure_nozzle(path, loss.left, 0.2) >= 0.75 * min(path.clearance, path.travel_clearance)
     lower = replace(path, points=path.points - [0, 0, path.standoff + 0.01])
-    assert measure_nozzle(lower, LEFT, 5.0) == pytest.approx(0, abs=1e-9)
+    assert measure_nozzle(lower, loss.left, 5.0) == pytest.approx(0, abs=1e-9)
 
 
 def test_the_check_sees_a_pass_that_crosses_itself() -> None:
-    path = plan_dent()
+    path = plan(dent(), direction=(0.0, 0.0, 1.0), simulate=False)
     assert count_crossings(path) == 0
     points = path.points.copy()
     own = np.flatnonzero(path.on & (path.number == path.passes))

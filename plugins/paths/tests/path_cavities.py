@@ -13,9 +13,9 @@ from damageest_paths.planar import Surroundings
 from damageest_paths.process import Process
 from damageest_paths.stripes import Bead
 from manifold3d import CrossSection, Manifold
-from path_shapes import BLOCK, Loss, cut
 
 from damageest.geometry.solids import to_manifold, to_solid
+from tests.path_shapes import BLOCK, Loss, cut
 
 BORE, DEPTH, LONG = 20.0, 3.0, 16.0
 """Radius of the bore, depth of its groove, length of the half shell."""

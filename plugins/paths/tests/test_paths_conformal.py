@@ -13,10 +13,10 @@ from damageest_paths.process import Pass, Plan
 from damageest_paths.regions import measure_length
 from manifold3d import Manifold
 from path_cavities import BALL, BORE, DEPTH, bowl, groove, pocket, prepare, stair, tip
-from path_shapes import Loss, cut
 
 from damageest.artefacts import Floats
 from damageest.geometry.distance import distance_to_edges
+from tests.path_shapes import Loss, cut
 
 MAKERS = {"groove": groove, "bowl": bowl, "pocket": pocket, "tip": tip}
 

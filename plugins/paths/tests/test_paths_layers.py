@@ -10,13 +10,13 @@ import pytest
 from damageest_evaluate.paths.check import measure_nozzle
 from damageest_paths.layers import Layers
 from path_cavities import bowl, groove, stair, tip
-from path_shapes import NOZZLE, OPTIONS, TOLERANCE, Loss, corner, dent, plan, slot
 from pydantic import ValidationError
 
 from damageest.artefacts import DepositPath, Mesh, Solid
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.transforms import turn_to_axis
+from tests.path_shapes import NOZZLE, OPTIONS, TOLERANCE, Loss, corner, dent, plan, slot
 
 UP = (0.0, 0.0, 1.0)
 

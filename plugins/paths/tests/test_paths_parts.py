@@ -13,10 +13,10 @@ from damageest_paths.nozzle import Cone, Nozzle, make_nozzle, make_nozzle_mesh
 from damageest_paths.obstacles import Obstacles, draw_passes
 from damageest_paths.process import Pass
 from manifold3d import Manifold
-from path_shapes import BLOCK, Loss, cut, dent, plan
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
+from tests.path_shapes import BLOCK, Loss, cut, dent, plan
 
 UP = np.array([0.0, 0.0, 1.0])
 

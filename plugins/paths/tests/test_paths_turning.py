@@ -7,9 +7,9 @@ from damageest_evaluate.paths.check import measure_nozzle
 from damageest_paths.axes import list_axes
 from damageest_paths.turning import BLOCKED, plan_course, turn_evenly
 from manifold3d import Manifold
-from path_shapes import Loss, cut, plan
 
 from damageest.artefacts import DepositPath, Floats
+from tests.path_shapes import Loss, cut, plan
 
 AXES = list_axes(np.radians(60))
 LINE = np.column_stack([np.linspace(0, 20, 81), np.zeros(81), np.zeros(81)])
