@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from damageest.api import run as run
     from damageest.batches.run import batch as batch
     from damageest.job import Job as Job
+    from damageest.pipeline.prepare import read_inputs as read_inputs
+    from damageest.pipeline.prepare import read_part as read_part
     from damageest.registry import Registry as Registry
     from damageest.registry.hookspecs import hookimpl as hookimpl
     from damageest.result import Result as Result
@@ -19,10 +21,12 @@ _PUBLIC = {
     "run": "damageest.api",
     "hookimpl": "damageest.registry.hookspecs",
     "Job": "damageest.job",
+    "read_inputs": "damageest.pipeline.prepare",
+    "read_part": "damageest.pipeline.prepare",
     "Registry": "damageest.registry",
     "Result": "damageest.result",
 }
-__all__ = ["Job", "Registry", "Result", "__version__", "batch", "hookimpl", "run"]
+__all__ = ["Job", "Registry", "Result", "__version__", "batch", "hookimpl", "read_inputs", "read_part", "run"]
 
 
 def __getattr__(name: str) -> Any:

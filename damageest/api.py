@@ -14,6 +14,7 @@ from damageest.errors import InputError, StageError
 from damageest.io.files import resolve_path
 from damageest.isolation import Limits, keep_one_thread
 from damageest.job import Job, load
+from damageest.output.files import describe_job, describe_result, write_report
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
 from damageest.pipeline.routes import SHOW, WRITE, route_of
@@ -21,7 +22,6 @@ from damageest.pipeline.state import JobState, Work
 from damageest.pipeline.workspace import open_workspace
 from damageest.registry import Registry
 from damageest.registry.contracts import Contract
-from damageest.report.files import describe_job, describe_result, write_report
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 from damageest.stages.part import ReadPart

@@ -1,8 +1,8 @@
-"""What a run found, as values; `report/` has what result.json says of them."""
+"""What a run found, as values; `output/` has what result.json says of them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
@@ -122,7 +122,7 @@ class Result:
     accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
     sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
     volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
-    high end.
+    high end. ``conversions``: what plugins can convert it to, see `convert`.
     """
 
     name: str
@@ -145,6 +145,7 @@ class Result:
     surplus: tuple[Surplus, ...] = ()
     fit: ModelFit | None = None
     volume_95: Interval | None = None
+    conversions: Mapping[str, Conversion] = field(default_factory=dict, repr=False)
 
     @property
     def status(self) -> Literal["ok", "incomplete"]:
@@ -194,15 +195,18 @@ class Result:
         """A ``cadquery.Shape`` with the faces of the part's CAD file: the part, what is ``undamaged`` of it, or the
         ``damage`` of a site. In the part's frame and in ``units``.
 
-        It takes the plugin cadquery, a part from STEP, IGES or BREP, and some seconds for each site. Raises ValueError
-        for another name, InputError where the part has no CAD faces or there is no exact form.
+        It takes a part from STEP, IGES or BREP, and some seconds for each site. Raises ValueError for another name,
+        InputError where the part has no CAD faces, there is no exact form, or no plugin converts to CadQuery.
         """
-        from importlib import import_module
-        from importlib.util import find_spec
+        return self.convert("cadquery", what, site)
 
-        if find_spec("damageest_cadquery") is None:
-            raise InputError("as_cadquery needs the plugin damageest-cadquery; install it, or take as_trimesh")
-        return import_module("damageest_cadquery.exact").as_cadquery(self, what, site)
+    def convert(self, kind: str, what: str, site: int | None = None) -> Any:
+        """An object of another library, made by a plugin's hook ``damageest_conversions``. ``kind``: the plugin's name
+        for it; ``what`` and ``site`` as in `mesh`. Raises InputError where no plugin makes it."""
+        if kind not in self.conversions:
+            known = ", ".join(sorted(self.conversions)) or "none"
+            raise InputError(f"no plugin here converts a result to '{kind}'; there are: {known}")
+        return self.conversions[kind](self, what, site)
 
     def _transform_to(self, frame: str) -> Floats | None:
         """T (4,4) that takes a point of the part to a frame; None for the part's own."""
@@ -224,3 +228,8 @@ def _require_solid(mesh: Mesh, what: str) -> Solid:
     if not isinstance(mesh, Solid):
         raise ValueError(f"{what} is an open mesh, and manifold3d takes solids; take as_trimesh")
     return mesh
+
+
+Conversion = Callable[[Result, str, int | None], Any]
+"""Makes an object of another library from a result, from what `Result.mesh` calls it by: its name, and the number of a
+site or None."""

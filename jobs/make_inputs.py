@@ -6,9 +6,9 @@ from pathlib import Path
 
 import cadquery as cq
 import numpy as np
+from damageest_evaluate.parts import PARTS
 
 from damageest.artefacts import Part, Solid
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.io.meshes import write_points, write_stl
 from damageest.stages.scan.simulate import Simulate

@@ -25,7 +25,9 @@ PLUGINS = tuple(sorted(path.parent.name for path in (Path(__file__).parents[1] /
 def find_obstacle(plugin: str) -> str:
     """Which system library the plugin lacks here, and what to do; empty where it can be used."""
     try:
-        importlib.import_module(f"damageest_{plugin}").damageest_stages()
+        module = importlib.import_module(f"damageest_{plugin}")
+        if hasattr(module, "damageest_stages"):
+            module.damageest_stages()
     except PluginError as error:
         return f"{error}; {error.remedy}"
     return ""

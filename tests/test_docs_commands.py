@@ -8,14 +8,15 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
-import click
 import pytest
+import typer
+from damageest_evaluate.readme import MATRIX
+from damageest_evaluate.report import make_legend
 from typer.main import get_command
 
 from damageest.cli import app
-from damageest.evaluate.readme import MATRIX
-from damageest.evaluate.report import make_legend
 from damageest.job import load
 from damageest.job.yamlfile import parse
 from damageest.registry import Registry
@@ -43,9 +44,9 @@ SHOWN = [(page, words) for page in PAGES for words in commands(page)]
 
 @pytest.mark.parametrize(("page", "words"), SHOWN, ids=[f"{p.name}: {' '.join(w)[:60]}" for p, w in SHOWN])
 def test_a_command_is_one(page: Path, words: list[str]) -> None:
-    command: click.Command = get_command(app)
-    context = click.Context(command, info_name="damageest")
-    while words and isinstance(command, click.Group) and not words[0].startswith("-"):
+    command: Any = get_command(app)
+    context = typer.Context(command, info_name="damageest")
+    while words and hasattr(command, "get_command") and not words[0].startswith("-"):
         found = command.get_command(context, words[0])
         assert found is not None, f"there is no command {words[0]}"
         command, words = found, words[1:]
@@ -54,6 +55,19 @@ def test_a_command_is_one(page: Path, words: list[str]) -> None:
     named = [word for word in words if word.startswith("jobs/") and not word.startswith("jobs/out/")]
     written_there = {"jobs/my_block.yaml"}
     assert all((ROOT / name).is_file() or name in written_there for name in named), "the file is there"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("nonsense", "there is no command nonsense"),
+        ("run job.yaml --nonsense", "No such option: --nonsense"),
+        ("evaluate suite --cases many", "valid int"),
+    ],
+)
+def test_a_command_that_is_none_is_seen(line: str, said: str) -> None:
+    with pytest.raises(Exception, match=said):
+        test_a_command_is_one(PAGES[0], line.split())
 
 
 def test_pages_show_commands() -> None:

@@ -7,24 +7,47 @@ from pathlib import Path
 
 import pytest
 
+import damageest
+from damageest import isolation, job
+from damageest import registry as registry_package
+
 PLUGINS = Path(__file__).parent.parent / "plugins"
-FILES = sorted(path for path in PLUGINS.glob("*/damageest_*/**/*.py") if path.parent.name != "evaluate")
-"""All but evaluations, which run jobs and draw random damages as those of damageest do."""
+FILES = sorted(PLUGINS.glob("*/damageest_*/**/*.py"))
 
 PUBLIC_NAMES = {
-    "damageest": {"hookimpl"},
-    "damageest.isolation": {"call_isolated", "end_with_parent", "require_memory"},
+    "damageest": set(damageest.__all__) | {""},
+    "damageest.isolation": set(isolation.__all__),
+    "damageest.job": set(job.__all__),
+    "damageest.registry": set(registry_package.__all__),
 }
-"""Modules of which only some names are public."""
+"""Packages of which only the names that they list are public, without their modules."""
 PUBLIC_MODULES = {
     "damageest.artefacts",
+    "damageest.batches.cluster",
+    "damageest.batches.tasks",
     "damageest.errors",
+    "damageest.findings",
     "damageest.geometry",
     "damageest.io",
+    "damageest.registry.contracts",
     "damageest.registry.system_libraries",
-    "damageest.result",  # what an export gets
+    "damageest.result",
 }
 """Public modules, with the modules in them."""
+EXCEPTIONS = {
+    "damageest_evaluate": {
+        "damageest.checks.model_fit",
+        "damageest.checks.scan_quality",
+        "damageest.job.yamlfile",
+        "damageest.stages.align.register",
+        "damageest.stages.scan.deformation",
+        "damageest.stages.scan.scanner",
+        "damageest.stages.scan.simulate",
+        "damageest.stages.scan.tools",
+    },
+}
+"""Modules that one plugin uses although they are not public: the evaluation makes its scans with the virtual scanner,
+and measures single steps of a run. The list in pyproject.toml is the same."""
 
 
 def is_public(module: str, name: str) -> bool:
@@ -73,6 +96,12 @@ def list_private_attributes(source: str) -> list[str]:
     ]
 
 
+def test_exceptions_are_needed() -> None:
+    for plugin, modules in EXCEPTIONS.items():
+        sources = [file.read_text(encoding="utf-8") for file in FILES if file.relative_to(PLUGINS).parts[1] == plugin]
+        assert modules == {name for text in sources for name, _ in list_imports(text)} & modules
+
+
 def test_there_are_plugins() -> None:
     assert {file.relative_to(PLUGINS).parts[0] for file in FILES} >= {"cadquery", "octree", "open3d", "sweep"}
 
@@ -80,7 +109,12 @@ def test_there_are_plugins() -> None:
 @pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(PLUGINS)))
 def test_a_plugin_uses_public_names_only(file: Path) -> None:
     source = file.read_text(encoding="utf-8")
-    private = [f"{module}: {name}" for module, name in list_imports(source) if not is_public(module, name)]
+    excepted = EXCEPTIONS.get(file.relative_to(PLUGINS).parts[1], set())
+    private = [
+        f"{module}: {name}"
+        for module, name in list_imports(source)
+        if not is_public(module, name) and module not in excepted
+    ]
     assert not private + list_private_attributes(source)
 
 
@@ -93,9 +127,10 @@ def test_a_plugin_uses_public_names_only(file: Path) -> None:
         "from damageest.stages.enclose import adaptive",
         "import damageest.stages.enclose.adaptive",
         "from damageest.pipeline.engine import Engine",
-        "from damageest.job import Job",
-        "from damageest import run",
-        "def f():\n    import damageest",
+        "from damageest.job.check import load",
+        "from damageest.batches.run import batch",
+        "from damageest import api",
+        "def f():\n    import damageest.pipeline",
     ],
 )
 def test_private_imports_are_found(line: str) -> None:

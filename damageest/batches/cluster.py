@@ -19,13 +19,13 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "IGL_N
 """Variables with the number of threads of numerical libraries: the jobs share the cores."""
 
 
-def require_dask(command: str, extra: str) -> None:
-    """Raises InputError where Dask is missing. ``extra``: that of damageest which installs it."""
+def require_dask() -> None:
+    """Raises InputError where Dask is missing."""
     try:
         import distributed  # noqa: F401
     except ImportError:
         raise InputError(
-            f"{command} needs dask distributed, which is not installed\n  try: pip install 'damageest[{extra}]'"
+            "damageest batch needs dask distributed, which is not installed\n  try: pip install 'damageest[batch]'"
         ) from None
 
 

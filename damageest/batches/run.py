@@ -59,7 +59,7 @@ def batch(
     Jobs with a result from an earlier call, of which neither the job nor a file nor the code has changed, do not run
     again. Raises JobError where there are no jobs, InputError where no scheduler answers.
     """
-    require_dask("damageest batch", "batch")
+    require_dask()
     words = [jobs] if isinstance(jobs, (str, Path)) else list(jobs)
     found, folder = find_jobs(words, settings), expand_home(Path(output)).absolute()
     if not found:

@@ -10,6 +10,7 @@ from typing import NoReturn
 import typer
 
 from damageest import __version__
+from damageest.cli._commands import Commands
 from damageest.errors import DamageestError, clean_message, describe_missing_library, is_interrupt
 from damageest.isolation.one_thread import ONE_THREAD
 
@@ -18,6 +19,7 @@ INTERRUPTED = 130
 
 app = typer.Typer(
     name="damageest",
+    cls=Commands,
     help="From a CAD part and a 3D scan of the damaged one to the watertight volume of the missing metal.",
     no_args_is_help=True,
     add_completion=False,
@@ -43,7 +45,6 @@ def _options(
 def _add_commands() -> None:
     from damageest.cli import (
         batch,
-        evaluate,
         faces,
         init,
         picture,
@@ -58,7 +59,6 @@ def _add_commands() -> None:
 
     for module in (run, batch, view, picture, verify, validate, init, faces, stages, plugins, schema):
         app.command(module.__name__.rsplit(".", 1)[1])(module.command)
-    app.add_typer(evaluate.app, name="evaluate")
 
 
 _add_commands()
@@ -70,11 +70,7 @@ def main() -> None:
 
     _process.is_command = True
     os.environ.update(ONE_THREAD)
-    built_in = {command.name for command in app.registered_commands} | {group.name for group in app.registered_groups}
-    word = next((argument for argument in sys.argv[1:] if not argument.startswith("-")), "")
     try:
-        if word not in built_in:
-            _add_plugin_commands()
         app()
     except SystemExit as end:
         if end.code == INTERRUPTED:  # typer turns KeyboardInterrupt into it
@@ -115,10 +111,3 @@ def fail(error: Exception) -> None:
             err=True,
         )
     sys.exit(getattr(error, "exit_status", 1))
-
-
-def _add_plugin_commands() -> None:
-    """Adds the commands of plugins. Called only if no built-in command is named, because it loads all plugins."""
-    from damageest.registry.loading import load
-
-    load()[0].hook.damageest_commands(app=app)

@@ -30,8 +30,8 @@ def command(
     import os
 
     from damageest.errors import Fault, JobError, suggest
-    from damageest.report.output_folder import open_output
-    from damageest.report.pictures import LOOKS, SIDES, Picture, draw_picture
+    from damageest.output.folder import open_output
+    from damageest.output.pictures import LOOKS, SIDES, Picture, draw_picture
 
     sides, looks = tuple(SIDES), show or ["damage"]
     for option, given, valid in (("--from", [side] if side else [], sides), ("--show", looks, LOOKS)):

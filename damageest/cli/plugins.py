@@ -6,9 +6,11 @@ import typer
 
 
 def command() -> None:
-    """List installed plugins with licence, stages and export formats, and broken plugins with the reason."""
+    """List installed plugins with licence, stages, export formats and commands, and broken plugins with the reason."""
+    from damageest.cli._commands import load_commands
     from damageest.registry import Registry
 
+    commands = load_commands()
     registry = Registry.discover()
     for provider in registry.providers:
         stages = [f"{i.contract.stage}: {i.name}" for i in registry.implementations if i.provider == provider]
@@ -16,6 +18,8 @@ def command() -> None:
         formats = [name for name, owner in registry.formats.items() if owner == provider]
         shown = stages if len(stages) <= 6 else [f"{len(stages)} stage implementations"]
         shown += [f"export formats: {', '.join(formats)}"] if formats else []
+        added = commands.get(provider.name)
+        shown += [f"commands: {', '.join(added)}"] if added else []
         typer.echo(f"{provider}  {provider.licence}  {', '.join(shown) or ('broken' if broken else 'no stages')}")
         for item in broken:
             typer.echo(f"  broken: {item.reason}\n  try: {item.remedy}")

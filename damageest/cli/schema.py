@@ -21,8 +21,8 @@ def command(
 ) -> None:
     """Print the JSON Schema of the job file, with the options of all installed plugins, or of result.json."""
     from damageest.job.schema import job_schema
+    from damageest.output.result_json import result_schema
     from damageest.registry import Registry
-    from damageest.report.result_json import result_schema
 
     content = job_schema(Registry.discover()) if which is SchemaName.job else result_schema()
     typer.echo(json.dumps(content, indent=2))

@@ -23,8 +23,8 @@ def command(
 
 def _check(folder: Path, rerun: bool) -> int:
     """Prints what changed, and gives the exit status."""
-    from damageest.report.output_folder import open_output
-    from damageest.report.verification import find_changes, find_other_versions
+    from damageest.output.folder import open_output
+    from damageest.output.verification import find_changes, find_other_versions
 
     content = open_output(folder).content
     changes = find_changes(folder, content)
@@ -48,9 +48,9 @@ def _run_again(folder: Path, content: dict[str, object]) -> list[str]:
     from damageest.api import run
     from damageest.errors import InputError
     from damageest.job import load
+    from damageest.output.folder import open_output
+    from damageest.output.verification import find_differences, read_provenance
     from damageest.registry import Registry
-    from damageest.report.output_folder import open_output
-    from damageest.report.verification import find_differences, read_provenance
 
     provenance: dict[str, Any] = read_provenance(folder, content)
     if provenance["given"]:

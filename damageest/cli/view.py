@@ -20,12 +20,12 @@ def command(
     import webbrowser
 
     from damageest.errors import InputError
-    from damageest.report.output_folder import open_output
+    from damageest.output.folder import open_output
 
     output = open_output(folder)
     output.check_site(site)
     if window:
-        from damageest.report.pictures import open_window
+        from damageest.output.pictures import open_window
 
         open_window(output, site)
         return

@@ -12,7 +12,7 @@ from damageest.errors import StageError
 from damageest.geometry.isosurface import extract_region
 from damageest.geometry.poisson import Grid
 from damageest.geometry.refinement import bisect_faces
-from damageest.isolation.foresee import require_memory
+from damageest.isolation.memory import require_memory
 
 Measure = Callable[[Floats], Floats]
 Nearest = Callable[[Floats], tuple[Floats, Floats]]

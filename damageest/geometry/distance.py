@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import list_used
 from damageest.geometry.voxels import order_by_place
-from damageest.isolation.foresee import FEWER_POINTS, require_memory
+from damageest.isolation.memory import FEWER_POINTS, require_memory
 
 BYTES_OF_POINT, BYTES_OF_TRIANGLE = 230, 480
 """Memory of `signed_distance` for each point and each triangle, measured."""

@@ -14,7 +14,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import order_integers
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid
-from damageest.isolation.foresee import FEWER_POINTS, require_memory
+from damageest.isolation.memory import FEWER_POINTS, require_memory
 
 Exact = Callable[[Floats], tuple[Floats, Ints]]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.neighbourhoods import find_neighbours, make_tree, query_neighbours
 from damageest.geometry.threads import cut_evenly, map_in_threads
-from damageest.isolation.foresee import require_memory
+from damageest.isolation.memory import require_memory
 
 Floats32 = NDArray[np.float32]
 

@@ -13,7 +13,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, measure_bounds, number_cubes, order_by_place
-from damageest.isolation.foresee import FEWER_POINTS, require_memory
+from damageest.isolation.memory import FEWER_POINTS, require_memory
 
 BYTES_OF_PLACE = 60
 """Memory of a search for each point, beside its neighbours, and for each point that may be one, measured."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
-from damageest.isolation.foresee import require_memory
+from damageest.isolation.memory import require_memory
 
 GridValues = NDArray[np.float32]
 """Values at the nodes of a `Grid`, in its shape."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
-from damageest.isolation.foresee import require_memory
+from damageest.isolation.memory import require_memory
 
 BYTES_OF_TRIANGLE = 150
 """Memory of a mesh prepared for rays, for each triangle, measured."""

@@ -10,7 +10,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.duplicates import find_members
-from damageest.isolation.foresee import require_memory
+from damageest.isolation.memory import require_memory
 
 BYTES_OF_FACE = 450
 """Memory of one round of refinement, for each triangle before or after it."""

@@ -28,6 +28,17 @@ def move_points(points: Floats, T: Floats) -> Floats:
     return np.asarray(points @ T[:3, :3].T + T[:3, 3])
 
 
+def turn_to_axis(axis: Floats) -> Floats:
+    """A rotation (3,3) that takes z to the unit vector ``axis`` (3,)."""
+    z = np.array([0.0, 0.0, 1.0])
+    c = float(axis @ z)
+    if c < -1 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    x, y, _ = (float(value) for value in np.cross(z, axis))
+    cross = np.array([[0, 0, y], [0, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + c))
+
+
 def make_motions(twist: Floats) -> Floats:
     """Rigid motions (H,4,4) from rotation vectors, in radians about the origin, and translations (H,6)."""
     from scipy.spatial.transform import Rotation

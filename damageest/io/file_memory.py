@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from damageest.errors import InputError, StageError
-from damageest.isolation.foresee import require_memory
+from damageest.isolation.memory import require_memory
 
 TIMES = {
     ".ply": 5, ".pcd": 5, ".npy": 3, ".las": 5, ".laz": 12, ".e57": 9, ".stl": 8, ".obj": 8, ".off": 18, ".ptx": 8,

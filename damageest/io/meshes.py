@@ -14,7 +14,7 @@ from damageest.artefacts import Floats, Ints, Mesh
 from damageest.errors import InputError
 from damageest.io.file_memory import require_memory_for
 from damageest.io.files import check_file, raise_environment_fault, shorten_error
-from damageest.isolation.foresee import FEWER_POINTS, require_memory
+from damageest.isolation.memory import FEWER_POINTS, require_memory
 
 MESH_SUFFIXES = (".stl", ".ply", ".obj", ".off", ".3mf")
 

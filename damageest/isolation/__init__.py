@@ -1,11 +1,11 @@
 """Calls in a process of their own, for native libraries that may crash, hang or take all memory."""
 
-from damageest.isolation.ends import ProcessError
-from damageest.isolation.foresee import require_memory
-from damageest.isolation.leash import end_with_parent
+from damageest.isolation.failures import ProcessError
 from damageest.isolation.limits import Limits, format_bytes, limit_this_process, measure_free_memory, parse_memory
+from damageest.isolation.memory import require_memory
 from damageest.isolation.notes import at_work
 from damageest.isolation.one_thread import ONE_THREAD, keep_one_thread
+from damageest.isolation.parent import end_with_parent
 from damageest.isolation.worker import call_isolated, cpu_seconds, end_workers
 
 __all__ = [

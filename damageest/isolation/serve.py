@@ -14,8 +14,8 @@ import time
 import traceback
 from typing import Any
 
-from damageest.isolation.leash import end_with_parent
 from damageest.isolation.limits import limited
+from damageest.isolation.parent import end_with_parent
 from damageest.isolation.transfer import load, receive, receive_parts, send
 
 is_worker = False

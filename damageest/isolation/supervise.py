@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from damageest.errors import StageError
-from damageest.isolation.ends import describe_signal
-from damageest.isolation.leash import end_with_parent
+from damageest.isolation.failures import describe_signal
 from damageest.isolation.notes import Entry, close_entry, read_entry, share_page
+from damageest.isolation.parent import end_with_parent
 
 PASSED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 """Signals that are passed on to the fork."""

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from damageest.errors import StageError
 from damageest.isolation import serve
-from damageest.isolation.ends import ProcessError, RemoteTraceback, blame_authors, describe_end, describe_memory
+from damageest.isolation.failures import ProcessError, RemoteTraceback, blame_authors, describe_end, describe_memory
 from damageest.isolation.limits import Limits, format_bytes, measure_free_memory, own_memory
 from damageest.isolation.one_thread import ONE_THREAD
 from damageest.isolation.transfer import receive, send

@@ -15,6 +15,7 @@ from damageest.io.files import describe_no_file, resolve_path
 from damageest.job import yamlfile
 from damageest.job.model import Header, Job, find_paths
 from damageest.job.wording import describe_fault
+from damageest.registry import bundled
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract
 from damageest.registry.registry import Implementation, Registry
 from damageest.stages import Stage
@@ -197,8 +198,9 @@ class _Check:
                 return None  # its own check says what is missing
         suffix = Path(str(first)).suffix.lower()
         readers = [item for item in self.registry.of(key) if suffix in item.cls.reads]
-        if not readers and suffix in (".step", ".stp", ".iges", ".igs", ".brep") and key == "part":
-            self.add_fault(f"'{suffix}' needs {self.registry.describe_plugin('damageest-cadquery')}", key, "path")
+        package = bundled.SUFFIXES.get(suffix) if key == ReadPart.stage else None
+        if not readers and package:
+            self.add_fault(f"'{suffix}' needs {self.registry.describe_plugin(package)}", key, "path")
         elif not readers:
             valid = sorted({s for item in self.registry.of(key) for s in item.cls.reads})
             self.add_fault(f"no reader for '{suffix}' files; valid are: {', '.join(valid)}", key, "path")
@@ -207,6 +209,9 @@ class _Check:
     def find_route(self, method: str, chosen: Mapping[Contract, Chosen]) -> tuple[list[Contract], str]:
         """The contracts that the job's route needs, and the method in full: `auto` is `surface` where the job names one
         of its stages, and the method of the implementation of `enclose` where the job names one that has its own."""
+        if method not in self.registry.methods() and method in bundled.METHODS:
+            self.add_fault(f"'{method}' needs {self.registry.describe_plugin(bundled.METHODS[method])}", "method")
+            return [], method
         if method not in self.registry.methods():
             valid = self.registry.methods()
             text = (

@@ -60,6 +60,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
         coverage=state.coverage,
         surplus=state.surplus,
         fit=None if state.fitted is None else state.fitted.fit,
+        conversions=engine.registry.conversions,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
     key = digest(

@@ -125,6 +125,11 @@ def gather_intact(engine: Engine, work: Work) -> Work:
     return replace(work, job=state, warnings=(*work.warnings, *state.deviation.notes, *state.sites.notes))
 
 
+def read_part(job: Job, registry: Registry) -> Part:
+    """The part of a job, as its stage reads it."""
+    return Engine(job, registry).call(ReadPart, start(job).job).part
+
+
 def read_inputs(job: Job, registry: Registry) -> tuple[Part, Scan]:
     """The part and the scan of a job, as their stages read them."""
     state = follow((ReadPart, ReadScan, crop_scan, set_far_aside), Engine(job, registry), start(job)).job

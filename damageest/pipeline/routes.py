@@ -11,7 +11,7 @@ from damageest.pipeline.coverage import describe_coverage, inspect_skin
 from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
-from damageest.pipeline.fit_model import correct_scan, fit_model, question_fit, question_sites
+from damageest.pipeline.form import correct_scan, fit_model, question_fit, question_sites
 from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.large_scans import add_points_near_damage
 from damageest.pipeline.lost_bodies import add_lost_bodies

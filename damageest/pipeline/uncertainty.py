@@ -25,7 +25,7 @@ from damageest.findings import Fading, Interval, Uncertainty
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.fit_model import measure_at_site
+from damageest.pipeline.form import measure_at_site
 from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.stages.allowance import Allowance
 

@@ -38,7 +38,6 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.export.files import Files
     from damageest.stages.part.file import PartFile
     from damageest.stages.part.reconstruct import PartFromScan
-    from damageest.stages.path.layers import Layers
     from damageest.stages.path.none import NoPath as NoPath
     from damageest.stages.reconstruct.pyvista import PyVista
     from damageest.stages.reconstruct.signed_distance import SignedDistance
@@ -56,7 +55,7 @@ def damageest_stages() -> list[type[Stage]]:
         PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, Points, MeshDistance, Dbscan, PyVista,
         LargestLoop, AllLoops, Offset, BoundingBox, Capsule, CylinderBackground, Minkowski, BuildVolume, ShortestPath,
         Adaptive, Implicit,
-        NoRepair, Manifold, NoAllowance, Milling, NoPath, Layers, Files, Uniform, CloudDistance, SignedDistance,
+        NoRepair, Manifold, NoAllowance, Milling, NoPath, Files, Uniform, CloudDistance, SignedDistance,
         PartFromScan, Html, NoReport,
     ]  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement: four that add, three that only observe.
+"""The hooks a plugin may implement: five that add, three that only observe.
 
 What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
 what they return is ignored.
@@ -14,6 +14,7 @@ import pluggy
 if TYPE_CHECKING:
     import typer
 
+    from damageest.result import Conversion
     from damageest.stages import Stage
     from damageest.stages.export import PathWriter, Writer
 
@@ -39,8 +40,15 @@ def damageest_path_writers() -> Mapping[str, PathWriter]:  # type: ignore[empty-
 
 
 @hookspec
+def damageest_conversions() -> Mapping[str, Conversion]:  # type: ignore[empty-body]
+    """Gives what this plugin can convert a result to, by the name that `Result.convert` calls it by. The function gets
+    the result, what of it ("damage"), and the number of a site or None."""
+
+
+@hookspec
 def damageest_commands(app: typer.Typer) -> None:
-    """Adds commands to the command line."""
+    """Adds commands to the command line. Called for a command that is not built in, and for ``--help``: import what
+    is large inside the commands. A built-in command of the same name stays."""
 
 
 @hookspec

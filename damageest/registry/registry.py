@@ -8,14 +8,17 @@ from __future__ import annotations
 import typing
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from functools import partial
+from typing import Any, NoReturn, TypeVar
 
 import pluggy
 from pydantic import ValidationError
 
-from damageest.errors import PluginError, clean_message, suggest
+from damageest.errors import InputError, PluginError, clean_message, suggest
+from damageest.registry import bundled
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
 from damageest.registry.loading import Broken, Provider, describe_broken, ignore_shadow_warnings, load
+from damageest.result import Conversion
 from damageest.stages import Stage
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.export import PathWriter, Writer
@@ -45,7 +48,7 @@ class Implementation:
 class Registry:
     """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them.
     ``writers``: the formats that `export` can write, by name; ``formats``: the provider of each. ``path_writers``:
-    the formats of paths, by name."""
+    the formats of paths, by name. ``conversions``: what a result can be converted to, by name."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]
@@ -55,6 +58,7 @@ class Registry:
     writers: Mapping[str, Writer] = field(default_factory=dict, compare=False)
     formats: Mapping[str, Provider] = field(default_factory=dict, compare=False)
     path_writers: Mapping[str, PathWriter] = field(default_factory=dict, compare=False)
+    conversions: Mapping[str, Conversion] = field(default_factory=dict, compare=False)
 
     @classmethod
     def discover(cls, observers: Iterable[object] = ()) -> Registry:
@@ -64,18 +68,21 @@ class Registry:
         writers: dict[str, Writer] = {}
         path_writers: dict[str, PathWriter] = {}
         formats: dict[str, Provider] = {}
+        conversions: dict[str, Conversion] = {}
         for plugin, provider in loaded:
             try:
                 with ignore_shadow_warnings():
                     classes = _read_offered(plugin)
                     added = _read_writers(plugin, "damageest_writers", Writer, writers)
                     added_paths = _read_writers(plugin, "damageest_path_writers", PathWriter, path_writers)
+                    converts = _read_conversions(plugin, conversions)
             except BaseException as error:
                 broken.append(describe_broken(error, provider))
                 continue
             writers |= added
             path_writers |= added_paths
             formats |= dict.fromkeys(added, provider)
+            conversions |= converts
             for stage in classes:
                 try:
                     found.append(_check_implementation(stage, provider))
@@ -88,7 +95,11 @@ class Registry:
         single = tuple(group[0] for group in groups.values() if len(group) == 1)
         clashes = tuple(group for group in groups.values() if len(group) > 1)
         providers = tuple(dict.fromkeys([p for _, p in loaded] + [b.provider for b in broken]))
-        return cls(single, providers, tuple(broken), clashes, manager, writers, formats, path_writers)
+        made = cls(single, providers, tuple(broken), clashes, manager, writers, formats, path_writers, conversions)
+        for kind, package in bundled.CONVERSIONS.items():
+            if kind not in conversions:
+                conversions[kind] = partial(_refuse, f"'{kind}' needs {made.describe_plugin(package)}")
+        return made
 
     def of(self, stage: str) -> tuple[Implementation, ...]:
         """The implementations of a stage, defaults first, then by name."""
@@ -120,6 +131,8 @@ class Registry:
         for item in self.of(stage):
             if item.name == name:
                 return item
+        if package := bundled.IMPLEMENTATIONS.get((stage, name)):
+            raise KeyError(f"'{name}' of stage '{stage}' needs {self.describe_plugin(package)}")
         names = [item.name for item in self.of(stage)]
         raise KeyError(
             f"stage '{stage}' has no '{name}'{suggest(name, names)}; there are: {', '.join(names)}{self.missing()}"
@@ -133,6 +146,11 @@ class Registry:
                 return f"the plugin {name}, which cannot be used here ({reason}); try: {broken.remedy}"
         remedy = f"uv sync --all-packages in a checkout, or pip install {name}"
         return f"the plugin {name}, which is not installed; try: {remedy}"
+
+    def describe_writer(self, name: str) -> str:
+        """A clause for what needs a format that no package here writes: the plugin, the reason, and what to do. Empty
+        where no plugin of this project writes it."""
+        return self.describe_plugin(bundled.FORMATS[name]) if name in bundled.FORMATS else ""
 
     def missing(self) -> str:
         """A clause on plugins that are installed but broken, empty where there are none."""
@@ -173,6 +191,20 @@ def _read_writers(plugin: Any, hook: str, kind: type[Kind], known: Mapping[str, 
     if twice := sorted(found.keys() & known.keys()):
         raise PluginError(f"writes {', '.join(twice)}, which another package writes already; uninstall one of them")
     return dict(found)
+
+
+def _read_conversions(plugin: Any, known: Mapping[str, Conversion]) -> dict[str, Conversion]:
+    """What a plugin can convert a result to. Raises PluginError for what is no function, or of a kind known already."""
+    found = plugin.damageest_conversions() if hasattr(plugin, "damageest_conversions") else {}
+    if not isinstance(found, Mapping) or not all(callable(convert) for convert in found.values()):
+        raise PluginError("its hook damageest_conversions did not give a mapping of names to functions")
+    if twice := sorted(found.keys() & known.keys()):
+        raise PluginError(f"converts to {', '.join(twice)}, as another package does already; uninstall one of them")
+    return dict(found)
+
+
+def _refuse(why: str, *values: object) -> NoReturn:
+    raise InputError(why)
 
 
 def _check_defaults(cls: type[Stage]) -> None:

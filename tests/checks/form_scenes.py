@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from damageest_evaluate.troubles.parts import make_named_part
 
 from damageest.artefacts import Floats, Part
 from damageest.checks.model_fit import FittedModel, measure_fit
-from damageest.evaluate.honesty.parts import make_named_part
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.sampling import sample_by_area
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from damageest_evaluate.parts import PARTS
 
 from damageest.artefacts import Floats, Scan
 from damageest.checks.scan_quality import (
@@ -14,7 +15,6 @@ from damageest.checks.scan_quality import (
     require_intact,
 )
 from damageest.errors import StageError
-from damageest.evaluate.parts import PARTS
 
 PART = PARTS["block"]()
 SCAN = Scan(np.zeros((1, 3)), noise=0.05, spacing=0.1)

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 from damageest.cli import app
 from damageest.errors import DamageestError, StageError
 from damageest.job import yamlfile
+from damageest.output.deviation_json import report_deviation
 from damageest.pipeline.fallback import drop_tried
-from damageest.report.deviation_json import report_deviation
 from tests import damaged_box
 
 

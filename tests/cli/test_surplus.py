@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from damageest.io.meshes import write_points
-from damageest.report.result_json import result_schema
+from damageest.output.result_json import result_schema
 from tests.cli.test_cli import call
 from tests.surplus_scenes import TOLERANCE, block, scan, slab, table
 

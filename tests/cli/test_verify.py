@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import damageest
 from damageest.cli import app
-from damageest.report.provenance import list_packages
+from damageest.output.provenance import list_packages
 from tests import damaged_box
 
 

@@ -14,8 +14,8 @@ import pytest
 
 import damageest
 from damageest.errors import InputError, JobError, StageError
-from damageest.report import pictures
-from damageest.report.output_folder import OutputFolder, open_output
+from damageest.output import pictures
+from damageest.output.folder import OutputFolder, open_output
 from tests import damaged_box
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from damageest_paths.layers import Layers, Nozzle
 
 from damageest import conformance
 from damageest.artefacts import DepositPath, Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
@@ -27,7 +28,6 @@ from damageest.stages.enclose.implicit import Implicit
 from damageest.stages.export import ExportedFiles
 from damageest.stages.export.files import Files
 from damageest.stages.part.file import PartFile
-from damageest.stages.path.layers import Layers, Nozzle
 from damageest.stages.reconstruct.signed_distance import SignedDistance
 from damageest.stages.repair.none import NoRepair as NoRepair
 from damageest.stages.report import ReportFiles

@@ -17,10 +17,11 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from damageest_evaluate.troubles.classify import TrueState, judge
+from damageest_evaluate.troubles.names import SPARSE
+
 import damageest
 from damageest.errors import InputError, StageError
-from damageest.evaluate.honesty.classify import TrueState, judge
-from damageest.evaluate.honesty.names import SPARSE
 from damageest.registry import Registry
 from damageest.result import Result
 

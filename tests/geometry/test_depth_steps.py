@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from damageest_evaluate.parts import PARTS
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Floats
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.depth_steps import measure_depth_step
 from damageest.geometry.sampling import sample_by_area
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.parts import PARTS
 
 from damageest.artefacts import Floats, Ints, Part
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.distance_by_cells import signed_distance_by_cells
 

@@ -12,7 +12,7 @@ import damageest.geometry
 FOLDER = Path(damageest.geometry.__file__).parent
 ROOT = Path(__file__).parents[2]
 MODULES = sorted(path for path in FOLDER.glob("*.py") if path.name != "__init__.py")
-ABOVE = {"stages", "pipeline", "registry", "job", "checks", "io", "report", "evaluate", "cli", "api", "conformance"}
+ABOVE = {"stages", "pipeline", "registry", "job", "checks", "io", "output", "cli", "api", "conformance"}
 
 
 def list_imports(path: Path) -> list[str]:

@@ -13,8 +13,8 @@ import pytest
 
 from damageest.job import yamlfile
 from damageest.job.schema import job_schema
+from damageest.output.result_json import result_schema
 from damageest.registry import Registry
-from damageest.report.result_json import result_schema
 from tests.needs import PLUGINS, needs_plugin
 
 ROOT = Path(__file__).parents[2]

@@ -17,11 +17,11 @@ from damageest.artefacts import Deposit, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import iou, to_arrays, to_manifold
 from damageest.job import Job
+from damageest.output.result_json import build_report, result_schema
 from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.registry import Registry
-from damageest.report.result_json import build_report, result_schema
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance.milling import Milling
 from damageest.stages.allowance.none import NoAllowance

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.parts import PARTS
+from damageest_evaluate.scores import iou
 
 import damageest
 from damageest.artefacts import Part, Scan, Solid, Truth
 from damageest.errors import StageError
-from damageest.evaluate.parts import PARTS
-from damageest.evaluate.scores import iou
 from damageest.geometry.solids import to_arrays
 from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import damageest
+from damageest.cli._commands import load_commands
 from damageest.errors import DamageestError, JobError
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS
@@ -73,9 +74,10 @@ def test_no_plugin_is_broken_but_for_a_missing_system_library(registry: Registry
 
 
 @pytest.mark.parametrize("plugin", [pytest.param(plugin, marks=needs_plugin(plugin)) for plugin in PLUGINS])
-def test_every_plugin_provides_stages(plugin: str, registry: Registry) -> None:
+def test_every_plugin_provides_stages_or_commands(plugin: str, registry: Registry) -> None:
     """Tests made for each implementation found, as of conformance, include the plugins' own."""
-    assert any(item.provider.name == f"damageest-{plugin}" for item in registry.implementations)
+    name = f"damageest-{plugin}"
+    assert any(item.provider.name == name for item in registry.implementations) or load_commands().get(name)
 
 
 def test_a_plugins_stage_runs(site: Site, tmp_path: Path) -> None:

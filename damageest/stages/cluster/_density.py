@@ -7,7 +7,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_cubes
-from damageest.isolation.foresee import FEWER_POINTS, require_memory
+from damageest.isolation.memory import FEWER_POINTS, require_memory
 
 MAX_PAIRS = 20_000_000
 """Largest number of pairs of neighbours in memory, see `PAIR_BYTES`; with more, points are first averaged in a grid."""

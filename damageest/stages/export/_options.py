@@ -9,16 +9,13 @@ from pydantic_core import PydanticCustomError
 
 from damageest.errors import suggest
 
-PLUGINS = {"step": "damageest-cadquery"}
-"""Format to the plugin that writes it; named where it is not installed."""
-
 
 def _check_known(name: str, info: ValidationInfo) -> str:
     registry = (info.context or {}).get("registry")
     if registry is None or name in registry.writers:
         return name
-    if plugin := PLUGINS.get(name):
-        raise _make_error(f"'{name}' needs {registry.describe_plugin(plugin)}")
+    if needed := registry.describe_writer(name):
+        raise _make_error(f"'{name}' needs {needed}")
     names = sorted(registry.writers)
     raise _make_error(f"no format '{name}'{suggest(name, names)}; there are: {', '.join(names)}{registry.missing()}")
 
@@ -41,7 +38,7 @@ def check_spline_writer(spline: bool, info: ValidationInfo) -> bool:
     """Refuses a spline where no writer can write one."""
     registry = (info.context or {}).get("registry")
     if spline and registry is not None and not any(writer.patch for writer in registry.writers.values()):
-        raise _make_error(f"a spline needs {registry.describe_plugin(PLUGINS['step'])}")
+        raise _make_error(f"a spline needs {registry.describe_writer('step')}")
     return spline
 
 

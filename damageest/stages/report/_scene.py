@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import DAMAGE, INTACT, Floats, Mesh
+from damageest.geometry.transforms import turn_to_axis
 from damageest.io import colours
-from damageest.paths.nozzle import turn_to_axis
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._thin import find_sharp_edges, thin_mesh, thin_points

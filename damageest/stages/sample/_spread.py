@@ -7,7 +7,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import measure_bounds, number_cubes
-from damageest.isolation.foresee import require_memory
+from damageest.isolation.memory import require_memory
 
 SPREAD_BYTES, THIN_BYTES, TRIANGLE_BYTES = 170, 210, 260
 """Memory to spread a point, to choose from it, and for each triangle, measured."""

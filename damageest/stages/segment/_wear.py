@@ -15,7 +15,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import CHUNK, number_cubes, number_faced_cubes
-from damageest.isolation.foresee import FEWER_POINTS, require_memory
+from damageest.isolation.memory import FEWER_POINTS, require_memory
 
 NEIGHBOURS = 48
 """Largest number of points that a mean is taken over."""

@@ -9,6 +9,7 @@ from damageest import hookimpl
 from damageest.stages import Stage
 
 if TYPE_CHECKING:
+    from damageest.result import Conversion
     from damageest.stages.export import Writer
 
 
@@ -31,6 +32,18 @@ def damageest_writers() -> Mapping[str, Writer]:
     from damageest_cadquery._step import write_step
 
     return {"step": Writer(write_step, simplify=True, patch=write_patch, exact=_write_exact)}
+
+
+@hookimpl
+def damageest_conversions() -> Mapping[str, Conversion]:
+    """`Result.as_cadquery`."""
+    return {"cadquery": _as_cadquery}
+
+
+def _as_cadquery(*values: Any) -> Any:
+    from damageest_cadquery.exact import as_cadquery  # imported late: it takes a second
+
+    return as_cadquery(*values)
 
 
 def _write_exact(*values: Any) -> Any:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.scores import iou
 from damageest_sweep.sweep import Sweep
 
 import damageest
 from damageest.artefacts import Mesh, Part, Rims, Scan, Truth
 from damageest.conformance import EncloseContract
 from damageest.errors import StageError
-from damageest.evaluate.scores import iou
 from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate
 

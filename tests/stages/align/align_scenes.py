@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from damageest_evaluate.parts import PARTS
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Floats, Part, Scan, Truth
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.stages.align._field import PartSurface
 from damageest.stages.align._points import orient_surface

@@ -7,14 +7,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from damageest_evaluate.scores import measure_pose_error
+from damageest_evaluate.troubles import shape, wear
+from damageest_evaluate.troubles.scene import Scanning
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
-from damageest.evaluate.honesty import shape, wear
-from damageest.evaluate.honesty.scene import Scanning
-from damageest.evaluate.scores import measure_pose_error
 from damageest.stages.align._fine import fit
 from damageest.stages.align._finish import finish_pose
 from damageest.stages.align._frame import Frame

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from align_scenes import error, scene
+from damageest_evaluate.parts import PARTS
 
 from damageest.artefacts import Scan
 from damageest.errors import StageError
-from damageest.evaluate.parts import PARTS
 from damageest.stages.align.register import Register
 from damageest.stages.scan.simulate import Simulate
 

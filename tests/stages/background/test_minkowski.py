@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from damageest_evaluate.parts import PARTS
 
 from damageest.artefacts import Mesh
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.distance import signed_distance
 from damageest.stages.background.minkowski import Minkowski
 from tests.stages.background.holding import box, dent, measure_gap

@@ -6,10 +6,10 @@ import igl
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.parts import PARTS
 
 from damageest.artefacts import Mesh, Part
 from damageest.errors import StageError
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.distance import signed_distance
 from damageest.stages.background.offset import Offset
 from tests.stages._open import bowl

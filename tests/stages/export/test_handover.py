@@ -18,8 +18,8 @@ from damageest.errors import JobError
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.geometry.units import MILLIMETRES
 from damageest.job import load
+from damageest.output.result_json import build_report
 from damageest.registry import Registry
-from damageest.report.result_json import build_report
 from damageest.result import Result
 from damageest.stages.export.files import DAMAGE, DEPOSIT, UNDAMAGED, Files
 from tests.stages.export import results

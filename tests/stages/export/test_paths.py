@@ -16,7 +16,7 @@ from damageest.stages.export import PathSettings
 from damageest.stages.export.path_apt import write_apt
 from damageest.stages.export.path_csv import HEAD, write_csv
 from damageest.stages.export.rs274 import write_rs274
-from tests.paths.shapes import corner, dent, plan
+from tests.path_shapes import corner, dent, plan
 
 SETTINGS = PathSettings("mm", "block site 1")
 

@@ -10,8 +10,8 @@ import pytest
 
 from damageest.artefacts import Surface
 from damageest.geometry.units import MILLIMETRES
+from damageest.output.result_json import build_report
 from damageest.registry import Registry
-from damageest.report.result_json import build_report
 from damageest.stages.export.files import Files
 from tests.needs import import_for, needs_plugin
 from tests.stages.export import results

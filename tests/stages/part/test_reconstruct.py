@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.scores import iou
 
 import damageest
 from damageest.artefacts import Part
 from damageest.errors import InputError
-from damageest.evaluate.scores import iou
 from damageest.stages.part.reconstruct import PartFromScan
 from damageest.stages.scan.simulate import Simulate
 from tests.damaged_box import TRUE_VOLUME, box, scan

@@ -15,7 +15,7 @@ from damageest.artefacts import DAMAGE, Deviation, Scan
 from damageest.findings import Verdict
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.sampling import sample_by_area
-from damageest.report.files import describe_result
+from damageest.output.files import describe_result
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 from damageest.stages.report.html import Html

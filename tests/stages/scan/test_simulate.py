@@ -10,12 +10,12 @@ import igl
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.parts import PARTS
 from manifold3d import Manifold
 from pydantic import ValidationError
 
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.errors import StageError
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.bodies import split_shells
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.stages.scan.scanner import apply_tools

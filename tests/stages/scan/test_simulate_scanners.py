@@ -8,11 +8,11 @@ import igl
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.parts import PARTS
 from pydantic import ValidationError
 
 from damageest.artefacts import Floats, Mesh, Part, Scan
 from damageest.errors import StageError
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.make_part import make_part
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.sampling import sample_by_area

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.parts import PARTS
 
 from damageest.artefacts import ADDED, DAMAGE, INTACT, Part, Scan
 from damageest.errors import StageError
-from damageest.evaluate.parts import PARTS
 from damageest.stages.sample.edge_aware import EdgeAware
 from damageest.stages.sample.uniform import Uniform
 from damageest.stages.scan.simulate import Simulate

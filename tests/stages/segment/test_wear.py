@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.parts import PARTS
 from manifold3d import Manifold
 
 import damageest
 from damageest.artefacts import DAMAGE, Floats, Part, Scan
-from damageest.evaluate.parts import PARTS
 from damageest.geometry.solids import to_arrays
 from damageest.stages.scan.simulate import Simulate
 from damageest.stages.segment._wear import Wear, find_wear

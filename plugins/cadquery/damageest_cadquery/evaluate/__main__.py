@@ -60,9 +60,10 @@ def _write_parts(folder: Path) -> list[Path]:
 
 def run_case(path: Path, seed: int, output: Path) -> list[dict[str, Any]]:
     """A row for each site of one random damage; a single one with ``error`` where there is none."""
+    from damageest_evaluate.damages import KINDS, make_random_damage
+
     import damageest
     from damageest.errors import DamageestError
-    from damageest.evaluate.damages import KINDS, make_random_damage
     from damageest_cadquery.brep import Brep
 
     base = {"part": path.stem, "seed": seed}

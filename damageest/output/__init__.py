@@ -1,0 +1,1 @@
+"""What an output folder says and shows: `result.json` with its schema and provenance, pictures, the window."""

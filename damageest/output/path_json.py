@@ -1,0 +1,87 @@
+"""What result.json says of a site's deposition path."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field
+
+from damageest.artefacts import DepositPath, Vector
+from damageest.output.base import JsonModel
+from damageest.result import Site
+from damageest.stages.export import ExportedFiles
+
+
+class UnreachedReport(JsonModel):
+    volume: float
+    why: str
+
+
+class BeadFillReport(JsonModel):
+    """The union of the beads against the deposit, on voxels. Heat, flow and shrinkage are not simulated."""
+
+    voxel: float = Field(description="edge of the voxels")
+    filled: float = Field(description="share of the reachable deposit that beads fill")
+    gap: float = Field(description="volume of the reachable deposit that they do not fill")
+    largest_gap: float = Field(description="volume of its largest connected piece")
+    void: float = Field(description="diameter of the largest ball in it")
+    spill: float = Field(description="volume of beads outside the deposit and the metal")
+    spill_distance: float = Field(description="how far beads reach out of the deposit, beside metal")
+    sunk: float = Field(description="volume of beads where metal is already")
+
+
+class PathReport(JsonModel):
+    """The passes that build up the deposit. Times are those of the feeds, without acceleration."""
+
+    passes: int
+    layers: int
+    directions: list[Vector] = Field(description="build direction of each part of the deposit")
+    layer_heights: list[float] = Field(description="of each part of the deposit")
+    length: float = Field(description="of all passes")
+    travel: float = Field(description="length of the moves between them")
+    minutes: float
+    bead_volume: float = Field(description="volume that the passes add: length by section")
+    deposit_volume: float
+    unreachable_volume: float = Field(description="of the deposit that no pass fills")
+    unreached: list[UnreachedReport] = Field(description="the same by reason")
+    clearance: float | None = Field(
+        description="least distance of the nozzle from metal, earlier deposits, fixture and layers below during "
+        "deposition; null: none is near"
+    )
+    travel_clearance: float | None = Field(description="the same between passes")
+    fill: BeadFillReport | None = Field(description="null where it was not simulated")
+    files: list[str]
+    notes: list[str]
+
+
+def report_path(site: Site, written: ExportedFiles) -> PathReport | None:
+    path = site.path
+    if path is None:
+        return None
+    stem = f"path/site-{site.id}."
+    return PathReport(
+        passes=path.passes,
+        layers=path.layers,
+        directions=[(x, y, z) for x, y, z in path.directions.tolist()],
+        layer_heights=path.heights.tolist(),
+        length=path.length,
+        travel=path.travel,
+        minutes=path.minutes,
+        bead_volume=path.bead_volume,
+        deposit_volume=path.deposit_volume,
+        unreachable_volume=path.unreached_volume,
+        unreached=[UnreachedReport(volume=item.volume, why=item.why) for item in path.unreached],
+        clearance=_bound(path.clearance),
+        travel_clearance=_bound(path.travel_clearance),
+        fill=_report_fill(path),
+        files=[name for name in written.files if name.removeprefix("scan_frame/").startswith(stem)],
+        notes=list(path.notes),
+    )
+
+
+def _bound(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _report_fill(path: DepositPath) -> BeadFillReport | None:
+    return None if path.fill is None else BeadFillReport(**vars(path.fill))

@@ -1,0 +1,186 @@
+"""What result.json says of a result."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from damageest.artefacts import Floats, Vector
+from damageest.output.base import JsonModel
+from damageest.output.deviation_json import DeviationReport, report_deviation
+from damageest.output.fit_json import FitReport, report_fit
+from damageest.output.free_json import FreeMotionReport, report_free_motion
+from damageest.output.provenance import ProvenanceReport
+from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
+from damageest.output.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
+from damageest.output.uncertainty_json import report_interval
+from damageest.result import Result
+from damageest.stages.export import ExportedFiles
+
+_NOTHING = ExportedFiles()
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+class PartReport(JsonModel):
+    path: str = Field(description="relative to this file; empty for a part given as arrays")
+    sha256: str
+    volume: float
+    watertight: bool
+    tessellation_error: float = Field(description="bound on the distance between CAD surface and triangles")
+    notes: list[str] = Field(description="what was repaired or converted when the part was read")
+
+
+class ScanReport(JsonModel):
+    paths: list[str]
+    points: int
+    total: int = Field(description="points in the files, of which `points` are used: all near damage, others evenly")
+    noise: float = Field(description="measured standard deviation of the points off the local surface")
+    spacing: float = Field(description="measured distance that a reconstructed surface has to bridge")
+    notes: list[str]
+
+
+class AlignmentReport(JsonModel):
+    transform: list[list[float]] = Field(description="T_part_scan, 4x4: from the scanner's frame to the part's")
+    quaternion: tuple[float, float, float, float] = Field(description="its rotation: w, x, y, z; w is not negative")
+    translation: Vector = Field(description="its shift, after the rotation")
+    rms: float = Field(description="of the inliers' distance to the part")
+    inliers: float = Field(description="share of the scan's points")
+    alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
+    notes: list[str]
+    doubts: list[str] = Field(description="those of the notes that make every site doubtful")
+    free: list[FreeMotionReport] = Field(
+        description="motions after which the scan fits as well, since no unworn skin holds it"
+    )
+    held: bool = Field(description="whether unworn skin holds the pose, but for these motions")
+
+
+class ExportReport(JsonModel):
+    files: list[str] = Field(description="all that were written; those below scan_frame/ are in the scan's frame")
+    notes: list[str] = Field(description="what was written in another way than asked for, and why")
+
+
+class TruthReport(JsonModel):
+    """Only after a virtual scan: how far the result is from the known truth."""
+
+    volume: float
+    iou: float = Field(description="intersection over union of found and true damage")
+    transform: list[list[float]] = Field(description="the true T_part_scan")
+
+
+class StageReport(JsonModel):
+    stage: str
+    use: str
+    provider: str
+    site: int = Field(description="0 for a stage that runs once per job")
+    seconds: float
+    cached: bool
+
+
+class Report(JsonModel):
+    """The content of result.json. Lengths, areas and volumes in ``units``; coordinates in the part's frame."""
+
+    version: Literal[1] = Field(1, alias="schema", description="version of this format")
+    status: Literal["ok", "incomplete"] = Field(description="incomplete: some sites have no damage volume or deposit")
+    name: str
+    units: str
+    tolerance: float
+    part: PartReport
+    scan: ScanReport
+    alignment: AlignmentReport
+    deviation: DeviationReport
+    coverage: CoverageReport | None
+    fit: FitReport | None = Field(description="null where too few points lie near the skin")
+    sites: list[SiteReport]
+    surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
+    export: ExportReport
+    damage_volume: float
+    volume_95: tuple[float, float] | None = Field(description="95 % interval of `damage_volume`; null: there is none")
+    undamaged_volume: float
+    material: MaterialReport = Field(description="what the whole repair takes")
+    truth: TruthReport | None
+    stages: list[StageReport]
+    failures: list[str] = Field(description="sites without a damage volume or a deposit, and why")
+    warnings: list[str]
+    versions: dict[str, str]
+    provenance: ProvenanceReport | None = Field(None, description="null in a result that is not in files")
+
+
+def result_schema() -> dict[str, Any]:
+    """The JSON Schema of result.json."""
+    return {"$schema": DIALECT, **Report.model_json_schema(mode="serialization"), "title": "damageest result"}
+
+
+def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: Any = str) -> dict[str, Any]:
+    """The content of result.json as plain values. ``relative`` turns an absolute input path into the one to write."""
+    import platform
+    from importlib.metadata import version
+
+    part, scan, pose = result.part, result.scan, result.pose
+    files = index_files(written.files)
+    sites = [report_site(site, written, files) for site in result.sites]
+    filled = Report(
+        status=result.status,
+        name=result.name,
+        units=result.units,
+        tolerance=result.tolerance,
+        part=PartReport(
+            path=relative(part.path) if part.path else "",
+            sha256=part.sha256,
+            volume=part.volume,
+            watertight=True,
+            tessellation_error=part.tessellation_error,
+            notes=list(part.notes),
+        ),
+        scan=ScanReport(
+            paths=[relative(path) for path in scan.paths],
+            points=len(scan.points),
+            total=scan.total or len(scan.points),
+            noise=scan.noise,
+            spacing=scan.spacing,
+            notes=list(scan.notes),
+        ),
+        alignment=AlignmentReport(
+            transform=pose.T_part_scan.tolist(),
+            quaternion=_to_quaternion(pose.T_part_scan),
+            translation=tuple(pose.T_part_scan[:3, 3].tolist()),
+            rms=pose.rms,
+            inliers=pose.inliers,
+            alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
+            notes=list(pose.notes),
+            doubts=list(pose.doubts),
+            free=[report_free_motion(motion) for motion in pose.free],
+            held=pose.is_held,
+        ),
+        deviation=report_deviation(result.deviation),
+        coverage=report_coverage(result.coverage),
+        fit=report_fit(result.fit),
+        sites=sites,
+        surplus=[report_surplus(item, result, written) for item in result.surplus],
+        export=ExportReport(files=list(written.files), notes=list(written.notes)),
+        damage_volume=result.damage_volume,
+        volume_95=report_interval(result.volume_95),
+        undamaged_volume=result.undamaged_volume,
+        material=sum_material([site.deposit for site in sites if site.deposit]),
+        truth=_report_truth(result),
+        stages=[StageReport(**vars(record)) for record in result.stages],
+        failures=list(result.failures),
+        warnings=list(result.warnings),
+        versions={"damageest": version("damageest"), "python": platform.python_version()},
+    )
+    return filled.model_dump(mode="json", by_alias=True)
+
+
+def _to_quaternion(T: Floats) -> tuple[float, float, float, float]:
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True).tolist()
+    return w, x, y, z
+
+
+def _report_truth(result: Result) -> TruthReport | None:
+    truth = result.scan.truth
+    if truth is None or result.truth is None:
+        return None
+    volume, iou = result.truth.tolist()
+    return TruthReport(volume=volume, iou=iou, transform=truth.T_part_scan.tolist())

@@ -1,0 +1,204 @@
+"""What result.json says of a site."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from damageest.artefacts import Deposit, Vector
+from damageest.output.base import JsonModel
+from damageest.output.path_json import PathReport, report_path
+from damageest.output.uncertainty_json import UncertaintyReport, report_interval, report_uncertainty
+from damageest.result import Site
+from damageest.stages.export import ExactForm, ExportedFiles
+
+
+class EvidenceReport(JsonModel):
+    ids_residual: float = Field(description="95th percentile of the IDS points' distance to the damage volume")
+    intact_points_inside: int = Field(description="intact scan points on the skin that it removes")
+    skin_contradicted: float = Field(description="share of the removed skin that intact scan points lie on")
+    skin_unseen: float = Field(description="share of the skin beside the damage that the scan does not show")
+    ids_unseen: float = Field(description="share of its inner surface without scan points near, interpolated")
+    ids_gap: float = Field(description="area of the largest connected piece of inner surface without scan points near")
+    intact_share: float = Field(description="share of the removed skin, rim included, that intact points lie on")
+    consistent: bool = Field(description="whether the scan agrees with the damage volume")
+    reasons: list[str] = Field(description="why it is not")
+
+
+class VerdictReport(JsonModel):
+    level: Literal["proven", "likely", "doubtful"]
+    reasons: list[str] = Field(description="what speaks against it, or could not be tested")
+
+
+class FilesReport(JsonModel):
+    """Where the job asks for several formats or frames, the first of them; `every` has them all."""
+
+    damage: str | None
+    surface: str | None
+    deposit: str | None
+    every: list[str] = Field(description="all files of this site alone")
+
+
+class SplineReport(JsonModel):
+    deviation: float | None = Field(description="largest distance between surface and spline, either way")
+    trimmed: bool = Field(description="whether it ends at the surface's rim; otherwise it reaches beyond")
+    reason: str = Field(description="why none was written; empty where one was")
+
+
+class ExactDepositReport(JsonModel):
+    """Whether the deposit in STEP has the CAD's own faces and their offsets."""
+
+    faces: int
+    offsets: int = Field(description="faces that are offsets of CAD faces, at the height of the stock")
+    volume: float | None
+    distance: float | None = Field(
+        description="95 % of the stock's surface, but for that within 1.5 tolerances of the damage's outline, are as "
+        "near to the mesh's, both ways, with stock as high as the mesh's"
+    )
+    farthest: float | None = Field(description="largest distance between them, both ways")
+    seconds: float = Field(description="of the processor")
+    reason: str = Field(description="why it has facets; empty where it has CAD faces")
+
+
+class ExactReport(JsonModel):
+    """Whether the solid in STEP has the CAD's own faces."""
+
+    form: str = Field(
+        description="of the inner surface: shapes (planes, cylinders, spheres), spline, planes (beside facets), "
+        "facets; none: facets all over"
+    )
+    faces: int
+    inner_faces: int = Field(description="faces inside the part")
+    volume: float | None
+    distance: float | None = Field(description="95 % of the inner surface are as near to the mesh's, both ways")
+    farthest: float | None = Field(description="largest distance of the inner surfaces, both ways")
+    beyond: float | None = Field(description="share of the inner surface farther than a quarter of the tolerance")
+    seconds: float = Field(description="of the processor")
+    tried: list[str] = Field(description="what was refused before, and why")
+    deposit: ExactDepositReport | None = Field(description="null where there is none beside the damage volume")
+
+
+class ThicknessReport(JsonModel):
+    """Height of the stock over the nominal surface, where stock was asked for."""
+
+    min: float
+    mean: float
+    max: float
+
+
+class DepositReport(JsonModel):
+    volume: float = Field(description="of what is to be deposited")
+    stock_volume: float = Field(description="of its share beyond the nominal surface, to be milled off")
+    cut_back_volume: float = Field(description="of intact metal to be removed before, for a clean surface")
+    thickness: ThicknessReport | None = Field(description="of the stock; null where none was asked for or measured")
+    faces: list[int] = Field(description="numbers of the CAD faces that stock stands on; empty without B-rep")
+
+
+class MaterialReport(JsonModel):
+    """Sums over all sites except those that the stage allowance refused."""
+
+    deposit_volume: float
+    stock_volume: float
+    cut_back_volume: float
+
+
+class SiteReport(JsonModel):
+    id: int
+    points: int
+    volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
+    volume_95: tuple[float, float] | None = Field(description="95 % interval of `volume`; null where there is none")
+    depth_95: tuple[float, float] | None = Field(description="95 % interval of the largest depth, before a cut-back")
+    uncertainty: UncertaintyReport | None
+    surface_area: float = Field(description="of the inner damage surface")
+    max_depth: float = Field(description="of the scan below the nominal surface")
+    volume_rates: list[float] = Field(description="change of the volume for each unit of each motion of alignment.free")
+    centroid: Vector
+    bounds: tuple[Vector, Vector]
+    method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
+    evidence: EvidenceReport
+    verdict: VerdictReport
+    accepted: bool = Field(description="whether it is part of damage_volume; a doubtful site is where the job says so")
+    deposit: DepositReport | None = Field(
+        description="null where the stage allowance refused the site, or it is not accepted"
+    )
+    path: PathReport | None = Field(description="null where the job asks for none, or none could be planned")
+    files: FilesReport
+    spline: SplineReport | None = Field(description="null where the job asks for none")
+    exact: ExactReport | None = Field(description="null where no STEP is asked for, or the part has no CAD faces")
+    warnings: list[str]
+
+
+def index_files(files: Iterable[str]) -> dict[str, list[str]]:
+    """The files by their path up to the first dot, in either frame."""
+    found: dict[str, list[str]] = {}
+    for name in files:
+        found.setdefault(name.removeprefix("scan_frame/").partition(".")[0], []).append(name)
+    return found
+
+
+def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str]]) -> SiteReport:
+    """``files``: as `index_files` gives them."""
+    kinds = ("damage", "surface", "deposit")
+    folders = dict(zip(kinds, kinds if site.accepted else ("doubtful", "doubtful/surface", "deposit"), strict=True))
+    own = {kind: files.get(f"{folder}/site-{site.id}", []) for kind, folder in folders.items()}
+    spline, exact = written.splines.get(site.id), written.exact.get(site.id)
+
+    low, high = site.damage.bounds.tolist()
+    evidence = {name: value for name, value in vars(site.evidence).items() if name not in ("reasons", "causes")}
+    return SiteReport(
+        id=site.id,
+        points=len(site.points),
+        volume=site.damage.volume,
+        volume_95=report_interval(site.volume_95),
+        depth_95=report_interval(site.depth_95),
+        uncertainty=report_uncertainty(site),
+        surface_area=site.surface.area,
+        max_depth=site.max_depth,
+        volume_rates=list(site.volume_rates),
+        centroid=tuple(site.centroid.tolist()),
+        bounds=(tuple(low), tuple(high)),
+        method=site.method,
+        deposit=_report_deposit(site),
+        path=report_path(site, written),
+        evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
+        verdict=VerdictReport(level=site.verdict.level, reasons=list(site.verdict.reasons)),
+        accepted=site.accepted,
+        files=FilesReport(
+            **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
+        ),
+        spline=SplineReport(**vars(spline)) if spline else None,
+        exact=_report_exact(exact) if exact else None,
+        warnings=list(site.warnings),
+    )
+
+
+def _report_exact(exact: ExactForm) -> ExactReport:
+    deposit = ExactDepositReport(**vars(exact.deposit)) if exact.deposit else None
+    return ExactReport(**{**vars(exact), "tried": list(exact.tried), "deposit": deposit})
+
+
+def _report_deposit(site: Site) -> DepositReport | None:
+    if site.refused or not site.accepted:
+        return None
+    deposit = site.deposit or site.damage
+    if not isinstance(deposit, Deposit):
+        stock = deposit.volume - site.damage.volume
+        return DepositReport(volume=deposit.volume, stock_volume=stock, cut_back_volume=0, thickness=None, faces=[])
+    low, mean, high = deposit.thickness or (0.0, 0.0, 0.0)
+    return DepositReport(
+        volume=deposit.volume,
+        stock_volume=deposit.stock_volume,
+        cut_back_volume=deposit.cut_back_volume,
+        thickness=ThicknessReport(min=low, mean=mean, max=high) if deposit.thickness else None,
+        faces=list(deposit.touched),
+    )
+
+
+def sum_material(deposits: list[DepositReport]) -> MaterialReport:
+    return MaterialReport(
+        deposit_volume=sum(deposit.volume for deposit in deposits),
+        stock_volume=sum(deposit.stock_volume for deposit in deposits),
+        cut_back_volume=sum(deposit.cut_back_volume for deposit in deposits),
+    )

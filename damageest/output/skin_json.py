@@ -1,0 +1,91 @@
+"""What result.json says of unseen skin and of what lies outside it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from damageest.artefacts import Vector
+from damageest.findings import Coverage, Surplus
+from damageest.output.base import JsonModel
+from damageest.result import Result
+from damageest.stages.export import ExportedFiles
+
+
+class UnseenReport(JsonModel):
+    area: float
+    centre: Vector
+    bounds: tuple[Vector, Vector]
+    faces: list[int] = Field(description="numbers of its CAD faces; empty without B-rep")
+    volume: float = Field(description="of the part behind it: the most that can be lost without a trace in the scan")
+    why: Literal["unknown", "hidden", "outside", "no points"] = Field(
+        description="hidden: by the part itself; outside: of every view; no points: though a view shows its place; "
+        "unknown: no scanner position is known"
+    )
+
+
+class CoverageReport(JsonModel):
+    seen: float = Field(description="share of the skin's area that the scan shows, or shows to be lost")
+    unseen: list[UnseenReport] = Field(description="connected regions without scan points, largest first")
+
+
+class SurplusReport(JsonModel):
+    """Matter outside the nominal surface."""
+
+    id: int
+    kind: Literal["surplus", "displaced piece", "surroundings"] = Field(
+        description="surplus: added metal or dirt; displaced piece: losses of like size are beside it; surroundings: a "
+        "fixture, a table or a second specimen"
+    )
+    points: int
+    share: float = Field(description="of the scan's points")
+    volume: float | None = Field(description="null where it does not close, and for surroundings")
+    height: float = Field(description="largest distance of its points from the nominal surface")
+    area: float = Field(description="of the skin that it covers")
+    centre: Vector = Field(description="of the bounds")
+    bounds: tuple[Vector, Vector] = Field(description="of the volume; of the points where there is none")
+    file: str | None = Field(description="the first one of the volume; null where there is none")
+    beside: list[int] = Field(description="numbers of the sites beside it")
+    notes: list[str]
+
+
+def report_coverage(coverage: Coverage | None) -> CoverageReport | None:
+    if coverage is None:
+        return None
+    regions = []
+    for region in coverage.unseen:
+        low, high = region.bounds.tolist()
+        regions.append(
+            UnseenReport(
+                area=region.area,
+                centre=tuple(region.centre.tolist()),
+                bounds=(tuple(low), tuple(high)),
+                faces=list(region.faces),
+                volume=region.volume,
+                why=region.why,
+            )
+        )
+    return CoverageReport(seen=coverage.seen, unseen=regions)
+
+
+def report_surplus(item: Surplus, result: Result, written: ExportedFiles) -> SurplusReport:
+    points = result.aligned.points[item.points]
+    bounds = np.array([points.min(axis=0), points.max(axis=0)]) if item.solid is None else item.solid.bounds
+    low, high = bounds.tolist()
+    own = [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"surplus/site-{item.id}.")]
+    return SurplusReport(
+        id=item.id,
+        kind=item.kind,
+        points=len(item.points),
+        share=item.share,
+        volume=item.volume,
+        height=item.height,
+        area=item.area,
+        centre=tuple(bounds.mean(axis=0).tolist()),
+        bounds=(tuple(low), tuple(high)),
+        file=next(iter(own), None),
+        beside=[site.id for site in result.sites if set(site.clusters) & set(item.clusters)],
+        notes=list(item.notes),
+    )

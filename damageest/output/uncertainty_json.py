@@ -1,0 +1,48 @@
+"""What result.json says about how exactly a site is known."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from damageest.findings import Interval
+from damageest.output.base import JsonModel
+from damageest.result import Site
+
+
+class FadingReport(JsonModel):
+    """Volumes of a shallow loss, counted only where it is deep enough."""
+
+    half: float = Field(description="where it is deeper than half the tolerance")
+    at: float = Field(description="where it is deeper than the tolerance")
+    twice: float = Field(description="where it is deeper than twice the tolerance")
+    beyond: float = Field(description="lost beyond the rim of the site, shallower still; not part of `volume`")
+
+
+class UncertaintyReport(JsonModel):
+    """The causes. The first six are standard deviations of the volume; the next two, how much larger it may be."""
+
+    noise: float = Field(description="noise of the points on the inner surface")
+    spacing: float = Field(description="the surface between the points, above all beside the rim")
+    rim: float = Field(description="where the inner surface meets the skin")
+    pose: float = Field(description="pose of the scan")
+    tessellation: float = Field(description="triangles in place of the CAD surface")
+    form: float = Field(description="skin that deviates over whole areas")
+    inside: float = Field(description="where no points show the inner surface")
+    beside: float = Field(description="where no points show the skin beside it")
+    fading: FadingReport | None = Field(description="of a loss that is shallow; null for one with a sharp rim")
+    reasons: list[str] = Field(description="why there is no interval, or why it is wide")
+
+
+def report_interval(interval: Interval | None) -> Interval | None:
+    """The interval as result.json has it."""
+    return None if interval is None else (float(interval[0]), float(interval[1]))
+
+
+def report_uncertainty(site: Site) -> UncertaintyReport | None:
+    """The causes of a site's uncertainty; None where it was not measured."""
+    found = site.uncertainty
+    if found is None:
+        return None
+    fading = FadingReport(**vars(found.fading)) if found.fading else None
+    values = {k: v for k, v in vars(found).items() if k not in ("volume_95", "depth_95", "fading", "reasons")}
+    return UncertaintyReport(**values, fading=fading, reasons=list(found.reasons))

@@ -1,1 +1,0 @@
-"""Deposition paths: layers of a deposit, passes that fill them, the nozzle, its clearance, and the beads."""

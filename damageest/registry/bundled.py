@@ -1,0 +1,34 @@
+"""What the packages of this project bring, so that a message can name the one that is missing.
+
+Only messages use this: what can be run is what was found, whoever provides it.
+"""
+
+from __future__ import annotations
+
+COMMANDS = {"evaluate": "damageest-evaluate"}
+"""Command to package."""
+
+CONVERSIONS = {"cadquery": "damageest-cadquery"}
+"""Kind of object that a result can be converted to, to package."""
+
+FORMATS = {"step": "damageest-cadquery"}
+"""Format that `export` writes, to package."""
+
+IMPLEMENTATIONS = {
+    ("part", "brep"): "damageest-cadquery",
+    ("reconstruct", "ball_pivot"): "damageest-open3d",
+    ("reconstruct", "pymeshlab"): "damageest-pymeshlab",
+    ("enclose", "octree"): "damageest-octree",
+    ("enclose", "poisson_subtract"): "damageest-open3d",
+    ("enclose", "sweep"): "damageest-sweep",
+    ("repair", "pymeshfix"): "damageest-pymeshfix",
+    ("boolean", "pymeshlab"): "damageest-pymeshlab",
+    ("path", "layers"): "damageest-paths",
+}
+"""Stage and name to package."""
+
+METHODS = {"octree": "damageest-octree"}
+"""Value of a job's `method` to package."""
+
+SUFFIXES = dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep"), "damageest-cadquery")
+"""Suffix of a part's file to package."""

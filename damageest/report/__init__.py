@@ -1,1 +1,0 @@
-"""What a result says: `result.json` and its schema."""

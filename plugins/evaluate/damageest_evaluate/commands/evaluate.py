@@ -1,0 +1,259 @@
+"""`damageest evaluate`: measures accuracy and cost against known truth."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from damageest_evaluate.commands import honesty, path, speed
+from damageest_evaluate.commands.intervals import run_intervals
+
+if TYPE_CHECKING:
+    from damageest_evaluate.case import DamageCase
+    from damageest_evaluate.matrix import MatrixCell
+
+app = typer.Typer(no_args_is_help=True, help="Measure accuracy and cost against known truth.")
+app.command("honesty")(honesty.command)
+app.command("speed")(speed.command)
+app.command("path")(path.command)
+
+Vary = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="STAGE.OPTION=A,B,C", help="Values to compare; also stage=a,b or method=a,b. Repeat it to vary several."
+    ),
+]
+Against = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="SETTINGS", help="Other settings to compare with, as 'method=octree enclose.depth=8'. May be repeated."
+    ),
+]
+Noise = Annotated[
+    str, typer.Option(metavar="A,B", help="Noise of the scan: multiples of its default, or lengths, as 0.02mm.")
+]
+Points = Annotated[str, typer.Option(metavar="A,B", help="Number of points of the scan.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Replace a value of the job in all cases: stage.option=value or field=value."),
+]
+Jobs = Annotated[int, typer.Option(min=1, help="Cases that run at the same time. More than 1 makes each run slower.")]
+Timeout = Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")]
+Scheduler = Annotated[
+    str, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster at this address, instead of --jobs here.")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(file_okay=False, help="Folder for cases.jsonl (to resume from), cases.csv, summary.json and plots."),
+]
+Plots = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw plots into the folder of --out.")]
+
+
+@app.command("job")
+def job_command(
+    job: Annotated[
+        Path, typer.Argument(metavar="JOB", help="Job file. Its part is used, and a scanner similar to its scan.")
+    ],
+    vary: Vary = None,
+    against: Against = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of random damages of each size.")] = 10,
+    size: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B",
+            help="Depths of the damage in the job's unit, or 4x for 4 tolerances. 0: none; any: all kinds and sizes.",
+        ),
+    ] = "",
+    noise: Noise = "",
+    points: Points = "",
+    tolerance: Annotated[
+        str, typer.Option(metavar="A,B", help="Lengths, 2x for 2 times the job's tolerance, or auto.")
+    ] = "",
+    settings: Settings = None,
+    jobs: Jobs = 2,
+    timeout: Timeout = 300,
+    scheduler: Scheduler = "",
+    out: Out = None,
+    plots: Plots = True,
+) -> None:
+    """Measure which depth of damage is found on your part with your scanner, and how accurately.
+
+    Random damages are removed from the job's part. The part is then scanned virtually, with the noise and the density
+    of the job's scan. Damage that the job itself simulates is not used. Default sizes: no damage, and depths of 2, 4, 8
+    and 16 tolerances.
+    """
+    from damageest.errors import InputError
+    from damageest.registry import Registry
+    from damageest_evaluate.figures import summarise
+    from damageest_evaluate.job import plan_study
+    from damageest_evaluate.variants import VariationRequest
+
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+    if scheduler and not out:
+        raise InputError("--scheduler: give --out too, a folder that the cluster sees: the part is put there")
+    request = VariationRequest(size, noise, points, tolerance, vary or (), settings or (), against or ())
+    place = out.resolve() if out and scheduler else None
+    with tempfile.TemporaryDirectory(prefix="damageest-evaluate-", dir=place) as folder:
+        study = plan_study(job, request, seeds, Registry.discover(), Path(folder))
+        for note in study.notes:
+            typer.echo(note)
+        rows = _run_cases(study.cases, jobs, timeout, out, scheduler)
+    _write_report(rows, [], study.unit, out, plots)
+    typer.echo(f"\n{summarise(rows, study.unit)}")
+
+
+@app.command("suite")
+def suite_command(
+    cases: Annotated[int, typer.Option(help="Number of random damages, on the parts in turn.")] = 26,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the damages, scans and poses.")] = 0,
+    parts: Annotated[str, typer.Option(metavar="A,B", help="Names of built-in parts. Default: all.")] = "",
+    method: Annotated[str, typer.Option(help="Method of the job: auto, implicit, surface or octree.")] = "auto",
+    pose: Annotated[str, typer.Option(help="Pose of the part in the scan: random, or identity (known).")] = "random",
+    vary: Vary = None,
+    against: Against = None,
+    size: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B",
+            help="Depths of the damage in mm, or 4x for 4 tolerances. 0: none; any: all kinds and sizes.",
+        ),
+    ] = "any",
+    noise: Noise = "",
+    points: Points = "",
+    tolerance: Annotated[
+        str, typer.Option(metavar="A,B", help="Multiples of the noise, lengths, as 1mm, or auto.")
+    ] = "4",
+    settings: Settings = None,
+    intervals: Annotated[
+        bool,
+        typer.Option(
+            "--intervals",
+            help="Count how often the truth lies in the 95 % intervals, at three noises and three densities.",
+        ),
+    ] = False,
+    jobs: Jobs = 2,
+    timeout: Timeout = 300,
+    scheduler: Scheduler = "",
+    out: Out = None,
+    plots: Plots = True,
+    write: Annotated[
+        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the tables.")
+    ] = None,
+    marks: Annotated[
+        str, typer.Option(help="Name in the marks <!-- NAME: begin --> and <!-- NAME: end --> of --write.")
+    ] = "suite",
+) -> None:
+    """Measure accuracy on random damages of thirteen built-in parts, from scan to damage volume."""
+    from damageest.errors import InputError
+    from damageest.registry import Registry
+    from damageest_evaluate import suite
+    from damageest_evaluate.figures import collect_axes, summarise
+    from damageest_evaluate.parts import PARTS
+    from damageest_evaluate.readme import replace_between_marks
+    from damageest_evaluate.report import make_readme_tables
+    from damageest_evaluate.variants import VariationRequest
+
+    chosen = [name.strip() for name in parts.split(",")] if parts else list(PARTS)
+    if intervals:
+        if vary or against or settings or noise or points:
+            raise InputError(
+                "--intervals: varies noise and density itself; leave out --vary, --against, --set, --noise and --points"
+            )
+        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, _format_command(), scheduler)
+        return
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+    if write:
+        replace_between_marks(write, None, marks)  # fails before the runs start if the marks are missing
+    if pose not in ("random", "identity"):
+        raise InputError(f"--pose: '{pose}' is not valid; give random or identity")
+    base = [f"method={method}", *(["align=none"] if pose == "identity" else [])]
+    varied = [text for text in base if text.partition("=")[0] not in {name.partition("=")[0] for name in vary or ()}]
+    request = VariationRequest(size, noise, points, tolerance, vary or (), [*varied, *(settings or ())], against or ())
+    planned = suite.make_cases(cases, seed, chosen, pose, request, Registry.discover())
+    rows = _run_cases(planned, jobs, timeout, out, scheduler)
+    first = ["part"] if len(chosen) > 1 or not collect_axes(rows) else []
+    _write_report(rows, first, "mm", out, plots)
+    typer.echo(f"\n{summarise(rows, 'mm')}")
+    if write:
+        write.write_text(
+            replace_between_marks(
+                write, make_readme_tables(rows, first + list(collect_axes(rows)), "mm", _format_command()), marks
+            )
+        )
+
+
+def _run_cases(
+    cases: Sequence[DamageCase], jobs: int, timeout: float, out: Path | None, scheduler: str
+) -> list[dict[str, Any]]:
+    from damageest_evaluate.report import format_row
+    from damageest_evaluate.rows import run_all
+
+    count = 0
+
+    def print_row(row: dict[str, Any]) -> None:
+        nonlocal count
+        count += 1
+        typer.echo(f"[{count}/{len(cases)}] {format_row(row)}", err=True)
+
+    return run_all(cases, out / "cases.jsonl" if out else None, jobs, timeout, print_row, scheduler)
+
+
+def _write_report(rows: list[dict[str, Any]], first: list[str], unit: str, out: Path | None, plots: bool) -> None:
+    from damageest_evaluate.figures import collect_axes
+    from damageest_evaluate.plots import draw_plots
+    from damageest_evaluate.report import format_tables, write_files
+
+    typer.echo("\n" + format_tables(rows, [*first, *collect_axes(rows)], unit))
+    if out:
+        write_files(rows, unit, out, _format_command())
+        paths = draw_plots(rows, unit, out) if plots else []
+        names = ", ".join(sorted({path.stem for path in paths}))
+        typer.echo(f"written to {out}" + (f", with plots: {names}" if paths else ""))
+
+
+def _format_command() -> str:
+    """The command line, without the options that name output files."""
+    words, output_options = sys.argv[1:], ("--out", "--write", "--marks")
+    kept = [
+        word
+        for before, word in zip(["", *words], words, strict=False)
+        if before not in output_options and word.partition("=")[0] not in output_options
+    ]
+    return shlex.join(["damageest", *kept])
+
+
+@app.command("matrix")
+def matrix_command(
+    jobs: Annotated[list[Path], typer.Argument(metavar="JOB...", help="Job files whose scan is simulated.")],
+    stage: Annotated[list[str] | None, typer.Option(help="Only this stage. May be repeated.")] = None,
+    workers: Annotated[int, typer.Option(help="Runs at the same time. More than 1 makes each run slower.")] = 1,
+    timeout: Annotated[float, typer.Option(help="Seconds after which a run is stopped.")] = 300,
+    write: Annotated[
+        Path | None, typer.Option(help="Text file. Its lines between the matrix marks are replaced by the table.")
+    ] = None,
+) -> None:
+    """Measure IoU, time and memory of every implementation of every stage, with the other stages at default."""
+    from damageest.registry import Registry
+    from damageest_evaluate.matrix import run_matrix
+    from damageest_evaluate.readme import make_matrix_table, replace_between_marks
+
+    if write:
+        replace_between_marks(write, None, "matrix")  # fails before the runs start if the marks are missing
+    cells = run_matrix(jobs, Registry.discover(), stage or (), workers, timeout, _print_cell)
+    typer.echo(make_matrix_table(cells))
+    if write:
+        write.write_text(replace_between_marks(write, make_matrix_table(cells, legend=False), "matrix"))
+
+
+def _print_cell(cell: MatrixCell) -> None:
+    figures = f"IoU {cell.iou:.4f}, {cell.seconds:.1f} s, {cell.megabytes:.0f} MB"
+    what = ", ".join([*([figures] if cell.iou == cell.iou else []), *([cell.refused] if cell.refused else [])])
+    typer.echo(f"{cell.stage}: {cell.use}: {cell.job}: {what}", err=True)

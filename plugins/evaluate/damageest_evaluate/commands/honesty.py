@@ -1,0 +1,101 @@
+"""`damageest evaluate honesty`: how often a result is right, wrong but said, or wrong and silent."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def command(
+    kinds: Annotated[
+        str, typer.Option(metavar="A,B", help="Kinds of trouble, in full or their beginning. Default: all.")
+    ] = "",
+    parts: Annotated[str, typer.Option(metavar="A,B", help="Names of parts. Default: all.")] = "",
+    seeds: Annotated[str, typer.Option(metavar="A,B", help="Seeds; each case runs once with each of them.")] = "0",
+    case: Annotated[
+        str, typer.Option(metavar="A,B", help="Numbers of cases, as the list of silent ones has them.")
+    ] = "",
+    points: Annotated[int, typer.Option(min=100, help="Number of points of each scan.")] = 50_000,
+    workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 2,
+    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,
+    scheduler: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster at this address, instead of --workers here.")
+    ] = "",
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder for honesty.jsonl, to resume from, and honesty.md.")
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
+    ] = None,
+    show: Annotated[bool, typer.Option("--list", help="Only list the cases.")] = False,
+) -> None:
+    """Count right, wrong but said, and wrong and silent results on scans with known trouble.
+
+    The troubles are those of real scans: lost walls, skin that was not scanned, a wrong part, frame or unit, fixtures,
+    misplaced views, and others. A result is silent where it is wrong and nothing in it says so.
+    """
+    from damageest.registry import Registry
+    from damageest_evaluate.job import fingerprint_code
+    from damageest_evaluate.readme import replace_between_marks
+    from damageest_evaluate.rows import run_all
+    from damageest_evaluate.troubles.report import describe_case, format_trouble_row, make_trouble_tables
+    from damageest_evaluate.troubles.suite import make_trouble_cases
+
+    if write:
+        replace_between_marks(write, None, "honesty")  # fails before the runs start if the marks are missing
+    source = fingerprint_code(Registry.discover())
+    cases = make_trouble_cases(
+        _split(kinds), _split(parts), _parse_numbers("--seeds", seeds), points, _parse_numbers("--case", case), source
+    )
+    if show:
+        for item in cases:
+            typer.echo(f"{item.number} {describe_case(item.make_blank_row())}")
+        return
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+    count = 0
+
+    def print_row(row: dict[str, Any]) -> None:
+        nonlocal count
+        count += 1
+        typer.echo(f"[{count}/{len(cases)}] {row['number']} {format_trouble_row(row)}", err=True)
+
+    rows = run_all(cases, out / "honesty.jsonl" if out else None, workers, timeout, print_row, scheduler)
+    text = make_trouble_tables(rows, _format_command())
+    typer.echo("\n" + text)
+    if out:
+        (out / "honesty.md").write_text(text + "\n")
+    if write:
+        write.write_text(replace_between_marks(write, make_trouble_tables(rows, _format_command(), False), "honesty"))
+
+
+def _split(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _parse_numbers(option: str, text: str) -> list[int]:
+    """The whole numbers in ``text``; raises InputError for anything else."""
+    from damageest.errors import InputError
+
+    try:
+        values = [int(word) for word in _split(text)]
+    except ValueError:
+        values = [-1]
+    if any(value < 0 for value in values):
+        raise InputError(f"{option}: '{text}' is not valid; give whole numbers separated by commas, as 0,1,2")
+    return values or ([0] if option == "--seeds" else [])
+
+
+def _format_command() -> str:
+    """The command line, without the options that name output files."""
+    words = sys.argv[1:]
+    kept = [
+        word
+        for before, word in zip(["", *words], words, strict=False)
+        if before not in ("--out", "--write") and word.partition("=")[0] not in ("--out", "--write")
+    ]
+    return shlex.join(["damageest", *kept])

@@ -1,0 +1,51 @@
+"""`damageest evaluate path`: deposition paths of many deposits, planned with 3 and 5 axes, and checked."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def command(
+    jobs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[JOB]...", help="Job files; the losses of their virtual scans count."),
+    ] = None,
+    each: Annotated[
+        int,
+        typer.Option(min=0, help="Number of pockets, worn bores, blade tips, broken teeth, and of each tight place."),
+    ] = 6,
+    random: Annotated[int, typer.Option(min=0, help="Number of random damages of the suite.")] = 20,
+    out: Annotated[Path | None, typer.Option(dir_okay=False, help="File for the rows, as JSON.")] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="Text file. Its lines between the path marks are replaced by the table.")
+    ] = None,
+) -> None:
+    """Plan deposition paths for deposits of known shape, and check what they fill and whether the nozzle touches.
+
+    Bead and nozzle fit each deposit. The check of the nozzle uses another library, and is
+    ten times finer than the planner's.
+    """
+    from damageest.registry import Registry
+    from damageest_evaluate.paths.run import make_table, run_scenes
+    from damageest_evaluate.paths.scenes import make_scenes
+    from damageest_evaluate.readme import describe_measurement, replace_between_marks
+
+    if write:
+        replace_between_marks(write, None, "path")
+    scenes = make_scenes(jobs or [], each, random, Registry.discover())
+    rows = run_scenes(scenes, lambda text: typer.echo(text, err=True))
+    if out:
+        out.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
+    table = make_table(rows)
+    typer.echo(table)
+    if write:
+        words = [word for word in sys.argv[1:] if not word.startswith("--write")]
+        measured = describe_measurement(f"`{shlex.join(['damageest', *words])}`")
+        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "path"))

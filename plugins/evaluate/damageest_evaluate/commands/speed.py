@@ -1,0 +1,60 @@
+"""`damageest evaluate speed`: where the time of a run goes, against one exact distance pass over the scan."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def command(
+    kinds: Annotated[str, typer.Option(metavar="A;B", help="Names of cases. Default: all but the dense scan.")] = "",
+    points: Annotated[str, typer.Option(metavar="N", help="Points of every scan, as 1e6, instead of the case's.")] = "",
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="Replace a value of the job: stage.option=value or field=value.")
+    ] = None,
+    repeat: Annotated[int, typer.Option(min=1, help="Runs of each case; the median is given.")] = 1,
+    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 600,
+    write: Annotated[
+        Path | None, typer.Option(help="Text file. Its lines between the speed marks are replaced by the table.")
+    ] = None,
+) -> None:
+    """Measure processor and wall time of runs of several kinds, one after the other.
+
+    Each runs in a process of its own, and is compared with one exact distance pass of libigl over the same points in
+    the same process.
+    """
+    from damageest.errors import InputError
+    from damageest.registry import Registry
+    from damageest_evaluate.readme import describe_measurement, replace_between_marks
+    from damageest_evaluate.rows import run_one
+    from damageest_evaluate.speed import USUAL, make_speed_cases, make_speed_table
+
+    if write:
+        replace_between_marks(write, None, "speed")  # fails before the runs start if the marks are missing
+    try:
+        count = int(float(points or 0))
+    except (ValueError, OverflowError):
+        raise InputError(f"--points: '{points}' is not a number, as 1e6") from None
+    names = [name.strip() for name in kinds.split(";")] if kinds else list(USUAL)
+    rows: list[list[dict[str, Any]]] = []
+    for case in make_speed_cases(names, count, settings or (), Registry.discover()):
+        runs = [run_one(case, timeout) for _ in range(repeat)]
+        typer.echo(f"{case.varied['kind']}: {runs[-1]['error']} {runs[-1]['seconds']:.1f} s", err=True)
+        rows.append(runs)
+    table = make_speed_table(rows)
+    typer.echo(table)
+    if write:
+        measured = describe_measurement(f"`{shlex.join(['damageest', *_leave_out_write(sys.argv[1:])])}`")
+        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "speed"))
+
+
+def _leave_out_write(words: list[str]) -> list[str]:
+    return [
+        word
+        for before, word in zip(["", *words], words, strict=False)
+        if before != "--write" and word.partition("=")[0] != "--write"
+    ]

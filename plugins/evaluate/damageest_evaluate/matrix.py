@@ -1,0 +1,129 @@
+"""Accuracy, time and memory of every implementation of every stage, with all other stages at their defaults.
+
+The scans of the jobs are simulated, so that the truth is known. Each run has a process of its own, so that its peak
+memory can be measured.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Part, Scan, Solid, Truth
+from damageest.errors import DamageestError, Fault, JobError
+from damageest.registry import Implementation, Registry
+from damageest.registry.contracts import STAGES
+from damageest_evaluate.matrix_job import MatrixJob, make_settings, prepare_matrix_job
+from damageest_evaluate.memory import PeakMemory
+from damageest_evaluate.processes import MARK, run_in_process
+from damageest_evaluate.scores import score
+
+
+@dataclass(frozen=True)
+class MatrixCell:
+    """One implementation on one job.
+
+    ``refused``: the reason if there is no result (``iou`` is NaN), or none for some sites. ``flagged``: the result's
+    own checks failed. ``stage_seconds``: time in the stage; ``seconds``: time of the run; ``megabytes``: peak memory.
+    """
+
+    stage: str
+    use: str
+    job: str
+    iou: float
+    flagged: bool = False
+    refused: str = ""
+    stage_seconds: float = float("nan")
+    seconds: float = float("nan")
+    megabytes: float = float("nan")
+
+
+def run_matrix(
+    jobs: Sequence[Path],
+    registry: Registry,
+    stages: Sequence[str] = (),
+    workers: int = 1,
+    timeout: float = 300,
+    tell: Callable[[MatrixCell], None] = lambda cell: None,
+) -> list[MatrixCell]:
+    """All cells, ordered by stage, implementation and job. Raises JobError for an invalid job or an unknown truth."""
+    if unknown := [stage for stage in stages if stage not in STAGES]:
+        raise JobError([Fault(f"no stage '{unknown[0]}'; there are: {', '.join(STAGES)}")], "matrix")
+    with tempfile.TemporaryDirectory(prefix="damageest-matrix-") as folder:
+        scenes = [prepare_matrix_job(path, registry, Path(folder) / str(k)) for k, path in enumerate(jobs)]
+        items = [item for stage in STAGES if not stages or stage in stages for item in registry.of(stage)]
+        with ThreadPoolExecutor(workers) as pool:
+            pairs = [(item, scene) for item in items for scene in scenes]
+            futures = [pool.submit(_run_cell, item, scene, timeout) for item, scene in pairs]
+            cells = []
+            for future in futures:
+                cells.append(future.result())
+                tell(cells[-1])
+    return cells
+
+
+def _run_cell(item: Implementation, scene: MatrixJob, timeout: float) -> MatrixCell:
+    """One implementation on one job, run in a process of its own."""
+    name = (item.contract.stage, item.name, scene.name)
+    settings = make_settings(item, scene)
+    if isinstance(settings, str):
+        return MatrixCell(*name, float("nan"), refused=settings)
+    case = {"folder": str(scene.folder), "stage": item.contract.stage, "use": item.name, **settings}
+    row = run_in_process("damageest_evaluate.matrix", case, timeout)
+    return MatrixCell(*name, **row) if isinstance(row, dict) else MatrixCell(*name, float("nan"), refused=row)
+
+
+def run_one(case: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a cell, from a run in this process."""
+    with PeakMemory() as memory:
+        return _run_measured(case, memory)
+
+
+def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
+    import damageest
+
+    folder = Path(case["folder"])
+    data = np.load(folder / "scene.npz")
+    part = Part(data["vertices"], data["faces"], unit=str(data["unit"]))
+    truth = Truth(Solid(data["lost"], data["lost_faces"]), data["pose"])
+    start = time.perf_counter()
+    row: dict[str, Any] = {"iou": float("nan")}
+    given: dict[str, Any] = {} if case["own_part"] else {"part": part}
+    pose = truth.T_part_scan
+    if not case["own_scan"]:
+        move = np.array(case["moved"])
+        given["scan"] = Scan(data["points"], unit=str(data["unit"])).move(move)
+        pose = pose @ np.linalg.inv(move)
+    try:
+        writes = case["stage"] in ("export", "report")
+        result = damageest.run(case["job"], output=folder / "out" if writes else False, **given)
+    except DamageestError as error:
+        row["refused"] = _shorten_reason(str(error))
+        return row | {"seconds": time.perf_counter() - start}
+    row["seconds"] = time.perf_counter() - start
+    row["stage_seconds"] = sum(record.seconds for record in result.stages if record.stage == case["stage"])
+    row["megabytes"] = memory.take_peak()
+    solids = [site.damage for site in result.sites]
+    row["iou"] = score(part, solids, truth.damage, result.tolerance, result.pose.T_part_scan, pose).iou
+    row["flagged"] = result.status != "ok" or not all(site.evidence.consistent for site in result.sites)
+    if result.failures:
+        row["refused"] = _shorten_reason(result.failures[0])
+    return row
+
+
+def _shorten_reason(text: str) -> str:
+    """The message without its remedy, and without stage and implementation, which the table's row names."""
+    return text.splitlines()[0].split(": ", 2)[-1]
+
+
+if __name__ == "__main__":
+    print(MARK + json.dumps(run_one(json.loads(sys.argv[1]))), flush=True)

@@ -1,0 +1,111 @@
+"""Measurements as Markdown tables, and their insertion into a text file such as a README."""
+
+from __future__ import annotations
+
+import datetime
+import math
+import os
+import platform
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from damageest.errors import InputError
+
+if TYPE_CHECKING:
+    from damageest_evaluate.matrix import MatrixCell
+
+
+def make_marks(kind: str) -> tuple[str, str]:
+    """The lines that enclose a table in the text file. ``kind``: as matrix or suite."""
+    return f"<!-- {kind}: begin -->", f"<!-- {kind}: end -->"
+
+
+MATRIX = (
+    "Columns with a job's name: intersection over union of found and true damage; flagged: a check of the result "
+    "failed. stage, s and run, s: median seconds of the stage and of the whole run. peak, MB: the largest peak memory "
+    "of a run"
+)
+
+
+def make_matrix_table(cells: Sequence[MatrixCell], legend: bool = True) -> str:
+    """A Markdown table: a row for each implementation, a column for each job. The reasons of refusals follow it.
+
+    ``legend``: whether the text says what the columns are; not for a page that has the legend already.
+    """
+    jobs = list(dict.fromkeys(cell.job for cell in cells))
+    rows = list(dict.fromkeys((cell.stage, cell.use) for cell in cells))
+    cell_of = {(cell.stage, cell.use, cell.job): cell for cell in cells}
+    reasons: list[str] = []
+    head = ["stage", "implementation", *jobs, "stage, s", "run, s", "peak, MB"]
+    lines = [head]
+    before = ""
+    for stage, use in rows:
+        row = [cell_of[stage, use, job] for job in jobs]
+        shown = [_format_cell(cell, reasons) for cell in row]
+        figures = [
+            _format_number([cell.stage_seconds for cell in row], "{:.2f}"),
+            _format_number([cell.seconds for cell in row if not math.isnan(cell.iou)], "{:.1f}"),
+            _format_number([cell.megabytes for cell in row], "{:.0f}", np.max),
+        ]
+        lines.append([stage if stage != before else "", use, *shown, *figures])
+        before = stage
+    notes = [f"{number}. {reason}" for number, reason in enumerate(reasons, 1)]
+    about = describe_measurement(MATRIX if legend else "")
+    return "\n".join([format_markdown(lines, 2), "", about, *(["", *notes] if notes else [])])
+
+
+def format_markdown(lines: Sequence[Sequence[str]], names: int = 1) -> str:
+    """A Markdown table; the first line is the head. All columns after the first ``names`` are aligned to the right."""
+    rule = ["---"] * names + ["---:"] * (len(lines[0]) - names)
+    return "\n".join("| " + " | ".join(words) + " |" for words in (lines[0], rule, *lines[1:]))
+
+
+def _format_cell(cell: MatrixCell, reasons: list[str]) -> str:
+    if cell.refused and cell.refused not in reasons:
+        reasons.append(cell.refused)
+    why = f"refused [{reasons.index(cell.refused) + 1}]" if cell.refused else ""
+    if math.isnan(cell.iou):
+        return why or "–"
+    return f"{cell.iou:.3f}" + (f", partly {why}" if why else " (flagged)" if cell.flagged else "")
+
+
+def _format_number(values: Sequence[float], form: str, of: object = np.median) -> str:
+    known = [value for value in values if not math.isnan(value)]
+    return form.format(of(known)) if known and callable(of) else "–"
+
+
+def describe_measurement(what: str) -> str:
+    """``what``, if any, followed by the date, the versions and the machine of the measurement."""
+    measured = collect_versions()
+    libraries = ", ".join(f"{name} {number}" for name, number in measured["versions"].items())
+    return f"{what}{'. ' if what else ''}Measured {measured['date']}: {libraries}; {measured['machine']}."
+
+
+def collect_versions() -> dict[str, Any]:
+    """Today's date, the versions of the libraries that compute, and the machine."""
+    names = ("damageest", "numpy", "pyvista", "manifold3d", "libigl")
+    return {
+        "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
+        "versions": {"Python": platform.python_version(), **{name: version(name) for name in names}},
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
+    }
+
+
+def replace_between_marks(path: Path, text: str | None, kind: str) -> str:
+    """The file's text with ``text`` between the marks; None: unchanged. Raises InputError if the marks are missing."""
+    first, last = make_marks(kind)
+    try:
+        old = path.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a text file: {error}") from None
+    before, begin, rest = old.partition(first)
+    _, end, after = rest.partition(last)
+    if not begin or not end:
+        raise InputError(
+            f"{path}: the lines that enclose the table are missing\n  try: add the lines  {first}  and  {last}"
+        )
+    return old if text is None else f"{before}{first}\n\n{text}\n\n{last}{after}"

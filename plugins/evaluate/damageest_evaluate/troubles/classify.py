@@ -1,0 +1,254 @@
+"""Right, wrong but said, or wrong and silent: the definition, applied to one run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from damageest.artefacts import Floats, Part, Pose, Solid
+from damageest.findings import Coverage
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
+from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.solids import to_manifold, to_solid
+from damageest.geometry.transforms import move_mesh
+from damageest.result import Result
+from damageest_evaluate.scores import MATCH, measure_depth, measure_pose_error, score, unite_solids
+
+RIGHT_IOU = 0.9
+"""Least intersection over union of the accepted damage volumes and the true damage."""
+SMALL = 4.0
+"""Damage with a volume below (4 tolerances)^3 is tiny, and damage no deeper than 4 tolerances is shallow: IoU says
+little about it. Tiny damage may be missed."""
+VOLUME_ERROR = 0.3
+SURFACE_ERROR = 0.5
+"""Tiny or shallow damage is right with this relative error of its volume, or with this volume of the symmetric
+difference over the area of its inner surface, in tolerances."""
+UNSEEN_SHARE = 0.5
+"""Share of the skin of a damage that has to be reported as unseen for the damage to count as unseen."""
+
+TOUCH = 1e-3
+"""Share of a damage inside doubtful sites from which they are about this damage."""
+
+Outcome = Literal["right", "said", "silent"]
+
+
+@dataclass(frozen=True, eq=False)
+class TrueState:
+    """The truth of a run.
+
+    ``pose`` (4,4) T_part_scan, None where no pose is right; ``damage`` in the part's frame. ``names``: patterns that
+    name the trouble. ``tolerance``: the one that the scan allows; a larger one of the job does not make damage tiny or
+    a pose right.
+    """
+
+    part: Part
+    damage: Solid | None
+    pose: Floats | None
+    names: tuple[str, ...] = ()
+    tolerance: float = float("inf")
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The outcome of a run and why. ``unseen``: number of true damages that lie on skin reported as unseen. ``iou``: of
+    the accepted volumes and the true damage that is not unseen, NaN where there is neither. ``cautious``: it would be
+    right with its doubtful sites accepted. ``refused``: the run gave an error."""
+
+    outcome: Outcome
+    reason: str
+    iou: float = float("nan")
+    unseen: int = 0
+    cautious: bool = False
+    refused: bool = False
+
+
+def judge_error(message: str, names: Sequence[str]) -> Judgement:
+    """The judgement on a run that was refused: said where the message names the trouble."""
+    if find_name([message], names, False):
+        return Judgement("said", f"refused: {message}", refused=True)
+    return Judgement("silent", f"refused for another reason: {message}", refused=True)
+
+
+def judge(result: Result, true: TrueState) -> Judgement:
+    """The judgement on a run that gave a result."""
+    tolerance = min(result.tolerance, true.tolerance)
+    motion = None if true.pose is None else find_motion(true.part, result.pose, true.pose, tolerance)
+    bodies = _split_damage(true, motion)
+    reported = {id(body): _find_report(body, result) for body in bodies}
+    unseen = [body for body in bodies if reported[id(body)] == "unseen"]
+    seen = _leave_out(bodies, unseen)
+    has_pose = motion is not None
+    accepted = [site.damage for site in result.sites if site.accepted]
+    faults = [] if has_pose else ["the pose is wrong"]
+    faults += find_faults(accepted, seen, unseen, true.part, tolerance)
+    value = _compare(accepted, seen, true.part, tolerance)[0]
+    if not faults:
+        return Judgement("right", "", value, len(unseen))
+    why = "; ".join(faults)
+    doubtful = [site.damage for site in result.sites if not site.accepted]
+    lost = [body for body in seen if reported[id(body)] == "lost"]
+    if lost and has_pose and not find_faults(accepted, _leave_out(seen, lost), [*unseen, *lost], true.part, tolerance):
+        return Judgement("said", f"named: {why} | skin reported as lost", value, len(unseen))
+    if doubtful and _is_rest_right(accepted, doubtful, seen, unseen, true.part, tolerance, has_pose):
+        all_faults = find_faults([*accepted, *doubtful], seen, unseen, true.part, tolerance)
+        return Judgement("said", f"doubtful: {why}", value, len(unseen), cautious=has_pose and not all_faults)
+    if text := find_name(collect_texts(result), true.names):
+        return Judgement("said", f"named: {why} | {text}", value, len(unseen))
+    return Judgement("silent", why, value, len(unseen))
+
+
+def find_faults(
+    accepted: Sequence[Solid], seen: Sequence[Solid], unseen: Sequence[Solid], part: Part, tolerance: float
+) -> list[str]:
+    """What is wrong about the accepted damage volumes; nothing where they are right.
+
+    ``seen``, ``unseen``: the bodies of the true damage; only those seen have to be found.
+    """
+    every = [*seen, *unseen]
+    faults = []
+    false = [solid for solid in accepted if _share_inside(solid, every) < MATCH]
+    if false:
+        faults.append(f"{len(false)} false sites with {sum(solid.volume for solid in false):.3g} in volume")
+    large = [body for body in seen if body.volume > (SMALL * tolerance) ** 3]
+    missed = [body for body in large if _share_inside(body, accepted) < MATCH]
+    if missed:
+        faults.append(f"{len(missed)} damages missed with {sum(body.volume for body in missed):.3g} in volume")
+    if faults:
+        return faults
+    # a found body that is partly reported as unseen counts in full where it was found
+    wanted = [*seen, *(body for body in unseen if _share_inside(body, accepted) >= MATCH)]
+    if accepted and wanted:
+        value, volume, surface, is_small = _compare(accepted, wanted, part, tolerance)
+        good = value >= RIGHT_IOU
+        if not good and is_small:
+            good = abs(volume) <= VOLUME_ERROR or surface < SURFACE_ERROR
+        if not good:
+            faults.append(f"IoU {value:.2f}, volume error {volume:+.0%}")
+    return faults
+
+
+def _compare(
+    found: Sequence[Solid], wanted: Sequence[Solid], part: Part, tolerance: float
+) -> tuple[float, float, float, bool]:
+    """IoU, relative error of the volume, error over the surface in tolerances, and whether it is tiny or shallow."""
+    if not found or not wanted:
+        return (float("nan") if not found and not wanted else 0.0), float("nan"), float("nan"), False
+    whole = join(wanted)
+    figures = score(part, found, whole, tolerance)
+    tiny = whole.volume < (SMALL * tolerance) ** 3 or measure_depth(whole, part) <= SMALL * tolerance
+    return figures.iou, figures.volume_error, figures.surface_error, tiny
+
+
+def join(solids: Sequence[Solid]) -> Solid:
+    """The union of solids. Raises ValueError where it is empty."""
+    if len(solids) == 1:
+        return solids[0]
+    origin = solids[0].bounds.mean(axis=0)
+    found = to_solid(unite_solids(solids, origin), origin)
+    if found is None:
+        raise ValueError("the union of the solids is empty")
+    return found
+
+
+def _share_inside(solid: Solid, others: Sequence[Solid]) -> float:
+    """Share of a solid's volume inside others."""
+    if not others:
+        return 0.0
+    origin = solid.bounds.mean(axis=0)
+    return float((to_manifold(solid, origin) ^ unite_solids(others, origin)).volume() / solid.volume)
+
+
+def _is_rest_right(
+    accepted: Sequence[Solid],
+    doubtful: Sequence[Solid],
+    seen: Sequence[Solid],
+    unseen: Sequence[Solid],
+    part: Part,
+    tolerance: float,
+    has_pose: bool,
+) -> bool:
+    """Whether all that is wrong is in doubtful sites: the accepted ones are right, and no damage has no site."""
+    if not has_pose:
+        return not accepted
+    touched = [body for body in seen if _share_inside(body, accepted) < MATCH and _share_inside(body, doubtful) > TOUCH]
+    return not find_faults(accepted, _leave_out(seen, touched), [*unseen, *touched], part, tolerance)
+
+
+def find_motion(part: Part, found: Pose, true: Floats, tolerance: float) -> Floats | None:
+    """The motion (4,4) of a symmetric part onto itself by which the found pose differs from the true one.
+
+    The identity where the pose is right as it is; None where it is wrong. A pose is right within two tolerances (rms
+    over the part's surface). On a symmetric part the true pose has to be among the alternatives, or, where the symmetry
+    is continuous, a note has to name it.
+    """
+    residual, path = measure_pose_error(part, found.T_part_scan, true)
+    if path < 2 * tolerance:
+        return np.eye(4)
+    for other in () if found.alternatives is None else found.alternatives:
+        if measure_pose_error(part, other, true)[1] < 2 * tolerance:
+            return np.asarray(found.T_part_scan @ np.linalg.inv(other))
+    if residual < 2 * tolerance and any("symmetry" in note for note in found.notes):
+        return np.asarray(found.T_part_scan @ np.linalg.inv(true))
+    return None
+
+
+def _split_damage(true: TrueState, motion: Floats | None) -> list[Solid]:
+    """The connected bodies of the true damage, where the found pose puts them on a symmetric part."""
+    if true.damage is None:
+        return []
+    damage = move_mesh(true.damage, motion)
+    origin = damage.bounds.mean(axis=0)
+    pieces = [to_solid(piece, origin) for piece in to_manifold(damage, origin).decompose()]
+    return [piece for piece in pieces if piece is not None]
+
+
+def _find_report(body: Solid, result: Result) -> Literal["unseen", "lost", ""]:
+    """What the result reports of most of a damage's skin: unseen, or lost as rays passed through it; empty: neither."""
+    coverage = result.coverage
+    if coverage is None or not len(coverage.skin.faces):
+        return ""
+    points = sample_by_area(body, 2000, np.random.default_rng(3))[0]
+    # not exactly on it: the pose that moved the body has an error
+    skin = points[distance_to_mesh(points, result.part) < 0.1 * result.tolerance]
+    if not len(skin):
+        return ""
+    cell = closest_on_mesh(skin, coverage.skin)[1]
+    lost = float(coverage.is_lost[cell].mean())
+    both = float((coverage.is_lost[cell] | (coverage.region[cell] >= 0)).mean())
+    if both < UNSEEN_SHARE:
+        return ""
+    return "lost" if lost > both / 2 else "unseen"
+
+
+def _leave_out(bodies: Sequence[Solid], others: Sequence[Solid]) -> list[Solid]:
+    return [body for body in bodies if not any(body is other for other in others)]
+
+
+def collect_texts(result: Result) -> list[str]:
+    """All sentences of a result in which a trouble can be named."""
+    surplus = [
+        " ".join([f"{entry.kind}: height {entry.height:.3g}, area {entry.area:.3g}", *entry.notes])
+        for entry in result.surplus
+    ]
+    sites = [text for site in result.sites for text in site.warnings]
+    sites += [text for site in result.sites if not site.accepted for text in site.verdict.reasons]
+    return [*result.warnings, *result.failures, *surplus, *sites, *result.pose.notes]
+
+
+def find_name(texts: Sequence[str], names: Sequence[str], with_amount: bool = True) -> str:
+    """The first text that names a trouble, with a number as its amount where ``with_amount``; empty without any."""
+    for text in texts:
+        if with_amount and not re.search(r"\d", text):
+            continue
+        if any(re.search(name, text, re.IGNORECASE | re.DOTALL) for name in names):
+            return " ".join(text.split())
+    return ""
+
+
+def measure_seen_error(coverage: Coverage | None, seen: float) -> float | None:
+    """Difference between reported and true share of seen skin, in points of per cent; None without a report."""
+    return None if coverage is None else 100 * abs(coverage.seen - seen)

@@ -1,0 +1,56 @@
+"""What a kind of trouble is: its scene, the words that name it, and its cases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from damageest_evaluate.troubles.scene import Scanning, TroubleScene
+
+
+@dataclass(frozen=True)
+class TroubleWay:
+    """One case of a kind. ``pose``: `known` (align: none) or `unknown`. ``views``: scanner positions; 0: all skin at
+    once. ``positions``: whether the job is told the scanner positions. ``amount``: see the kind's function."""
+
+    part: str
+    pose: str = "known"
+    views: int = 8
+    positions: bool = True
+    amount: float = 0.0
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """A kind of trouble. ``names``: patterns of texts that name it. A text with a pattern and a number is enough."""
+
+    make: Callable[[Scanning], TroubleScene]
+    names: tuple[str, ...]
+    ways: tuple[TroubleWay, ...]
+
+
+def spread_over(parts: str, pose: str = "known", views: int = 8) -> tuple[TroubleWay, ...]:
+    """A way for each part. ``pose`` `both`: the poses alternate."""
+    poses = {"both": ("known", "unknown")}.get(pose, (pose,))
+    return tuple(TroubleWay(name, poses[k % len(poses)], views) for k, name in enumerate(parts.split()))
+
+
+_PARTS = ("block", "gear", "tube", "ribbed_plate", "lever", "cuboid", "keyed_shaft", "coupling", "plate", "rib_bracket")
+
+
+def scan_partly() -> tuple[TroubleWay, ...]:
+    """Four parts, each from 1, 3 and 8 positions, in known and in unknown pose."""
+    return tuple(
+        TroubleWay(name, "known" if (k + views) % 2 else "unknown", views)
+        for k, name in enumerate(_PARTS[:4])
+        for views in (1, 3, 8)
+    )
+
+
+def scan_from_few(amount: float = 0.0) -> tuple[TroubleWay, ...]:
+    """Ten parts, each from 1, 2 and 3 positions, in known and in unknown pose."""
+    return tuple(
+        TroubleWay(name, "known" if (k + views) % 2 else "unknown", views, amount=amount)
+        for k, name in enumerate(_PARTS)
+        for views in (1, 2, 3)
+    )

@@ -1,0 +1,18 @@
+"""The table of forms."""
+
+from __future__ import annotations
+
+from damageest_evaluate.forms import FormCase, make_form_cases, run_case
+
+
+def test_every_kind_is_there_on_at_least_six_parts() -> None:
+    cases = make_form_cases()
+    assert {case.kind for case in cases} == {"scale", "bend", "twist"}
+    assert len({case.part for case in cases}) >= 6
+
+
+def test_a_row_says_what_was_found() -> None:
+    cells = [cell.strip() for cell in run_case(FormCase("plate", "twist", 2.0), False).split("|")]
+    assert cells[3] == "deformed"
+    assert cells[4].startswith("twist")
+    assert abs(float(cells[5].removesuffix("%"))) < 20

@@ -1,0 +1,193 @@
+"""Right, wrong but said, wrong and silent: the definition on results made by hand, on a box with two dents."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from damageest_evaluate.troubles.classify import (
+    TrueState,
+    find_motion,
+    find_name,
+    judge,
+    judge_error,
+    measure_seen_error,
+)
+
+from damageest.artefacts import Deviation, Evidence, Part, Pose, Scan, Solid, Surface
+from damageest.findings import Coverage, Surplus, UnseenRegion, Verdict
+from damageest.geometry.solids import to_arrays
+from damageest.result import Result, Site
+
+TOLERANCE = 0.2
+EYE = np.eye(4)
+
+
+def _make_box(low: tuple[float, ...], high: tuple[float, ...]) -> Solid:
+    from manifold3d import Manifold
+
+    return Solid(*to_arrays(Manifold.cube(tuple(np.subtract(high, low))).refine(6).translate(low)))
+
+
+PART = Part(*vars(_make_box((0, 0, 0), (40, 30, 20))).values())
+DENT = _make_box((5, 5, 16), (12, 12, 20))
+OTHER = _make_box((25, 15, 16), (32, 22, 20))
+FALSE = _make_box((25, 2, 0), (30, 6, 3))
+BOTH = Solid(
+    np.concatenate([DENT.vertices, OTHER.vertices]), np.concatenate([DENT.faces, OTHER.faces + len(DENT.vertices)])
+)
+
+
+def _make_site(solid: Solid, accepted: bool = True, **fields: Any) -> Site:
+    ids = Surface(solid.vertices, solid.faces)
+    verdict = Verdict() if accepted else Verdict("doubtful", ("its depth of 0.3 is near the tolerance",))
+    points = np.empty(0, np.int64)
+    site = Site(1, (1,), points, solid, ids, None, "implicit", Evidence(), 4.0, verdict=verdict, accepted=accepted)
+    return replace(site, **fields)
+
+
+def _make_result(*sites: Site, **fields: Any) -> Result:
+    scan = Scan(PART.vertices)
+    count = len(scan.points)
+    deviation = Deviation(np.zeros(count), np.zeros(count, np.int64), np.zeros(count, np.uint8))
+    known: dict[str, Any] = {
+        "name": "hand", "units": "mm", "tolerance": TOLERANCE, "part": PART, "scan": scan, "aligned": scan,
+        "pose": Pose(EYE), "deviation": deviation, "site_label": np.zeros(count, np.int32), "sites": sites,
+        "damage": None, "undamaged": PART, "warnings": (), "failures": (), "truth": None,
+    }  # fmt: skip
+    return Result(**(known | fields))
+
+
+def _judge(result: Result, damage: Solid | None = BOTH, *names: str, pose: Any = EYE) -> Any:
+    return judge(result, TrueState(PART, damage, pose, names))
+
+
+def _make_coverage(low: tuple[float, ...], high: tuple[float, ...]) -> Coverage:
+    """Skin between two corners is unseen."""
+    middle = PART.triangles.mean(axis=1)
+    unseen = ((middle > low) & (middle < high)).all(axis=1)
+    bounds = np.array([low, high])
+    region = UnseenRegion(100.0, bounds.mean(0), bounds, (), 300.0)
+    nothing = np.zeros(len(unseen), np.bool_)
+    return Coverage(0.9, (region,), PART, ~unseen, np.zeros(len(unseen)), nothing, np.where(unseen, 0, -1))
+
+
+def test_right_sites_are_right() -> None:
+    found = _judge(_make_result(_make_site(DENT), _make_site(OTHER)))
+    assert (found.outcome, found.reason, found.unseen) == ("right", "", 0)
+    assert found.iou == pytest.approx(1)
+
+
+def test_no_site_on_an_undamaged_part_is_right() -> None:
+    found = _judge(_make_result(), None)
+    assert found.outcome == "right"
+    assert np.isnan(found.iou)
+
+
+def test_a_doubtful_false_site_beside_right_ones_is_right() -> None:
+    assert _judge(_make_result(_make_site(BOTH), _make_site(FALSE, False))).outcome == "right"
+
+
+def test_an_accepted_false_site_is_silent() -> None:
+    found = _judge(_make_result(_make_site(BOTH), _make_site(FALSE)))
+    assert found.outcome == "silent"
+    assert found.reason == "1 false sites with 60 in volume"
+    assert _judge(_make_result(_make_site(FALSE)), None).outcome == "silent"
+
+
+def test_a_missed_damage_is_silent_unless_it_is_tiny() -> None:
+    found = _judge(_make_result(_make_site(DENT)))
+    assert found.outcome == "silent"
+    assert "1 damages missed with 196 in volume" in found.reason
+    tiny = _make_box((25, 15, 19.3), (25.8, 15.8, 20))
+    assert tiny.volume < (4 * TOLERANCE) ** 3
+    assert _judge(_make_result(), tiny).outcome == "right"
+    coarse = judge(_make_result(tolerance=2.0), TrueState(PART, DENT, EYE, tolerance=TOLERANCE))
+    assert coarse.outcome == "silent", "a coarse tolerance does not make the damage tiny"
+
+
+def test_a_missed_damage_on_skin_reported_as_unseen_is_right_and_counted() -> None:
+    hidden = _judge(_make_result(_make_site(DENT), coverage=_make_coverage((20, 10, 19), (40, 30, 21))))
+    assert (hidden.outcome, hidden.unseen) == ("right", 1)
+    elsewhere = _judge(_make_result(_make_site(DENT), coverage=_make_coverage((0, 0, -1), (40, 30, 1))))
+    assert elsewhere.outcome == "silent"
+
+
+def test_a_missed_damage_on_skin_reported_as_lost_is_said() -> None:
+    coverage = _make_coverage((20, 10, 19), (40, 30, 21))
+    found = _judge(_make_result(_make_site(DENT), coverage=replace(coverage, is_lost=coverage.region >= 0)))
+    assert (found.outcome, found.unseen) == ("said", 0)
+    assert found.reason.endswith("skin reported as lost")
+
+
+def test_a_doubtful_site_on_the_damage_is_said() -> None:
+    found = _judge(_make_result(_make_site(DENT), _make_site(OTHER, False)))
+    assert (found.outcome, found.cautious) == ("said", True)
+    assert found.reason.startswith("doubtful: 1 damages missed")
+    wrong = _make_box((25, 15, 12), (32, 22, 20))
+    assert _judge(_make_result(_make_site(DENT), _make_site(wrong, False))).cautious is False
+    elsewhere = _judge(_make_result(_make_site(DENT), _make_site(FALSE, False)))
+    assert elsewhere.outcome == "silent", "the doubtful site says nothing of the missed damage"
+
+
+def test_a_wrong_volume_is_silent_and_shallow_damage_has_wider_limits() -> None:
+    deeper = _make_box((5, 5, 15), (12, 12, 20))
+    found = _judge(_make_result(_make_site(deeper)), DENT)
+    assert (found.outcome, found.reason) == ("silent", "IoU 0.80, volume error +25%")
+    true, shallow = _make_box((5, 5, 19.6), (15, 15, 20)), _make_box((5, 5, 19.5), (15, 15, 20))
+    assert _judge(_make_result(_make_site(shallow)), true).outcome == "right"
+    half = _make_box((5, 5, 19.7), (15, 10, 20))
+    assert _judge(_make_result(_make_site(half)), true).outcome == "silent"
+
+
+def test_a_text_that_names_the_trouble_needs_an_amount() -> None:
+    sites = (_make_site(DENT),)
+    said = _judge(_make_result(*sites, warnings=("a wall of 1.2 mm3 may be lost",)), BOTH, "may be lost")
+    assert said.outcome == "said"
+    assert said.reason.startswith("named: 1 damages missed")
+    assert _judge(_make_result(*sites, warnings=("a wall may be lost",)), BOTH, "may be lost").outcome == "silent"
+    assert _judge(_make_result(*sites, warnings=("12 points are stray",)), BOTH, "may be lost").outcome == "silent"
+    surplus = Surplus(1, np.arange(5), 0.2, None, 3.0, 10.0, "surroundings")
+    assert _judge(_make_result(*sites, surplus=(surplus,)), BOTH, "surroundings").outcome == "said"
+
+
+def test_the_pose_has_to_be_right_up_to_listed_symmetries() -> None:
+    half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+    half_turn[:2, 3] = 40, 30
+    same = find_motion(PART, Pose(EYE), EYE, TOLERANCE)
+    assert same is not None
+    assert np.array_equal(same, EYE)
+    assert find_motion(PART, Pose(half_turn), EYE, TOLERANCE) is None
+    listed = Pose(half_turn, alternatives=np.array([EYE]))
+    noted = Pose(half_turn, notes=("the part fits at any angle (continuous symmetry)",))
+    for pose in (listed, noted):
+        motion = find_motion(PART, pose, EYE, TOLERANCE)
+        assert motion is not None
+        assert np.allclose(motion, half_turn)
+    shifted = EYE.copy()
+    shifted[0, 3] = 1
+    assert find_motion(PART, replace(noted, T_part_scan=shifted), EYE, TOLERANCE) is None
+    turned = Solid(DENT.vertices @ half_turn[:3, :3].T + half_turn[:3, 3], DENT.faces)
+    assert _judge(_make_result(_make_site(turned), pose=listed), DENT).outcome == "right"
+    assert _judge(_make_result(_make_site(DENT), pose=Pose(shifted)), DENT).outcome == "silent"
+
+
+def test_without_a_right_pose_only_doubt_is_said() -> None:
+    assert _judge(_make_result(), None, pose=None).outcome == "silent"
+    assert _judge(_make_result(_make_site(FALSE, False)), None, pose=None).outcome == "said"
+    assert _judge(_make_result(_make_site(FALSE, False), _make_site(DENT)), None, pose=None).outcome == "silent"
+
+
+def test_an_error_has_to_name_the_trouble() -> None:
+    message = "align: none: only 12 % of the points lie within the tolerance of the part's surface"
+    said = judge_error(message, ("points lie within the tolerance",))
+    assert (said.outcome, said.refused) == ("said", True)
+    assert judge_error("enclose: implicit: no surface", ("points lie",)).outcome == "silent"
+    assert find_name(["a wall\nof 2 mm"], ("wall.*mm",)) == "a wall of 2 mm"
+
+
+def test_the_error_of_the_seen_share_is_in_points() -> None:
+    assert measure_seen_error(None, 0.5) is None
+    assert measure_seen_error(_make_coverage((0, 0, 0), (1, 1, 1)), 0.85) == pytest.approx(5)

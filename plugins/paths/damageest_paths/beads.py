@@ -1,0 +1,161 @@
+"""Simulates the beads of a path on voxels: what they fill, what they leave, and what lies outside the deposit.
+
+A bead is a block: as wide as the bead, as high as the layer, swept along the pass, with round ends. How metal flows,
+heats up, warps or shrinks is not simulated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from damageest.artefacts import BeadFill, Flags, Floats, Mesh
+from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.voxels import measure_bounds
+from damageest_paths.frames import Frame
+
+SHARE = 4
+"""Voxels along the shorter side of a bead's section."""
+MOST_VOXELS = 60_000_000
+CHUNK = 2_000_000
+"""Places that are stamped at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beads:
+    """Pieces of beads: from ``start`` (N,3) to ``stop`` (N,3) on the top of the bead, ``normal`` (N,3) of the layer,
+    ``width`` and ``height`` (N,)."""
+
+    start: Floats
+    stop: Floats
+    normal: Floats
+    width: Floats
+    height: Floats
+
+
+def simulate_beads(
+    beads: Beads, deposit: Mesh, missing: Mesh | None, metal: Mesh | None, frame: Frame, edge: float
+) -> BeadFill:
+    """Compares the union of beads with the deposit, on voxels of an ``edge`` along the axes of a frame.
+
+    ``missing``: what of the deposit is known to be out of reach. The edge is larger where the voxels would be too many.
+    """
+    from scipy import ndimage
+
+    local = Mesh(frame.to_local(deposit.vertices), deposit.faces)
+    low, size, edge = _choose_grid(local, beads, frame, edge)
+    wanted = _fill_solid(local, low, size, edge)
+    reachable = wanted.copy()
+    if missing is not None:
+        reachable &= ~_fill_solid(Mesh(frame.to_local(missing.vertices), missing.faces), low, size, edge)
+    done = stamp_beads(beads, frame, low, size, edge)
+    gaps = reachable & ~done
+    spilled = done & ~wanted
+    sunk = np.zeros_like(done)
+    if metal is not None:
+        sunk = spilled & _fill_solid(Mesh(frame.to_local(metal.vertices), metal.faces), low, size, edge)
+        spilled &= ~sunk
+    cell = edge**3
+    pieces, count = ndimage.label(gaps)
+    largest = int(np.bincount(pieces.ravel())[1:].max()) if count else 0
+    depth = float(ndimage.distance_transform_edt(gaps, sampling=edge).max()) if count else 0.0
+    # the border of the deposit goes through voxels, so that its outermost ones may be beads though just outside
+    rim = spilled & ~ndimage.binary_dilation(wanted, np.ones((3, 3, 3), bool))
+    places = low + (np.argwhere(rim) + 0.5) * edge
+    far = float(distance_to_mesh(places, local).max()) if len(places) else 0.0
+    return BeadFill(
+        edge,
+        1.0 - gaps.sum() / max(int(reachable.sum()), 1),
+        float(gaps.sum() * cell),
+        max(2 * depth - edge, 0.0),
+        largest * cell,
+        float(spilled.sum() * cell),
+        far,
+        float(sunk.sum() * cell),
+    )
+
+
+def _choose_grid(local: Mesh, beads: Beads, frame: Frame, edge: float) -> tuple[Floats, tuple[int, int, int], float]:
+    """Lowest corner (3,), number of voxels along each axis, and their edge."""
+    corners = [local.bounds]
+    if len(beads.start):
+        ends = frame.to_local(np.concatenate([beads.start, beads.stop]))
+        corners.append(measure_bounds(ends))
+    reach = float(max(beads.width.max(initial=0.0), beads.height.max(initial=0.0)))
+    low = np.min([each[0] for each in corners], axis=0) - reach - 2 * edge
+    high = np.max([each[1] for each in corners], axis=0) + reach + 2 * edge
+    total = float(np.prod((high - low) / edge))
+    edge *= max(1.0, (total / MOST_VOXELS) ** (1 / 3))
+    nx, ny, nz = (int(np.ceil(extent / edge)) for extent in high - low)
+    return low, (nx, ny, nz), edge
+
+
+def _fill_solid(mesh: Mesh, low: Floats, size: tuple[int, int, int], edge: float) -> Flags:
+    """Whether the centre of each voxel lies in a closed mesh."""
+    import pyvista as pv
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkImagingStencil import vtkImageStencilToImage, vtkPolyDataToImageStencil
+
+    surface = pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+    stencil = vtkPolyDataToImageStencil()
+    stencil.SetInputData(surface)
+    stencil.SetOutputOrigin(*(low + edge / 2))
+    stencil.SetOutputSpacing(edge, edge, edge)
+    stencil.SetOutputWholeExtent(0, size[0] - 1, 0, size[1] - 1, 0, size[2] - 1)
+    stencil.SetTolerance(0.0)
+    image = vtkImageStencilToImage()
+    image.SetInputConnection(stencil.GetOutputPort())
+    image.SetOutputScalarTypeToUnsignedChar()
+    image.SetInsideValue(1)
+    image.SetOutsideValue(0)
+    image.Update()
+    values = vtk_to_numpy(image.GetOutput().GetPointData().GetScalars())
+    return np.asarray(values.reshape(size[::-1]).transpose(2, 1, 0).astype(bool))
+
+
+def stamp_beads(beads: Beads, frame: Frame, low: Floats, size: tuple[int, int, int], edge: float) -> Flags:
+    """Whether the centre of each voxel lies in a bead."""
+    done = np.zeros(size, bool)
+    if not len(beads.start):
+        return done
+    start, stop = frame.to_local(beads.start), frame.to_local(beads.stop)
+    normal = beads.normal @ frame.turn.T
+    length = np.linalg.norm(stop - start, axis=1)
+    counts = np.maximum(np.ceil(length / (beads.width / 6)).astype(int), 1) + 1
+    owner = np.repeat(np.arange(len(start)), counts)
+    share = np.concatenate([np.linspace(0, 1, count) for count in counts])
+    points = start[owner] + share[:, None] * (stop - start)[owner]
+    reach = int(np.ceil(np.hypot(beads.width.max() / 2, beads.height.max()) / edge)) + 1
+    ball = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    middle = points - (beads.height[owner] / 2)[:, None] * normal[owner]
+    half = np.hypot(beads.width.max() / 2, beads.height.max() / 2) + np.sqrt(3) * edge
+    ball = ball[np.linalg.norm(ball, axis=1) * edge <= half]
+    for first in range(0, len(points), max(CHUNK // len(ball), 1)):
+        own = slice(first, first + max(CHUNK // len(ball), 1))
+        which = owner[own]
+        ahead, behind = (stop - start)[which] * (1 - share[own, None]), (stop - start)[which] * share[own, None]
+        width, height = beads.width[which], beads.height[which]
+        _stamp(done, points[own], middle[own], normal[which], ahead, behind, width, height, ball, low, edge)
+    return done
+
+
+def _stamp(
+    done: NDArray[np.bool_], points: Floats, middle: Floats, normal: Floats, ahead: Floats, behind: Floats,
+    width: Floats, height: Floats, ball: NDArray[np.int64], low: Floats, edge: float,
+) -> None:  # fmt: skip
+    """Marks the voxels near ``points`` (N,3) on the tops of beads that lie in the bead: as high as the layer, and not
+    farther than half its width from the line that goes on ``ahead`` (N,3) and ``behind`` (N,3)."""
+    cell = np.floor((middle - low) / edge).astype(np.int64)[:, None] + ball
+    away = low + (cell + 0.5) * edge - points[:, None]
+    up = np.einsum("nmi,ni->nm", away, normal)
+    front, back = np.linalg.norm(ahead, axis=1), np.linalg.norm(behind, axis=1)
+    along = np.einsum("nmi,ni->nm", away, (ahead + behind) / np.maximum(front + back, 1e-300)[:, None])
+    beside = np.clip(along, -back[:, None], front[:, None])
+    across = np.einsum("nmi,nmi->nm", away, away) - up**2 - beside * (2 * along - beside)
+    tiny = 1e-9 * edge
+    inside = (up <= tiny) & (up >= -height[:, None] - tiny) & (across <= (width[:, None] / 2) ** 2 + tiny)
+    inside &= ((cell >= 0) & (cell < np.array(done.shape))).all(axis=2)
+    x, y, z = cell[inside].T
+    done[x, y, z] = True

@@ -1,0 +1,203 @@
+"""Plans layers that follow the floor of the cavity: surfaces at equal depth above it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Mesh
+from damageest.geometry.solids import to_arrays
+from damageest_paths.fill import fill_region
+from damageest_paths.floor import Floor, find_floor
+from damageest_paths.follow import follow_line, make_pass
+from damageest_paths.frames import Frame
+from damageest_paths.obstacles import Obstacles
+from damageest_paths.patches import NotFollowedError, Patch, list_patches
+from damageest_paths.planar import COLLIDES, SHORT, UNSUPPORTED, Surroundings
+from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes, resample
+from damageest_paths.regions import cover, measure_length, shift_border
+from damageest_paths.sheets import (
+    FINE,
+    Grid,
+    Sheet,
+    guess_heights,
+    lay_sheet,
+    make_grid,
+    measure_reach,
+    measure_support,
+)
+from damageest_paths.sweeps import Sweeps
+
+NO_FLOOR, BESIDE = (
+    "no side of it that lies on metal faces the build direction",
+    "lies beside or below the floor that the layers follow",
+)
+SPARE = 0.02
+"""Share of a layer's height that is not worth another layer: the facets of a round floor are off by as much."""
+SLIVER = 0.05
+"""Least thickness and volume of what no layer covers, in layer heights and in lengths of bead as long as it is wide."""
+GROWN, DEEPER = 0.1, 0.5
+"""Shares of a bead's width and height by which layers are taken to be wider and deeper when it is looked for: below a
+crease of the floor it is farther than one height to the layer below."""
+THIN = 0.01
+"""Share of the layer height up to which what reaches into a layer is left out."""
+
+
+def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Process) -> Plan:
+    """Passes that build up a body, a Manifold relative to the frame's origin, in layers along the cavity's floor.
+
+    The top of each layer is a surface at equal distance above the floor, its passes are drawn in the plane into which
+    it is unrolled. All layers have one height, at most the process's, so that the last ends with the thickest place.
+    A place is built where metal or a pass of the layer below is near enough. Where the floor cannot be followed,
+    nothing is planned, and the reason says why.
+    """
+    local, metal = frame.move(body), frame.move(around.metal)
+    floor = find_floor(local, metal, process)
+    if floor is None:
+        return Plan(frame, process.height, (), local, {NO_FLOOR: float(local.volume())})
+    corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
+    meshes = [Mesh(*to_arrays(metal))]
+    meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
+    near = Obstacles(meshes, corners[0], corners[1], process.bead.width)
+    standing = Sweeps(around.clearance.with_obstacles(near))
+    thickest = float(floor.measure(to_arrays(local.refine_to_length(process.bead.width))[0]).distance.max())
+    count = max(1, int(np.ceil(thickest / process.height - SPARE)))
+    work = _Work(local, _crop(metal, corners, process), floor, standing, process, min(thickest / count, process.height))
+    try:
+        work.build(count, corners)
+    except NotFollowedError as error:
+        return Plan(frame, work.height, (), local, {str(error): float(local.volume())})
+    return Plan(frame, work.height, tuple(work.passes), work.missing, work.reasons)
+
+
+def _crop(metal: Any, corners: Floats, process: Process) -> Mesh:
+    """What lies of the metal in the box round the body."""
+    from manifold3d import Manifold
+
+    margin = process.bead.width + 2 * process.height
+    low, high = corners[0] - margin, corners[1] + margin
+    return Mesh(*to_arrays(metal ^ Manifold.cube(tuple(high - low)).translate(tuple(low))))
+
+
+@dataclass(eq=False)
+class _Work:
+    """What is planned of a body. ``near``: the metal round it. ``stack``: triangles of the layers below that are not
+    covered by another."""
+
+    body: Any
+    near: Mesh
+    floor: Floor
+    standing: Sweeps
+    process: Process
+    height: float
+    passes: list[Pass] = field(default_factory=list)
+    layer: list[Pass] = field(default_factory=list)
+    missing: Any = None
+    reasons: dict[str, float] = field(default_factory=dict)
+    stack: list[tuple[Sheet, Floats]] = field(default_factory=list)
+    covered: list[Any] = field(default_factory=list)
+
+    def build(self, count: int, corners: Floats) -> None:
+        grid = make_grid(self.floor, corners[0, :2], corners[1, :2], self.process)
+        solid = Mesh(*to_arrays(self.body))
+        heights = guess_heights(self.floor, grid)
+        width = self.process.bead.width
+        for number in range(count):
+            sheet = lay_sheet(self.floor, grid, heights, (number + 1) * self.height, self.process, self.height)
+            heights = sheet.points[:, 2]
+            reach = measure_reach(sheet, solid, self.height, 3 * FINE * width) + THIN * self.height
+            lines = [one.points for one in self.layer]
+            lean = self.height * np.tan(self.process.overhang)
+            some = np.flatnonzero(reach < width)
+            held = measure_support(sheet, some, self.near, lines, width / 2, self.height, lean - 3 * FINE * width)
+            self.stack.append((sheet, reach))
+            top = self._gather_top(grid)
+            meshes = [top] if len(top.faces) else []
+            above = Obstacles(meshes, corners[0], corners[1], width)
+            around = [self.standing, Sweeps(self.standing.clearance.with_obstacles(above))]
+            self.layer = []
+            for patch in list_patches(sheet, grid, reach, self.floor, self.process):
+                self._fill_patch(patch, number, reach, held - lean, around)
+            self.passes += order_passes(self.layer, self.passes[-1].points[-1] if self.passes else None)
+        self._add_rest()
+
+    def _add_rest(self) -> None:
+        """What no layer covers is missing too, as below the planes in which the floor goes on."""
+        from manifold3d import Manifold, OpType
+
+        rest = Manifold.batch_boolean([self.body, *self.covered], OpType.Subtract)
+        smallest = SLIVER * self.process.bead.width**2 * self.height
+        for piece in rest.decompose():
+            # thin skins are where a layer's border is not exact
+            if piece.volume() > max(smallest, SLIVER * self.height * piece.surface_area()):
+                self._add_piece(piece, BESIDE)
+
+    def _gather_top(self, grid: Grid) -> Mesh:
+        """The sheets of all layers as a mesh, as far as beads lie under them and no other layer on them."""
+        half = self.process.bead.width / 2
+        vertices, faces = [], []
+        for k, (sheet, reach) in enumerate(self.stack):
+            shown: Flags = sheet.is_found & (reach < half)
+            own = grid.coarse[shown[grid.coarse].any(axis=1) & sheet.is_found[grid.coarse].all(axis=1)]
+            if k + 1 < len(self.stack):
+                own = own[(self.stack[k + 1][1][own] > -2 * half).any(axis=1)]
+            vertices.append(sheet.points)
+            faces.append(own + k * len(reach))
+        used, number = np.unique(np.concatenate(faces), return_inverse=True)
+        return Mesh(np.concatenate(vertices)[used], number.reshape(-1, 3))
+
+    def _fill_patch(self, patch: Patch, layer: int, reach: Floats, support: Floats, around: Sequence[Sweeps]) -> None:
+        process = self.process
+        wanted = patch.draw_region(reach, process)
+        held = wanted ^ patch.draw_region(support, process)
+        wider = shift_border(wanted, GROWN * process.bead.width)
+        if not wider.is_empty():
+            self.covered.append(patch.fill_below(wider, self.height * (1 + DEEPER), process))
+        lines = fill_region(held, process.pattern, process.bead, process.angle + layer * process.turn)
+        long = [line for line in lines if measure_length(line) >= process.shortest]
+        short = [line for line in lines if measure_length(line) < process.shortest]
+        done, dropped = [], []
+        for line in long:
+            made, left = self._place(patch, line, layer, around)
+            done += made
+            dropped += left
+        filled = cover(done, process.bead.width)
+        unreached = cover(dropped, process.bead.width)
+        left_out = {
+            UNSUPPORTED: wanted - held,
+            COLLIDES: (unreached ^ held) - filled,
+            SHORT: (cover(short, process.bead.width) ^ held) - filled - unreached,
+        }
+        for why, region in left_out.items():
+            self._add_missing(patch, region, layer, why)
+
+    def _place(
+        self, patch: Patch, line: Floats, layer: int, around: Sequence[Sweeps]
+    ) -> tuple[list[Floats], list[Floats]]:
+        """Adds the passes along a line (K,2) of the plane. Gives the pieces with a bead (K,2), and those without."""
+        process = self.process
+        places, _ = resample(extend_line(line, *process.extend), process.step)
+        points, normals, _ = patch.tree.find(places)
+        least = min(int(np.ceil(process.shortest / process.step)) + 2, len(points))
+        runs = follow_line(points, normals, around, process, least)
+        self.layer += [make_pass(points, normals, run, layer, process, self.standing.clearance.reach) for run in runs]
+        stops = [0, *(k for run in runs for k in (run.start, run.stop)), len(places)]
+        left = [places[max(a - 1, 0) : b + 1] for a, b in zip(stops[::2], stops[1::2], strict=True) if b > a]
+        return [places[run.start : run.stop] for run in runs], left
+
+    def _add_missing(self, patch: Patch, region: Any, layer: int, why: str) -> None:
+        if region.is_empty():
+            return
+        # the first layer reaches down to the floor wherever that is
+        drop = self.height * (2 if layer == 0 else 1)
+        self._add_piece(self.body ^ patch.fill_below(region, drop, self.process), why)
+
+    def _add_piece(self, piece: Any, why: str) -> None:
+        if self.missing is not None:
+            piece = piece - self.missing
+        if piece.volume() > 0:
+            self.missing = piece if self.missing is None else self.missing + piece
+            self.reasons[why] = self.reasons.get(why, 0.0) + piece.volume()

@@ -1,0 +1,117 @@
+"""Build directions that are tried, and the deposit cut into parts with a direction each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Mesh
+from damageest.geometry.distance import distance_to_mesh
+from damageest_paths.frames import Frame, make_frame, make_unit
+from damageest_paths.obstacles import draw_passes
+from damageest_paths.planar import Surroundings
+from damageest_paths.process import Plan, Process
+
+ENOUGH = 1e-3
+"""Share of a body's volume below which what is missing is not worth another direction."""
+MOST_PARTS, MOST_DIRECTIONS = 4, 6
+COARSE = 2.0
+"""Factor of layer height and bead width for the trials of directions."""
+ROUGH = 0.1
+"""Share of the layer height within which the body is simplified for these trials."""
+ALIKE = np.cos(np.radians(5.0))
+Planner = Callable[[Any, Frame, Surroundings, Process], Plan]
+
+
+def find_open_normal(deposit: Mesh, metal: Mesh | None, tolerance: float) -> Floats:
+    """Mean outward normal (3,) of the faces of a deposit that do not lie on metal; of all upward ones where that is 0.
+
+    ``tolerance``: faces nearer to the metal than that lie on it.
+    """
+    centre, area = deposit.triangles.mean(axis=1), np.linalg.norm(deposit.cross, axis=1)
+    is_open = np.ones(len(centre), bool) if metal is None else distance_to_mesh(centre, metal) > tolerance
+    total = deposit.cross[is_open].sum(axis=0)
+    if np.linalg.norm(total) <= 1e-6 * area.sum():
+        return np.array([0.0, 0.0, 1.0])
+    return make_unit(total)
+
+
+def list_directions(deposit: Mesh, metal: Mesh | None, tolerance: float) -> list[Floats]:
+    """Build directions (3,) worth a trial: the mean normal of the open faces, the normals of large open planes, and
+    the axes of the part's frame both ways; those that point into the open first."""
+    main = find_open_normal(deposit, metal, tolerance)
+    centre = deposit.triangles.mean(axis=1)
+    is_open = np.ones(len(centre), bool) if metal is None else distance_to_mesh(centre, metal) > tolerance
+    rounded = np.round(deposit.face_normals, 2)
+    kinds, number = np.unique(rounded[is_open], axis=0, return_inverse=True)
+    area = np.bincount(number.ravel(), weights=np.linalg.norm(deposit.cross[is_open], axis=1), minlength=len(kinds))
+    planes = [kinds[k] for k in np.argsort(-area, kind="stable")[:3] if np.linalg.norm(kinds[k]) > 0.5]
+    axes = sorted((sign * row for row in np.eye(3) for sign in (1.0, -1.0)), key=lambda axis: -float(axis @ main))
+    found: list[Floats] = []
+    for one in [main, *planes, *axes]:
+        unit = make_unit(one)
+        if all(unit @ other < ALIKE for other in found):
+            found.append(unit)
+    return found[:MOST_DIRECTIONS]
+
+
+def choose_direction(
+    body: Any, origin: Floats, directions: Sequence[Floats], around: Surroundings, process: Process, planner: Planner
+) -> Plan:
+    """The plan of the direction that fills most of a body: the first that fills all of it; else the best by trials with
+    larger beads. At least one direction is needed."""
+    first = planner(body, make_frame(directions[0], origin), around, process)
+    volume = float(body.volume())
+    if len(directions) == 1 or first.missing_volume <= ENOUGH * volume:
+        return first
+    coarse = process.coarsen(COARSE)
+    rough = body.simplify(ROUGH * process.height)
+    trials = [planner(rough, make_frame(one, origin), around, coarse).missing_volume for one in directions]
+    order = np.argsort(np.round(np.array(trials) / volume, 3), kind="stable")
+    if order[0] == 0:
+        return first
+    best = planner(body, make_frame(directions[order[0]], origin), around, process)
+    return best if best.missing_volume < first.missing_volume else first
+
+
+def plan_parts(
+    body: Any, origin: Floats, directions: Sequence[Floats], around: Surroundings, process: Process, planner: Planner
+) -> list[Plan]:
+    """Plans for the whole body, each for what the ones before have left, with a direction of its own.
+
+    With 3 axes there is one plan. With more, the directions of later plans lie within the machine's tilt of the first.
+    """
+    plans = [choose_direction(body, origin, directions, around, process, planner)]
+    if process.axes == 3:
+        return plans
+    within = [one for one in directions if one @ plans[0].frame.direction >= np.cos(process.tilt) - 1e-9]
+    volume, smallest = float(body.volume()), process.bead.width**2 * process.height
+    while len(plans) < MOST_PARTS and plans[-1].missing_volume > max(ENOUGH * volume, smallest):
+        left = plans[-1].missing
+        left_local = left.transform(np.hstack([plans[-1].frame.turn.T, np.zeros((3, 1))]))
+        standing = around.metal + (body - left_local)
+        beads = [
+            Mesh(mesh.vertices @ plan.frame.turn, mesh.faces) for plan in plans for mesh in _draw_plan(plan, process)
+        ]
+        there = replace(around, metal=standing, others=[*around.others, *beads])
+        plan = choose_direction(left_local, origin, within, there, process, planner)
+        if plan.missing_volume > 0.9 * plans[-1].missing_volume:
+            break
+        plans.append(plan)
+    return plans
+
+
+def _draw_plan(plan: Plan, process: Process) -> list[Mesh]:
+    """The beads of a plan, in its local coordinates."""
+    return [draw_passes(plan.passes, process.bead.width, plan.height)] if plan.passes else []
+
+
+def gather_missing(plans: Sequence[Plan]) -> Any:
+    """What the last of the plans leaves, as a Manifold relative to the frame's origin; None where it leaves nothing."""
+    last = plans[-1]
+    if last.missing is None:
+        return None
+    return last.missing.transform(np.hstack([last.frame.turn.T, np.zeros((3, 1))]))

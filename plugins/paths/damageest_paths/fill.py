@@ -1,0 +1,127 @@
+"""Patterns that fill a layer: polylines whose beads cover it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from damageest.artefacts import Floats
+from damageest_paths.regions import cover, find_main_angle, measure_length, shift_border
+from damageest_paths.stripes import Bead, fill_with_rows
+
+Pattern = Literal["zigzag", "contour", "spiral", "offset-zigzag"]
+
+SLIVER = 0.04
+"""Area of a gap, in squares of the bead's width, from which it gets a pass of its own."""
+ROUNDS = 2
+"""How often gaps between passes are looked for and filled."""
+
+
+def fill_region(region: Any, pattern: Pattern, bead: Bead, angle: float) -> list[Floats]:
+    """Polylines (K,2) whose beads cover a region. ``angle`` in radians: of the rows of a zigzag."""
+    if region.is_empty():
+        return []
+    lines = {"zigzag": _fill_zigzag, "contour": _fill_contour, "spiral": _fill_spiral, "offset-zigzag": _fill_both}[
+        pattern
+    ](region, bead, angle)
+    for _ in range(ROUNDS):
+        added = _fill_gaps(region, lines, bead)
+        if not added:
+            break
+        lines += added
+    return lines
+
+
+def _fill_gaps(region: Any, lines: Sequence[Floats], bead: Bead) -> list[Floats]:
+    """Rows in what the beads leave of a region, along the longer side of each gap."""
+    gaps = (region - cover(lines, bead.width)).decompose()
+    large = [gap for gap in gaps if gap.area() > SLIVER * bead.width**2]
+    large.sort(key=lambda gap: gap.bounds())
+    return [line for gap in large for line in fill_with_rows(gap, bead, find_main_angle(gap), linked=False)]
+
+
+def _fill_zigzag(region: Any, bead: Bead, angle: float) -> list[Floats]:
+    return fill_with_rows(region, bead, angle)
+
+
+def _fill_contour(region: Any, bead: Bead, angle: float) -> list[Floats]:
+    return [_close(ring) for ring in _find_rings(region, bead)]
+
+
+def _fill_both(region: Any, bead: Bead, angle: float) -> list[Floats]:
+    rings = shift_border(region, -bead.width / 2)
+    outer = [_close(ring) for ring in _read_rings(rings, bead)]
+    inner = shift_border(shift_border(region, -bead.width / 2 - bead.step), bead.width / 2) if outer else region
+    return [*outer, *(fill_with_rows(inner, bead, angle) if not inner.is_empty() else [])]
+
+
+def _fill_spiral(region: Any, bead: Bead, angle: float) -> list[Floats]:
+    """Rings, each linked with the one inside it: it ends a step before it closes, and goes on at the nearest point."""
+    rings = _find_rings(region, bead)
+    lines: list[Floats] = []
+    while rings:
+        line = rings.pop(0)
+        closed = True
+        while True:
+            found = _find_inner(line[-1] if not closed else line, rings, bead) if rings else None
+            if found is None:
+                break
+            number, corner = found
+            ring = rings.pop(number)
+            if closed:
+                start = int(np.argmin(np.linalg.norm(line - ring[corner], axis=1)))
+                line = _open(np.roll(line, -start, axis=0), bead.step)
+                corner = int(np.argmin(np.linalg.norm(ring - line[-1], axis=1)))
+                closed = False
+            line = np.concatenate([line, _open(np.roll(ring, -corner, axis=0), bead.step)])
+        lines.append(_close(line) if closed else line)
+    return lines
+
+
+def _find_inner(end: Floats, rings: Sequence[Floats], bead: Bead) -> tuple[int, int] | None:
+    """The ring that passes a point (2,) or a ring (K,2) by not much more than a step, and its nearest corner."""
+    ends = np.atleast_2d(end)
+    gaps = [np.linalg.norm(ring[:, None] - ends[None], axis=2).min(axis=1) for ring in rings]
+    number = int(np.argmin([gap.min() for gap in gaps]))
+    return (number, int(gaps[number].argmin())) if gaps[number].min() <= 1.5 * bead.step else None
+
+
+def _find_rings(region: Any, bead: Bead) -> list[Floats]:
+    """Closed rings (K,2), without the first corner again, from outside to inside."""
+    rings: list[Floats] = []
+    inside = shift_border(region, -bead.width / 2)
+    while not inside.is_empty():
+        rings += _read_rings(inside, bead)
+        inside = shift_border(inside, -bead.step)
+    return rings
+
+
+def _read_rings(region: Any, bead: Bead) -> list[Floats]:
+    """The outlines of a region as rings with corners not farther apart than the bead's width."""
+    polygons = region.simplify(bead.width / 100).to_polygons()
+    rings = [np.asarray(ring, dtype=np.float64) for ring in polygons]
+    return [_refine(ring, bead.width) for ring in rings if len(ring) > 2 and measure_length(_close(ring)) > bead.width]
+
+
+def _refine(ring: Floats, longest: float) -> Floats:
+    """A ring with more corners, so that none is farther than ``longest`` from the next."""
+    sides = np.roll(ring, -1, axis=0) - ring
+    counts = np.maximum(np.ceil(np.linalg.norm(sides, axis=1) / longest).astype(int), 1)
+    share = np.concatenate([np.arange(count) / count for count in counts])
+    return np.asarray(np.repeat(ring, counts, axis=0) + share[:, None] * np.repeat(sides, counts, axis=0))
+
+
+def _close(ring: Floats) -> Floats:
+    return np.concatenate([ring, ring[:1]])
+
+
+def _open(ring: Floats, gap: float) -> Floats:
+    """A ring as a line that ends ``gap`` before it closes; all of a ring that is short."""
+    line = _close(ring)
+    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    stop = max(at[-1] - gap, at[-1] / 2)
+    kept = at < stop
+    end = np.array([np.interp(stop, at, line[:, k]) for k in range(2)])
+    return np.concatenate([line[kept], end[None]])

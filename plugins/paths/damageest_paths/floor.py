@@ -1,0 +1,150 @@
+"""The floor of a cavity, and the signed distance from it, which conformal layers follow.
+
+The floor is what of a deposit lies on metal and is not too steep; what is steeper is a wall. Beyond its rim the floor
+goes on as a plane, so that a layer ends at a wall, or at an open side, as it lies before it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.distance import SurfaceTree, distance_to_mesh, is_inside
+from damageest.geometry.solids import to_arrays
+from damageest.geometry.vectors import normalise
+from damageest_paths.process import Process
+
+STEEPEST = np.radians(75.0)
+"""Largest angle between the floor's normal and the build direction; what is steeper is a wall."""
+PROBE = 0.15
+"""Share of the bead's width or height by which metal is thick where a face lies on it: slivers do not count."""
+EDGE = 0.5
+"""Longest edge of the floor's triangles in bead widths."""
+SPECK = 0.25
+"""Area, in squares of the bead's width, up to which a piece of wall within the floor is floor, and the other way."""
+
+
+class Depth(NamedTuple):
+    """``distance`` (N,) above the floor, negative below it; ``upward`` (N,3): unit vectors along which it grows."""
+
+    distance: Floats
+    upward: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """``mesh``: open, its normals into the deposit, in local coordinates. ``normals`` (V,3) of its vertices; ``on_rim``
+    (V,): whether they are on its border; ``rim_edges`` (F,3): whether the edge opposite of each corner is."""
+
+    mesh: Mesh
+    tree: SurfaceTree
+    normals: Floats
+    on_rim: Flags
+    rim_edges: Flags
+
+    def measure(self, points: Floats) -> Depth:
+        """The depth of points (N,3). Where the nearest place is on the rim, it is that above the plane there."""
+        if not len(points):
+            return Depth(np.empty(0), np.empty((0, 3)))
+        distance, face, place = self.tree.closest(points)
+        share = find_shares(self.mesh.triangles[face], place)
+        corners = self.mesh.faces[face]
+        normal = normalise(np.einsum("nk,nki->ni", share, self.normals[corners]))
+        away = points - place
+        above = np.einsum("ni,ni->n", away, normal)
+        beyond = ((share < 1e-6) & self.rim_edges[face]).any(axis=1)
+        beyond |= ((share > 1 - 1e-6) & self.on_rim[corners]).any(axis=1)
+        signed = np.where(above < 0, -distance, distance)
+        # very near to the floor the difference of two places has no direction
+        unsure = beyond | (distance < 1e-9 * self.tree.mesh.diagonal)
+        upward = np.where(unsure[:, None], normal, away / np.where(signed == 0, 1, signed)[:, None])
+        return Depth(np.where(beyond, above, signed), upward)
+
+
+def find_shares(triangles: Floats, places: Floats) -> Floats:
+    """Barycentric coordinates (N,3) of places (N,3) in triangles (N,3,3)."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    normal = np.cross(b - a, c - a)
+    square = np.maximum(np.einsum("ni,ni->n", normal, normal), 1e-300)
+    first = np.einsum("ni,ni->n", np.cross(c - b, places - b), normal) / square
+    second = np.einsum("ni,ni->n", np.cross(a - c, places - c), normal) / square
+    share = np.clip(np.stack([first, second, 1 - first - second], axis=1), 0, 1)
+    return np.asarray(share / share.sum(axis=1, keepdims=True))
+
+
+def find_floor(body: Any, metal: Any, process: Process) -> Floor | None:
+    """The floor of a deposit, a Manifold in local coordinates, on the metal; None where nothing of it is floor."""
+    if metal.is_empty():
+        return None
+    width = process.bead.width
+    vertices, faces = to_arrays(body.refine_to_length(EDGE * width))
+    mesh = Mesh(vertices, faces)
+    area = np.linalg.norm(mesh.cross, axis=1) / 2
+    sound = area > 1e-12 * width**2
+    on_metal, standing = np.zeros(len(faces), bool), Mesh(*to_arrays(metal))
+    middle, deep = mesh.triangles.mean(axis=1), PROBE * min(width, process.height)
+    near = np.flatnonzero(sound)
+    near = near[distance_to_mesh(middle[near], standing) < deep]
+    on_metal[near] = is_inside(middle[near] + deep * mesh.face_normals[near], standing)
+    is_floor = on_metal & (-mesh.cross[:, 2] > 2 * area * np.cos(STEEPEST))
+    is_floor = _drop_specks(faces, on_metal, is_floor, area, SPECK * width**2)
+    if not is_floor.any():
+        return None
+    return make_floor(vertices, faces[is_floor][:, ::-1], width)
+
+
+def make_floor(vertices: Floats, faces: Ints, width: float) -> Floor:
+    """The floor of faces (F,3) whose normals point into the deposit; ``width`` of a bead."""
+    used, number = np.unique(faces, return_inverse=True)
+    mesh = Mesh(vertices[used], number.reshape(-1, 3))
+    edges = np.sort(np.stack([mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]], mesh.faces[:, [0, 1]]], axis=1), axis=2)
+    _, which, count = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True)
+    rim_edges = (count[which.ravel()] == 1).reshape(-1, 3)
+    on_rim = np.zeros(len(mesh.vertices), bool)
+    on_rim[edges[rim_edges].ravel()] = True
+    normals = _find_normals(mesh, on_rim, width / 2)
+    return Floor(mesh, SurfaceTree(mesh), normals, on_rim, rim_edges)
+
+
+def _find_normals(mesh: Mesh, on_rim: Flags, radius: float) -> Floats:
+    """Normals (V,3) of the vertices: the mean of the faces there; on the rim, of those within a radius."""
+    from scipy.spatial import cKDTree
+
+    normals = np.zeros_like(mesh.vertices)
+    for corner in range(3):
+        np.add.at(normals, mesh.faces[:, corner], mesh.cross)
+    rim = np.flatnonzero(on_rim)
+    smooth = np.flatnonzero(mesh.face_normals[:, 2] > np.cos(STEEPEST))
+    tree = cKDTree(mesh.triangles[smooth].mean(axis=1))
+    for vertex, near in zip(rim, tree.query_ball_point(mesh.vertices[rim], radius, return_sorted=True), strict=True):
+        total = mesh.cross[smooth[near]].sum(axis=0)
+        normals[vertex] = total if total.any() else normals[vertex]
+    return normalise(normals)
+
+
+def _drop_specks(faces: Ints, on_metal: Flags, is_floor: Flags, area: Floats, smallest: float) -> Flags:
+    """Whether each face (F,) is floor, where small pieces of wall, and of floor, are like what is round them."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort([edges[:, 1], edges[:, 0]])
+    same = (edges[order][1:] == edges[order][:-1]).all(axis=1)
+    first, second = owner[order][:-1][same], owner[order][1:][same]
+    found = is_floor.copy()
+    for kind in (True, False):
+        mine = on_metal & (found == kind)
+        linked = mine[first] & mine[second]
+        graph = coo_matrix((np.ones(linked.sum()), (first[linked], second[linked])), (len(faces), len(faces)))
+        _, piece = connected_components(graph, directed=False)
+        small = mine & (np.bincount(piece, weights=area * mine)[piece] < smallest)
+        if not kind:  # not where it is on the border
+            border = np.zeros(len(faces), bool)
+            border[piece[np.concatenate([first[~on_metal[second]], second[~on_metal[first]]])]] = True
+            small &= ~border[piece]
+        found[small] = not kind
+    return found & on_metal

@@ -1,0 +1,214 @@
+"""Passes layer by layer, checked against collision of the nozzle."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from damageest.artefacts import DepositPath, Floats, Mesh, Solid, Vector
+from damageest.errors import StageError
+from damageest.options import Options
+from damageest.stages import JobPath
+from damageest.stages.path import Path
+
+Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+def _check_direction(value: Literal["auto", "normal"] | Vector) -> Literal["auto", "normal"] | Vector:
+    if not isinstance(value, str) and not np.linalg.norm(value) > 0:
+        raise ValueError("a direction needs a length above 0")
+    return value
+
+
+class Nozzle(Options):
+    """A nozzle that is a solid of revolution, or a closed mesh with its tip at 0 and its axis along z."""
+
+    tip_radius: float | None = Field(None, ge=0, allow_inf_nan=False, description="of the flat tip, in the job's unit")
+    cone_angle: float = Field(30.0, ge=0, lt=85, description="between the axis and the side of the cone, in degrees")
+    length: Length | None = Field(None, description="of the whole nozzle from the tip, in the job's unit")
+    body_radius: Length | None = Field(None, description="of the cylinder above the cone, in the job's unit")
+    mesh: JobPath | None = Field(None, description="file of a closed mesh, in the job's unit, instead of the others")
+
+    @model_validator(mode="after")
+    def _check_shape(self) -> Nozzle:
+        given = [self.tip_radius, self.length, self.body_radius]
+        if self.mesh is not None and any(value is not None for value in given):
+            raise ValueError("give mesh, or tip_radius, length and body_radius; not both")
+        if self.mesh is None and any(value is None for value in given):
+            raise ValueError("give tip_radius, length and body_radius, or mesh")
+        if self.mesh is None and (self.body_radius or 0) < (self.tip_radius or 0):
+            raise ValueError("body_radius must not be smaller than tip_radius")
+        return self
+
+
+class Machine(Options):
+    """Limits of the machine."""
+
+    tilt: float = Field(
+        60.0, ge=0, lt=90, description="largest angle between tool axis and build direction, in degrees"
+    )
+    turn: float = Field(
+        20.0,
+        ge=0,
+        allow_inf_nan=False,
+        description="largest turn of the tool axis along a pass with 5 axes, in degrees per bead width; 0: none",
+    )
+
+
+class Layers(Path):
+    """Passes layer by layer along a build direction, for a nozzle that lays beads of metal or plastic.
+
+    All lengths are in the job's unit, all places in part coordinates. Beads are blocks; heat, flow and shrinkage are
+    not considered.
+    """
+
+    use: Literal["layers"] = "layers"
+    height: Length = Field(
+        description="largest height of a layer; layers are made equal, so that the last ends at the top"
+    )
+    layers: Literal["planar", "conformal"] = Field(
+        "planar",
+        description="planar: planes across the build direction; conformal: surfaces at equal depth above the floor of "
+        "the cavity, that is what of the deposit lies on metal and is less than 75 degrees steep",
+    )
+    width: Length = Field(description="of a bead")
+    feed: Length = Field(description="speed of deposition, in lengths a minute")
+    nozzle: Nozzle = Field(
+        description="{tip_radius, cone_angle, length, body_radius}: a flat tip, a cone of this angle (degrees) between "
+        "axis and side, a cylinder; or {mesh: path}, tip at 0, axis along z"
+    )
+    overlap: float = Field(0.3, ge=0, lt=0.9, description="share of a bead's width that the next bead overlaps")
+    axes: Literal[3, "3+2", 5] = Field(
+        3,
+        description="3: one direction for the whole deposit, tool along it; 3+2: cut into parts with a direction each; "
+        "5: the tool is tilted too, pass by pass, where it would collide",
+    )
+    direction: Annotated[Literal["auto", "normal"] | Vector, AfterValidator(_check_direction)] = Field(
+        "auto",
+        description="build direction: [x, y, z]; normal: the mean normal of the deposit's open side; auto: that where "
+        "it reaches all, else the one that reaches most of it, the normals of open planes, and the axes",
+    )
+    pattern: Literal["zigzag", "contour", "spiral", "offset-zigzag"] = Field(
+        "zigzag",
+        description="zigzag: rows to and fro; contour: rings; spiral: rings linked into one pass; offset-zigzag: one "
+        "ring, rows inside",
+    )
+    angle: float = Field(0.0, allow_inf_nan=False, description="of the rows in the first layer, in degrees")
+    turn: float = Field(90.0, allow_inf_nan=False, description="of the rows from layer to layer, in degrees")
+    overhang: float = Field(
+        45.0, ge=0, lt=90, description="largest angle between build direction and an overhanging side, in degrees"
+    )
+    min_length: float = Field(0.0, ge=0, allow_inf_nan=False, description="passes shorter than this are left out")
+    standoff: Length | None = Field(
+        None, description="distance from the nozzle's tip to the top of the bead; default: the bead's width"
+    )
+    clearance: Length | None = Field(
+        None, description="distance that the nozzle keeps from everything; default: a quarter of the bead's width"
+    )
+    machine: Machine = Field(Machine(), description="{tilt: largest angle of the tool against the build direction}")
+    fixture: JobPath | None = Field(
+        None, description="file of a mesh that the nozzle must not touch, in part coordinates"
+    )
+    travel_feed: Length | None = Field(None, description="speed between passes; default: five times feed")
+    travel_clearance: Length | None = Field(
+        None, description="lift between passes, along the tool; default: two widths of a bead"
+    )
+    start_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="how far a pass begins before its start")
+    stop_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="how far a pass goes on beyond its end")
+    sites: tuple[int, ...] = Field((), description="numbers of the sites that are built up first, in this order")
+    simulate: bool = Field(True, description="compare the union of the beads with the deposit, on voxels")
+
+    @model_validator(mode="after")
+    def _check_standoff(self) -> Layers:
+        if self.standoff is not None and self.standoff < self._gap:
+            raise ValueError(
+                f"standoff ({self.standoff:g}) is smaller than clearance ({self._gap:g}): the tip would be too near to "
+                "the bead that it lays"
+            )
+        return self
+
+    @property
+    def _gap(self) -> float:
+        return self.clearance or self.width / 4
+
+    def rank_site(self, number: int) -> int:
+        """Sites named in ``sites`` come first, in that order."""
+        return self.sites.index(number) if number in self.sites else len(self.sites)
+
+    def run(self, body: Solid, left: Solid | None, built: Solid | None, tolerance: float) -> DepositPath | None:
+        """The path. Raises StageError where the nozzle, the fixture or the direction cannot be used."""
+        from damageest_paths.assemble import Speeds, Task, plan_path
+        from damageest_paths.conformal import plan_conformal
+        from damageest_paths.directions import find_open_normal
+        from damageest_paths.planar import plan_planar
+        from damageest_paths.process import Process
+        from damageest_paths.stripes import Bead
+
+        process = Process(
+            height=self.height,
+            bead=Bead(self.width, (1 - self.overlap) * self.width),
+            pattern=self.pattern,
+            angle=float(np.radians(self.angle)),
+            turn=float(np.radians(self.turn)),
+            overhang=float(np.radians(self.overhang)),
+            shortest=self.min_length,
+            gap=self._gap,
+            axes=self.axes,
+            tilt=float(np.radians(self.machine.tilt)),
+            extend=(self.start_overlap, self.stop_overlap),
+            turn_rate=float(np.radians(self.machine.turn)) / self.width,
+        )
+        direction: Floats | None = None
+        if self.direction == "normal":
+            direction = find_open_normal(body, left, tolerance)
+        elif not isinstance(self.direction, str):
+            direction = np.array(self.direction) / np.linalg.norm(self.direction)
+        others: list[Mesh] = [built] if built is not None else []
+        if self.fixture is not None:
+            others.append(_read_mesh(self.fixture, "fixture", False))
+        path = plan_path(
+            Task(body, left, others, tolerance),
+            self._make_nozzle(),
+            self.standoff or self.width,
+            process,
+            Speeds(
+                self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance or 2 * self.width, self.simulate
+            ),
+            direction,
+            plan_conformal if self.layers == "conformal" else plan_planar,
+        )
+        if self.layers == "conformal" and not len(path.points):
+            why = "; ".join(item.why for item in path.unreached)
+            raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")
+        return path
+
+    def _make_nozzle(self) -> Any:
+        from damageest_paths import nozzle
+
+        shape = self.nozzle
+        if shape.mesh is not None:
+            return nozzle.Nozzle(_read_mesh(shape.mesh, "nozzle", True))
+        assert shape.tip_radius is not None
+        assert shape.body_radius is not None
+        assert shape.length is not None
+        angle = float(np.radians(shape.cone_angle))
+        return nozzle.make_nozzle(nozzle.Cone(shape.tip_radius, shape.body_radius, shape.length, angle))
+
+
+def _read_mesh(path: JobPath, what: str, is_closed: bool) -> Mesh:
+    """A mesh from a file. Raises StageError where it cannot be read, or is not closed where it has to be."""
+    from damageest.artefacts import open_edges
+    from damageest.geometry.duplicates import find_duplicates
+    from damageest.io.meshes import read_mesh
+
+    try:
+        vertices, faces, _ = read_mesh(path)
+        keep, number = find_duplicates(vertices)
+        mesh = Mesh(vertices[keep], number[faces])
+    except Exception as error:
+        raise StageError(f"{what}: {path.name} cannot be read: {error}", "give an STL, PLY or OBJ file") from error
+    if not len(mesh.faces) or (is_closed and open_edges(mesh.faces)):
+        raise StageError(f"{what}: {path.name} is {'not closed' if len(mesh.faces) else 'empty'}", "give a closed mesh")
+    return mesh

@@ -1,0 +1,216 @@
+"""Puts passes in a sequence, with the moves between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Ints
+from damageest_paths.clearance import Clearance
+from damageest_paths.process import Pass
+
+LIFTS = (1, 3, 9)
+"""Multiples of the hop that are tried."""
+MOST_EXITS = 12
+"""Passes whose axes, and places, are tried where the tool cannot leave along its own axis, as in a bore."""
+MOST_POSES = 2000
+"""Poses at which one leg of a travel is checked at most."""
+
+
+@dataclass(frozen=True)
+class Travel:
+    """``hop``: how far the tool is lifted along its axis between passes. ``safe``: a distance from ``centre`` (3,) at
+    which the nozzle is clear of everything. ``gap``: distance to keep. ``feed``, ``fast``: speeds of deposition and of
+    travel, in lengths a minute."""
+
+    hop: float
+    safe: float
+    centre: Floats
+    gap: float
+    feed: float
+    fast: float
+
+
+class Exit(NamedTuple):
+    """A ``place`` (3,) from which the tool may be clear when it leaves along an ``axis`` (3,)."""
+
+    place: Floats
+    axis: Floats
+
+
+class Moves(NamedTuple):
+    """Points (N,3), tool axes (N,3), normals (N,3), speed (N,), whether the move that ends there deposits (N,), layer
+    (N,), pass (N,) and part (N,). ``gap``: least distance of the nozzle during travel; ``blocked``: travels for which
+    no clear way was found."""
+
+    points: Floats
+    axes: Floats
+    normals: Floats
+    feed: Floats
+    on: Flags
+    layer: Ints
+    number: Ints
+    part: Ints
+    gap: float
+    blocked: int
+
+
+def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: Travel) -> Moves:
+    """One sequence of moves through passes in the part's frame.
+
+    ``groups``: the passes of each part of the deposit. ``clearance``: to what is there; the layers, numbered from 1
+    over all groups, have that rank. Between two passes the tool is lifted by the hop, or by as much more as a clear
+    straight way needs, up to the safe distance. It comes and leaves along its axis; where that is not clear, along that
+    of another pass, or from above that pass. On the way to a pass the layers before it stand, and its own layer unless
+    the pass is the first of it.
+    """
+    rows: list[tuple[Floats, Floats, Floats, float, bool, int, int, int]] = []
+    gap, number, blocked = np.inf, 0, 0
+    before: Pass | None = None
+    old, ranks, exits = 0, rank_layers(groups), _list_exits(groups)
+    for part, passes in enumerate(groups, 1):
+        for one in passes:
+            rank = ranks[part - 1, one.layer]
+            number += 1
+            standing = clearance.after(rank if rank == old else rank - 1)
+            way, way_axes, found = _find_way(before, one, exits, standing, travel)
+            old = rank
+            blocked += found < travel.gap / 2
+            gap = min(gap, found)
+            for point, axis in zip(way, way_axes, strict=True):
+                rows.append((point, axis, one.normals[0], travel.fast, False, one.layer + 1, number, part))
+            first = (one.points[0], one.axes[0], one.normals[0], travel.fast, False, one.layer + 1, number, part)
+            rows.append(first)
+            for k in range(1, len(one.points)):
+                values = (one.points[k], one.axes[k], one.normals[k], travel.feed, True)
+                rows.append((*values, one.layer + 1, number, part))
+            before = one
+    if before is not None:
+        standing = clearance.after(len(ranks))
+        way, way_axes, found = _find_exit(before.points[-1], before.axes[-1], exits, standing, travel)
+        blocked += found < travel.gap / 2
+        gap = min(gap, found)
+        for point, axis in zip(way, way_axes, strict=True):
+            rows.append((point, axis, before.normals[-1], travel.fast, False, rows[-1][5], number, rows[-1][7]))
+    columns: list[Any] = list(zip(*rows, strict=True)) or [()] * 8
+    points, axes, normals = (np.array(column, float).reshape(-1, 3) for column in columns[:3])
+    layer, numbers, parts = (np.array(column, np.int64) for column in columns[5:])
+    feed, on = np.array(columns[3], float), np.array(columns[4], bool)
+    return Moves(points, axes, normals, feed, on, layer, numbers, parts, max(gap, 0.0), blocked)
+
+
+def rank_layers(groups: Sequence[Sequence[Pass]]) -> dict[tuple[int, int], int]:
+    """The number, from 1, of each layer that has passes, by the number of its group and its own in the group."""
+    layers = dict.fromkeys((number, one.layer) for number, passes in enumerate(groups) for one in passes)
+    return {each: rank for rank, each in enumerate(layers, 1)}
+
+
+def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
+    """The point (3,) at the safe distance from the centre, straight up the axis."""
+    away = point - travel.centre
+    along = float(away @ axis)
+    root = np.sqrt(max(along**2 - float(away @ away) + travel.safe**2, 0.0))
+    return np.asarray(point + max(root - along, travel.hop) * axis)
+
+
+def _list_exits(groups: Sequence[Sequence[Pass]]) -> list[Exit]:
+    """The tool axes of the passes, each once, in their order, with the start of the first pass that has it."""
+    found: dict[tuple[float, ...], Exit] = {}
+    for passes in groups:
+        for one in passes:
+            key = tuple(np.round(one.axes[0], 6).tolist())
+            found.setdefault(key, Exit(one.points[0], one.axes[0]))
+    return list(found.values())[:MOST_EXITS]
+
+
+def _list_ways_out(
+    point: Floats, axis: Floats, exits: Sequence[Exit], travel: Travel
+) -> Iterator[tuple[Floats, Floats]]:
+    """Ways from a place (3,) to the safe distance: points (K,3) and axes (K,3). Straight up the tool's ``axis`` (3,);
+    after a hop along that of an exit; from above the exit."""
+    yield _lift(point, axis, travel)[None], axis[None]
+    turned = [(point, gate.axis) for gate in exits if not np.allclose(gate.axis, axis)]
+    for place, along in [*turned, *exits]:
+        way = [point + travel.hop * axis, place + travel.hop * along, _lift(place, along, travel)]
+        yield np.array(way), np.array([axis, along, along])
+
+
+def _find_exit(
+    point: Floats, axis: Floats, exits: Sequence[Exit], clearance: Clearance, travel: Travel
+) -> tuple[Floats, Floats, float]:
+    """Points (K,3) and axes (K,3) from a place (3,) on a pass to the safe distance, and the least distance: the first
+    way that is clear, else the clearest."""
+    best = np.empty((0, 3)), np.empty((0, 3)), -np.inf
+    for way, axes in _list_ways_out(point, axis, exits, travel):
+        gap = _measure_way(np.concatenate([point[None], way]), np.concatenate([axis[None], axes]), clearance, travel)
+        if gap > best[2]:
+            best = way, axes, gap
+        if gap >= travel.gap / 2:
+            break
+    return best
+
+
+def _find_way(
+    before: Pass | None, one: Pass, exits: Sequence[Exit], clearance: Clearance, travel: Travel
+) -> tuple[Floats, Floats, float]:
+    """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
+    stop, axis = one.points[0], one.axes[0]
+    if before is None:
+        way, axes, gap = _find_exit(stop, axis, exits, clearance, travel)
+        return way[::-1], axes[::-1], gap
+    start, old = before.points[-1], before.axes[-1]
+    if np.linalg.norm(stop - start) < 1e-9 and np.allclose(axis, old):
+        return np.empty((0, 3)), np.empty((0, 3)), np.inf
+    for factor in LIFTS:
+        lift = factor * travel.hop
+        if np.linalg.norm(stop - travel.centre) + lift > travel.safe:
+            break
+        # both ends at the height of the higher one
+        rise = float((stop - start) @ one.normals[0])
+        way = np.array([start + (max(rise, 0.0) + lift) * old, stop + (max(-rise, 0.0) + lift) * axis])
+        axes = np.array([old, axis])
+        points, turned = np.concatenate([start[None], way, stop[None]]), np.array([old, old, axis, axis])
+        gap = _measure_way(points, turned, clearance, travel)
+        if gap >= travel.gap / 2:
+            return way, axes, gap
+    out, out_axes, first = _find_exit(start, old, exits, clearance, travel)
+    back, back_axes, last = _find_exit(stop, axis, exits, clearance, travel)
+    way, axes = _round_the_sphere(np.array([out[-1], back[-1]]), np.array([out_axes[-1], back_axes[-1]]), travel)
+    gap = min(first, last, _measure_way(way, axes, clearance, travel))
+    return np.concatenate([out[:-1], way, back[-2::-1]]), np.concatenate([out_axes[:-1], axes, back_axes[-2::-1]]), gap
+
+
+def _round_the_sphere(way: Floats, axes: Floats, travel: Travel) -> tuple[Floats, Floats]:
+    """The way between two points at the safe distance, along the sphere, with the axis turning evenly."""
+    first, last = way - travel.centre
+    far = max(float(np.linalg.norm(first)), float(np.linalg.norm(last)))
+    angle = float(np.arccos(np.clip(first @ last / (np.linalg.norm(first) * np.linalg.norm(last)), -1, 1)))
+    turn = float(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
+    count = int(np.ceil(max(angle, turn) / np.radians(10.0)))
+    if count < 2:
+        return way, axes
+    share = np.linspace(0, 1, count + 1)[:, None]
+    inner = (1 - share) * first + share * last
+    inner *= far / np.maximum(np.linalg.norm(inner, axis=1), 1e-9 * far)[:, None]
+    inner[0], inner[-1] = first, last
+    turned = (1 - share) * axes[0] + share * axes[1]
+    turned /= np.maximum(np.linalg.norm(turned, axis=1), 1e-9)[:, None]
+    return travel.centre + inner, turned
+
+
+def _measure_way(points: Floats, axes: Floats, clearance: Clearance, travel: Travel) -> float:
+    """The least distance along a way, as a lower bound between the poses that are measured."""
+    far = np.linalg.norm(np.diff(points, axis=0), axis=1) + clearance.bound_turns(axes)
+    counts = np.clip(np.ceil(far / travel.gap - 1e-9).astype(int), 1, MOST_POSES)
+    share = np.concatenate([*(np.arange(count) / count for count in counts), [0.0]])
+    place = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
+    share[-1] = 1.0
+    dense = points[place] + share[:, None] * (points[place + 1] - points[place])
+    turned = (1 - share)[:, None] * axes[place] + share[:, None] * axes[place + 1]
+    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    moves = np.linalg.norm(np.diff(dense, axis=0), axis=1) + clearance.bound_turns(turned)
+    found = clearance.measure_poses(dense, turned, travel.gap)
+    return float(min(found.min(), np.min((found[1:] + found[:-1] - moves) / 2, initial=np.inf)))

@@ -1,0 +1,131 @@
+"""Pieces of a sheet, unrolled into planes, and what is wanted of them as regions there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Ints
+from damageest.geometry.cutting import cut_triangles
+from damageest_paths.floor import Floor
+from damageest_paths.process import Process
+from damageest_paths.regions import make_region
+from damageest_paths.sheets import Grid, Sheet, SheetTree
+from damageest_paths.unroll import unroll
+
+CLIFF = np.cos(np.radians(75.0))
+"""Cosine of the angle between a sheet's face and the way in which the depth grows, from which it is a cliff."""
+FEW = 0.02
+"""Share of a sheet that may be cliffs, or stretched too much."""
+TIGHT = 0.6
+"""Least ratio of a length on the sheet to that in the plane: beads are laid as much too close there."""
+
+
+class NotFollowedError(Exception):
+    """No even layers can follow the floor; the message says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A connected piece of a sheet: ``numbers`` (V,) of its points in the sheet, ``places`` (V,2) in the plane,
+    ``faces`` (F,3). ``tight``: the least ratio of a length on the surface to that in the plane; none is above 1."""
+
+    numbers: Ints
+    places: Floats
+    faces: Ints
+    tree: SheetTree
+    tight: float
+
+    def draw_region(self, values: Floats, process: Process) -> Any:
+        """Where a field is negative that is given at the points of the whole sheet (N,), as a region of the plane."""
+        own = np.clip(values[self.numbers], -1e3 * process.bead.width, 1e3 * process.bead.width)
+        flat = np.column_stack([self.places, np.zeros(len(self.places))])
+        vertices, faces, _, is_outside = cut_triangles(flat, self.faces, own)
+        inside = faces[~is_outside]
+        return make_region([vertices[loop, :2] for loop in _trace_border(inside)]).simplify(process.bead.width / 200)
+
+    def fill_below(self, region: Any, drop: float, process: Process) -> Any:
+        """What lies up to ``drop`` below a region, as a Manifold in local coordinates."""
+        block = region.extrude(drop).refine_to_length(process.bead.width / 2)
+
+        def bend(places: Floats) -> Floats:
+            points, _, upward = self.tree.find(np.ascontiguousarray(places[:, :2]), exact=False)
+            return points + (places[:, 2:] - drop) * upward
+
+        return block.warp_batch(bend)
+
+
+def _trace_border(faces: Ints) -> list[Ints]:
+    """The border of faces as closed loops of vertices, in the sense of the faces. Loops may meet in a vertex."""
+    if not len(faces):
+        return []
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    size = int(faces.max()) + 1
+    key, back = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
+    after: dict[int, list[int]] = {}
+    for start, stop in edges[~np.isin(key, back)].tolist():
+        after.setdefault(start, []).append(stop)
+    loops = []
+    while after:
+        first = node = next(iter(after))
+        loop = []
+        while node in after:
+            loop.append(node)
+            follow = after[node]
+            node = follow.pop()
+            if not follow:
+                del after[loop[-1]]
+            if node == first:
+                break
+        loops.append(np.array(loop, np.int64))
+    return [loop for loop in loops if len(loop) > 2]
+
+
+def list_patches(sheet: Sheet, grid: Grid, reach: Floats, floor: Floor, process: Process) -> list[Patch]:
+    """The pieces of a sheet round what is wanted of it: where ``reach`` (N,) is negative.
+
+    Raises NotFollowedError where the sheet has cliffs, or cannot be unrolled without beads far too close.
+    """
+    width = process.bead.width
+    used = sheet.is_found & (reach < width + max(process.extend))
+    faces = grid.faces[used[grid.faces].all(axis=1)]
+    wanted = reach[faces].min(axis=1) < 0
+    corners = sheet.points[faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    along = np.einsum("fi,fi->f", cross, sheet.upward[faces].sum(axis=1)) / 3
+    if area[wanted & (along < CLIFF * area)].sum() > FEW * area[wanted].sum():
+        raise NotFollowedError("the floor of the cavity has steps, and no even layer goes over them")
+    return [
+        _make_patch(sheet, floor, faces[own], reach, process)
+        for own in _split(faces, len(reach))
+        if (reach[faces[own]] < 0).any()
+    ]
+
+
+def _split(faces: Ints, count: int) -> list[Ints]:
+    """The numbers of the faces in each connected piece."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    start, stop = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    graph = coo_matrix((np.ones(len(start)), (start, stop)), (count, count))
+    _, piece = connected_components(graph, directed=False)
+    owner = piece[faces[:, 0]]
+    return [np.flatnonzero(owner == one) for one in np.unique(owner)]
+
+
+def _make_patch(sheet: Sheet, floor: Floor, faces: Ints, reach: Floats, process: Process) -> Patch:
+    numbers, own = np.unique(faces, return_inverse=True)
+    own = own.reshape(-1, 3)
+    unrolled = unroll(sheet.points[numbers], own)
+    matters = reach[faces].min(axis=1) < 0
+    stretch = unrolled.stretch[matters]
+    largest = float(np.quantile(stretch[:, 0], 1 - FEW / 4))
+    tight = float(np.quantile(stretch[:, 1], FEW)) / largest
+    if tight < TIGHT:
+        raise NotFollowedError("the layers bend too much both ways: beads laid side by side would lie far too close")
+    places = unrolled.places if abs(largest - 1) < 1e-6 else unrolled.places * largest
+    return Patch(numbers, places, own, SheetTree(sheet, floor, places, own, numbers), tight)

@@ -1,0 +1,179 @@
+"""Plans layers that are planes across the build direction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Mesh
+from damageest.geometry.solids import to_arrays
+from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
+from damageest_paths.clearance import Clearance
+from damageest_paths.fill import fill_region
+from damageest_paths.frames import Frame
+from damageest_paths.obstacles import Obstacles
+from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes, resample
+from damageest_paths.regions import cover, make_region, measure_length, shift_border, unite_regions
+
+UNSUPPORTED, COLLIDES, SHORT = (
+    "stands on nothing within the permitted overhang",
+    "the nozzle would come too near to something",
+    "shorter than the shortest pass",
+)
+Z = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What the nozzle must not touch, relative to the frame's origin. ``metal``: a Manifold of what is left of the part
+    and stands already. ``others``: meshes. ``nozzle``: see `Clearance`."""
+
+    metal: Any
+    others: Sequence[Mesh]
+    clearance: Clearance
+
+
+def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process) -> Plan:
+    """Passes that build up a body, a Manifold relative to the frame's origin, layer by layer.
+
+    All layers have one height, at most the process's, so that the last ends with the body. A layer is made where metal
+    or the layer below is near enough. Passes, or pieces of passes, at which the nozzle comes too near to metal, other
+    meshes or the layers below are left out.
+    """
+    local, metal = frame.move(body), frame.move(around.metal)
+    low, high = local.bounding_box()[2], local.bounding_box()[5]
+    count = max(1, int(np.ceil((high - low) / process.height - 1e-6)))
+    height = (high - low) / count
+    near = _crop(metal, local, height + process.bead.width)
+    meshes = [Mesh(*to_arrays(metal))] if not metal.is_empty() else []
+    meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
+    corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
+    clearance = around.clearance.with_obstacles(Obstacles(meshes, corners[0], corners[1], process.bead.width))
+    done = make_region([])
+    passes: list[Pass] = []
+    missing: list[Any] = []
+    reasons: dict[str, float] = {}
+    choice = _AxisChoice(process, clearance)
+    for number in range(count):
+        floor, top = low + number * height, low + (number + 1) * height
+        slab = _cut_slab(local, floor, top)
+        wanted = _cast_shadow(slab, process)
+        ground = _cast_shadow(_cut_slab(near, floor - height / 4, top), process)
+        held = wanted ^ shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
+        lines = fill_region(held, process.pattern, process.bead, process.angle + number * process.turn)
+        long = [line for line in lines if measure_length(line) >= process.shortest]
+        short = [line for line in lines if measure_length(line) < process.shortest]
+        made, dropped = choice.place(long, top, number)
+        made = order_passes(made, passes[-1].points[-1] if passes else None)
+        done = cover([one.points[:, :2] for one in made], process.bead.width)
+        left = {
+            UNSUPPORTED: wanted - held,
+            COLLIDES: (cover(long, process.bead.width) ^ held) - done if dropped else make_region([]),
+            SHORT: (cover(short, process.bead.width) ^ held) - done - cover(long, process.bead.width),
+        }
+        for why, region in left.items():
+            if region.is_empty():
+                continue
+            piece = slab ^ region.extrude(top - floor).translate((0, 0, floor))
+            if piece.volume() > 0:
+                missing.append(piece)
+                reasons[why] = reasons.get(why, 0.0) + piece.volume()
+        passes += made
+    return Plan(frame, height, tuple(passes), _gather(missing), reasons)
+
+
+def _gather(pieces: list[Any]) -> Any:
+    from manifold3d import Manifold, OpType
+
+    return Manifold.batch_boolean(pieces, OpType.Add) if pieces else None
+
+
+def _crop(metal: Any, body: Any, margin: float) -> Any:
+    """What lies of the metal in the box round the body."""
+    from manifold3d import Manifold
+
+    low, high = np.array(body.bounding_box()[:3]) - margin, np.array(body.bounding_box()[3:]) + margin
+    return metal ^ Manifold.cube(tuple(high - low)).translate(tuple(low))
+
+
+def _cut_slab(body: Any, floor: float, top: float) -> Any:
+    return body.trim_by_plane((0, 0, 1), floor).trim_by_plane((0, 0, -1), -top)
+
+
+def _cast_shadow(slab: Any, process: Process) -> Any:
+    """The outline of a slab, seen from above."""
+    if slab.is_empty():
+        return make_region([])
+    return make_region(slab.project().to_polygons()).simplify(process.bead.width / 200)
+
+
+class _AxisChoice:
+    """Places the lines of a layer with tool axes. It remembers which axis served last."""
+
+    def __init__(self, process: Process, clearance: Clearance) -> None:
+        self.process, self.clearance = process, clearance
+        tilt = process.tilt if process.axes == 5 else 0.0
+        axes = list_axes(tilt, np.radians(30.0), 6) if process.is_trial else list_axes(tilt)
+        # everything up to the top of the layer stays below the nozzle's lowest point
+        self.lowest = np.array([_find_lowest(clearance, axis) for axis in axes])
+        self.axes = axes[self.lowest >= process.gap * (1 - 1e-9)]
+        self.lowest = self.lowest[self.lowest >= process.gap * (1 - 1e-9)]
+        self.last = 0
+
+    def place(self, lines: Sequence[Floats], top: float, layer: int) -> tuple[list[Pass], list[Floats]]:
+        """Passes along the lines (K,2) at a height, and the pieces of lines (K,2) that the nozzle does not reach."""
+        clearance, needed = self.clearance.above(top), self.process.gap
+        made: list[Pass] = []
+        dropped: list[Floats] = []
+        if not len(self.axes) or not lines:
+            return made, list(lines)
+        process = self.process
+        least = int(np.ceil(process.shortest / process.step)) + 2
+        limits = Limits(needed, process.step, process.turn_rate, least)
+        sampled = []
+        for line in lines:
+            line = extend_line(line, *process.extend)
+            sampled.append(resample(np.column_stack([line, np.full(len(line), top)]), process.step))
+        chosen = choose_axes([points for points, _ in sampled], self.axes, self.last, clearance, limits)
+        for (points, corner), pieces in zip(sampled, chosen, strict=True):
+            at = 0
+            for piece in pieces:
+                if piece.start > at:
+                    dropped.append(points[at : piece.start, :2])
+                at = piece.stop
+                made.append(self._make_pass(points, corner, piece, layer))
+            if at < len(points):
+                dropped.append(points[at:, :2])
+            if pieces:
+                self.last = int(np.argmax(self.axes @ pieces[-1].axes[-1]))
+        return made, dropped
+
+    def _make_pass(self, points: Floats, corner: Floats, piece: Piece, layer: int) -> Pass:
+        start, stop, axes, gaps = piece
+        turns = np.zeros(stop - start, bool)
+        turns[1:] = np.abs(np.diff(axes, axis=0)).max(axis=1) > 1e-9
+        turns[:-1] |= turns[1:]
+        chosen = np.flatnonzero((corner[start:stop] >= 0) | turns)
+        chosen = np.unique(np.concatenate([[0], chosen, [stop - start - 1]]))
+        if len(chosen) == 1:
+            chosen = np.repeat(chosen, 2)
+        tightest = int(np.argmin(gaps))
+        lowest = min(_find_lowest(self.clearance, axis) for axis in np.unique(axes, axis=0))
+        return Pass(
+            points[start + chosen],
+            axes[chosen],
+            np.tile(Z, (len(chosen), 1)),
+            layer,
+            min(lowest, float(gaps.min()) - self.process.step / 2),
+            (points[start + tightest], axes[tightest]),
+        )
+
+
+def _find_lowest(clearance: Clearance, axis: Floats) -> float:
+    """Height of the nozzle's lowest point above the point that it works on."""
+    from damageest.geometry.transforms import turn_to_axis
+
+    return float((clearance.nozzle.mesh.vertices @ turn_to_axis(axis).T)[:, 2].min() + clearance.standoff * axis[2])

@@ -1,0 +1,132 @@
+"""What a path is planned with, and what a plan consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from damageest.artefacts import Floats
+from damageest_paths.fill import Pattern
+from damageest_paths.frames import Frame
+from damageest_paths.stripes import Bead
+
+Axes = Literal[3, "3+2", 5]
+
+
+@dataclass(frozen=True)
+class Process:
+    """Lengths in the job's unit, angles in radians.
+
+    ``height``: largest of a layer. ``turn``: of the rows from layer to layer. ``overhang``: largest angle between the
+    build direction and an overhanging side. ``shortest``: least length of a pass. ``gap``: distance that the nozzle has
+    to keep. ``tilt``: largest of the tool axis against the build direction. ``extend``: how far a pass begins before
+    its start and goes on beyond its end. ``turn_rate``: largest turn of the tool axis per length along a pass.
+    ``is_trial``: few axes are tried.
+    """
+
+    height: float
+    bead: Bead
+    pattern: Pattern
+    angle: float
+    turn: float
+    overhang: float
+    shortest: float
+    gap: float
+    axes: Axes
+    tilt: float
+    extend: tuple[float, float] = (0.0, 0.0)
+    turn_rate: float = 0.0
+    is_trial: bool = False
+
+    @property
+    def step(self) -> float:
+        """Distance of the poses at which the nozzle is checked: it comes nearer by half of it between two at most."""
+        return min(self.bead.width / 2, self.gap)
+
+    def coarsen(self, factor: float) -> Process:
+        """The same with larger layers and beads, for a quick trial."""
+        bead = Bead(factor * self.bead.width, factor * self.bead.step)
+        return replace(self, height=factor * self.height, bead=bead, pattern="zigzag", extend=(0.0, 0.0), is_trial=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """One pass: ``points`` (K,3) on the top of the bead, ``axes`` (K,3) from the tip away from the work, ``normals``
+    (K,3) of the layer, ``gap``: least distance of the nozzle, ``tightest``: the point (3,) and axis (3,) there."""
+
+    points: Floats
+    axes: Floats
+    normals: Floats
+    layer: int
+    gap: float = np.inf
+    tightest: tuple[Floats, Floats] | None = None
+
+    def reverse(self) -> Pass:
+        """The same pass, run the other way."""
+        return replace(self, points=self.points[::-1], axes=self.axes[::-1], normals=self.normals[::-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Passes for one build direction, in the order of their layers, in coordinates relative to the frame's origin.
+
+    ``height``: of a layer. ``missing``: a Manifold of what they do not fill, or None; ``reasons``: volume by reason.
+    """
+
+    frame: Frame
+    height: float
+    passes: tuple[Pass, ...]
+    missing: Any
+    reasons: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def missing_volume(self) -> float:
+        return float(self.missing.volume()) if self.missing is not None else 0.0
+
+
+def resample(line: Floats, longest: float) -> tuple[Floats, Floats]:
+    """Points (N,3) along a polyline (K,3), no farther from each other than ``longest``, with its corners; and the
+    number of the corner (N,) that each is, -1 for one between corners."""
+    sides = np.diff(line, axis=0)
+    counts = np.maximum(np.ceil(np.linalg.norm(sides, axis=1) / longest - 1e-9).astype(int), 1)
+    share = np.concatenate([np.arange(count) / count for count in counts] or [np.empty(0)])
+    points = np.repeat(line[:-1], counts, axis=0) + share[:, None] * np.repeat(sides, counts, axis=0)
+    corner = np.where(share == 0, np.repeat(np.arange(len(sides)), counts), -1)
+    return np.concatenate([points, line[-1:]]), np.append(corner, len(line) - 1)
+
+
+def measure_along(points: Floats) -> Floats:
+    """The way (N,) along a polyline to each of its points (N,K)."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def extend_line(line: Floats, before: float, after: float) -> Floats:
+    """A line that begins earlier and ends later; a closed one overlaps its own start."""
+    if not before and not after:
+        return line
+    if np.allclose(line[0], line[-1]):
+        at = measure_along(line)
+        stop = min(before + after, at[-1] / 2)
+        end = np.array([np.interp(stop, at, line[:, k]) for k in range(2)])
+        return np.concatenate([line, line[1:][at[1:] < stop], end[None]])
+    first, last = line[0] - line[1], line[-1] - line[-2]
+    start = line[0] + before * first / max(float(np.linalg.norm(first)), 1e-300)
+    end = line[-1] + after * last / max(float(np.linalg.norm(last)), 1e-300)
+    return np.concatenate([start[None], line[1:-1], end[None]])
+
+
+def order_passes(passes: Sequence[Pass], start: Floats | None) -> list[Pass]:
+    """The passes of one layer, each the nearest to the end of the one before, some of them the other way round."""
+    left, ordered = list(passes), []
+    at = start
+    while left:
+        ends = np.array([[one.points[0], one.points[-1]] for one in left])
+        gaps = np.linalg.norm(ends - (ends[0, 0] if at is None else at), axis=2)
+        number, end = np.unravel_index(int(np.argmin(np.round(gaps, 9))), gaps.shape)
+        one = left.pop(int(number))
+        ordered.append(one.reverse() if end else one)
+        at = ordered[-1].points[-1]
+    return ordered

@@ -1,0 +1,189 @@
+"""The tops of conformal layers: surfaces at equal depth above the cavity floor, over a grid of columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.distance import SurfaceTree, distance_to_edges, signed_distance
+from damageest_paths.floor import Floor
+from damageest_paths.process import Process
+
+FINE = 0.25
+"""Distance of the grid's columns on the steepest place of the floor, in bead widths."""
+COARSE = 0.2
+"""Distance of those columns, in bead widths, that the nozzle is kept clear of."""
+MOST_COLUMNS = 20_000
+STEPS = 30
+"""Steps by which a column is brought to a depth at most."""
+CLOSE = 1e-5
+"""Share of the layer height to which it is brought."""
+SAMPLES = 9
+"""Places between the top and the bottom of a layer at which it is looked for the deposit."""
+UNDER = 0.25
+"""Share of the layer height by which metal may lie deeper than the layer's bottom and still hold it."""
+STEEP = 0.15
+"""Cosine of the steepest angle at which a column is followed."""
+
+
+class Grid(NamedTuple):
+    """Columns (N,2), at a distance of ``edge``, with a triangle (F,3) between each three neighbours, and the number of
+    rows and columns. ``coarse`` (G,3): the same with larger triangles."""
+
+    columns: Floats
+    edge: float
+    faces: Ints
+    coarse: Ints
+    shape: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """The top of a layer at a ``depth``: ``points`` (N,3), one in each column; ``upward`` (N,3): where the depth grows;
+    ``normals`` (N,3): the same, smoothed over a bead; ``is_found`` (N,): whether the column has that depth."""
+
+    depth: float
+    points: Floats
+    upward: Floats
+    normals: Floats
+    is_found: Flags
+
+
+def make_grid(floor: Floor, low: Floats, high: Floats, process: Process) -> Grid:
+    """Columns over the box from ``low`` to ``high`` (2,), denser the steeper the floor is."""
+    width = process.bead.width
+    slope = np.sort(np.abs(floor.mesh.face_normals[:, 2]))
+    steep = max(float(slope[len(slope) // 20]), 0.5)
+    edge = FINE * width * steep
+    margin = width + max(process.extend) + 2 * edge
+    low, high = low - margin, high + margin
+    edge *= max(1.0, float(np.sqrt(np.prod((high - low) / edge) / MOST_COLUMNS)))
+    x, y = (np.arange(low[k], high[k] + edge, edge) for k in range(2))
+    columns = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    number = np.arange(len(columns)).reshape(len(x), len(y))
+    stride = max(1, int(COARSE * width / edge))
+    rows, lines = (np.unique(np.append(np.arange(0, many, stride), many - 1)) for many in number.shape)
+    return Grid(columns, edge, _span(number), _span(number[np.ix_(rows, lines)]), number.shape)
+
+
+def _span(number: Ints) -> Ints:
+    """Triangles (F,3) between columns with the numbers (R,C)."""
+    a, b, c, d = number[:-1, :-1].ravel(), number[1:, :-1].ravel(), number[1:, 1:].ravel(), number[:-1, 1:].ravel()
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
+def guess_heights(floor: Floor, grid: Grid) -> Floats:
+    """Heights (N,) at which the columns meet about the floor, or the planes beyond its rim."""
+    from scipy.spatial import cKDTree
+
+    vertices, normals = floor.mesh.vertices, floor.normals
+    nearest = cKDTree(vertices[:, :2]).query(grid.columns)[1]
+    away = grid.columns - vertices[nearest, :2]
+    return np.asarray(
+        vertices[nearest, 2]
+        - np.einsum("ni,ni->n", away, normals[nearest, :2]) / np.maximum(normals[nearest, 2], STEEP)
+    )
+
+
+def lay_sheet(floor: Floor, grid: Grid, heights: Floats, depth: float, process: Process, spacing: float) -> Sheet:
+    """The sheet at a depth, found from heights (N,) near to it. ``spacing``: the layer height."""
+    points = np.column_stack([grid.columns, heights])
+    distance, upward = floor.measure(points)
+    distance, upward = distance.copy(), upward.copy()
+    for _ in range(STEPS):
+        far = np.flatnonzero(np.abs(depth - distance) > CLOSE * spacing)
+        if not len(far):
+            break
+        step = (depth - distance[far]) / np.maximum(upward[far, 2], STEEP)
+        points[far, 2] += np.clip(step, -spacing, spacing)
+        distance[far], upward[far] = floor.measure(points[far])
+    is_found = (np.abs(depth - distance) < 0.02 * spacing) & (upward[:, 2] > STEEP)
+    rounds = int(np.clip(np.ceil((process.bead.width / 2 / grid.edge) ** 2), 1, 100))
+    return Sheet(depth, points, upward, _smooth(upward, is_found, grid.shape, rounds), is_found)
+
+
+def _smooth(normals: Floats, is_found: Flags, shape: tuple[int, int], rounds: int) -> Floats:
+    """Normals (N,3), each the mean of its neighbours', again and again."""
+    field = np.where(is_found[:, None], normals, 0.0).reshape(*shape, 3)
+    weight = is_found.reshape(*shape, 1).astype(float)
+    for _ in range(rounds):
+        padded = np.pad(field, ((1, 1), (1, 1), (0, 0)))
+        total = padded[1:-1, 1:-1] * 4 + padded[2:, 1:-1] + padded[:-2, 1:-1] + padded[1:-1, 2:] + padded[1:-1, :-2]
+        field = weight * total / np.maximum(np.linalg.norm(total, axis=2, keepdims=True), 1e-12)
+    found = field.reshape(-1, 3)
+    return np.where(is_found[:, None], found, normals)
+
+
+def measure_reach(sheet: Sheet, solid: Mesh, drop: float, spacing: float) -> Floats:
+    """How far (N,) the deposit is from what lies up to ``drop`` below each point of a sheet; negative where it is so.
+
+    It is exact where it is less than ``spacing``, the distance of neighbouring points, from 0; inf where the column has
+    no such depth.
+    """
+    found = np.full(len(sheet.points), np.inf)
+    some = np.flatnonzero(sheet.is_found)
+    found[some] = signed_distance(sheet.points[some] - drop / 2 * sheet.upward[some], solid)[0]
+    near = some[(found[some] < drop / 2 + spacing) & (found[some] > -spacing)]
+    for share in np.linspace(0, 1, SAMPLES):
+        if abs(share - 0.5) > 1e-9 and len(near):
+            below = sheet.points[near] - share * drop * sheet.upward[near]
+            found[near] = np.minimum(found[near], signed_distance(below, solid)[0])
+    return found
+
+
+def measure_support(
+    sheet: Sheet, some: Ints, metal: Mesh, lines: list[Floats], bead: float, drop: float, enough: float
+) -> Floats:
+    """How far (N,) places of a sheet, with the numbers ``some``, are from those that metal or a bead of the layer below
+    holds; inf elsewhere.
+
+    ``lines``: the passes (K,3) of the layer below; ``bead``: half of its width; ``drop``: the layer height. Values
+    below ``enough`` may be too large.
+    """
+    held = np.full(len(sheet.points), np.inf)
+    if lines and len(some):
+        starts = np.concatenate([[0], np.cumsum([len(line) for line in lines])])
+        edges = [np.stack([np.arange(a, b - 1), np.arange(a + 1, b)], axis=1) for a, b in pairwise(starts)]
+        below = sheet.points[some] - drop * sheet.upward[some]
+        held[some] = distance_to_edges(below, np.concatenate(lines), np.concatenate(edges)) - bead
+    for share in (1 + UNDER, 1.0, 0.5, 0.0):
+        left = some[held[some] > enough]
+        if len(left) and len(metal.faces):
+            below = sheet.points[left] - share * drop * sheet.upward[left]
+            held[left] = np.minimum(held[left], signed_distance(below, metal)[0])
+    return held
+
+
+class SheetTree:
+    """Finds places on a piece of a sheet by their places in the plane into which it is unrolled."""
+
+    def __init__(self, sheet: Sheet, floor: Floor, places: Floats, faces: Ints, numbers: Ints) -> None:
+        """``places`` (V,2), ``faces`` (F,3) of the piece; ``numbers`` (V,): of the sheet's points."""
+        self.sheet, self.floor = sheet, floor
+        self.points, self.normals = sheet.points[numbers], sheet.normals[numbers]
+        self.upward = sheet.upward[numbers]
+        self.tree = SurfaceTree(Mesh(np.column_stack([places, np.zeros(len(places))]), faces))
+
+    def find(self, places: Floats, exact: bool = True) -> tuple[Floats, Floats, Floats]:
+        """Points (N,3) at places (N,2) of the plane, their smoothed normals (N,3), and where the depth grows (N,3).
+
+        ``exact``: whether the points have the sheet's depth, or are only on the triangles between its points.
+        """
+        from damageest_paths.floor import find_shares
+
+        _, face, foot = self.tree.closest(np.column_stack([places, np.zeros(len(places))]))
+        corners = self.tree.mesh.faces[face]
+        share = find_shares(self.tree.mesh.triangles[face], foot)
+        points = np.einsum("nk,nki->ni", share, self.points[corners])
+        normals = np.einsum("nk,nki->ni", share, self.normals[corners])
+        upward = np.einsum("nk,nki->ni", share, self.upward[corners])
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        upward /= np.linalg.norm(upward, axis=1)[:, None]
+        if exact:
+            distance, upward = self.floor.measure(points)
+            points = points + (self.sheet.depth - distance)[:, None] * upward
+        return points, normals, upward

@@ -1,0 +1,155 @@
+"""Layers along the floor of a cavity: on known surfaces, filled, supported, and as planes on a flat floor."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from damageest_paths.conformal import plan_conformal
+from damageest_paths.planar import plan_planar
+from damageest_paths.process import Pass, Plan
+from damageest_paths.regions import measure_length
+from manifold3d import Manifold
+from path_cavities import BALL, BORE, DEPTH, bowl, groove, pocket, prepare, stair, tip
+
+from damageest.artefacts import Floats
+from damageest.geometry.distance import distance_to_edges
+from tests.path_shapes import Loss, cut
+
+MAKERS = {"groove": groove, "bowl": bowl, "pocket": pocket, "tip": tip}
+
+
+@cache
+def plan_cavity(name: str) -> tuple[Loss, Plan]:
+    loss = MAKERS[name]()
+    scene = prepare(loss)
+    return loss, plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+
+
+def to_part(plan: Plan, points: Floats) -> Floats:
+    return plan.frame.to_part(points + (plan.frame.to_local(plan.frame.origin[None])))
+
+
+def sample(one: Pass) -> Floats:
+    """Points of a pass and between them."""
+    return np.concatenate([one.points[:-1], (one.points[1:] + one.points[:-1]) / 2, one.points[-1:]])
+
+
+def list_layers(plan: Plan) -> list[tuple[int, Floats]]:
+    numbers = sorted({one.layer for one in plan.passes})
+    return [(k, to_part(plan, np.concatenate([sample(one) for one in plan.passes if one.layer == k]))) for k in numbers]
+
+
+def test_layers_of_a_bore_are_cylinders_about_its_axis() -> None:
+    _, plan = plan_cavity("groove")
+    assert plan.height == pytest.approx(DEPTH / 3, rel=0.01)
+    layers = list_layers(plan)
+    assert len(layers) == 3
+    for number, points in layers:
+        radius = np.linalg.norm(points[:, [0, 2]], axis=1)
+        # the bore's tessellation of 256 sides is off by 1.7e-3
+        assert radius == pytest.approx(np.full(len(points), BORE + DEPTH - (number + 1) * plan.height), abs=0.01)
+
+
+def test_layers_of_a_bowl_are_spheres_about_its_centre() -> None:
+    _, plan = plan_cavity("bowl")
+    for number, points in list_layers(plan):
+        radius = np.linalg.norm(points - [0, 0, BALL - 4], axis=1)
+        assert radius == pytest.approx(np.full(len(points), BALL - (number + 1) * plan.height), abs=0.02)
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_each_point_is_as_far_from_the_floor_as_its_layer(name: str) -> None:
+    scene = prepare(MAKERS[name]())
+    _, plan = plan_cavity(name)
+    for one in plan.passes:
+        depth = scene.floor.measure(one.points).distance
+        assert depth == pytest.approx(np.full(len(depth), (one.layer + 1) * plan.height), abs=0.01)
+
+
+def test_the_tool_follows_the_normal_up_to_its_limit() -> None:
+    scene = prepare(groove(), tilt=np.radians(30.0))
+    plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+    for one in plan.passes:
+        places = to_part(plan, one.points)
+        true = np.column_stack([-places[:, 0], 0 * places[:, 0], -places[:, 2]])
+        true /= np.linalg.norm(true, axis=1)[:, None]
+        assert np.einsum("ij,ij->i", one.normals, true).min() > np.cos(np.radians(3.0))
+        tilt = np.degrees(np.arccos(one.axes[:, 2]))
+        assert tilt.max() < 30.01
+        inner = np.degrees(np.arccos(np.clip(true[:, 2], -1, 1))) < 29
+        assert np.einsum("ij,ij->i", one.axes, true)[inner].min() > np.cos(np.radians(3.0))
+
+
+def test_a_flat_floor_gives_planes() -> None:
+    scene = prepare(pocket(), axes=3, gap=0.2)
+    planar, found = (
+        make(scene.body, scene.frame, scene.around, scene.process) for make in (plan_planar, plan_conformal)
+    )
+    assert found.height == pytest.approx(planar.height)
+    assert len(found.passes) == len(planar.passes)
+    for one, other in zip(found.passes, planar.passes, strict=True):
+        assert measure_length(one.points) == pytest.approx(measure_length(other.points), rel=0.01)
+        assert one.axes == pytest.approx(np.tile(other.axes[0], (len(one.axes), 1)))
+        for some, others in ((one, other), (other, one)):
+            edges = np.stack([np.arange(len(others.points) - 1), np.arange(1, len(others.points))], axis=1)
+            away = distance_to_edges(sample(some), others.points, edges)
+            assert away.max() < 0.1, "a tenth of a bead's height"
+    assert found.missing_volume == pytest.approx(planar.missing_volume, abs=0.01 * scene.body.volume())
+
+
+@pytest.mark.parametrize("pattern", ["contour", "spiral", "offset-zigzag"])
+def test_rows_and_rings_are_a_step_apart_on_the_surface(pattern: Any) -> None:
+    """The beads, 2 wide and drawn on the bowl, leave nothing of it."""
+    scene = prepare(bowl(), pattern=pattern)
+    plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+    assert plan.missing_volume < 1e-3 * scene.body.volume()
+    centre = np.array([0, 0, BALL - 4])
+    first = to_part(plan, np.concatenate([sample(one) for one in plan.passes if one.layer == 0]))
+    reach = BALL - plan.height
+    angle, turn = np.meshgrid(np.linspace(0, 0.9, 40), np.linspace(0, 2 * np.pi, 60))
+    ball = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), -np.cos(angle)], axis=-1).reshape(
+        -1, 3
+    )
+    away = np.linalg.norm((centre + reach * ball)[:, None] - first[None], axis=2).min(axis=1)
+    inside = (centre + (reach + plan.height / 2) * ball)[:, 2] < -0.1
+    assert inside.any()
+    assert away[inside].max() <= 1.05, "half of a bead's width, and the points' distance along the pass"
+
+
+def test_nothing_hangs_in_the_air() -> None:
+    """A ledge over an open side: only what the overhang permits of it is held."""
+    body = Manifold.cube((10, 10, 3)) + Manifold.cube((10, 14, 1)).translate((0, 0, 2))
+    loss = cut(body + Manifold.cube((10, 10, 5)).translate((0, 0, -5)), body)
+    scene = prepare(loss, axes=3)
+    plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+    hanging = sum(volume for why, volume in plan.reasons.items() if "stands on nothing" in why)
+    # 4 wide, of which as much is held as the layer is high
+    assert hanging == pytest.approx(10 * 3 * 1, rel=0.15)
+    assert plan.missing_volume == pytest.approx(sum(plan.reasons.values()))
+
+
+def test_a_floor_with_a_step_is_refused() -> None:
+    scene = prepare(stair())
+    plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+    assert not plan.passes
+    assert [why for why in plan.reasons if "steps" in why]
+    assert plan.missing_volume == pytest.approx(scene.body.volume())
+
+
+def test_no_floor_no_passes() -> None:
+    scene = prepare(pocket())
+    plan = plan_conformal(scene.body.translate((0, 0, 30)), scene.frame, scene.around, scene.process)
+    assert not plan.passes
+    assert [why for why in plan.reasons if "faces the build direction" in why]
+
+
+def test_the_same_twice() -> None:
+    first, second = (
+        plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+        for scene in (prepare(bowl()), prepare(bowl()))
+    )
+    assert [one.points.tobytes() for one in first.passes] == [one.points.tobytes() for one in second.passes]
+    assert [one.axes.tobytes() for one in first.passes] == [one.axes.tobytes() for one in second.passes]

@@ -1,0 +1,85 @@
+"""Patterns: what they cover, and that passes cross nothing."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from damageest_paths.fill import Pattern, fill_region
+from damageest_paths.regions import cover, make_region
+from damageest_paths.stripes import Bead
+from manifold3d import CrossSection
+
+from damageest.artefacts import Floats
+
+BEAD = Bead(1.0, 0.7)
+
+
+def make_star() -> Any:
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    radius = 6 + 2 * np.cos(5 * angle)
+    return make_region([np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])])
+
+
+REGIONS = {
+    "disc": CrossSection.circle(5, 64),
+    "ring": CrossSection.circle(6, 64) - CrossSection.circle(2.5, 64),
+    "star": make_star(),
+    "thin": CrossSection.square((12, 0.4)),
+    "two": CrossSection.square((4, 4)) + CrossSection.square((3, 2)).translate((8, 1)),
+    "L": CrossSection.square((9, 3)) + CrossSection.square((3, 9)),
+}
+
+
+@pytest.mark.parametrize("pattern", get_args(Pattern))
+@pytest.mark.parametrize("name", REGIONS)
+def test_beads_cover_the_region_and_little_else(name: str, pattern: Pattern) -> None:
+    region = REGIONS[name]
+    lines = fill_region(region, pattern, BEAD, 0.4)
+    covered = cover(lines, BEAD.width)
+    assert (region - covered).area() <= 0.01 * region.area()
+    assert max((gap.area() for gap in (region - covered).decompose()), default=0) <= 0.1 * BEAD.width**2
+    assert (covered - region.offset(BEAD.width)).area() <= 1e-6
+
+
+def count_crossings(line: Floats, other: Floats) -> int:
+    """How many sides of one polyline properly cross sides of another."""
+    a, b, c, d = line[:-1, None], line[1:, None], other[None, :-1], other[None, 1:]
+
+    def side(p: Floats, q: Floats, r: Floats) -> Floats:
+        return np.asarray((q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0])
+
+    apart = 1e-9
+    across = (side(a, b, c) * side(a, b, d) < -apart) & (side(c, d, a) * side(c, d, b) < -apart)
+    return int(across.sum())
+
+
+@pytest.mark.parametrize("pattern", get_args(Pattern))
+@pytest.mark.parametrize("name", REGIONS)
+def test_no_pass_crosses_itself(name: str, pattern: Pattern) -> None:
+    for line in fill_region(REGIONS[name], pattern, BEAD, 0.4):
+        assert count_crossings(line, line) == 0
+
+
+@pytest.mark.parametrize("name", REGIONS)
+def test_rows_of_a_zigzag_cross_no_other(name: str) -> None:
+    lines = fill_region(REGIONS[name], "zigzag", BEAD, 0.4)
+    assert sum(count_crossings(a, b) for a, b in combinations(lines, 2)) == 0
+
+
+def test_a_convex_region_is_one_pass() -> None:
+    assert len(fill_region(REGIONS["disc"], "zigzag", BEAD, 0.0)) == 1
+    assert len(fill_region(REGIONS["disc"], "spiral", BEAD, 0.0)) <= 2, "and a dab in the middle"
+
+
+def test_rows_follow_the_angle() -> None:
+    (line,) = fill_region(CrossSection.square((10, 6)), "zigzag", BEAD, np.pi / 2)
+    sides = np.abs(np.diff(line, axis=0))
+    assert sides[::2, 1].min() > 4
+    assert sides[::2, 0].max() < 1e-9
+
+
+def test_nothing_for_nothing() -> None:
+    assert fill_region(CrossSection(), "zigzag", BEAD, 0.0) == []
