@@ -20,7 +20,7 @@ def is_told(part: Part, scan: Scan, pose: Pose) -> bool:
     """Whether the pose is right, or the right one is listed and all are doubted."""
     if measure_apart(part, pose.T_part_scan, scan) < RIGHT:
         return True
-    others = [] if pose.alternatives is None else pose.alternatives
+    others = np.zeros((0, 4, 4)) if pose.alternatives is None else pose.alternatives
     return bool(pose.doubts) and min((measure_apart(part, T, scan) for T in others), default=1.0) < RIGHT
 
 
