@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 import damageest
@@ -41,7 +42,7 @@ def test_it_is_said_beside_a_weld_bead() -> None:
 
 
 def test_it_is_not_said_beside_sites_that_the_pose_makes(dented: Floats) -> None:
-    result = run(dented + [0.196, 0, 0])
+    result = run(dented + np.array([0.196, 0.0, 0.0]))
     assert result.fit is not None
     shallow = [site.id for site in result.sites if site.verdict.level == "doubtful"]
     assert shallow

@@ -34,7 +34,7 @@ def turn_poses(poses: Floats, target: PartSurface, field: PlaneGrid, scan: Orien
     scores = score(turned, few, field, WIDE)
     turned = turned[scores > float(score(poses[:1], few, field, WIDE)[0]) - LESS]
     if not len(turned):
-        return turned
+        return np.zeros((0, 4, 4))
     turned = turned[select_distinct(turned, score(turned, few, field, WIDE), APART, TRIED)]
     turned = refine(turned, few, field, np.geomspace(WIDE, FINE, 6))
     together = np.concatenate([poses, turned])

@@ -54,7 +54,7 @@ def _group_points(target: PartSurface, points: Floats, pose: Floats) -> tuple[In
     if len(points) <= NEIGHBOUR:
         return np.full(len(points), -1), np.zeros((0, 3)), np.zeros(0, np.int64)
     at = move_points(points, pose)
-    reach = cKDTree(at).query(at[:1000], k=NEIGHBOUR + 1)[0][:, -1]
+    reach = np.asarray(cKDTree(at).query(at[:1000], k=NEIGHBOUR + 1)[0])[:, -1]
     edge = EDGE * max(float(np.median(reach)), 1e-9)
     _, _, face = target.closest(at)
     key = number_faced_cubes(at, target.normals[face], edge)[1]
