@@ -29,6 +29,7 @@ from damageest_cadquery._split import (
     Piece,
     Tool,
     build_flat,
+    is_near,
     is_opencascade_error,
     is_sound,
     is_valid,
@@ -143,6 +144,8 @@ def _count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> i
         return alone
     lost, count = to_manifold(damage, origin), 0
     for piece in solids:
+        if not is_near(piece.shape, damage):
+            continue
         try:
             common = to_manifold(triangulate(piece.shape, tolerance / 16), origin) ^ lost
         except (InputError, ValueError):

@@ -17,7 +17,7 @@ from damageest_cadquery._check import VOLUME
 from damageest_cadquery._exact import SPECK
 from damageest_cadquery._planar import build_solid
 from damageest_cadquery._read import explore
-from damageest_cadquery._split import Piece, triangulate
+from damageest_cadquery._split import Piece, is_near, triangulate
 
 FACET = -3
 """In origins: (-1, FACET) is a facet that stands for CAD faces."""
@@ -32,6 +32,9 @@ def cut_facets(rest: Sequence[Piece], damage: Solid, part: Part, tolerance: floa
     lost, cutter = to_manifold(damage, origin), to_manifold(_thicken(damage, part, tolerance / 2), origin)
     pieces: list[Piece] = []
     for piece in rest:
+        if not is_near(piece.shape, damage):
+            pieces.append(piece)
+            continue
         try:
             whole = to_manifold(triangulate(piece.shape, chord), origin)
         except (InputError, ValueError):

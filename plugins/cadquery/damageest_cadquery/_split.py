@@ -155,6 +155,17 @@ def triangulate(shape: Any, chord: float, angle: float = 0.35) -> Solid:
     return Solid(mesh.vertices, mesh.faces)
 
 
+def is_near(shape: Any, mesh: Solid) -> bool:
+    """Whether the boxes of a shape and of a mesh meet."""
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+
+    box = Bnd_Box()
+    BRepBndLib.Add_s(shape, box, False)
+    bounds = np.array(box.Get()).reshape(2, 3)
+    return bool((bounds[0] <= mesh.bounds[1]).all() and (bounds[1] >= mesh.bounds[0]).all())
+
+
 def is_watertight(shape: Any, chord: float) -> bool:
     """Whether triangles of a solid close; those of some solids that BRepCheck finds valid do not."""
     try:
