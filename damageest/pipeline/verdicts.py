@@ -73,8 +73,10 @@ def judge_sites(engine: Engine, work: Work) -> Work:
                 site.damage, state.part, state.aligned.points[site.members], state.aligned.points,
                 state.aligned.noise, state.aligned.spacing, state.tolerance, state.unit,
             )  # fmt: skip
-            told = (beyond.reason,) if beyond.reason else ()
-            against, questions = (*against, *told) if beyond.is_contradicted else against, (*questions, *told)
+            if beyond.is_contradicted:
+                against = (*against, beyond.reason)
+            elif beyond.reason:
+                questions = (*questions, beyond.reason)
         verdict = judge_site(
             site.evidence, -state.deviation.distance[site.members], area, state.pose, limits,
             by_rays, site.damage.area, (*site.questions, *questions), (*site.doubts, *against),
