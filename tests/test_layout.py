@@ -41,6 +41,14 @@ def test_few_modules_lie_at_the_top() -> None:
     assert top == {"__init__.py", "api.py", "errors.py", "findings.py", "options.py", "result.py"}
 
 
+def test_the_core_names_no_module_of_a_plugin() -> None:
+    """Plugins come in through hooks; messages name packages, of which `registry/bundled.py` is the list."""
+    modules = [path.name for path in (ROOT / "plugins").glob("*/damageest_*")]
+    assert len(modules) == len(list((ROOT / "plugins").glob("*/pyproject.toml")))
+    sources = {path: path.read_text() for path in (ROOT / "damageest").rglob("*.py")}
+    assert not [(path.name, name) for path, text in sources.items() for name in modules if name in text]
+
+
 def test_the_package_is_typed() -> None:
     assert (ROOT / "damageest" / "py.typed").is_file()
 
