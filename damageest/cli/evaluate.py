@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from damageest.cli import evaluate_path, honesty, speed
+from damageest.cli._streams import say
 from damageest.cli.intervals import run_intervals
 
 if TYPE_CHECKING:
@@ -102,10 +103,10 @@ def job_command(
     with tempfile.TemporaryDirectory(prefix="damageest-evaluate-", dir=place) as folder:
         study = plan_study(job, request, seeds, Registry.discover(), Path(folder))
         for note in study.notes:
-            typer.echo(note)
+            say(note)
         rows = _run_cases(study.cases, jobs, timeout, out, scheduler)
     _write_report(rows, [], study.unit, out, plots)
-    typer.echo(f"\n{summarise(rows, study.unit)}")
+    say(f"\n{summarise(rows, study.unit)}")
 
 
 @app.command("suite")
@@ -179,12 +180,13 @@ def suite_command(
     rows = _run_cases(planned, jobs, timeout, out, scheduler)
     first = ["part"] if len(chosen) > 1 or not collect_axes(rows) else []
     _write_report(rows, first, "mm", out, plots)
-    typer.echo(f"\n{summarise(rows, 'mm')}")
+    say(f"\n{summarise(rows, 'mm')}")
     if write:
         write.write_text(
             replace_between_marks(
                 write, make_readme_tables(rows, first + list(collect_axes(rows)), "mm", _format_command()), marks
-            )
+            ),
+            encoding="utf-8",
         )
 
 
@@ -212,7 +214,7 @@ def _run_cases(
     def print_row(row: dict[str, Any]) -> None:
         nonlocal count
         count += 1
-        typer.echo(f"[{count}/{len(cases)}] {format_row(row)}", err=True)
+        say(f"[{count}/{len(cases)}] {format_row(row)}", err=True)
 
     return run_all(cases, out / "cases.jsonl" if out else None, jobs, timeout, print_row, scheduler)
 
@@ -222,12 +224,12 @@ def _write_report(rows: list[dict[str, Any]], first: list[str], unit: str, out: 
     from damageest.evaluate.plots import draw_plots
     from damageest.evaluate.report import format_tables, write_files
 
-    typer.echo("\n" + format_tables(rows, [*first, *collect_axes(rows)], unit))
+    say("\n" + format_tables(rows, [*first, *collect_axes(rows)], unit))
     if out:
         write_files(rows, unit, out, _format_command())
         paths = draw_plots(rows, unit, out) if plots else []
         names = ", ".join(sorted({path.stem for path in paths}))
-        typer.echo(f"written to {out}" + (f", with plots: {names}" if paths else ""))
+        say(f"written to {out}" + (f", with plots: {names}" if paths else ""))
 
 
 def _format_command() -> str:
@@ -261,12 +263,14 @@ def matrix_command(
     if write:
         replace_between_marks(write, None, "matrix")  # fails before the runs start if the marks are missing
     cells = run_matrix(jobs, Registry.discover(), stage or (), workers, timeout, _print_cell)
-    typer.echo(make_matrix_table(cells))
+    say(make_matrix_table(cells))
     if write:
-        write.write_text(replace_between_marks(write, make_matrix_table(cells, legend=False), "matrix"))
+        write.write_text(
+            replace_between_marks(write, make_matrix_table(cells, legend=False), "matrix"), encoding="utf-8"
+        )
 
 
 def _print_cell(cell: MatrixCell) -> None:
     figures = f"IoU {cell.iou:.4f}, {cell.seconds:.1f} s, {cell.megabytes:.0f} MB"
     what = ", ".join([*([figures] if cell.iou == cell.iou else []), *([cell.refused] if cell.refused else [])])
-    typer.echo(f"{cell.stage}: {cell.use}: {cell.job}: {what}", err=True)
+    say(f"{cell.stage}: {cell.use}: {cell.job}: {what}", err=True)

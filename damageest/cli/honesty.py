@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+from damageest.cli._streams import say
+
 
 def command(
     kinds: Annotated[
@@ -55,7 +57,7 @@ def command(
     )
     if show:
         for item in cases:
-            typer.echo(f"{item.number} {describe_case(item.make_blank_row())}")
+            say(f"{item.number} {describe_case(item.make_blank_row())}")
         return
     if out:
         out.mkdir(parents=True, exist_ok=True)
@@ -64,15 +66,18 @@ def command(
     def print_row(row: dict[str, Any]) -> None:
         nonlocal count
         count += 1
-        typer.echo(f"[{count}/{len(cases)}] {row['number']} {format_trouble_row(row)}", err=True)
+        say(f"[{count}/{len(cases)}] {row['number']} {format_trouble_row(row)}", err=True)
 
     rows = run_all(cases, out / "honesty.jsonl" if out else None, workers, timeout, print_row, scheduler)
     text = make_trouble_tables(rows, _format_command())
-    typer.echo("\n" + text)
+    say("\n" + text)
     if out:
-        (out / "honesty.md").write_text(text + "\n")
+        (out / "honesty.md").write_text(text + "\n", encoding="utf-8")
     if write:
-        write.write_text(replace_between_marks(write, make_trouble_tables(rows, _format_command(), False), "honesty"))
+        write.write_text(
+            replace_between_marks(write, make_trouble_tables(rows, _format_command(), False), "honesty"),
+            encoding="utf-8",
+        )
 
 
 def _split(text: str) -> list[str]:

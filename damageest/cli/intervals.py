@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import typer
+from damageest.cli._streams import say
 
 
 def run_intervals(
@@ -29,10 +29,10 @@ def run_intervals(
     def print_row(row: dict[str, Any]) -> None:
         nonlocal count
         count += 1
-        typer.echo(f"[{count}/{len(planned)}] {format_interval_row(row)}", err=True)
+        say(f"[{count}/{len(planned)}] {format_interval_row(row)}", err=True)
 
     rows = run_all(planned, out / "intervals.jsonl" if out else None, jobs, timeout, print_row, scheduler)
     text = make_interval_tables(rows, command)
-    typer.echo("\n" + text)
+    say("\n" + text)
     if write:
-        write.write_text(replace_between_marks(write, text, marks))
+        write.write_text(replace_between_marks(write, text, marks), encoding="utf-8")

@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+from damageest.cli._streams import say
+
 
 def command(
     kinds: Annotated[str, typer.Option(metavar="A;B", help="Names of cases. Default: all but the dense scan.")] = "",
@@ -45,13 +47,13 @@ def command(
     rows: list[list[dict[str, Any]]] = []
     for case in make_speed_cases(names, count, settings or (), Registry.discover()):
         runs = [run_one(case, timeout) for _ in range(repeat)]
-        typer.echo(f"{case.varied['kind']}: {runs[-1]['error']} {runs[-1]['seconds']:.1f} s", err=True)
+        say(f"{case.varied['kind']}: {runs[-1]['error']} {runs[-1]['seconds']:.1f} s", err=True)
         rows.append(runs)
     table = make_speed_table(rows)
-    typer.echo(table)
+    say(table)
     if write:
         measured = describe_measurement(f"`{shlex.join(['damageest', *_leave_out_write(sys.argv[1:])])}`")
-        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "speed"))
+        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "speed"), encoding="utf-8")
 
 
 def _leave_out_write(words: list[str]) -> list[str]:
