@@ -8,10 +8,13 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+import damageest
+from damageest.cli.run import _print_table
 from tests import damaged_box
 from tests.cli.test_watched_stages import FAULTY, environment, write_job
 from tests.needs import needs_plugin
@@ -177,26 +180,30 @@ HARMFUL = "[/red] [bold]x :bomb: \x1b[31mred\x1b]0;title\x07 \x9b2J ‮back"
 SHOWN = r"[/red] [bold]x :bomb: \x1b[31mred\x1b]0;title\x07 \x9b2J \u202eback"
 
 
-@pytest.mark.parametrize("way", ["note", "error", "library"])
+@pytest.mark.parametrize("way", ["error", "library"])
 def test_texts_of_plugins_are_shown_as_they_are(way: str, site: Site, ready: Path) -> None:
-    noted = FAULTY.replace(
-        "return EdgeAware().run(part, tolerance)",
-        f"from dataclasses import replace\n        done = EdgeAware().run(part, tolerance)\n"
-        f"        return replace(done, notes=({HARMFUL!r}, 'x' * 50_000_000))",
-    )
-    site.add("acme-bad", noted)
+    site.add("acme-bad", FAULTY)
     raised = {
-        "note": "",
         "error": f"from damageest.errors import StageError; raise StageError({HARMFUL!r} + 'x' * 50_000_000)",
         "library": f"raise ValueError({HARMFUL!r} + 'x' * 50_000_000)",
     }
-    job = write_job(ready, "harmful", raised[way])
-    ran = shell(f"run {job}", ready, environment(site))
-    said = (ran.stdout if way == "note" else ran.stderr).decode()
+    ran = shell(f"run {write_job(ready, 'harmful', raised[way])}", ready, environment(site))
+    said = ran.stderr.decode()
     assert SHOWN in said, said[:2000]
-    assert not [one for one in said if one in "\x1b\x07\x9b‮"]
+    assert not [one for one in said if one in "\x1b\x07\x9b\u202e"]
     assert len(said) < 100_000
-    assert ran.returncode == (0 if way == "note" else 1)
+    assert ran.returncode == 1
+
+
+def test_notes_and_failures_are_shown_as_they_are(ready: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = damageest.run(ready / "job.yaml", output=True)
+    told = replace(result, warnings=(HARMFUL, "x" * 50_000_000), failures=(HARMFUL,))
+    _print_table(told, ready / "final [v2]")
+    said = capsys.readouterr().out
+    assert f"note: {SHOWN}" in said
+    assert f"failed: {SHOWN}" in said
+    assert len(said) < 20_000
+    assert said.splitlines()[-1] == f"written to {ready / 'final [v2]'}"
 
 
 @pytest.mark.parametrize("output", ["final [v2]", "[red]x", ":bomb:", "a\tb\x1b[1m"])
@@ -219,7 +226,7 @@ def test_a_file_name_that_is_no_text_is_shown(ready: Path) -> None:
         cwd=ready, capture_output=True, text=True, timeout=100,
     )  # fmt: skip
     assert ran.returncode == 2
-    assert r"sc\udcffn.yaml: valid" in ran.stdout
+    assert r"sc\udcffn.yaml" in ran.stderr
     assert "unexpected" not in ran.stderr
 
 
