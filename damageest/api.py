@@ -11,7 +11,7 @@ import numpy as np
 
 from damageest.artefacts import Part, Scan
 from damageest.errors import InputError, StageError
-from damageest.io.files import resolve_path
+from damageest.io.files import resolve_path, working_folder
 from damageest.isolation import Limits, keep_one_thread
 from damageest.job import Job, load
 from damageest.output.files import describe_job, describe_result, write_report
@@ -57,7 +57,7 @@ def run(
         job = load(source, registry, settings, given)
     if output is False:
         return follow(route_of(job.method), Engine(job, registry, limits=limits), start(job)).job.result
-    target = job.output if output is True else resolve_path(Path(output), Path.cwd())
+    target = job.output if output is True else resolve_path(Path(output), working_folder())
     with open_workspace(target, cache) as place:
         engine = Engine(job, registry, place.cache, limits=limits)
         work = follow(route_of(job.method), engine, start(job))

@@ -17,7 +17,7 @@ from damageest.batches.tasks import run_tasks
 from damageest.batches.work import compute_key, load_job, release, work
 from damageest.errors import DamageestError, Fault, JobError
 from damageest.geometry.threads import count_cores
-from damageest.io.files import expand_home, read_json
+from damageest.io.files import expand_home, read_json, working_folder
 from damageest.isolation import measure_free_memory
 from damageest.isolation.limits import STAGE_SECONDS
 
@@ -61,6 +61,7 @@ def batch(
     """
     require_dask()
     words = [jobs] if isinstance(jobs, (str, Path)) else list(jobs)
+    working_folder()  # raises where it was deleted
     found, folder = find_jobs(words, settings), expand_home(Path(output)).absolute()
     if not found:
         raise JobError([Fault("give at least one job file, folder or glob")], "batch")

@@ -10,8 +10,11 @@ from typing import NoReturn
 import typer
 
 from damageest import __version__
+from damageest.cli import _interrupt, _process, _streams
 from damageest.cli._commands import Commands
+from damageest.cli._streams import say
 from damageest.errors import DamageestError, clean_message, describe_missing_library, is_interrupt
+from damageest.io.files import working_folder
 from damageest.isolation.one_thread import ONE_THREAD
 
 INTERRUPTED = 130
@@ -31,7 +34,7 @@ app = typer.Typer(
 
 def _print_version(requested: bool) -> None:
     if requested:
-        typer.echo(f"damageest {__version__}")
+        say(f"damageest {__version__}")
         raise typer.Exit
 
 
@@ -66,12 +69,25 @@ _add_commands()
 
 def main() -> None:
     """Runs the command line. Exit status 0: done; 1: a stage failed or refused; 2: the job or an input is not valid."""
-    from damageest.cli import _process
-
     _process.is_command = True
     os.environ.update(ONE_THREAD)
+    _streams.prepare()
     try:
+        _call_app()
+    except SystemExit as end:
+        failure = _streams.describe_failure()
+        if failure and not end.code:
+            say(f"error: standard output cannot be written: {failure}; files that were written are whole", err=True)
+            sys.exit(1)
+        raise
+
+
+def _call_app() -> NoReturn:
+    """Runs the command that the arguments name, and ends with its exit status."""
+    try:
+        working_folder()  # where it was deleted, no path has a place
         app()
+        sys.exit(0)
     except SystemExit as end:
         if end.code == INTERRUPTED:  # typer turns KeyboardInterrupt into it
             _stop_interrupted()
@@ -92,20 +108,18 @@ def main() -> None:
 
 
 def _stop_interrupted() -> NoReturn:
-    from damageest.cli import _interrupt
-
-    typer.echo(_interrupt.text, err=True)
+    say(_interrupt.text, err=True)
     sys.exit(INTERRUPTED)
 
 
-def fail(error: Exception) -> None:
+def fail(error: Exception) -> NoReturn:
     """Prints the error and exits with its status. With --debug, prints the traceback."""
     if "--debug" in sys.argv:
         traceback.print_exception(error)
     elif isinstance(error, DamageestError):
-        typer.echo(f"error: {error}", err=True)
+        say(f"error: {error}", err=True)
     else:
-        typer.echo(
+        say(
             f"error: unexpected {type(error).__name__}: {clean_message(error)}\n"
             "  try: add --debug to see the traceback",
             err=True,

@@ -8,6 +8,8 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from damageest.cli._streams import say
+
 
 class Commands(TyperGroup):
     """The built-in commands, and those of plugins. Plugins are loaded only for a command that is not built in, and for
@@ -43,7 +45,7 @@ def load_commands() -> dict[str, dict[str, Any]]:
             group: Any = typer.main.get_command(app)
         except (Exception, SystemExit) as error:
             broken = describe_broken(error, provider)
-            typer.echo(f"warning: the commands of {provider} are broken: {broken.reason}; {broken.remedy}", err=True)
+            say(f"warning: the commands of {provider} are broken: {broken.reason}; {broken.remedy}", err=True)
         else:
             made[provider.name] = dict(group.commands)
     return made

@@ -11,6 +11,7 @@ from typing import NoReturn
 
 import typer
 
+from damageest.cli._streams import say
 from damageest.errors import StageError
 from damageest.isolation import supervise as watching
 from damageest.isolation.supervise import IS_POSSIBLE, end_alike, supervise
@@ -24,7 +25,7 @@ def end_with(work: Callable[[], int]) -> NoReturn:
     """As `end_with_each`, for work that is one item."""
 
     def report(error: StageError, _: str) -> int:
-        typer.echo(f"error: {error}", err=True)
+        say(f"error: {error}", err=True)
         return error.exit_status
 
     end_with_each(lambda _: work(), [""], report)

@@ -19,6 +19,7 @@ from rich.progress_bar import ProgressBar
 from rich.text import Text
 
 from damageest.artefacts import Enclosures, Scan, Sites
+from damageest.errors import clean_message
 from damageest.registry.hookspecs import hookimpl
 
 SECONDS = {"sample": 0.3, "align": 4.0, "segment": 0.4, "cluster": 0.2, "enclose": 3.0, "export": 0.4, "report": 0.6}
@@ -67,7 +68,7 @@ class Progress:
         """Shows the progress of one job while the ``with`` block runs."""
         self.points = self.sites = 0
         self.finished, self.current = [], ""
-        self.console.print(Text(name, style="bold"))
+        self.console.print(Text(clean_message(name), style="bold"))
         if not self.console.is_terminal:
             yield
             return
@@ -153,4 +154,4 @@ class Progress:
 
 
 def _format_label(stage: str, use: str, site: int) -> str:
-    return f"{stage}: {use}" + (f", site {site}" if site else "")
+    return clean_message(f"{stage}: {use}") + (f", site {site}" if site else "")

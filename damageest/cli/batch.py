@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from damageest.cli._streams import say
+from damageest.errors import clean_message
 from damageest.isolation.limits import STAGE_SECONDS
 
 if TYPE_CHECKING:
@@ -103,13 +105,12 @@ class _Display:
             self.told.add(name)
             if not self.live.is_started and not self.console.quiet:
                 count = f"[{len(self.told)}/{len(jobs)}]"
-                sys.stderr.write(f"{count} {name}: {_describe(rows[name])}\n")
-                sys.stderr.flush()
+                say(f"{count} {name}: {_describe(rows[name])}", err=True)
 
 
 def _describe(row: Row) -> str:
     volume = f", {row.damage_volume:.5g} {row.units}³" if row.sites and row.damage_volume is not None else ""
-    said = f"{row.verdict}{volume}" if row.ran else f"{row.outcome}: {row.error[:200]}"
+    said = f"{row.verdict}{volume}" if row.ran else f"{row.outcome}: {clean_message(row.error, 200)}"
     return f"{said}, {row.seconds:.1f} s"
 
 
@@ -142,11 +143,11 @@ def _print(rows: Sequence[Row], out: Path) -> None:
         volume = f"{row.damage_volume:.5g} {row.units}³" if row.sites and row.damage_volume is not None else ""
         interval = f"{row.volume_95[0]:.4g} to {row.volume_95[1]:.4g}" if row.volume_95 and row.sites else ""
         outcome = Text(row.outcome, style="" if row.ran else "red")
-        table.add_row(Text(row.name), outcome, row.verdict, volume, interval, f"{row.seconds:.1f}")
+        table.add_row(Text(row.name), outcome, Text(row.verdict), volume, interval, f"{row.seconds:.1f}")
     console.print(table)
     for row in rows:
         if not row.ran:
-            console.print(Text(f"{row.name}: {row.outcome}: {row.error}"))
+            console.print(Text(clean_message(f"{row.name}: {row.outcome}: {row.error}")))
     console.print(
-        f"{sum(row.ran for row in rows)} of {len(rows)} jobs ran; written to {out / 'batch.html'}", markup=False
+        Text(clean_message(f"{sum(row.ran for row in rows)} of {len(rows)} jobs ran; written to {out / 'batch.html'}"))
     )

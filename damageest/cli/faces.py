@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from damageest.cli import _process
 from damageest.cli._process import end_with
+from damageest.cli._streams import keep_for_results, say, say_result
 
 if TYPE_CHECKING:
     from damageest.stages.part import CadFace
@@ -22,7 +24,12 @@ def command(
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """List a part's CAD faces: number, name, kind, area, centre, and normal, or axis and radius."""
-    end_with(lambda: _list_faces(part, units, as_json))
+    end_with(lambda: _list_clean(part, units, as_json))
+
+
+def _list_clean(part: Path, units: str, as_json: bool) -> int:
+    with keep_for_results(as_json, for_good=_process.is_command):
+        return _list_faces(part, units, as_json)
 
 
 def _list_faces(part: Path, units: str, as_json: bool) -> int:
@@ -44,7 +51,7 @@ def _list_faces(part: Path, units: str, as_json: bool) -> int:
     assert isinstance(reader, ReadPart)
     faces = call_implementation(reader.cad_faces, {"unit": unit}, reader, item, Limits())
     if as_json:
-        typer.echo(json.dumps({"part": str(part), "units": unit, "faces": [asdict(face) for face in faces]}, indent=1))
+        say_result(json.dumps({"part": str(part), "units": unit, "faces": [asdict(face) for face in faces]}, indent=1))
     else:
         _print_table(faces, unit)
     return 0
@@ -53,6 +60,8 @@ def _list_faces(part: Path, units: str, as_json: bool) -> int:
 def _print_table(faces: tuple[CadFace, ...], unit: str) -> None:
     from rich.console import Console
     from rich.table import Table
+
+    from damageest.errors import clean_message
 
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
     named = any(face.name for face in faces)
@@ -63,11 +72,11 @@ def _print_table(faces: tuple[CadFace, ...], unit: str) -> None:
     table.add_column(f"centre {unit}")
     table.add_column("normal, or axis and radius")
     for face in faces:
-        row = (str(face.number), *((face.name,) if named else ()), face.kind)
+        row = (str(face.number), *((clean_message(face.name, 200),) if named else ()), face.kind)
         table.add_row(*row, f"{face.area:.6g}", _format_vector(face.centre), _describe_shape(face, unit))
     # wider than any row, so that rich does not truncate cells
-    Console(highlight=False, markup=False, width=240).print(table)
-    typer.echo(f"{len(faces)} faces; select them in a job by number{' or name' if named else ''}")
+    Console(highlight=False, markup=False, emoji=False, width=240).print(table)
+    say(f"{len(faces)} faces; select them in a job by number{' or name' if named else ''}")
 
 
 def _describe_shape(face: CadFace, unit: str) -> str:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from damageest.cli._streams import say
+
 if TYPE_CHECKING:
     from damageest.artefacts import Part, Scan
 
@@ -48,10 +50,10 @@ def command(
         *_write_values(paths, units, tolerance),
         *_write_examples(target.stem, registry.methods(), tolerance),
     ]
-    target.write_text("\n".join(lines) + "\n")
-    typer.echo(f"written to {target}; next: damageest run {target}")
+    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    say(f"written to {target}; next: damageest run {target}")
     for caution in cautions:
-        typer.echo(f"caution: {caution}", err=True)
+        say(f"caution: {caution}", err=True)
 
 
 def _describe_inputs(part: Path, scan: Path, solid: Part, cloud: Scan, units: str, cautions: list[str]) -> list[str]:

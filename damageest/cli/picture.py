@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from damageest.cli._streams import say
+
 
 def command(
     folders: Annotated[list[Path], typer.Argument(metavar="OUT...", help="Output folders, a column for each.")],
@@ -54,4 +56,4 @@ def command(
         os.environ["DAMAGEEST_DEBUG"] = "1"
     width, height = (int(number) for number in numbers.groups())
     draw_picture(Picture(opened, tuple(sites), tuple(looks), side, (width, height)), output)  # type: ignore[arg-type]
-    typer.echo(f"written to {output}")
+    say(f"written to {output}")

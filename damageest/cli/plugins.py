@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import typer
+from damageest.cli._streams import say
 
 
 def command() -> None:
@@ -20,11 +20,11 @@ def command() -> None:
         shown += [f"export formats: {', '.join(formats)}"] if formats else []
         added = commands.get(provider.name)
         shown += [f"commands: {', '.join(added)}"] if added else []
-        typer.echo(f"{provider}  {provider.licence}  {', '.join(shown) or ('broken' if broken else 'no stages')}")
+        say(f"{provider}  {provider.licence}  {', '.join(shown) or ('broken' if broken else 'no stages')}")
         for item in broken:
-            typer.echo(f"  broken: {item.reason}\n  try: {item.remedy}")
+            say(f"  broken: {item.reason}\n  try: {item.remedy}")
     for group in registry.clashes:
         names = " and ".join(str(item.provider) for item in group)
-        typer.echo(
+        say(
             f"conflict: {group[0].contract.stage}: {group[0].name} is provided by {names}\n  try: uninstall all but one"
         )

@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import json
 import sys
-from contextlib import redirect_stdout
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from damageest.cli import _process
 from damageest.cli._process import end_with_each
+from damageest.cli._streams import keep_for_results, say, say_result
+from damageest.errors import clean_message
 from damageest.isolation.limits import STAGE_SECONDS, Limits, limit_this_process, parse_memory
 from damageest.isolation.notes import note_job
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from damageest.findings import Surplus
     from damageest.result import Result
 
 
+Show = Callable[[str], None]
+"""Prints one line."""
 MOST_UNSEEN = 5
 """Unseen regions that are printed; result.json has all."""
 UNSEEN_WHY = {
@@ -62,7 +65,7 @@ def command(
             [Fault("only valid with a single job; with several jobs, each job's own output folder is used")], "--output"
         )
     end_with_each(
-        lambda first: _run_jobs(jobs[first:], given),
+        lambda first: _run_clean(jobs[first:], given),
         [str(path) for path in jobs],
         lambda error, source: _report_failure(error, source, as_json, debug),
     )
@@ -81,11 +84,18 @@ class _Given:
     debug: bool
 
 
+def _run_clean(jobs: list[Path], given: _Given) -> int:
+    """As `_run_jobs`; with --json nothing else is written to standard output, by whatever code."""
+    with keep_for_results(given.as_json, for_good=_process.is_command):
+        return _run_jobs(jobs, given)
+
+
 def _run_jobs(jobs: list[Path], given: _Given) -> int:
     """Runs jobs one after the other, all in this process. Gives the exit status."""
     from damageest.cli import _interrupt
     from damageest.cli._progress import Progress
     from damageest.errors import DamageestError
+    from damageest.io.files import read_json
     from damageest.job import load
     from damageest.registry import Registry
 
@@ -107,7 +117,7 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
         note_job(number)
         output = given.output or job.output
         try:
-            with progress.show_job(job.name), redirect_stdout(sys.stderr if given.as_json else sys.stdout):
+            with progress.show_job(job.name):
                 result = run(
                     job, output=given.output or True, cache=given.cache, registry=registry, limits=given.limits
                 )
@@ -119,12 +129,12 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
             raise
         target = output.resolve()
         if given.as_json:
-            typer.echo(json.dumps(json.loads((target / "result.json").read_text())))
+            say_result(json.dumps(read_json(target / "result.json")))
         elif not given.quiet:
             _print_table(result, target)
         if result.sites and not any(site.accepted for site in result.sites):
             status = max(status, 1)
-            typer.echo(
+            say(
                 f"error: {job.source}: all sites are doubtful, and none is part of the damage; see the reasons, and "
                 "take over those that are damage with  accept: [1]  or  accept: all  in the job",
                 err=True,
@@ -132,7 +142,7 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
         if result.failures:
             status = max(status, 1)
             for failure in result.failures if given.quiet or given.as_json else ():
-                typer.echo(f"error: {failure}", err=True)
+                say(f"error: {failure}", err=True)
     return status
 
 
@@ -166,22 +176,22 @@ def _on_seen(result: Result) -> str:
     return f" on the {coverage.seen:.0%} of the skin that the scan shows" if coverage and coverage.seen < 0.995 else ""
 
 
-def _print_coverage(result: Result, console: Console) -> None:
+def _print_coverage(result: Result, show: Show) -> None:
     """Prints how much of the skin the scan shows, and the largest of the rest."""
     coverage = result.coverage
     if coverage is None:
         return
     unit = result.units
-    console.print(f"tolerance: {result.tolerance:.4g} {unit}; the scan shows {coverage.seen:.0%} of the skin")
+    show(f"tolerance: {result.tolerance:.4g} {unit}; the scan shows {coverage.seen:.0%} of the skin")
     for region in coverage.unseen[:MOST_UNSEEN]:
         x, y, z = region.centre
         why = "" if region.why == "unknown" else f" ({UNSEEN_WHY[region.why]})"
-        console.print(
+        show(
             f"unseen: {region.area:.4g} {unit}² near ({x:.4g}, {y:.4g}, {z:.4g}){why}; a loss of up to "
             f"{region.volume:.4g} {unit}³ there would not show"
         )
     if more := coverage.unseen[MOST_UNSEEN:]:
-        console.print(f"unseen: {len(more)} smaller regions, {sum(one.area for one in more):.4g} {unit}²")
+        show(f"unseen: {len(more)} smaller regions, {sum(one.area for one in more):.4g} {unit}²")
 
 
 def _report_failure(error: Exception, source: str, as_json: bool, debug: bool) -> int:
@@ -189,10 +199,10 @@ def _report_failure(error: Exception, source: str, as_json: bool, debug: bool) -
 
     status = int(getattr(error, "exit_status", 1))
     if as_json:
-        typer.echo(json.dumps({"schema": 1, "status": "failed", "job": source, "exit": status, "error": str(error)}))
+        say_result(json.dumps({"schema": 1, "status": "failed", "job": source, "exit": status, "error": str(error)}))
     if debug:
         traceback.print_exception(error)
-    typer.echo(f"error: {error}", err=True)
+    say(f"error: {error}", err=True)
     return status
 
 
@@ -200,8 +210,13 @@ def _print_table(result: Result, target: Path) -> None:
     """Prints the sites with the result of the check against the scan, notes, and the path of the output folder."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
+
+    def show(text: str, label: str = "", style: str = "") -> None:
+        console.print(Text(label, style) + Text(clean_message(text)))  # no text is markup
+
     unit = result.units
     if result.sites:
         table = Table(title=None, box=None, pad_edge=False, header_style="bold")
@@ -220,22 +235,20 @@ def _print_table(result: Result, target: Path) -> None:
             table.add_row(str(site.id), *numbers, _format_interval(site.volume_95), site.method, verdict)
         console.print(table)
         known = "" if result.volume_95 is None else f" (95 %: {_format_interval(result.volume_95)})"
-        console.print(
-            f"damage volume: {result.damage_volume:.6g} {unit}³{known}; part volume: {result.part.volume:.6g} {unit}³"
-        )
+        show(f"damage volume: {result.damage_volume:.6g} {unit}³{known}; part volume: {result.part.volume:.6g} {unit}³")
     elif not result.failures:
         depth = f"{result.tolerance:.4g} {unit}"
-        console.print(f"no damage deeper than the tolerance of {depth} was found{_on_seen(result)}")
-    _print_coverage(result, console)
+        show(f"no damage deeper than the tolerance of {depth} was found{_on_seen(result)}")
+    _print_coverage(result, show)
     if result.fit is not None and result.fit.model == "ok":  # otherwise it is among the notes
-        console.print(f"fit: {result.fit.words}")
+        show(f"fit: {result.fit.words}")
     for item in result.surplus:
-        console.print(_describe_surplus(item, unit))
+        show(_describe_surplus(item, unit))
     for text in result.failures:
-        console.print(f"[red]failed:[/red] {text}")
+        show(f" {text}", "failed:", "red")
     for text in (*result.warnings, *_list_reasons(result), *_list_warnings(result), *_list_uncertainties(result)):
-        console.print(f"[yellow]note:[/yellow] {text}")
-    console.print(f"written to {target}")
+        show(f" {text}", "note:", "yellow")
+    show(f"written to {target}")
 
 
 def _describe_surplus(item: Surplus, unit: str) -> str:

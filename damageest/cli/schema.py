@@ -8,6 +8,9 @@ from typing import Annotated
 
 import typer
 
+from damageest.cli import _process
+from damageest.cli._streams import keep_for_results, say_result
+
 
 class SchemaName(StrEnum):
     job = "job"
@@ -24,5 +27,6 @@ def command(
     from damageest.output.result_json import result_schema
     from damageest.registry import Registry
 
-    content = job_schema(Registry.discover()) if which is SchemaName.job else result_schema()
-    typer.echo(json.dumps(content, indent=2))
+    with keep_for_results(for_good=_process.is_command):
+        content = job_schema(Registry.discover()) if which is SchemaName.job else result_schema()
+        say_result(json.dumps(content, indent=2))

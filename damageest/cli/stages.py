@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from damageest.cli._streams import say
 from damageest.errors import suggest
 
 if TYPE_CHECKING:
@@ -46,15 +47,15 @@ def _print_stage(stage: str, registry: Registry, with_options: bool) -> None:
     typer.secho(stage, bold=True)
     for item in items:
         default = " (default)" if DEFAULTS[item.contract] == item.name else ""
-        typer.echo(f"  {item.name + default:<26} {_get_first_line(item.cls)}  [{item.provider}]")
+        say(f"  {item.name + default:<26} {_get_first_line(item.cls)}  [{item.provider}]")
         if with_options:
             _print_options(item)
 
 
 def _print_implementation(item: Implementation) -> None:
-    typer.echo(f"{item.contract.stage}: {item.name}   by {item.provider}, {item.provider.licence}\n")
-    typer.echo(inspect.getdoc(item.cls) or "")
-    typer.echo("\noptions:" if len(item.cls.model_fields) > 1 else "\nno options")
+    say(f"{item.contract.stage}: {item.name}   by {item.provider}, {item.provider.licence}\n")
+    say(inspect.getdoc(item.cls) or "")
+    say("\noptions:" if len(item.cls.model_fields) > 1 else "\nno options")
     _print_options(item)
 
 
@@ -67,7 +68,7 @@ def _print_options(item: Implementation) -> None:
             if field.is_required()
             else f"default {_format_default(field.get_default(call_default_factory=True))}"
         )
-        typer.echo(f"    {name:<20} {field.description or ''} ({default})")
+        say(f"    {name:<20} {field.description or ''} ({default})")
 
 
 def _format_default(value: Any) -> str:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from damageest.cli._process import end_with
+from damageest.cli._streams import say
 
 
 def command(
@@ -39,12 +40,12 @@ def _check(jobs: list[Path], settings: list[str]) -> int:
         except JobError as error:
             status = 2
             for line in error.lines():
-                typer.echo(line, err=True)
+                say(line, err=True)
             continue
         except (InputError, StageError) as error:
             status = error.exit_status if status < 2 else status
-            typer.echo(f"{path}: {error}", err=True)
+            say(f"{path}: {error}", err=True)
             continue
         stages = ", ".join(f"{contract.stage} {stage.use}" for contract, stage in job.stages.items())
-        typer.echo(f"{path}: valid; method {job.method}: {stages}")
+        say(f"{path}: valid; method {job.method}: {stages}")
     return status

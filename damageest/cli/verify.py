@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from damageest.cli._process import end_with
+from damageest.cli._streams import say
 
 
 def command(
@@ -29,12 +30,12 @@ def _check(folder: Path, rerun: bool) -> int:
     content = open_output(folder).content
     changes = find_changes(folder, content)
     for text in changes:
-        typer.echo(f"error: {text}", err=True)
+        say(f"error: {text}", err=True)
     for text in find_other_versions(content):
-        typer.echo(f"note: {text}")
+        say(f"note: {text}")
     count, inputs = (len(content["provenance"][kind]) for kind in ("outputs", "inputs"))
     if not changes:
-        typer.echo(f"{folder}: result.json, {count} files and {inputs} inputs are as the run left them")
+        say(f"{folder}: result.json, {count} files and {inputs} inputs are as the run left them")
     if rerun:
         changes += _run_again(folder, content)
     return 1 if changes else 0
@@ -63,7 +64,7 @@ def _run_again(folder: Path, content: dict[str, object]) -> list[str]:
         run(job, output=Path(place) / "out", registry=registry)
         differences = find_differences(content, open_output(Path(place) / "out").content)
     for text in differences:
-        typer.echo(f"error: {text}", err=True)
+        say(f"error: {text}", err=True)
     if not differences:
-        typer.echo(f"{folder}: a repeated run gives the same")
+        say(f"{folder}: a repeated run gives the same")
     return differences

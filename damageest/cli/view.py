@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from damageest.cli._streams import say
+
 
 def command(
     folder: Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of a run.")],
@@ -36,6 +38,6 @@ def command(
         )
     address = path.as_uri() + (f"#site-{site}" if site else "")
     if webbrowser.open(address):
-        typer.echo(f"opened {address}")
+        say(f"opened {address}")
     else:
-        typer.echo(f"no browser was found here; open {address}")
+        say(f"no browser was found here; open {address}")

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from damageest.errors import Fault, JobError, PluginError, clean_message, suggest
-from damageest.io.files import describe_no_file, resolve_path
+from damageest.io.files import describe_no_file, resolve_path, working_folder
 from damageest.job import yamlfile
 from damageest.job.model import Header, Job, find_paths
 from damageest.job.wording import describe_fault
@@ -39,8 +39,10 @@ def load(
     of the job. Raises JobError naming every fault.
     """
     if isinstance(source, Mapping):
-        return _Check(dict(source), {}, "job", folder or Path.cwd(), registry, given or {}).job(settings, "job")
+        return _Check(dict(source), {}, "job", folder or working_folder(), registry, given or {}).job(settings, "job")
     path = Path(source)
+    if not path.is_absolute():
+        working_folder()
     tree, positions = yamlfile.read(path)
     if not isinstance(tree, Mapping):
         raise JobError([Fault("a job is a mapping with at least version, part and scan")], str(path))

@@ -27,7 +27,7 @@ def describe_job(job: Job, target: Path) -> str:
 def write_report(result: Result, job: Job, folder: Path, target: Path, written: ExportedFiles) -> None:
     """Writes result.json and job.yaml into ``folder``, their paths relative to ``target``, where they will stand."""
     content = describe_result(result, target, written)
-    (folder / "job.yaml").write_text(describe_job(job, target))
+    (folder / "job.yaml").write_text(describe_job(job, target), encoding="utf-8")
     content["provenance"] = build_provenance(job, folder, target)
     content["provenance"]["sha256"] = seal(content)
-    (folder / "result.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
+    (folder / "result.json").write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -165,7 +165,7 @@ class Files(Export):
         if truth is None:
             return ExportedFiles()
         pose = {"units": result.units, "T_part_scan": truth.T_part_scan.tolist()}
-        _make_folder(folder, "truth/pose.json").write_text(json.dumps(pose, indent=1) + "\n")
+        _make_folder(folder, "truth/pose.json").write_text(json.dumps(pose, indent=1) + "\n", encoding="utf-8")
         if truth.damage is None:
             return ExportedFiles(("truth/pose.json",))
         body = Body("true damage", truth.damage, DAMAGE)

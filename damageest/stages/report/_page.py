@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -156,8 +157,9 @@ def _read_library() -> str:
     path = Path(found.origin).parent / "static" / "standalone.js" if found and found.origin else None
     if path is None or not path.is_file():
         raise StageError("the Python package k3d has no script for the 3D view", "pip install --force-reinstall k3d")
-    # an end tag within the script would end it
-    return path.read_text(encoding="utf-8").replace("</script", "<\\/script")
+    # an end tag within the script would end it; the files that it names beside the fonts that it carries are not there
+    text = path.read_text(encoding="utf-8").replace("</script", "<\\/script")
+    return re.sub(r',url\(fonts/[\w.-]+\) format\("\w+"\)', "", text)
 
 
 def _sample_map() -> str:

@@ -99,7 +99,7 @@ def replace_between_marks(path: Path, text: str | None, kind: str) -> str:
     """The file's text with ``text`` between the marks; None: unchanged. Raises InputError if the marks are missing."""
     first, last = make_marks(kind)
     try:
-        old = path.read_text()
+        old = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a text file: {error}") from None
     before, begin, rest = old.partition(first)

@@ -150,7 +150,7 @@ def write_files(rows: Sequence[Row], unit: str, folder: Path, command: str) -> N
     """Writes cases.csv and summary.json into ``folder``."""
     flat = [_flatten(row) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))
-    with (folder / "cases.csv").open("w", newline="") as stream:
+    with (folder / "cases.csv").open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, names, restval="")
         writer.writeheader()
         writer.writerows(flat)
@@ -163,7 +163,7 @@ def write_files(rows: Sequence[Row], unit: str, folder: Path, command: str) -> N
         name: {"seconds": seconds, "megabytes": most} for name, (seconds, most) in compute_stage_costs(rows).items()
     }
     summary |= {"all": compute_figures(rows), "by": groups, "stages": costs}
-    (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
 
 
 def _flatten(row: Row) -> dict[str, Any]:

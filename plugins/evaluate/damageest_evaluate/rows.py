@@ -68,7 +68,7 @@ def run_all(
             rows_by_key[row["key"]] = row
             tell(row)
             if out:
-                with out.open("a") as stream:
+                with out.open("a", encoding="utf-8") as stream:
                     stream.write(json.dumps(row) + "\n")
     return _collect_rows(cases, rows_by_key)
 
@@ -92,10 +92,10 @@ def read_rows(out: Path | None) -> list[Row]:
     """The complete rows of a file. A truncated row, left by a run that was killed, is removed from the file."""
     if out is None or not out.is_file():
         return []
-    rows, lines = [], out.read_text().splitlines(keepends=True)
+    rows, lines = [], out.read_text(encoding="utf-8").splitlines(keepends=True)
     for text in lines:
         with contextlib.suppress(ValueError, RecursionError):
             rows.append(json.loads(text))
     if len(rows) < len(lines) or (lines and not lines[-1].endswith("\n")):
-        out.write_text("".join(json.dumps(row) + "\n" for row in rows))
+        out.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
     return rows

@@ -71,7 +71,7 @@ def test_no_other_script_runs_and_nothing_is_fetched(chromium: Any) -> None:
     path.write_text(page.replace("<header>", f"<header>{foreign}"), encoding="utf-8")
     shown = browser.Shown(chromium, path)
     assert shown.page.evaluate("window.ran") is None
-    assert sum("Content Security Policy" in text for text in shown.faults) == 2, shown.faults
+    assert sum("Content Security Policy" in text for text in shown.faults) == 3, shown.faults
     shown.page.close()
 
 

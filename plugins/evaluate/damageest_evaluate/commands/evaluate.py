@@ -186,7 +186,8 @@ def suite_command(
         write.write_text(
             replace_between_marks(
                 write, make_readme_tables(rows, first + list(collect_axes(rows)), "mm", _format_command()), marks
-            )
+            ),
+            encoding="utf-8",
         )
 
 
@@ -250,7 +251,9 @@ def matrix_command(
     cells = run_matrix(jobs, Registry.discover(), stage or (), workers, timeout, _print_cell)
     typer.echo(make_matrix_table(cells))
     if write:
-        write.write_text(replace_between_marks(write, make_matrix_table(cells, legend=False), "matrix"))
+        write.write_text(
+            replace_between_marks(write, make_matrix_table(cells, legend=False), "matrix"), encoding="utf-8"
+        )
 
 
 def _print_cell(cell: MatrixCell) -> None:

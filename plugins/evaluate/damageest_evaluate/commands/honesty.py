@@ -68,9 +68,12 @@ def command(
     text = make_trouble_tables(rows, _format_command())
     typer.echo("\n" + text)
     if out:
-        (out / "honesty.md").write_text(text + "\n")
+        (out / "honesty.md").write_text(text + "\n", encoding="utf-8")
     if write:
-        write.write_text(replace_between_marks(write, make_trouble_tables(rows, _format_command(), False), "honesty"))
+        write.write_text(
+            replace_between_marks(write, make_trouble_tables(rows, _format_command(), False), "honesty"),
+            encoding="utf-8",
+        )
 
 
 def _split(text: str) -> list[str]:

@@ -35,4 +35,4 @@ def run_intervals(
     text = make_interval_tables(rows, command)
     typer.echo("\n" + text)
     if write:
-        write.write_text(replace_between_marks(write, text, marks))
+        write.write_text(replace_between_marks(write, text, marks), encoding="utf-8")

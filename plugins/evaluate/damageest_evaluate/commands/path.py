@@ -42,10 +42,10 @@ def command(
     scenes = make_scenes(jobs or [], each, random, Registry.discover())
     rows = run_scenes(scenes, lambda text: typer.echo(text, err=True))
     if out:
-        out.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
+        out.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
     table = make_table(rows)
     typer.echo(table)
     if write:
         words = [word for word in sys.argv[1:] if not word.startswith("--write")]
         measured = describe_measurement(f"`{shlex.join(['damageest', *words])}`")
-        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "path"))
+        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "path"), encoding="utf-8")

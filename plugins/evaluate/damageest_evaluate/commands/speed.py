@@ -49,7 +49,7 @@ def command(
     typer.echo(table)
     if write:
         measured = describe_measurement(f"`{shlex.join(['damageest', *_leave_out_write(sys.argv[1:])])}`")
-        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "speed"))
+        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "speed"), encoding="utf-8")
 
 
 def _leave_out_write(words: list[str]) -> list[str]:
