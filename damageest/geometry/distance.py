@@ -45,7 +45,7 @@ class Closest(NamedTuple):
 def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
     """The nearest place on a mesh for each of ``points`` (N,3). The mesh may be open; it must have a triangle."""
     if not len(points):
-        return Closest(np.empty(0), np.empty(0, np.int64), np.empty((0, 3)))
+        return _find_none()
     centre = mesh.bounds.mean(axis=0)
     if (tree := _centred.get(mesh)) is None:
         tree = SurfaceTree(Mesh(mesh.vertices - centre, mesh.faces))
@@ -96,7 +96,9 @@ class SurfaceTree:
         return trees
 
     def closest(self, points: Floats) -> Closest:
-        """The nearest place on the mesh for each of ``points`` (N,3), N at least 1, as `closest_on_mesh` gives it."""
+        """The nearest place on the mesh for each of ``points`` (N,3), as `closest_on_mesh` gives it."""
+        if not len(points):
+            return _find_none()
         order = order_by_place(points)
         query, found = np.ascontiguousarray(points[order], np.float64), []
         for tree, faces, numbers in self._trees:
@@ -108,6 +110,11 @@ class SurfaceTree:
             squared, face = np.where(nearer, other, squared), np.where(nearer, its_face, face)
             place = np.where(nearer[:, None], its_place, place)
         return Closest(*(_undo_order(order, column) for column in (np.sqrt(squared), face, place)))
+
+
+def _find_none() -> Closest:
+    """The nearest places of no points."""
+    return Closest(np.empty(0), np.empty(0, np.int64), np.empty((0, 3)))
 
 
 def _undo_order(order: Ints, values: NDArray[Any]) -> NDArray[Any]:

@@ -24,10 +24,13 @@ ALONG = 48
 
 
 def measure_bounds(points: Floats) -> Floats:
-    """The lowest and the highest corner (2,3) of points (N,3), at least one.
+    """The lowest and the highest corner (2,3) of points (N,3).
 
-    Column by column: numpy takes six times as long for all columns at once.
+    Column by column: numpy takes six times as long for all columns at once. Raises ValueError without points: nothing
+    has no bounds.
     """
+    if not len(points):
+        raise ValueError("measure_bounds: got no points, and nothing has no bounds; ask only where there are points")
     return np.array([[column.min() for column in points.T], [column.max() for column in points.T]])
 
 
@@ -72,11 +75,12 @@ def number_cubes(points: Floats, edge: float, low: Floats | None = None) -> tupl
         The indices (N,3) of the cube along x, y and z, and its number (N,). Points of one cube have the same number;
         numbers ascend along z first, then y, then x.
 
-    ``low`` (3,) is a corner of the grid, at or below all points; by default the lowest corner of their bounds. At least
-    one point is needed.
+    ``low`` (3,) is a corner of the grid, at or below all points; by default the lowest corner of their bounds.
     """
     cell = np.empty((3, len(points)), np.int64)
     number = np.zeros(len(points), np.int64)
+    if not len(points):
+        return cell.T, number
     for axis, along in enumerate(points.T):
         cell[axis] = np.floor((along - (along.min() if low is None else low[axis])) / edge)
         number *= cell[axis].max() + 1
@@ -85,18 +89,19 @@ def number_cubes(points: Floats, edge: float, low: Floats | None = None) -> tupl
 
 
 def order_by_place(points: Floats) -> Ints:
-    """An order (N,) of points (N,3), N at least 1, in which most lie near the one before.
+    """An order (N,) of points (N,3) in which most lie near the one before.
 
     Places that are searched for in this order need the same nodes of a tree, one after the other. Measured: a quarter
     to a half less time than in random order.
     """
+    if not len(points):
+        return np.empty(0, np.int64)
     low, high = measure_bounds(points)
     return order_integers(number_cubes(points, max(float((high - low).max()) / ALONG, 1e-300), low)[1])
 
 
 def measure_area(points: Floats, edge: float, fewest: int = 1) -> float:
-    """Area that points (N,3) on a surface cover, N at least 1: that of a side of each cube with at least ``fewest`` of
-    them."""
+    """Area that points (N,3) on a surface cover: that of a side of each cube with at least ``fewest`` of them."""
     count = np.unique(number_cubes(points, edge)[1], return_counts=True)[1]
     return float((count >= fewest).sum() * edge**2)
 
@@ -104,8 +109,6 @@ def measure_area(points: Floats, edge: float, fewest: int = 1) -> float:
 def number_faced_cubes(points: Floats, normals: Floats, edge: float) -> tuple[Ints, Ints]:
     """As `number_cubes`, but points of one cube have the same number (N,) only if their normals (N,3) are nearest to
     the same one of the six directions along the axes.
-
-    At least one point is needed.
     """
     cell, number = number_cubes(points, edge)
     axis = np.abs(normals).argmax(axis=1)

@@ -26,6 +26,14 @@ def test_pose_with_a_third_missing(name: str) -> None:
     assert 0.5 * scan.noise < pose.rms < 2 * scan.noise
 
 
+@pytest.mark.parametrize("points", [2000, 9999, 10_000, 10_001])
+def test_scans_with_fewer_points_than_the_comparisons_take(points: int) -> None:
+    """Poses are compared on the first 1,500 points, then the next 8,500, then the rest: a small scan has no rest."""
+    part, scan = scene("block", seed=3, missing=0.2, clutter=0.0, points=points)
+    pose = Register().run(scan, part, 4 * scan.noise)
+    assert error(part, pose.T_part_scan, scan) < 1
+
+
 @pytest.mark.parametrize("name", ["lever", pytest.param("block", marks=pytest.mark.slow)])
 def test_pose_with_a_third_unseen(name: str) -> None:
     part, scan = scene(name, seed=4, missing=0.05, unseen=0.33)
