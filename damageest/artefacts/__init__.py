@@ -11,6 +11,7 @@ from damageest.artefacts.arrays import ArtefactError, Flags, Floats, Ints, Vecto
 from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, EvidenceCause, Rims
 from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
 from damageest.artefacts.paths import BeadFill, DepositPath, Unreached
+from damageest.artefacts.reasons import Effect, Reason
 from damageest.artefacts.scans import (
     ADDED,
     DAMAGE,
@@ -35,6 +36,7 @@ __all__ = [
     "Deposit",
     "DepositPath",
     "Deviation",
+    "Effect",
     "Enclosure",
     "Enclosures",
     "Evidence",
@@ -46,6 +48,7 @@ __all__ = [
     "Mesh",
     "Part",
     "Pose",
+    "Reason",
     "Rims",
     "Samples",
     "Scan",

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Floats, Scan
-from damageest.checks.form_words import name_model
+from damageest.artefacts import Floats, Reason, Scan
 from damageest.checks.model_fit import FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import fit_views
@@ -22,8 +21,6 @@ from damageest.stages.scan import ReadScan
 
 MEASURED = 40_000
 """Points, about, that the scale is measured with before it is corrected."""
-NEAR, CLEAR = 2.0, 4.0
-"""Depth of a site over the systematic deviation there, below which it is doubtful, and below which it is open."""
 
 
 def correct_scan(engine: Engine, work: Work) -> Work:
@@ -107,32 +104,10 @@ def fit_model(engine: Engine, work: Work) -> Work:
     sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.tolerance, JobState.views)
     state = state.derive(JobState.fitted, found, *sources)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
-    words = (found.fit.words,) if found is not None and told else ()
-    return replace(work, job=state, warnings=(*work.warnings, *words))
-
-
-def question_sites(engine: Engine, work: Work) -> Work:
-    """Doubts sites that are not deeper than the systematic deviation of the intact skin there."""
-    state = work.job
-    if state.fitted is None or state.fitted.fit.model == "ok":
-        return work
-    sites = []
-    for site in work.sites:
-        if not len(site.members):
-            sites.append(site)
-            continue
-        local = measure_at_site(state, site)
-        depth = float(np.quantile(-state.deviation.distance[site.members], 0.95))
-        text = (
-            f"it is {depth:.3g} {state.unit} deep, and intact skin deviates by about {local:.3g} {state.unit} there: "
-            f"{name_model(state.fitted.fit)}"
-        )
-        if depth < NEAR * local:
-            site = replace(site, doubts=(*site.doubts, text))
-        elif depth < CLEAR * local:
-            site = replace(site, questions=(*site.questions, text))
-        sites.append(site)
-    return replace(work, sites=tuple(sites))
+    if found is not None and told:
+        warning = Reason("model_fit", found.fit.words, amount=found.fit.amount, unit=state.unit)
+        work = replace(work, warnings=(*work.warnings, warning))
+    return replace(work, job=state)
 
 
 def measure_at_site(state: JobState, site: FoundSite) -> float:

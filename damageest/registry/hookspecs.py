@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement: four that add, three that only observe.
+"""The hooks a plugin may implement: five that add, three that only observe.
 
 What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
 what they return is ignored.
@@ -14,6 +14,7 @@ import pluggy
 if TYPE_CHECKING:
     import typer
 
+    from damageest.rules import Rule
     from damageest.stages import Stage
     from damageest.stages.export import PathWriter, Writer
 
@@ -36,6 +37,11 @@ def damageest_writers() -> Mapping[str, Writer]:  # type: ignore[empty-body]
 def damageest_path_writers() -> Mapping[str, PathWriter]:  # type: ignore[empty-body]
     """Gives the formats of deposition paths that this plugin can write, by the name that a job's
     `export: {paths: ...}` calls them by."""
+
+
+@hookspec
+def damageest_rules() -> Sequence[type[Rule]]:  # type: ignore[empty-body]
+    """Gives the rules that this plugin adds: each looks at the facts about a site and gives reasons for its verdict."""
 
 
 @hookspec

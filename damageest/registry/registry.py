@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from damageest.errors import PluginError, suggest
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
 from damageest.registry.loading import Broken, Provider, describe_broken, ignore_shadow_warnings, load
+from damageest.rules import Rule
 from damageest.stages import Stage
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.export import PathWriter, Writer
@@ -45,7 +46,7 @@ class Implementation:
 class Registry:
     """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them.
     ``writers``: the formats that `export` can write, by name; ``formats``: the provider of each. ``path_writers``:
-    the formats of paths, by name."""
+    the formats of paths, by name. ``rules``: those that give reasons for verdicts."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]
@@ -55,6 +56,7 @@ class Registry:
     writers: Mapping[str, Writer] = field(default_factory=dict, compare=False)
     formats: Mapping[str, Provider] = field(default_factory=dict, compare=False)
     path_writers: Mapping[str, PathWriter] = field(default_factory=dict, compare=False)
+    rules: tuple[Rule, ...] = field(default=(), compare=False)
 
     @classmethod
     def discover(cls, observers: Iterable[object] = ()) -> Registry:
@@ -64,17 +66,20 @@ class Registry:
         writers: dict[str, Writer] = {}
         path_writers: dict[str, PathWriter] = {}
         formats: dict[str, Provider] = {}
+        rules: dict[str, Rule] = {}
         for plugin, provider in loaded:
             try:
                 with ignore_shadow_warnings():
                     classes = _read_offered(plugin)
                     added = _read_writers(plugin, "damageest_writers", Writer, writers)
                     added_paths = _read_writers(plugin, "damageest_path_writers", PathWriter, path_writers)
+                    added_rules = _read_rules(plugin, rules)
             except (Exception, SystemExit) as error:
                 broken.append(describe_broken(error, provider))
                 continue
             writers |= added
             path_writers |= added_paths
+            rules |= added_rules
             formats |= dict.fromkeys(added, provider)
             for stage in classes:
                 try:
@@ -88,7 +93,9 @@ class Registry:
         single = tuple(group[0] for group in groups.values() if len(group) == 1)
         clashes = tuple(group for group in groups.values() if len(group) > 1)
         providers = tuple(dict.fromkeys([p for _, p in loaded] + [b.provider for b in broken]))
-        return cls(single, providers, tuple(broken), clashes, manager, writers, formats, path_writers)
+        return cls(
+            single, providers, tuple(broken), clashes, manager, writers, formats, path_writers, tuple(rules.values())
+        )
 
     def of(self, stage: str) -> tuple[Implementation, ...]:
         """The implementations of a stage, defaults first, then by name."""
@@ -173,6 +180,23 @@ def _read_writers(plugin: Any, hook: str, kind: type[Kind], known: Mapping[str, 
     if twice := sorted(found.keys() & known.keys()):
         raise PluginError(f"writes {', '.join(twice)}, which another package writes already; uninstall one of them")
     return dict(found)
+
+
+def _read_rules(plugin: Any, known: Mapping[str, Rule]) -> dict[str, Rule]:
+    """The rules that a plugin adds, by their code. Raises PluginError for what is no rule, or has a code twice."""
+    found = plugin.damageest_rules() if hasattr(plugin, "damageest_rules") else []
+    rules: dict[str, Rule] = {}
+    for cls in found:
+        if not (isinstance(cls, type) and issubclass(cls, Rule)):
+            raise PluginError(f"its hook damageest_rules gave {cls!r}, which is no class derived from Rule")
+        if missing := [
+            name for name in ("code", "meaning", "threshold") if not isinstance(getattr(cls, name, None), str)
+        ]:
+            raise PluginError(f"its rule {cls.__qualname__} has no {', no '.join(missing)}")
+        if cls.code in known or cls.code in rules:
+            raise PluginError(f"its rule {cls.__qualname__} has the code '{cls.code}', which another rule has")
+        rules[cls.code] = cls()
+    return rules
 
 
 def _check_defaults(cls: type[Stage]) -> None:

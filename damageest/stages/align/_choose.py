@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Reason
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._fine import fit, robust_cost
@@ -30,6 +30,9 @@ one that slid a little."""
 
 FIRST_POINTS, SECOND_POINTS = 1500, 10_000
 """Number of points for the first comparison of poses and the fits before it, and for the second comparison."""
+
+
+REMEDY = "where the pose is known, give it to align: icp or align: none"
 
 
 @dataclass(frozen=True)
@@ -183,8 +186,8 @@ def is_worse(cost: Floats, best: Floats) -> bool:
     return total > 0.0005 * len(more) and total > 5 * float(np.sqrt((more**2).sum()))
 
 
-def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[str, ...]:
-    """A note where the scan does not fix the pose; empty where it does.
+def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[Reason, ...]:
+    """A doubt where the scan does not fix the pose; empty where it does.
 
     A bar with both ends missing or unseen fits at any place along its axis. Each motion that hardly changes the points'
     distances to their planes is tried, by a few bands in both directions.
@@ -202,11 +205,11 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
             if differs > 0.002 and not is_worse(
                 robust_cost(target.closest(move_points(points, D @ pose))[0], band), here
             ):
-                return (
+                text = (
                     "the scan does not fix the pose: the part can be moved or turned a little and fits as well, "
-                    "because the surface that would prevent it is missing or was not seen; where the pose is known, "
-                    "give it to align: none",
+                    "because the surface that would prevent it is missing or was not seen"
                 )
+                return (Reason("pose_free", text, "contradicts", remedy=REMEDY),)
     return ()
 
 
@@ -224,8 +227,8 @@ def describe_choice(choice: Choice) -> tuple[str, ...]:
     return ()
 
 
-def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[str, ...]:
-    """A note where other poses fit as well and are not symmetries of the part; empty where there are none."""
+def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[Reason, ...]:
+    """A doubt where other poses fit as well and are not symmetries of the part; empty where there are none."""
     if not len(choice.others):
         return ()
     surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
@@ -233,8 +236,8 @@ def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[str, ...]:
     apart = max(float((np.abs(target.closest(move_points(surface, D))[0]) > choice.band).mean()) for D in motions)
     if apart <= 0.002:
         return ()
-    return (
+    text = (
         f"the poses that fit are not all symmetries of the part (up to {apart:.1%} of its surface differs): the "
-        "surface that would distinguish them is missing or was not seen, so the damage found depends on the pose; "
-        "where the pose is known, give it to align: icp or align: none",
+        "surface that would distinguish them is missing or was not seen, so the damage found depends on the pose"
     )
+    return (Reason("other_poses", text, "contradicts", apart, remedy=REMEDY),)

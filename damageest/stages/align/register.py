@@ -100,10 +100,10 @@ class Register(Align):
             turns = choice.others @ np.linalg.inv(choice.pose)
             poses = turns @ best.pose if finish.is_changed else choice.others
             others = np.array([frame.unscale_pose(pose) for pose in poses])
-        doubts = (
-            check.note_doubts() + note_ambiguity(choice, target) + note_free_motion(best.pose, target, fine, best.band)
-        )
-        notes = describe_choice(choice) + doubts + finish.notes
+        doubts = check.note_doubts() + note_ambiguity(choice, target)
+        if not finish.free:  # those have amounts, and are terms of the intervals
+            doubts += note_free_motion(best.pose, target, fine, best.band)
+        notes = (*describe_choice(choice), *map(str, doubts), *finish.notes)
         pose = frame.unscale_pose(best.pose)
         rms = check.rms * frame.size
         return Pose(pose, rms, check.inliers, others, notes, doubts, finish.free, finish.is_held)

@@ -169,7 +169,7 @@ def test_a_site_that_takes_too_long_gets_facets_and_says_so(done: Run, tmp_path:
     late = export_again(one, tmp_path / "late", limit=0.01)
     assert {exact.form for exact in late.exact.values()} == {"none"}
     assert "longer than 0.01 s" in late.exact[1].tried[0]
-    assert any("site-1.step has facets" in warning for warning in late.warnings)
+    assert any("site-1.step has facets" in warning.text for warning in late.warnings)
     (solid,) = take_solids(tmp_path / "late/damage/site-1.step")
     assert solid.Volume() == pytest.approx(done.result.sites[0].damage.volume, rel=0.01)
     assert len(solid.Faces()) > 20
@@ -253,7 +253,7 @@ def test_a_blob_is_one_spline_or_few_facets(done: Run, tmp_path: Path) -> None:
 def test_a_mesh_has_no_exact_form(done: Run, tmp_path: Path) -> None:
     meshed = replace(done.result, part=replace(done.result.part, cad_scale=0.0))
     told = export_again(meshed, tmp_path / "out", solids="exact")
-    assert any("without CAD faces" in warning for warning in told.warnings)
+    assert any("without CAD faces" in warning.text for warning in told.warnings)
     assert (tmp_path / "out/damage/site-1.step").is_file()
     with pytest.raises(InputError, match="is a mesh"):
         meshed.as_cadquery("part")
