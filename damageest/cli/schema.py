@@ -1,4 +1,4 @@
-"""`damageest schema`: prints the JSON Schemas, for editors and for checks by other programs."""
+"""`damageest schema`: prints the JSON Schemas, for editors and for checks by other programs, and the reasons."""
 
 from __future__ import annotations
 
@@ -12,17 +12,26 @@ import typer
 class SchemaName(StrEnum):
     job = "job"
     result = "result"
+    reasons = "reasons"
 
 
 def command(
     which: Annotated[
-        SchemaName, typer.Argument(help="job: schema of the job file; result: schema of result.json.")
+        SchemaName,
+        typer.Argument(
+            help="job: schema of the job file; result: schema of result.json; reasons: the codes of reasons, as tables."
+        ),
     ] = SchemaName.job,
 ) -> None:
-    """Print the JSON Schema of the job file, with the options of all installed plugins, or of result.json."""
+    """Print the JSON Schema of the job file, with the options of all installed plugins, or of result.json, or the
+    table of all reasons."""
     from damageest.job.schema import job_schema
     from damageest.registry import Registry
     from damageest.report.result_json import result_schema
+    from damageest.rules.reference import format_reasons
 
+    if which is SchemaName.reasons:
+        typer.echo(format_reasons(Registry.discover().rules), nl=False)
+        return
     content = job_schema(Registry.discover()) if which is SchemaName.job else result_schema()
     typer.echo(json.dumps(content, indent=2))

@@ -12,6 +12,15 @@ DIFFERS = 0.02
 decides which metal is lost."""
 
 
+POSE_CODES = {
+    "another_part": "little of the scan near the part lies on its surface: it may show another part or revision",
+    "other_poses": "poses fit that are no symmetries of the part; it concerns sites whose metal is another one in them",
+    "pose_free": "the part can be moved or turned a little and fits as well",
+    "given_pose": "in a pose nearby more of the scan lies on the part than in the given one",
+}
+"""Codes of the reasons that implementations of align give against their pose."""
+
+
 class PoseDoubt(Rule):
     code = "pose"
     meaning = "the pose may be wrong, or other poses fit as well in which other metal is lost"
