@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Floats, Ints, Part, Scan
+from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
 
 ON_SKIN, BELOW = 0.4, 0.9
@@ -13,6 +13,8 @@ NEIGHBOURS = 12
 """Points looked at about each point of the site."""
 LEAST, MOST = 0.25, 0.75
 """Share of them on the skin between which both kinds are there."""
+BETWEEN = 0.25
+"""Share of them between both, from which they are one surface with noise: wear of less than a tolerance."""
 APART = 0.85
 """Distance of the middles of both kinds, in radii of the neighbours, from which they lie side by side, as at the rim of
 a loss. Half discs lie 1.2 apart, twice six points drawn at random 0.58."""
@@ -23,7 +25,7 @@ MOST_ASKED = 2000
 
 
 def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members: Ints, tolerance: float) -> float:
-    """Share of a site's points ``members`` (M,) among whose neighbours along the skin intact points are mixed in.
+    """Share of a site's points ``members`` (M,) among whose neighbours along the skin are points on it.
 
     At the rim of a loss points of both kinds lie side by side. Where two views do not fit together, or one surface was
     scanned twice with an error between, they lie in the same place.
@@ -34,23 +36,32 @@ def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members:
     spacing = max(aligned.spacing, 1e-300)
     low, high = aligned.points[below].min(axis=0), aligned.points[below].max(axis=0)
     near = find_in_box(aligned.points, low - 3 * tolerance - 3 * spacing, high + 3 * tolerance + 3 * spacing)
-    on_skin = near[(deviation.label[near] == INTACT) & (np.abs(deviation.distance[near]) < ON_SKIN * tolerance)]
-    if len(on_skin) < NEIGHBOURS:
+    # whatever their label: among damaged points, means of neighbours make damage of points on the skin
+    # whatever their label: among damaged points, means of neighbours make damage of points on the skin
+    distance = deviation.distance[near]
+    near, distance = near[distance < ON_SKIN * tolerance], distance[distance < ON_SKIN * tolerance]
+    is_on = np.concatenate([np.zeros(len(below), bool), distance > -ON_SKIN * tolerance])
+    is_between = np.concatenate([np.zeros(len(below), bool), (distance <= -ON_SKIN * tolerance)])
+    is_between[len(below) :] &= distance > -BELOW * tolerance
+    used = np.concatenate([np.ones(len(below), bool), is_on[len(below) :] | is_between[len(below) :]])
+    feet = np.concatenate([_find_feet(aligned, deviation, part, index, FACING * spacing) for index in (below, near)])
+    feet, is_on, is_between = feet[used], is_on[used], is_between[used]
+    if is_on.sum() < NEIGHBOURS:
         return 0.0
-    feet_below, feet_on = (_find_feet(aligned, deviation, part, index, FACING * spacing) for index in (below, on_skin))
-    feet = np.concatenate([feet_below, feet_on])
-    is_on = np.arange(len(feet)) >= len(below)
     asked = np.arange(len(below))[:: max(1, len(below) // MOST_ASKED)]
     index = find_neighbours(feet[asked], NEIGHBOURS, feet)[1]
-    offset, on = feet[index] - feet[asked][:, None], is_on[index]
+    offset, on, between = feet[index] - feet[asked][:, None], is_on[index], is_between[index]
     share = on.mean(axis=1)
-    count_on = np.maximum(on.sum(axis=1), 1)[:, None]
-    count_below = np.maximum((~on).sum(axis=1), 1)[:, None]
-    middle_on = (offset * on[..., None]).sum(axis=1) / count_on
-    middle_below = (offset * ~on[..., None]).sum(axis=1) / count_below
+    middle_on, middle_below = (_find_middle(offset, kind) for kind in (on, ~on & ~between))
     radius = np.sqrt(((offset - offset.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1))
     apart = np.linalg.norm(middle_on - middle_below, axis=1) / np.maximum(radius, 1e-300)
-    return float(((share > LEAST) & (share < MOST) & (apart < APART)).mean())
+    is_mixed = (share > LEAST) & (share < MOST) & (between.mean(axis=1) < BETWEEN) & (apart < APART)
+    return float(is_mixed.mean())
+
+
+def _find_middle(offset: Floats, chosen: Flags) -> Floats:
+    """(N,K) the middle of the chosen (N,M) of some offsets (N,M,K)."""
+    return np.asarray((offset * chosen[..., None]).sum(axis=1) / np.maximum(chosen.sum(axis=1), 1)[:, None])
 
 
 def _find_feet(aligned: Scan, deviation: Deviation, part: Part, index: Ints, weight: float) -> Floats:
