@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Part, Scan
+from damageest.artefacts import Part, Reason, Scan
 from damageest.errors import InputError, StageError
 from damageest.io.files import resolve_path, working_folder
 from damageest.isolation import Limits, keep_one_thread
@@ -23,6 +23,7 @@ from damageest.pipeline.workspace import open_workspace
 from damageest.registry import Registry
 from damageest.registry.contracts import Contract
 from damageest.result import Result
+from damageest.rules.notes import make_notes, rank_notes
 from damageest.stages.export import ExportedFiles
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
@@ -66,7 +67,8 @@ def run(
         state = state.with_value(JobState.path_writers, registry.path_writers, digest(sorted(registry.path_writers)))
         written = follow(WRITE, engine, replace(work, job=state)).job.written
         if written.warnings:
-            told = replace(state.result, warnings=(*state.result.warnings, *written.warnings))
+            notes = rank_notes((*state.result.warnings, *make_notes("export", written.warnings)))
+            told = replace(state.result, warnings=notes)
             state = state.with_value(JobState.result, told, state.key("result"))
         result, written = _show_result(engine, replace(work, job=state), target, written)
         write_report(result, job, place.folder, target, written)
@@ -86,7 +88,7 @@ def _show_result(engine: Engine, work: Work, target: Path, written: ExportedFile
     try:
         done = follow(SHOW, engine, replace(work, job=state)).job.reported
     except StageError as error:
-        warning = f"{error.args[0]} (the run went on without a report)"
+        warning = Reason("report", f"{error.args[0]} (the run went on without a report)")
         return replace(result, warnings=(*result.warnings, warning)), written
     result = replace(result, stages=tuple(engine.records))
     return result, replace(written, files=(*written.files, *done.files), notes=(*written.notes, *done.notes))

@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Flags, Floats, Ints, Mesh, Solid
+from damageest.artefacts import Flags, Floats, Ints, Mesh, Reason, Solid
+
+Level = Literal["proven", "likely", "doubtful"]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a damage volume is worth: ``level``, and ``reasons`` that speak against it, in words.
+    """What a damage volume is worth: ``level``, and the ``reasons`` for it.
 
-    `proven`: all that could contradict it was asked, and agrees. `likely`: nothing contradicts it, but not all could be
-    asked. `doubtful`: something contradicts it, or what it rests on cannot be told from errors of the scan.
-    ``is_by_form``: whether skin that deviates (by pose, form or scanner) may be all that a doubtful one shows.
+    `proven`: the 95 % interval of its volume is narrow, and nothing is open. `likely`: the interval, with all causes in
+    it, excludes that nothing was lost, and the scan does not contradict it. `doubtful`: the interval reaches down to
+    nearly nothing, or the scan contradicts it, or poses that fit differ in which metal is lost.
     """
 
-    level: Literal["proven", "likely", "doubtful"] = "proven"
-    reasons: tuple[str, ...] = ()
-    is_by_form: bool = False
+    level: Level = "proven"
+    reasons: tuple[Reason, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +116,9 @@ class ViewFit:
 
 
 Deformed = Literal["bend", "twist", "shear", "stretch", "scale"]
+DONE: dict[Deformed, str] = {
+    "bend": "bent", "twist": "twisted", "shear": "sheared", "stretch": "stretched", "scale": "scaled"
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,9 +148,31 @@ class ModelFit:
     waviness: float
     corrected_scale: float = 1.0
 
+    @property
+    def name(self) -> str:
+        """The model in a few words."""
+        if self.model == "scaled":
+            return f"the scale is wrong by {100 * (self.scale - 1):+.3g} %"
+        if self.model == "deformed":
+            return "the part is " + " and ".join(DONE[kind] for kind, _ in self.deformation)
+        return {
+            "ok": "the part is as designed",
+            "open": "no form was found",
+            "views disagree": "the views of the scan disagree",
+            "wavy": "the skin is wavy",
+        }[self.model]
+
 
 Interval = tuple[float, float]
-"""Low and high end."""
+"""Low and high end; a high end of infinity is open: nothing that was seen limits it."""
+
+
+def describe_interval(interval: Interval | None) -> str:
+    """As "98.2 to 101" or "at least 98.2"; a dash where there is none."""
+    if interval is None:
+        return "–"
+    low, high = interval
+    return f"{low:.4g} to {high:.4g}" if math.isfinite(high) else f"at least {low:.4g}"
 
 
 @dataclass(frozen=True)
@@ -163,12 +190,13 @@ class Fading:
 class Uncertainty:
     """How exactly a site's volume and its largest depth are known.
 
-    ``volume_95``, ``depth_95``: the 95 % intervals; None where the scan does not support one, and ``reasons`` say why.
-    The causes, each as one standard deviation of the volume: ``noise`` of the points; ``spacing`` of the points,
-    between which the inner surface is interpolated; ``rim``: where it meets the skin; ``pose``; ``tessellation`` of the
-    part; ``form`` of skin that deviates over whole areas. ``inside``, ``beside``: by how much the loss may be larger at
-    most where no points show the inner surface, and the skin beside it. ``fading``: None for a loss that is not
-    shallow.
+    ``volume_95``, ``depth_95``: the 95 % intervals; None where no scan points lie on the inner surface. Causes, each
+    as one standard deviation of the volume: ``noise`` of the points; ``spacing`` of the points, between which the inner
+    surface is interpolated; ``rim``: where it meets the skin; ``pose`` as it was fitted; ``tessellation`` of the part;
+    ``form`` of skin that deviates over whole areas; ``outward``: skin that lies as far outside; ``views`` that differ.
+    ``free``: change of the volume at the ends of motions that the scan does not exclude. ``inside``, ``beside``: by how
+    much the loss may be larger at most where no points show the inner surface, and the skin beside it. ``fading``: None
+    for a loss that is not shallow.
     """
 
     volume_95: Interval | None
@@ -179,7 +207,14 @@ class Uncertainty:
     pose: float = 0.0
     tessellation: float = 0.0
     form: float = 0.0
+    outward: float = 0.0
+    views: float = 0.0
+    free: Interval = (0.0, 0.0)
     inside: float = 0.0
     beside: float = 0.0
     fading: Fading | None = None
-    reasons: tuple[str, ...] = ()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether nothing that was seen limits how large the loss may be."""
+        return self.volume_95 is not None and math.isinf(self.volume_95[1])

@@ -18,6 +18,7 @@ from damageest.artefacts import (
     Mesh,
     Part,
     Pose,
+    Reason,
     Scan,
     Solid,
     Surface,
@@ -50,7 +51,7 @@ class Site:
     method: str
     evidence: Evidence
     max_depth: float
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Reason, ...] = ()
     refused: bool = False
     verdict: Verdict = field(default_factory=Verdict)
     accepted: bool = True
@@ -137,7 +138,7 @@ class Result:
     sites: tuple[Site, ...]
     damage: Solid | None
     undamaged: Solid | None
-    warnings: tuple[str, ...]
+    warnings: tuple[Reason, ...]
     failures: tuple[str, ...]
     truth: Floats | None
     stages: tuple[StageRecord, ...] = ()

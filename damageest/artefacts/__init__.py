@@ -12,6 +12,7 @@ from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, Evid
 from damageest.artefacts.fields import ArtefactError
 from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
 from damageest.artefacts.paths import BeadFill, DepositPath, Unreached
+from damageest.artefacts.reasons import Effect, Reason
 from damageest.artefacts.scans import (
     ADDED,
     DAMAGE,
@@ -36,6 +37,7 @@ __all__ = [
     "Deposit",
     "DepositPath",
     "Deviation",
+    "Effect",
     "Enclosure",
     "Enclosures",
     "Evidence",
@@ -47,6 +49,7 @@ __all__ = [
     "Mesh",
     "Part",
     "Pose",
+    "Reason",
     "Rims",
     "Samples",
     "Scan",

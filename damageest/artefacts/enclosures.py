@@ -1,4 +1,4 @@
-"""What bounds a damage, and how the scan speaks for it."""
+"""What bounds a damage, and how well the scan agrees with it."""
 
 from __future__ import annotations
 
@@ -69,9 +69,8 @@ class Evidence:
     ``ids_unseen``: share of its inner surface without scan points near: there it is interpolated. ``ids_gap``: area of
     the largest connected piece of that.
     ``intact_share``: share of the skin that the DV removes on which intact points lie as densely as elsewhere, also
-    near the rim. Unlike ``skin_contradicted``, it is measured on shallow and small sites too.
-    ``consistent``: whether the scan agrees with the DV. ``reasons`` say why not, and ``causes`` names the check that
-    gave each reason.
+    near the rim; 0 where they are fewer than four. Unlike ``skin_contradicted``, it is measured on shallow and small
+    sites too. ``consistent``: whether the scan agrees with the DV. ``causes``: the checks that say it does not.
     """
 
     ids_residual: float = 0.0
@@ -82,5 +81,4 @@ class Evidence:
     ids_gap: float = 0.0
     intact_share: float = 0.0
     consistent: bool = True
-    reasons: tuple[str, ...] = ()
     causes: tuple[EvidenceCause, ...] = ()

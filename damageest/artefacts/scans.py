@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
 from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
 from damageest.artefacts.meshes import Solid
+from damageest.artefacts.reasons import Reason
 
 INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
 """Labels of a scan point: on the nominal surface; on an inner damage surface; outside the part by more than the
@@ -173,8 +174,9 @@ class Pose(Checked):
     """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
 
     ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is
-    one of several right ones. ``notes`` say so in words. ``doubts``: those of the notes that make the verdict on every
-    site doubtful, such as a small share of the scan on the part, or other poses that fit and are no symmetries.
+    one of several right ones. ``notes`` say so in words. ``doubts``: what speaks against the pose, and so against every
+    site, as a small share of the scan on the part. Of those with the code `other_poses`, that poses fit which are no
+    symmetries, only sites are concerned whose metal is another one in them.
     ``free``: motions that unworn skin does not exclude. ``is_held``: whether skin without wear holds the pose but for
     those; False where that was not tested.
     """
@@ -184,7 +186,7 @@ class Pose(Checked):
     inliers: float = 1.0
     alternatives: Floats | None = None
     notes: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Reason, ...] = ()
     free: tuple[FreeMotion, ...] = ()
     is_held: bool = False
     _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64}

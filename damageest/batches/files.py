@@ -17,7 +17,7 @@ from damageest.batches.rows import LEVELS, OUTCOMES, Row
 
 COLUMNS = (
     "name", "outcome", "sites", *LEVELS, "damage_volume", "volume_low", "volume_high", "part_volume", "units",
-    "tolerance", "warnings", "seconds", "megabytes", "tries", "host", "job", "output", "error",
+    "tolerance", "warnings", "reasons", "remedies", "seconds", "megabytes", "tries", "host", "job", "output", "error",
 )  # fmt: skip
 """Columns of batch.csv."""
 _PICTURE = re.compile(rb'<img[^>]*src="(data:image/png;base64,[A-Za-z0-9+/=]{1,400000})"')
@@ -65,7 +65,8 @@ def _load_page() -> Any:
 def _flatten(row: Row) -> dict[str, Any]:
     values = {name: value for name, value in row.to_values().items() if name in COLUMNS}
     low, high = row.volume_95 or ("", "")
-    values |= {"volume_low": low, "volume_high": high}
+    values |= {"volume_low": low, "volume_high": "" if high is None else high}
+    values |= {"reasons": "; ".join(row.reasons), "remedies": "; ".join(row.remedies)}
     return values | ({level: row.verdicts.get(level, 0) for level in LEVELS} if row.has_result else {})
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
+from damageest.artefacts import Reason
+from damageest.findings import Interval, describe_interval
 from damageest.result import Result
 
 OUTCOMES = {
@@ -24,7 +27,9 @@ LEVELS = ("proven", "likely", "doubtful")
 @dataclass(frozen=True)
 class Row:
     """One job of a batch. ``outcome``: a key of `OUTCOMES`. ``verdicts``: number of sites by verdict. ``warnings``:
-    their number. Volumes are in ``units`` cubed, ``volume_95`` the 95 % interval. ``seconds`` from start to end,
+    their number. ``reasons``: the codes of the reasons for its verdicts with their amounts, as "1: form ±3.2 mm³", and
+    ``remedies``: what to do. Volumes are in ``units`` cubed, ``volume_95`` the 95 % interval, its high end None where
+    nothing limits it. ``seconds`` from start to end,
     ``megabytes`` the peak of the job's process, ``tries``: how many workers the job was given to. ``key`` tells
     whether job, inputs and code are the same in another run of the batch."""
 
@@ -37,11 +42,13 @@ class Row:
     sites: int = 0
     verdicts: dict[str, int] = field(default_factory=dict)
     damage_volume: float | None = None
-    volume_95: tuple[float, float] | None = None
+    volume_95: tuple[float, float | None] | None = None
     part_volume: float | None = None
     units: str = ""
     tolerance: float | None = None
     warnings: int = 0
+    reasons: tuple[str, ...] = ()
+    remedies: tuple[str, ...] = ()
     seconds: float = 0.0
     megabytes: float | None = None
     tries: int = 1
@@ -73,22 +80,45 @@ class Row:
 def read_row(values: dict[str, Any]) -> Row:
     """The row of `Row.to_values`. Raises TypeError or ValueError for anything else."""
     interval = values.get("volume_95")
-    changed = {"settings": tuple(values["settings"]), "volume_95": None if interval is None else tuple(interval)}
+    lists = ("settings", "reasons", "remedies")
+    changed = {name: tuple(values[name]) for name in lists} | {
+        "volume_95": None if interval is None else tuple(interval)
+    }
     return Row(**{**values, **changed})
 
 
 def describe_result(result: Result) -> dict[str, Any]:
     """The fields of a row that come from a result."""
     levels = [site.verdict.level for site in result.sites]
+    told = [(site.id, reason) for site in result.sites for reason in site.verdict.reasons]
     return {
         "outcome": result.status,
         "error": "; ".join(" ".join(text.split()) for text in result.failures),
         "sites": len(result.sites),
         "verdicts": {level: levels.count(level) for level in LEVELS if level in levels},
         "damage_volume": result.damage_volume,
-        "volume_95": result.volume_95,
+        "volume_95": _close_interval(result.volume_95),
         "part_volume": result.part.volume,
         "units": result.units,
         "tolerance": result.tolerance,
         "warnings": len(result.warnings) + sum(len(site.warnings) for site in result.sites),
+        "reasons": tuple(f"{number}: {_show_reason(reason)}" for number, reason in told),
+        "remedies": tuple(dict.fromkeys(reason.remedy for _, reason in told if reason.remedy)),
     }
+
+
+def _close_interval(interval: Interval | None) -> tuple[float, float | None] | None:
+    """The interval with None for an open end, which JSON can hold."""
+    return None if interval is None else (interval[0], interval[1] if math.isfinite(interval[1]) else None)
+
+
+def show_interval(interval: tuple[float, float | None]) -> str:
+    """The interval of a row in words."""
+    low, high = interval
+    return describe_interval((low, math.inf if high is None else high))
+
+
+def _show_reason(reason: Reason) -> str:
+    """Code and amount of a reason."""
+    amount = "" if reason.amount is None else f" {reason.amount:.3g} {reason.unit}".rstrip()
+    return f"{reason.code}{amount}"

@@ -17,6 +17,7 @@ from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
+from damageest.rules.beyond_points import ASKED, CONTRADICTED
 
 PLACES, MOST = 4000, 20_000
 """Places on the surface, and points of the site, that are looked at."""
@@ -30,11 +31,6 @@ BARE = 1.6
 SEEN, STRAY = 0.05, 0.01
 """Share of the surface without points, and share of the volume behind points, up to which the points show all of the
 surface, as that of an undercut."""
-ASKED, CONTRADICTED = 0.01, 0.03
-"""Share of the volume that no point shows, from which it is asked about, and from which it contradicts the volume.
-Measured with points 2.5 to 5 tolerances apart: true volumes (pits, an edge, a narrow hole, a worn bore, a pocket half a
-gap deep) have at most 0.007; a pocket found 27 % too large has 0.035. What is too large beside the rim does not show
-here: a pocket found 13 % too large, mostly beside its rim, has 0.005."""
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ HALF = 0.5
 """Share of intact points over a damage volume from which they contradict it. On the rim of a pit two tolerances deep, a
 quarter of its area is shallower than half a tolerance."""
 UNSEEN = 0.25
-"""Share of the skin beside a damage volume that may be unseen."""
+"""Share of the skin beside a damage volume that may be unseen, before the other method is tried too."""
 
 
 def weigh_evidence(
@@ -84,27 +84,18 @@ def weigh_evidence(
     # as many as on intact skin of this area, or as many as there are points of the site: either shows intact skin
     skin_area = float(np.linalg.norm(damage.cross[~inner], axis=1).sum() / 2)
     expected = min(len(ids_points) + over, skin_area * (1.1 / spacing) ** 2 if spacing else np.inf)
-    intact_share = float(min(over / max(expected, 1.0), 1.0))
+    intact_share = float(min(over / max(expected, 1.0), 1.0)) if over >= FEWEST_INTACT else 0.0
 
-    found: list[tuple[EvidenceCause, str]] = []
-    if residual > 1.5 * tolerance + 0.25 * spacing:
-        found.append(("residual", f"its boundary is off the damaged points (95 % within {residual:.3g})"))
-    if inside > max(10, 0.02 * len(ids_points)):
-        found.append(("inside", f"{inside} intact points lie on the skin that it removes"))
-    if contradicted > 0.1:
-        found.append(("contradicted", f"intact points lie on {contradicted:.0%} of the skin that it removes"))
-    if bare > 0.1:
-        found.append(("bare", f"{bare:.0%} of its inner surface has no scan point nearby"))
-    if over >= FEWEST_INTACT and intact_share > HALF:
-        reason = f"intact points lie on {intact_share:.0%} of the skin that it removes, shallow as it is"
-        found.append(("shallow", reason))
-    if unseen > UNSEEN:
-        reason = f"{unseen:.0%} of the skin beside it has no scan point: the damage may extend there"
-        found.append(("unseen", reason))
-    causes, reasons = zip(*found, strict=True) if found else ((), ())
-    return Evidence(
-        residual, inside, contradicted, unseen, ids_unseen, ids_gap, intact_share, not found, reasons, causes
-    )
+    found: dict[EvidenceCause, bool] = {
+        "residual": residual > 1.5 * tolerance + 0.25 * spacing,
+        "inside": inside > max(10, 0.02 * len(ids_points)),
+        "contradicted": contradicted > 0.1,
+        "bare": bare > 0.1,
+        "shallow": intact_share > HALF,
+        "unseen": unseen > UNSEEN,
+    }
+    causes = tuple(cause for cause, is_found in found.items() if is_found)
+    return Evidence(residual, inside, contradicted, unseen, ids_unseen, ids_gap, intact_share, not causes, causes)
 
 
 def _measure_largest_gap(places: Floats, chosen: Flags, area: float, spacing: float) -> float:

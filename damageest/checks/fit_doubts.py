@@ -10,13 +10,15 @@ from collections.abc import Mapping
 
 from damageest.artefacts import ADDED, Deviation, Pose, Scan
 from damageest.checks.coverage import SkinView
-from damageest.checks.verdict import FEWEST_OUTSIDE
+from damageest.checks.scan_facts import FEWEST_OUTSIDE
 from damageest.findings import Surplus, Verdict
 from damageest.geometry.voxels import measure_area
 
 LARGE = 0.1
 """Area outside the part, as a share of the skin that the scan shows, from which it is no weld bead or dirt on skin that
 is as designed otherwise."""
+BY_FORM = frozenset({"nothing", "wide_loss"})
+"""Codes of reasons by which skin that deviates may be all that a doubtful site shows."""
 
 
 def find_fit_doubts(
@@ -37,7 +39,7 @@ def find_fit_doubts(
     by_form = sorted(
         number
         for number, verdict in verdicts.items()
-        if verdict.level == "doubtful" and (verdict.is_by_form or number in displaced)
+        if verdict.level == "doubtful" and (number in displaced or BY_FORM & {one.code for one in verdict.reasons})
     )
     if by_form:
         names = f"site{'s' if len(by_form) > 1 else ''} {', '.join(map(str, by_form))}"

@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.findings import ModelFit, ViewFit
-
-DONE = {"bend": "bent", "twist": "twisted", "shear": "sheared", "stretch": "stretched", "scale": "scaled"}
+from damageest.findings import DONE, ModelFit, ViewFit
 
 
 def describe_fit(fit: ModelFit, unit: str, tolerance: float, doubts: tuple[str, ...] = ()) -> ModelFit:
@@ -28,18 +26,6 @@ def describe_fit(fit: ModelFit, unit: str, tolerance: float, doubts: tuple[str, 
             f"the scale of the scan was corrected by {100 * (fit.corrected_scale - 1):+.3g} %, as the job says; {words}"
         )
     return replace(fit, words=words)
-
-
-def name_model(fit: ModelFit) -> str:
-    """The model in a few words, for a sentence about a site."""
-    return {
-        "ok": "the part as designed",
-        "open": "no form was found",
-        "scaled": f"the scale is wrong by {100 * (fit.scale - 1):+.3g} %",
-        "deformed": "the part is " + " and ".join(DONE[kind] for kind, _ in fit.deformation),
-        "views disagree": "the views of the scan disagree",
-        "wavy": "the skin is wavy",
-    }[fit.model]
 
 
 def _describe_scale(fit: ModelFit, unit: str) -> str:

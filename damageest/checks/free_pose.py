@@ -1,4 +1,4 @@
-"""How a damage volume depends on motions that unworn skin does not exclude."""
+"""How a damage volume depends on motions that unworn skin does not exclude, and on other poses that fit."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Floats, FreeMotion, Part, Pose, Solid
+from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.transforms import move_points
 
-OPEN = 0.02
-"""Change of a damage volume, as a share of it, from which it is not proven."""
-DOUBTFUL = 0.1
-"""Change from which the damage volume is doubtful."""
+SAMPLES = 500
+"""Places on the removed skin that are looked for in another pose."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,12 @@ class Dependence:
         """The largest movement that the scan does not exclude, in the job's unit."""
         return max(self.motion.high, -self.motion.low)
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest change of the volume within the motion."""
+        low, high = sorted((self.rate * self.motion.low, self.rate * self.motion.high))
+        return low, high
+
 
 def measure_dependence(damage: Solid, part: Part, pose: Pose) -> tuple[Dependence, ...]:
     """How a damage volume depends on each of the free motions of a pose: its inner surface moves with the scan."""
@@ -48,26 +55,25 @@ def measure_dependence(damage: Solid, part: Part, pose: Pose) -> tuple[Dependenc
     return tuple(found)
 
 
-def ask_free_pose(
-    dependences: tuple[Dependence, ...], volume: float, unit: str
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The reasons against a site of some ``volume``, and the questions that stay open, that a free pose gives."""
-    against: list[str] = []
-    questions: list[str] = []
-    for one in dependences:
-        share = one.moved * one.reach / volume
-        if share > OPEN:
-            (against if share > DOUBTFUL else questions).append(_describe(one, volume, unit))
-    return tuple(against), tuple(questions)
-
-
-def _describe(one: Dependence, volume: float, unit: str) -> str:
-    motion = one.motion
+def describe_motion(motion: FreeMotion, unit: str) -> str:
+    """The motion in a few words."""
     x, y, z = motion.direction
     kind = "a shift along" if motion.point is None else "a turn about"
-    ends = sorted(max(volume + one.rate * amount, 0.0) for amount in (motion.low, motion.high))
-    return (
-        f"its volume depends on the pose, which is free for {kind} ({x:.3f}, {y:.3f}, {z:.3f}) from {motion.low:.3g} "
-        f"to {motion.high:+.3g} {unit}: {ends[0]:.4g} to {ends[1]:.4g} {unit}³, and the worn metal may lie on the "
-        "opposite side; name faces that are not worn in align.datum"
-    )
+    return f"{kind} ({x:.3f}, {y:.3f}, {z:.3f}) from {motion.low:.3g} to {motion.high:+.3g} {unit}"
+
+
+def compare_other_poses(damage: Solid, part: Part, pose: Pose, tolerance: float) -> float:
+    """Share of the skin that a damage volume removes which is not skin of the part in another pose that fits as well.
+
+    In a pose that a symmetry of the part makes, the same metal is lost. Where the share is large, the poses differ in
+    which metal it is.
+    """
+    if pose.alternatives is None or not len(pose.alternatives):
+        return 0.0
+    on_skin = np.flatnonzero(~find_inner_faces(damage, part) & (np.linalg.norm(damage.cross, axis=1) > 0))
+    if not len(on_skin):
+        return 0.0
+    places = sample_by_area(damage, SAMPLES, np.random.default_rng(0), on_skin)[0]
+    back = np.linalg.inv(pose.T_part_scan)
+    away = [distance_to_mesh(move_points(places, other @ back), part) > tolerance for other in pose.alternatives]
+    return float(max(one.mean() for one in away))

@@ -61,14 +61,12 @@ class PoseError:
 
 
 def measure_pose_error(
-    part: Part, aligned: Scan, deviation: Deviation, tolerance: float, free: Floats | None = None, form: float = 0.0
+    part: Part, aligned: Scan, deviation: Deviation, tolerance: float, form: float = 0.0
 ) -> PoseError:
     """The error that the intact points leave to the pose.
 
     Args:
         aligned, deviation: the scan in the part's frame, N points. tolerance: in the job's unit.
-        free: (6,F) motions that the scan does not fix, as the columns of `PoseError.spread` about the centre of the
-            part's bounds, each as far as it may go.
         form: standard deviation by which the skin is known to deviate; the measured one where it is larger.
 
     No direction of the pose is taken to be worse than the tolerance: a larger error would show as damage. Turning a
@@ -81,7 +79,7 @@ def measure_pose_error(
     mean, rows, count = _average_patches(part, aligned, deviation, centre, edge)
     if len(mean) < FEWEST_PATCHES:
         spread = tolerance * scale
-        return PoseError(centre, _add_columns(spread, free), max(form, 0.0), edge**2)
+        return PoseError(centre, spread, max(form, 0.0), edge**2)
     rows = rows @ scale
     prior = np.eye(6) / tolerance**2
     variance = np.maximum(aligned.noise**2 / count, (1e-6 * part.diagonal) ** 2)
@@ -102,11 +100,7 @@ def measure_pose_error(
     spread = vectors * np.sqrt(np.maximum(values, 0))
     if motion @ information @ motion > SIGNIFICANT:
         spread = np.column_stack([spread, motion])
-    return PoseError(centre, _add_columns(scale @ spread, free), systematic, edge**2)
-
-
-def _add_columns(spread: Floats, free: Floats | None) -> Floats:
-    return spread if free is None else np.column_stack([spread, free])
+    return PoseError(centre, scale @ spread, systematic, edge**2)
 
 
 def _make_rows(places: Floats, normals: Floats) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Floats, Part, Scan
+from damageest.artefacts import Floats, Part, Reason, Scan
 from damageest.errors import InputError, StageError
 
 AUTO_TOLERANCE = 4.0
@@ -32,8 +32,8 @@ MOST_OUTSIDE = 0.02
 """Share of these points that may lie outside the part where wear explains that few are intact."""
 
 
-def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float = 0.0) -> tuple[float, list[str]]:
-    """Lambda in the job's unit, and what is doubtful about it, in words.
+def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float = 0.0) -> tuple[float, list[Reason]]:
+    """Lambda in the job's unit, and what is doubtful about it.
 
     ``wanted`` None: from the scan's noise and from the ``step`` of its depth (0: continuous). Raises InputError for a
     tolerance that is no length of this part.
@@ -41,50 +41,61 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
     if wanted is not None and not LEAST_TOLERANCE * part.diagonal <= wanted <= part.diagonal:
         low, high = LEAST_TOLERANCE * part.diagonal, part.diagonal
         raise InputError(
-            f"tolerance: {wanted:g} {part.unit} is no threshold for a part that is {part.diagonal:.4g} {part.unit} "
+            f"tolerance: {wanted:g} {part.unit} cannot be used for a part that is {part.diagonal:.4g} {part.unit} "
             f"across; give {low:.2g} to {high:.4g}, or auto; is `units` right?"
         )
     least = 1e-4 * part.diagonal
     auto = max(AUTO_TOLERANCE * scan.noise, AUTO_STEPS * step, 2 * part.tessellation_error, least)
     tolerance = wanted or auto
-    warnings = []
+    unit = part.unit
+    found: list[Reason] = []
     if step:
-        warnings.append(
-            f"the scan's depth has steps of {step:.3g}, as of a depth camera: damage shallower than about "
-            f"{AUTO_STEPS * step:.3g} cannot be found in it"
+        least = AUTO_STEPS * step
+        text = (
+            f"the scan's depth has steps of {step:.3g} {unit}, as of a depth camera: damage shallower than about "
+            f"{least:.3g} {unit} cannot be found in it"
         )
+        found.append(Reason("depth_steps", text, amount=least, unit=unit))
     if step and tolerance < step:
-        warnings.append(
-            f"the tolerance {tolerance:.3g} is less than one step of the scan's depth: intact surface may be taken for "
-            f"damage; {AUTO_STEPS * step:.3g} would be safe"
+        text = (
+            f"the tolerance {tolerance:.3g} {unit} is less than one step of the scan's depth: intact surface may be "
+            "taken for damage"
         )
+        remedy = f"{AUTO_STEPS * step:.3g} {unit} would be safe"
+        found.append(Reason("tolerance_small", text, amount=step, unit=unit, remedy=remedy))
     elif tolerance < 3 * scan.noise:
-        warnings.append(
-            f"the tolerance {tolerance:.3g} is less than three times the scan's noise {scan.noise:.3g}: intact surface "
-            f"may be taken for damage; {AUTO_TOLERANCE * scan.noise:.3g} would be safe"
+        text = (
+            f"the tolerance {tolerance:.3g} {unit} is less than three times the scan's noise of {scan.noise:.3g} "
+            f"{unit}: intact surface may be taken for damage"
         )
+        remedy = f"{AUTO_TOLERANCE * scan.noise:.3g} {unit} would be safe"
+        found.append(Reason("tolerance_small", text, amount=scan.noise, unit=unit, remedy=remedy))
     if part.tessellation_error > tolerance / 2:
-        warnings.append(
-            f"the part's triangles deviate from the CAD surface by up to {part.tessellation_error:.3g}, more than half "
-            f"the tolerance {tolerance:.3g}; ask for a finer part.chord, or for a smaller part.angle if that is no help"
+        text = (
+            f"the part's triangles deviate from the CAD surface by up to {part.tessellation_error:.3g} {unit}, more "
+            f"than half the tolerance of {tolerance:.3g} {unit}"
         )
+        remedy = "ask for a finer part.chord, or for a smaller part.angle if that is no help"
+        found.append(Reason("coarse_part", text, amount=part.tessellation_error, unit=unit, remedy=remedy))
     if scan.spacing > 5 * tolerance:
-        warnings.append(
-            f"the scan's points lie {scan.spacing:.3g} apart, far more than the tolerance {tolerance:.3g}: the damage "
-            "surface between them is interpolated"
+        text = (
+            f"the scan's points lie {scan.spacing:.3g} {unit} apart, far more than the tolerance of {tolerance:.3g} "
+            f"{unit}: the damage surface between them is interpolated"
         )
-    return tolerance, warnings
+        found.append(Reason("sparse_scan", text, amount=scan.spacing, unit=unit))
+    return tolerance, found
 
 
-def describe_few(scan: Scan) -> list[str]:
+def describe_few(scan: Scan) -> list[Reason]:
     """A warning where the scan has next to no points; else nothing."""
     count = len(scan.points)
     if count >= FEW_POINTS:
         return []
-    return [
+    text = (
         f"the scan has {count} point{'s' * (count > 1)}, too few to show the skin between them: damage can be anywhere "
         "else"
-    ]
+    )
+    return [Reason("few_points", text, amount=count)]
 
 
 def measure_form_deviation(distance: Floats, within: float) -> float:
@@ -108,7 +119,7 @@ def measure_form_deviation(distance: Floats, within: float) -> float:
     return band / 3.5 if band < 0.5 * within else 0.0
 
 
-def raise_tolerance(tolerance: float, distance: Floats, part: Part, noise: float) -> tuple[float, list[str]]:
+def raise_tolerance(tolerance: float, distance: Floats, part: Part, noise: float) -> tuple[float, list[Reason]]:
     """Lambda for a scan whose intact points deviate by more than its noise, and a warning that says so; else the same.
 
     ``tolerance``: chosen from the noise before the alignment. ``distance`` (N,): signed, of the aligned points.
@@ -117,11 +128,12 @@ def raise_tolerance(tolerance: float, distance: Floats, part: Part, noise: float
     needed = AUTO_TOLERANCE * deviation
     if needed <= RAISE * tolerance:
         return tolerance, []
-    return needed, [
+    text = (
         f"intact surface deviates from the part by {deviation:.3g} (standard deviation), far more than the scan's "
         f"noise of {noise:.3g}: form errors of scanner or part, or an inexact pose; tolerance: auto was raised from "
         f"{tolerance:.3g} to {needed:.3g}, and shallower damage is not found"
-    ]
+    )
+    return needed, [Reason("tolerance_raised", text, amount=needed, unit=part.unit)]
 
 
 def require_intact(distance: Floats, tolerance: float, part: Part) -> None:
@@ -151,7 +163,7 @@ def require_intact(distance: Floats, tolerance: float, part: Part) -> None:
     )
 
 
-def check_walls(tolerance: float, part: Part) -> list[str]:
+def check_walls(tolerance: float, part: Part) -> list[Reason]:
     """A warning where the tolerance is so large that damage cannot be found in the part's walls; else nothing."""
     from damageest.geometry.rays import RayCaster
     from damageest.geometry.sampling import sample_by_area
@@ -167,7 +179,8 @@ def check_walls(tolerance: float, part: Part) -> list[str]:
     if thin < 0.1:
         return []
     walls = f"{float(np.quantile(thickness, 0.1)):.3g} {part.unit} thick where they are thin"
-    return [
+    text = (
         f"the tolerance {tolerance:.3g} {part.unit} is more than half the thickness of the part's walls on {thin:.0%} "
         f"of its surface (walls are {walls}): no damage can be found there"
-    ]
+    )
+    return [Reason("thin_walls", text, amount=thin)]

@@ -1,8 +1,9 @@
 """The 95 % intervals of volumes and depths: what the errors of a site add up to, and those of all sites together.
 
 Errors that have nothing to do with one another add as squares: those of noise, of the spacing and of the rim. Errors
-that all sites share add as they are: a wrong pose moves all inner surfaces, and a deviating form is everywhere.
-What unseen surface may hide, and what fades out, makes a volume larger and never smaller.
+that all sites share add as they are: a wrong pose moves all inner surfaces, and a deviating form is everywhere. Motions
+that the scan does not exclude move the ends of the interval: any amount of them is as likely. What unseen surface may
+hide, and what fades out, makes a volume larger and never smaller.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import Evidence, Flags, Floats, Part, Scan, Solid
+from damageest.artefacts import Evidence, Flags, Floats, FreeMotion, Part, Scan, Solid
 from damageest.checks.inner_surface import measure_inner_surface, pair_faces
 from damageest.checks.pose_error import PoseError
-from damageest.checks.verdict import GAP
-from damageest.findings import Coverage, Fading, Interval
+from damageest.findings import Coverage, Interval
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby
+from damageest.rules import ScanFacts
+from damageest.rules.inner_surface import GAP
 
 WIDTH = 2.0
 """Half the width of a 95 % interval in standard deviations."""
@@ -27,6 +29,9 @@ HOLE = 0.5
 """Depth that a hole in the scan of an inner surface may hide, in square roots of its area."""
 FLAT, SMOOTH = 0.05, 30.0
 """Angles in degrees between triangles that are chords of one curved face."""
+OUTWARD = 0.3
+"""Share of a site's area that skin which lies outside by some tolerances has to have, to be the sign of one error: no
+damage puts skin outside."""
 ASKED = 2000
 """Scan points among which the deepest ones of a site are looked for."""
 MOST = 50_000
@@ -48,9 +53,10 @@ class SiteError:
     """The errors of one site's volume, each as one standard deviation, and of its largest depth.
 
     ``pose`` (K,): signed, by the columns of `PoseError.spread`; ``excess``: by how much the volume is too large on
-    average; ``inside``, ``beside``, ``fading``: by how much the loss may be larger. ``depth``: of the damage volume,
-    corrected for its mean error; ``depth_error``: one standard deviation. ``measured``: the largest depth of a scan
-    point, with what its noise, the pose and the skin may be off.
+    average; ``rates`` (M,): change of the volume for each unit of each free motion, and ``motions`` (M,2): their ends;
+    ``inside``, ``beside``, ``fading``: by how much the loss may be larger. ``depth``: of the damage volume, corrected
+    for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free motions.
+    ``measured``: the largest depth of a scan point, with what its noise, the pose and the skin may be off.
     """
 
     volume: float
@@ -61,26 +67,39 @@ class SiteError:
     pose: Floats = field(default_factory=lambda: np.empty(0))
     tessellation: float = 0.0
     form: float = 0.0
+    outward: float = 0.0
+    views: float = 0.0
+    rates: Floats = field(default_factory=lambda: np.empty(0))
+    motions: Floats = field(default_factory=lambda: np.empty((0, 2)))
     inside: float = 0.0
     beside: float = 0.0
     fading: float = 0.0
     depth: float = 0.0
     depth_error: float = 0.0
     measured: float = np.inf
+    depth_free: float = 0.0
+
+    @property
+    def free(self) -> Interval:
+        """Least and largest change of the volume by the free motions."""
+        return _sweep(self.rates, self.motions)
 
 
 def measure_site_error(
     damage: Solid, inner: Flags, part: Part, aligned: Scan, members: Floats, evidence: Evidence, pose: PoseError,
-    tolerance: float, form: float = 0.0,
+    scan: ScanFacts, form: float = 0.0, free: Sequence[FreeMotion] = (),
 ) -> SiteError | None:  # fmt: skip
     """The errors of one site; None where no scan point lies on its inner surface.
 
     Args:
         inner: (F,) which faces of ``damage`` are on its inner surface, as `find_inner_faces` gives them.
         members: (M,3) its scan points, in the part's frame.
+        scan: what the whole scan says about skin that deviates.
         form: standard deviation by which the skin deviates systematically, in the job's unit, as a fit of the model
             gives it; where it is less than what the intact skin shows, the latter counts.
+        free: motions that the scan does not exclude.
     """
+    tolerance = scan.tolerance
     surface = measure_inner_surface(damage, inner, members, aligned.noise, aligned.spacing, tolerance)
     if surface is None or inner.all():
         return None
@@ -88,12 +107,13 @@ def measure_site_error(
     skin = ~inner
     skin_area = float(area[skin].sum())
     patches = max(1.0, skin_area / max(pose.patch_area, 1e-300))
-    systematic = max(form, pose.systematic)
+    systematic = max(pose.systematic, scan.systematic)
+    outward = _limit_outward(scan, skin_area)
     chord = part.tessellation_error * _measure_curved(damage, skin, area) if part.tessellation_error else 0.0
     hole = evidence.ids_gap if evidence.ids_gap > GAP * max(tolerance, aligned.spacing) ** 2 else 0.0
     deepest = _find_deepest(damage, inner, part, members, 3 * max(surface.gap, tolerance))
     by_pose = pose.of_distance(deepest.at, deepest.normal)
-    beside = by_pose**2 + systematic**2 + part.tessellation_error**2 / 3
+    beside = by_pose**2 + max(form, systematic) ** 2 + part.tessellation_error**2 / 3
     by_point = float(np.sqrt(aligned.noise**2 + beside))
     return SiteError(
         volume=damage.volume,
@@ -104,19 +124,25 @@ def measure_site_error(
         pose=pose.of_volume(damage.triangles[skin].mean(axis=1), damage.face_normals[skin], area[skin]),
         tessellation=chord / np.sqrt(3),
         # a form that a fit gives is common to the whole site; that of patches is different in each
-        form=float(max(form * skin_area, pose.systematic * skin_area / np.sqrt(patches))),
+        form=float(max(form * skin_area, systematic * skin_area / np.sqrt(patches))),
+        outward=outward * skin_area / WIDTH,
+        views=scan.between_views * skin_area / WIDTH,
         inside=HOLE * hole**1.5,
         depth=deepest.depth - surface.depth_excess,
         depth_error=float(np.sqrt(surface.depth**2 + beside)),
         measured=deepest.measured + WIDTH * by_point,
+        depth_free=sum(
+            max(-one.low, one.high) * abs(float(one.move(deepest.at[None])[0] @ deepest.normal)) for one in free
+        ),
     )
 
 
 def combine_site(error: SiteError) -> tuple[Interval, Interval]:
     """The 95 % intervals of volume and depth of one site. No depth is beyond what its scan points show."""
     depth = min(error.depth, error.measured)
-    depth_high = min(depth + WIDTH * error.depth_error, error.measured)
-    return combine_total(error.volume, [error]), (max(depth - WIDTH * error.depth_error, 0.0), depth_high)
+    depth_high = min(depth + WIDTH * error.depth_error, error.measured) + error.depth_free
+    depth_low = depth - WIDTH * error.depth_error - error.depth_free
+    return combine_total(error.volume, [error]), (max(depth_low, 0.0), depth_high)
 
 
 def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 0.0) -> Interval:
@@ -127,14 +153,28 @@ def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 
     if not errors:
         return volume, volume + doubtful
     alone = np.array([[one.noise, one.spacing, one.rim] for one in errors])
-    shared = np.array([[one.form, one.tessellation] for one in errors]).sum(axis=0)
+    shared = np.array([[one.form, one.tessellation, one.outward, one.views] for one in errors]).sum(axis=0)
     moved = np.sum([one.pose for one in errors], axis=0)
     deviation = float(np.sqrt((alone**2).sum() + (shared**2).sum() + (moved**2).sum()))
     more = sum(one.inside + one.beside + one.fading for one in errors)
+    free = _sweep(np.sum([one.rates for one in errors], axis=0), errors[0].motions)
     middle = volume - sum(one.excess for one in errors)
-    low = min(middle - WIDTH * deviation, volume)
-    high = max(middle + WIDTH * deviation, volume) + more
+    low = min(middle - WIDTH * deviation, volume) + free[0]
+    high = max(middle + WIDTH * deviation, volume) + free[1] + more
     return max(low, 0.0), high + doubtful
+
+
+def _sweep(rates: Floats, motions: Floats) -> Interval:
+    """Least and largest sum of changes at rates (M,) by motions between their ends (M,2), 0 among them."""
+    ends = rates[:, None] * motions
+    low, high = np.minimum(ends.min(axis=1, initial=0), 0).sum(), np.maximum(ends.max(axis=1, initial=0), 0).sum()
+    return float(low), float(high)
+
+
+def _limit_outward(scan: ScanFacts, skin_area: float) -> float:
+    """Height up to which the loss may come from the same error as skin that lies outside; 0 where there is too little
+    of it."""
+    return scan.outward_height if scan.outward_area > OUTWARD * skin_area else 0.0
 
 
 def limit_beside(coverage: Coverage, damage: Solid, reach: float, depth: float) -> float:
@@ -148,17 +188,6 @@ def limit_beside(coverage: Coverage, damage: Solid, reach: float, depth: float) 
     touched = np.unique(coverage.region[near[distance_to_mesh(centres[near], damage) < reach]])
     regions = [coverage.unseen[number] for number in touched]
     return float(sum(min(one.volume, one.area * depth) for one in regions))
-
-
-def describe_fading(fading: Fading, volume: float, unit: str, tolerance: float) -> str:
-    """In words, how the volume of a shallow loss depends on where it is taken to end."""
-    share = fading.beyond / max(volume, 1e-300)
-    return (
-        "it is shallow, and the lost volume depends on the depth from which it counts: "
-        f"{fading.half:.4g} {unit}³ from half the tolerance of {tolerance:.3g} {unit} on, {fading.at:.4g} from the "
-        f"tolerance on, {fading.twice:.4g} from twice the tolerance on; {fading.beyond:.3g} {unit}³ ({share:.1%}) fade "
-        "out beyond its rim"
-    )
 
 
 def _find_deepest(damage: Solid, inner: Flags, part: Part, members: Floats, reach: float) -> _Place:

@@ -10,24 +10,6 @@ from damageest.findings import Coverage
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.skin import find_inner_faces
 
-ASKED, AGAINST = 0.08, 0.3
-"""Share of the rim beside unseen skin from which it is open where the damage ends there; from the second one on the
-volume is doubtful."""
-
-
-def ask_unseen_rim(
-    damage: Solid, part: Part, coverage: Coverage, reach: float
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What speaks against a damage volume, and what stays open, because its rim lies within ``reach`` of unseen skin.
-
-    Worn skin may go on where the scan does not show it: a bore that was scanned from both ends looks worn at the ends.
-    """
-    share = measure_unseen_rim(damage, part, coverage, reach)
-    if share < ASKED:
-        return (), ()
-    text = f"{share:.0%} of its rim lies beside skin that the scan does not show: the damage may go on there"
-    return ((text,), ()) if share > AGAINST else ((), (text,))
-
 
 def measure_unseen_rim(damage: Solid, part: Part, coverage: Coverage, reach: float) -> float:
     """Share of the length of the rim within ``reach`` of an unseen region of the skin; 0 without a rim.

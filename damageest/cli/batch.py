@@ -135,13 +135,15 @@ def _print(rows: Sequence[Row], out: Path) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from damageest.batches.rows import show_interval
+
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in ("job", "outcome", "verdict", "volume", "95 %", "s"):
         table.add_column(name, justify="right" if name in ("volume", "95 %", "s") else "left")
     for row in rows:
         volume = f"{row.damage_volume:.5g} {row.units}³" if row.sites and row.damage_volume is not None else ""
-        interval = f"{row.volume_95[0]:.4g} to {row.volume_95[1]:.4g}" if row.volume_95 and row.sites else ""
+        interval = show_interval(row.volume_95) if row.volume_95 and row.sites else ""
         outcome = Text(row.outcome, style="" if row.ran else "red")
         table.add_row(Text(row.name), outcome, Text(row.verdict), volume, interval, f"{row.seconds:.1f}")
     console.print(table)

@@ -41,7 +41,8 @@ def command(
         )
     source = {"version": 1, "units": units, "part": str(part), "scan": str(scan)}
     registry = Registry.discover()
-    solid, cloud, tolerance, cautions = inspect_inputs(load(source, registry), registry)
+    solid, cloud, tolerance, doubts = inspect_inputs(load(source, registry), registry)
+    cautions = list(map(str, doubts))
     if swapped := _find_swap(part, scan, solid, cloud):
         cautions = [swapped, *cautions]
     paths = [os.path.relpath(path.resolve(), target.resolve().parent) for path in (part, scan)]

@@ -146,28 +146,19 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
     return status
 
 
-def _list_reasons(result: Result) -> list[str]:
-    return [
-        f"site {site.id} is {site.verdict.level}: {reason}" for site in result.sites for reason in site.verdict.reasons
-    ]
+def _list_notes(result: Result) -> list[str]:
+    """What is said about the run, and about its sites: each reason once, with the sites that have it."""
+    from damageest.rules.notes import fold_notes, join_reasons
 
-
-def _list_uncertainties(result: Result) -> list[str]:
-    return [
-        f"site {site.id}: {reason}"
-        for site in result.sites
-        if site.uncertainty and site.accepted
-        for reason in site.uncertainty.reasons
-    ]
-
-
-def _format_interval(interval: tuple[float, float] | None) -> str:
-    """As "98.2 to 101", or a dash where there is none."""
-    return "–" if interval is None else f"{interval[0]:.4g} to {interval[1]:.4g}"
-
-
-def _list_warnings(result: Result) -> list[str]:
-    return [f"site {site.id}: {note}" for site in result.sites for note in site.warnings]
+    notes = [str(note) for note in fold_notes(result.warnings)]
+    for level in ("doubtful", "likely", "proven"):
+        chosen = [site for site in result.sites if site.verdict.level == level]
+        told = [(site.id, reason) for site in chosen for reason in site.verdict.reasons]
+        for one in join_reasons(told):
+            verb = "is" if len(one.sites) == 1 else "are"
+            notes.append(f"{one.names} {verb} {level}: {one.reason}")
+    told = [(site.id, note) for site in result.sites for note in site.warnings]
+    return notes + [f"{one.names}: {one.reason}" for one in join_reasons(told)]
 
 
 def _on_seen(result: Result) -> str:
@@ -212,6 +203,8 @@ def _print_table(result: Result, target: Path) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from damageest.findings import describe_interval
+
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
 
     def show(text: str, label: str = "", style: str = "") -> None:
@@ -232,9 +225,9 @@ def _print_table(result: Result, target: Path) -> None:
                 stock = getattr(site.deposit, "stock_volume", None)
                 numbers += [f"{site.deposit.volume:.6g}" if site.deposit else "–"]
                 numbers += ["–" if stock is None else f"{stock:.6g}"]
-            table.add_row(str(site.id), *numbers, _format_interval(site.volume_95), site.method, verdict)
+            table.add_row(str(site.id), *numbers, describe_interval(site.volume_95), site.method, verdict)
         console.print(table)
-        known = "" if result.volume_95 is None else f" (95 %: {_format_interval(result.volume_95)})"
+        known = "" if result.volume_95 is None else f" (95 %: {describe_interval(result.volume_95)})"
         show(f"damage volume: {result.damage_volume:.6g} {unit}³{known}; part volume: {result.part.volume:.6g} {unit}³")
     elif not result.failures:
         depth = f"{result.tolerance:.4g} {unit}"
@@ -246,7 +239,7 @@ def _print_table(result: Result, target: Path) -> None:
         show(_describe_surplus(item, unit))
     for text in result.failures:
         show(f" {text}", "failed:", "red")
-    for text in (*result.warnings, *_list_reasons(result), *_list_warnings(result), *_list_uncertainties(result)):
+    for text in _list_notes(result):
         show(f" {text}", "note:", "yellow")
     show(f"written to {target}")
 

@@ -1,4 +1,4 @@
-"""`damageest schema`: prints the JSON Schemas, for editors and for checks by other programs."""
+"""`damageest schema`: prints the JSON Schemas, for editors and for checks by other programs, and the reasons."""
 
 from __future__ import annotations
 
@@ -15,18 +15,28 @@ from damageest.cli._streams import keep_for_results, say_result
 class SchemaName(StrEnum):
     job = "job"
     result = "result"
+    reasons = "reasons"
 
 
 def command(
     which: Annotated[
-        SchemaName, typer.Argument(help="job: schema of the job file; result: schema of result.json.")
+        SchemaName,
+        typer.Argument(
+            help="job: schema of the job file; result: schema of result.json; reasons: the codes of reasons, as tables."
+        ),
     ] = SchemaName.job,
 ) -> None:
-    """Print the JSON Schema of the job file, with the options of all installed plugins, or of result.json."""
+    """Print the JSON Schema of the job file, with the options of all installed plugins, or of result.json, or the
+    table of all reasons."""
     from damageest.job.schema import job_schema
     from damageest.output.result_json import result_schema
     from damageest.registry import Registry
+    from damageest.rules.reference import format_reasons
 
     with keep_for_results(for_good=_process.is_command):
-        content = job_schema(Registry.discover()) if which is SchemaName.job else result_schema()
+        registry = Registry.discover()
+        if which is SchemaName.reasons:
+            say_result(format_reasons(registry.rules).rstrip("\n"))
+            return
+        content = job_schema(registry) if which is SchemaName.job else result_schema()
         say_result(json.dumps(content, indent=2))

@@ -79,11 +79,11 @@ def describe(result: Any) -> dict[str, Any]:
             "volume": site.damage.volume,
             "surface_area": site.surface.area,
             "max_depth": site.max_depth,
-            "verdict": {"level": site.verdict.level, "reasons": list(site.verdict.reasons)},
+            "verdict": {"level": site.verdict.level, "reasons": [vars(reason) for reason in site.verdict.reasons]},
             "accepted": site.accepted,
             "deposit": None,
             "files": {"damage": f"damage/site-{site.id}.stl", "surface": None, "deposit": None, "every": []},
-            "warnings": list(site.warnings),
+            "warnings": [vars(reason) for reason in site.warnings],
         }
         for site in result.sites
     ]
@@ -109,6 +109,6 @@ def describe(result: Any) -> dict[str, Any]:
         "truth": None,
         "stages": [],
         "failures": list(result.failures),
-        "warnings": list(result.warnings),
+        "warnings": [vars(reason) for reason in result.warnings],
         "versions": {"damageest": "0"},
     }  # fmt: skip

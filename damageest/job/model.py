@@ -20,6 +20,9 @@ from damageest.stages.enclose import EncloseAll
 Unit = Literal["um", "mm", "cm", "m", "in", "ft"]
 
 
+Accept = Literal["proven", "likely", "all"] | tuple[PositiveInt, ...]
+
+
 Corner = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
@@ -57,8 +60,10 @@ class Header(Options):
         "sites that it fails on or that the scan contradicts; plugins may add others",
     )
     sites: SiteChoice = Field(SiteChoice(), description="sites to drop, to merge and to keep")
-    accept: Literal["all"] | tuple[PositiveInt, ...] = Field(
-        (), description="numbers of doubtful sites to take over as damage all the same, or all; default: none"
+    accept: Accept = Field(
+        "likely",
+        description="which sites are damage: proven, likely (and proven) or all; or numbers of doubtful sites to take "
+        "beside those that are likely",
     )
     output: Path | None = Field(None, description="output folder; default: out/<name>, beside the job file")
 
@@ -82,7 +87,7 @@ class Job:
     output: Path
     source: str
     sites: SiteChoice = field(default_factory=SiteChoice)
-    accept: Literal["all"] | tuple[int, ...] = ()
+    accept: Accept = "likely"
     given: Mapping[Contract, Any] = field(default_factory=dict)
     make_fault: Callable[..., Fault] = field(default=_make_fault, compare=False)
 

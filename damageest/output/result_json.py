@@ -12,6 +12,7 @@ from damageest.output.deviation_json import DeviationReport, report_deviation
 from damageest.output.fit_json import FitReport, report_fit
 from damageest.output.free_json import FreeMotionReport, report_free_motion
 from damageest.output.provenance import ProvenanceReport
+from damageest.output.reason_json import ReasonReport, report_reasons
 from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
 from damageest.output.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
 from damageest.output.uncertainty_json import report_interval
@@ -48,7 +49,7 @@ class AlignmentReport(JsonModel):
     inliers: float = Field(description="share of the scan's points")
     alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
     notes: list[str]
-    doubts: list[str] = Field(description="those of the notes that make every site doubtful")
+    doubts: list[ReasonReport] = Field(description="what speaks against the pose, and so against every site")
     free: list[FreeMotionReport] = Field(
         description="motions after which the scan fits as well, since no unworn skin holds it"
     )
@@ -95,13 +96,15 @@ class Report(JsonModel):
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
     export: ExportReport
     damage_volume: float
-    volume_95: tuple[float, float] | None = Field(description="95 % interval of `damage_volume`; null: there is none")
+    volume_95: tuple[float, float | None] | None = Field(
+        description="95 % interval of `damage_volume`, its high end null where nothing limits it; null: there is none"
+    )
     undamaged_volume: float
     material: MaterialReport = Field(description="what the whole repair takes")
     truth: TruthReport | None
     stages: list[StageReport]
     failures: list[str] = Field(description="sites without a damage volume or a deposit, and why")
-    warnings: list[str]
+    warnings: list[ReasonReport] = Field(description="about the whole run, those first that may change a decision")
     versions: dict[str, str]
     provenance: ProvenanceReport | None = Field(None, description="null in a result that is not in files")
 
@@ -148,7 +151,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             inliers=pose.inliers,
             alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
             notes=list(pose.notes),
-            doubts=list(pose.doubts),
+            doubts=report_reasons(pose.doubts),
             free=[report_free_motion(motion) for motion in pose.free],
             held=pose.is_held,
         ),
@@ -165,7 +168,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
         truth=_report_truth(result),
         stages=[StageReport(**vars(record)) for record in result.stages],
         failures=list(result.failures),
-        warnings=list(result.warnings),
+        warnings=report_reasons(result.warnings),
         versions={"damageest": version("damageest"), "python": platform.python_version()},
     )
     return filled.model_dump(mode="json", by_alias=True)

@@ -10,6 +10,7 @@ from pydantic import Field
 from damageest.artefacts import Deposit, Vector
 from damageest.output.base import JsonModel
 from damageest.output.path_json import PathReport, report_path
+from damageest.output.reason_json import ReasonReport, report_reasons
 from damageest.output.uncertainty_json import UncertaintyReport, report_interval, report_uncertainty
 from damageest.result import Site
 from damageest.stages.export import ExactForm, ExportedFiles
@@ -24,12 +25,12 @@ class EvidenceReport(JsonModel):
     ids_gap: float = Field(description="area of the largest connected piece of inner surface without scan points near")
     intact_share: float = Field(description="share of the removed skin, rim included, that intact points lie on")
     consistent: bool = Field(description="whether the scan agrees with the damage volume")
-    reasons: list[str] = Field(description="why it is not")
+    causes: list[str] = Field(description="the checks that say it does not")
 
 
 class VerdictReport(JsonModel):
     level: Literal["proven", "likely", "doubtful"]
-    reasons: list[str] = Field(description="what speaks against it, or could not be tested")
+    reasons: list[ReasonReport] = Field(description="why, those first that change the verdict most")
 
 
 class FilesReport(JsonModel):
@@ -108,8 +109,12 @@ class SiteReport(JsonModel):
     id: int
     points: int
     volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
-    volume_95: tuple[float, float] | None = Field(description="95 % interval of `volume`; null where there is none")
-    depth_95: tuple[float, float] | None = Field(description="95 % interval of the largest depth, before a cut-back")
+    volume_95: tuple[float, float | None] | None = Field(
+        description="95 % interval of `volume`, its high end null where nothing limits it; null where there is none"
+    )
+    depth_95: tuple[float, float | None] | None = Field(
+        description="95 % interval of the largest depth, before a cut-back"
+    )
     uncertainty: UncertaintyReport | None
     surface_area: float = Field(description="of the inner damage surface")
     max_depth: float = Field(description="of the scan below the nominal surface")
@@ -127,7 +132,7 @@ class SiteReport(JsonModel):
     files: FilesReport
     spline: SplineReport | None = Field(description="null where the job asks for none")
     exact: ExactReport | None = Field(description="null where no STEP is asked for, or the part has no CAD faces")
-    warnings: list[str]
+    warnings: list[ReasonReport] = Field(description="what stages said about it; they change no verdict")
 
 
 def index_files(files: Iterable[str]) -> dict[str, list[str]]:
@@ -146,7 +151,6 @@ def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str
     spline, exact = written.splines.get(site.id), written.exact.get(site.id)
 
     low, high = site.damage.bounds.tolist()
-    evidence = {name: value for name, value in vars(site.evidence).items() if name not in ("reasons", "causes")}
     return SiteReport(
         id=site.id,
         points=len(site.points),
@@ -162,15 +166,15 @@ def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str
         method=site.method,
         deposit=_report_deposit(site),
         path=report_path(site, written),
-        evidence=EvidenceReport(**evidence, reasons=list(site.evidence.reasons)),
-        verdict=VerdictReport(level=site.verdict.level, reasons=list(site.verdict.reasons)),
+        evidence=EvidenceReport(**{**vars(site.evidence), "causes": list(site.evidence.causes)}),
+        verdict=VerdictReport(level=site.verdict.level, reasons=report_reasons(site.verdict.reasons)),
         accepted=site.accepted,
         files=FilesReport(
             **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
         ),
         spline=SplineReport(**vars(spline)) if spline else None,
         exact=_report_exact(exact) if exact else None,
-        warnings=list(site.warnings),
+        warnings=report_reasons(site.warnings),
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from pydantic import Field
 
 from damageest.findings import Interval
@@ -19,7 +21,8 @@ class FadingReport(JsonModel):
 
 
 class UncertaintyReport(JsonModel):
-    """The causes. The first six are standard deviations of the volume; the next two, how much larger it may be."""
+    """The causes. The first eight are standard deviations of the volume; `free`: its change at the ends of motions that
+    the scan does not exclude; the next two, how much larger it may be."""
 
     noise: float = Field(description="noise of the points on the inner surface")
     spacing: float = Field(description="the surface between the points, above all beside the rim")
@@ -27,15 +30,20 @@ class UncertaintyReport(JsonModel):
     pose: float = Field(description="pose of the scan")
     tessellation: float = Field(description="triangles in place of the CAD surface")
     form: float = Field(description="skin that deviates over whole areas")
+    outward: float = Field(description="skin that lies as far outside the part")
+    views: float = Field(description="views that differ where they overlap")
+    free: tuple[float, float] = Field(description="least and largest change")
     inside: float = Field(description="where no points show the inner surface")
     beside: float = Field(description="where no points show the skin beside it")
     fading: FadingReport | None = Field(description="of a loss that is shallow; null for one with a sharp rim")
-    reasons: list[str] = Field(description="why there is no interval, or why it is wide")
 
 
-def report_interval(interval: Interval | None) -> Interval | None:
-    """The interval as result.json has it."""
-    return None if interval is None else (float(interval[0]), float(interval[1]))
+def report_interval(interval: Interval | None) -> tuple[float, float | None] | None:
+    """The interval as result.json has it: an open end is None."""
+    if interval is None:
+        return None
+    low, high = map(float, interval)
+    return low, high if math.isfinite(high) else None
 
 
 def report_uncertainty(site: Site) -> UncertaintyReport | None:
@@ -44,5 +52,5 @@ def report_uncertainty(site: Site) -> UncertaintyReport | None:
     if found is None:
         return None
     fading = FadingReport(**vars(found.fading)) if found.fading else None
-    values = {k: v for k, v in vars(found).items() if k not in ("volume_95", "depth_95", "fading", "reasons")}
-    return UncertaintyReport(**values, fading=fading, reasons=list(found.reasons))
+    values = {k: v for k, v in vars(found).items() if k not in ("volume_95", "depth_95", "fading")}
+    return UncertaintyReport(**values, fading=fading)

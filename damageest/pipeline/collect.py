@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
-from damageest.checks.verdict import FEW
 from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid, unite
 from damageest.geometry.transforms import move_points
@@ -16,6 +15,7 @@ from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.pipeline.uncertainty import shift_interval, shift_uncertainty
 from damageest.result import Result, Site
+from damageest.rules.notes import make_notes, rank_notes
 
 
 def collect_result(engine: Engine, work: Work) -> Work:
@@ -53,7 +53,7 @@ def collect_result(engine: Engine, work: Work) -> Work:
         sites=sites,
         damage=damage,
         undamaged=to_solid(subtract_lost(to_manifold(part, origin), lost), origin) if sites else part,
-        warnings=tuple(dict.fromkeys(work.warnings)),
+        warnings=rank_notes(work.warnings),
         failures=tuple(str(error) for error in work.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance),
         stages=tuple(engine.records),
@@ -70,16 +70,15 @@ def collect_result(engine: Engine, work: Work) -> Work:
 
 
 def _describe_site(found: FoundSite) -> Site:
-    evidence, members, warnings = found.evidence, found.members, found.notes
-    if 0 < len(members) < FEW:
-        warnings = ("scan it more densely for a reliable volume", *warnings)
+    evidence, members = found.evidence, found.members
+    warnings = make_notes("enclose", found.notes)
     deposit, damage = found.deposit, found.damage
     if isinstance(deposit, Deposit):
         damage = deposit.cavity or damage
-        warnings += deposit.notes
+        warnings += make_notes("allowance", deposit.notes)
     path = found.path
     if path is not None:
-        warnings += tuple(f"path: {note}" for note in path.notes)
+        warnings += make_notes("path", path.notes)
     return Site(
         id=found.number,
         clusters=found.clusters,
@@ -91,7 +90,7 @@ def _describe_site(found: FoundSite) -> Site:
         verdict=found.verdict,
         accepted=found.accepted,
         uncertainty=shift_uncertainty(found.uncertainty, damage.volume - found.damage.volume),
-        volume_rates=found.volume_rates,
+        volume_rates=tuple(one.rate for one in found.dependences),
         enclosures=found.enclosures if damage is found.damage else (),
         path=path,
         method=found.method,

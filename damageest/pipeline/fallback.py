@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+from damageest.artefacts import Reason
 from damageest.errors import StageError
 from damageest.pipeline.engine import Engine, Route, Step, follow
 from damageest.pipeline.state import FoundSite, Work
@@ -24,7 +25,9 @@ def fall_back(first: Route, second: Route) -> Step:
             tried = follow(first, engine, replace(work, failures=()))
         except StageError as error:
             text = str(error).partition("\n")[0]  # its remedy is another method, and that is what follows
-            tried = replace(work, warnings=(*work.warnings, f"fell back to method surface: {text}"))
+            tried = replace(
+                work, warnings=(*work.warnings, Reason("fell_back", f"fell back to method surface: {text}"))
+            )
         agreed = {cluster for site in tried.sites if site.evidence.consistent for cluster in site.clusters}
         wanted = tuple(k for k in range(1, work.job.sites.count + 1) if k not in agreed)
         if not wanted:

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Floats, Scan
+from damageest.artefacts import Floats, Reason, Scan
 from damageest.checks.fit_doubts import find_fit_doubts
-from damageest.checks.form_words import describe_fit, name_model
+from damageest.checks.form_words import describe_fit
 from damageest.checks.model_fit import FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import fit_views
@@ -23,8 +23,6 @@ from damageest.stages.scan import ReadScan
 
 MEASURED = 40_000
 """Points, about, that the scale is measured with before it is corrected."""
-NEAR, CLEAR = 2.0, 4.0
-"""Depth of a site over the systematic deviation there, below which it is doubtful, and below which it is open."""
 
 
 def correct_scan(engine: Engine, work: Work) -> Work:
@@ -108,32 +106,10 @@ def fit_model(engine: Engine, work: Work) -> Work:
     sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.tolerance, JobState.views)
     state = state.derive(JobState.fitted, found, *sources)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
-    words = (found.fit.words,) if found is not None and told else ()
-    return replace(work, job=state, warnings=(*work.warnings, *words))
-
-
-def question_sites(engine: Engine, work: Work) -> Work:
-    """Doubts sites that are not deeper than the systematic deviation of the intact skin there."""
-    state = work.job
-    if state.fitted is None or state.fitted.fit.model == "ok":
-        return work
-    sites = []
-    for site in work.sites:
-        if not len(site.members):
-            sites.append(site)
-            continue
-        local = measure_at_site(state, site)
-        depth = float(np.quantile(-state.deviation.distance[site.members], 0.95))
-        text = (
-            f"it is {depth:.3g} {state.unit} deep, and intact skin deviates by about {local:.3g} {state.unit} there: "
-            f"{name_model(state.fitted.fit)}"
-        )
-        if depth < NEAR * local:
-            site = replace(site, doubts=(*site.doubts, text))
-        elif depth < CLEAR * local:
-            site = replace(site, questions=(*site.questions, text))
-        sites.append(site)
-    return replace(work, sites=tuple(sites))
+    if found is not None and told:
+        warning = Reason("model_fit", found.fit.words, amount=found.fit.amount, unit=state.unit)
+        work = replace(work, warnings=(*work.warnings, warning))
+    return replace(work, job=state)
 
 
 def question_fit(engine: Engine, work: Work) -> Work:
@@ -151,8 +127,9 @@ def question_fit(engine: Engine, work: Work) -> Work:
     fit = describe_fit(replace(before, model="open"), state.unit, state.tolerance, doubts)
     key = digest("questioned", state.key("fitted"), doubts)
     state = state.with_value(JobState.fitted, replace(state.fitted, fit=fit), key)
-    warnings = tuple(text for text in work.warnings if text != before.words)
-    return replace(work, job=state, warnings=(*warnings, fit.words))
+    # a scale that was corrected was told as a note, in words that are true no more
+    warnings = tuple(note for note in work.warnings if note.code != "model_fit")
+    return replace(work, job=state, warnings=(*warnings, Reason("model_fit", fit.words)))
 
 
 def measure_at_site(state: JobState, site: FoundSite) -> float:

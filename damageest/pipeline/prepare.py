@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from damageest.artefacts import INTACT, Part, Scan
+from damageest.artefacts import INTACT, Part, Reason, Scan
 from damageest.checks.scan_quality import check_walls, choose_tolerance, describe_few, raise_tolerance, require_intact
 from damageest.errors import InputError, StageError
 from damageest.geometry.crops import crop_points
@@ -20,6 +20,7 @@ from damageest.pipeline.engine import Engine, follow, start
 from damageest.pipeline.large_scans import check_crops
 from damageest.pipeline.state import JobState, Work
 from damageest.registry.registry import Registry
+from damageest.rules.notes import make_notes
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
@@ -52,7 +53,7 @@ def set_far_aside(engine: Engine, work: Work) -> Work:
     scan = state.scan.take(~far)
     scan = replace(scan, notes=(*scan.notes, text))
     state = state.derive(JobState.scan, scan, JobState.scan, JobState.part)
-    return replace(work, job=state, warnings=(*work.warnings, text))
+    return replace(work, job=state, warnings=(*work.warnings, Reason("far_points", text, amount=int(far.sum()))))
 
 
 def measure_scan(engine: Engine, work: Work) -> Work:
@@ -69,7 +70,7 @@ def measure_scan(engine: Engine, work: Work) -> Work:
     tolerance, warnings = choose_tolerance(engine.job.tolerance, scan, part, step)
     warnings = [*describe_few(scan), *warnings]
     if wrong_unit := diagnose_size(part.vertices, part.unit):
-        warnings = [wrong_unit, *warnings]
+        warnings = [Reason("unit", wrong_unit), *warnings]
     state = state.derive(JobState.scan, scan, JobState.scan)
     state = state.with_value(JobState.tolerance, tolerance, digest(tolerance))
     return replace(work, job=state, warnings=(*work.warnings, *warnings))
@@ -89,7 +90,7 @@ def place_scan(engine: Engine, work: Work) -> Work:
     state = state.derive(JobState.aligned, scan.move(pose.T_part_scan), JobState.scan, JobState.pose)
     state = state.derive(JobState.noise, scan.noise, JobState.scan)
     state = state.derive(JobState.spacing, scan.spacing, JobState.scan)
-    return replace(work, job=state, warnings=(*work.warnings, *pose.notes))
+    return replace(work, job=state, warnings=(*work.warnings, *make_notes("align", pose.notes)))
 
 
 def settle_tolerance(engine: Engine, work: Work) -> Work:
@@ -97,7 +98,7 @@ def settle_tolerance(engine: Engine, work: Work) -> Work:
     Warns of a tolerance that the part's walls are too thin for."""
     state = work.job
     part, points, tolerance = state.part, state.aligned.points, state.tolerance
-    warnings: list[str] = []
+    warnings: list[Reason] = []
     if engine.job.tolerance is None and len(points):
         distance = signed_distance(points[:: max(1, math.ceil(len(points) / COMPARED))], part)[0]
         tolerance, warnings = raise_tolerance(tolerance, distance, part, state.noise)
@@ -122,7 +123,8 @@ def gather_intact(engine: Engine, work: Work) -> Work:
     state = work.job
     intact = state.aligned.points[state.deviation.label == INTACT]
     state = state.derive(JobState.intact, intact, JobState.aligned, JobState.deviation)
-    return replace(work, job=state, warnings=(*work.warnings, *state.deviation.notes, *state.sites.notes))
+    notes = (*make_notes("segment", state.deviation.notes), *make_notes("cluster", state.sites.notes))
+    return replace(work, job=state, warnings=(*work.warnings, *notes))
 
 
 def read_part(job: Job, registry: Registry) -> Part:
@@ -136,11 +138,11 @@ def read_inputs(job: Job, registry: Registry) -> tuple[Part, Scan]:
     return state.part, state.scan
 
 
-def inspect_inputs(job: Job, registry: Registry) -> tuple[Part, Scan, float, list[str]]:
+def inspect_inputs(job: Job, registry: Registry) -> tuple[Part, Scan, float, list[Reason]]:
     """Part, measured scan, a tolerance for them, and what is doubtful; for a new job."""
     part, scan = read_inputs(job, registry)
-    doubts = [doubt] if (doubt := diagnose_scale(scan.points, part.vertices, part.unit)) else []
-    doubts += [doubt] if (doubt := diagnose_size(part.vertices, part.unit)) else []
+    wrong = (diagnose_scale(scan.points, part.vertices, part.unit), diagnose_size(part.vertices, part.unit))
+    doubts = [Reason("unit", text) for text in wrong if text]
     noise, spacing, step = _measure(scan)
     scan = replace(scan, noise=noise, spacing=spacing)
     tolerance, more = choose_tolerance(None, scan, part, step)

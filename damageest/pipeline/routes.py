@@ -11,7 +11,7 @@ from damageest.pipeline.coverage import describe_coverage, inspect_skin
 from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
-from damageest.pipeline.form import correct_scan, fit_model, question_fit, question_sites
+from damageest.pipeline.form import correct_scan, fit_model, question_fit
 from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.large_scans import add_points_near_damage
 from damageest.pipeline.lost_bodies import add_lost_bodies
@@ -35,8 +35,8 @@ from damageest.pipeline.sites import (
     where_damaged,
 )
 from damageest.pipeline.surplus import find_surplus, relate_surplus
-from damageest.pipeline.uncertainty import measure_uncertainty
-from damageest.pipeline.verdicts import choose_sites, judge_sites
+from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
+from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
 from damageest.stages.align import Align
 from damageest.stages.allowance import Allowance
 from damageest.stages.background import Background
@@ -64,9 +64,9 @@ BY_SITE: Route = (
 )  # fmt: skip
 AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
 CLOSE: Route = (
-    add_lost_bodies, set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus,
-    question_sites, judge_sites, question_fit, make_deposits(Allowance), separate_deposits, plan_paths(Path),
-    measure_uncertainty, collect_result,
+    add_lost_bodies, set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus, gather_facts,
+    measure_uncertainty, judge_sites, question_fit, make_deposits(Allowance), separate_deposits, plan_paths(Path),
+    sum_uncertainty, collect_result,
 )  # fmt: skip
 
 WRITE: Route = (Export,)

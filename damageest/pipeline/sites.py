@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from damageest.artefacts import Reason
 from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
@@ -96,7 +97,8 @@ def gather_sites(engine: Engine, work: Work) -> Work:
         failures.append(error)
     warnings = []
     if dropped > 1e-3 * sum(site.damage.volume for site in out):
-        warnings.append(f"pieces of {dropped:.3g} in volume that no damaged point touches were dropped")
+        text = f"pieces of {dropped:.3g} {state.unit}³ that no damaged point touches were dropped"
+        warnings.append(Reason("scraps", text, amount=dropped, unit=f"{state.unit}³"))
     return replace(
         work, candidates=(), sites=tuple(out), failures=(*work.failures, *failures),
         warnings=(*work.warnings, *warnings),
@@ -111,9 +113,10 @@ def set_specks_aside(engine: Engine, work: Work) -> Work:
         members = state.sites.members(error.site) if error.place and error.site else np.empty(0, np.int64)
         if 0 < len(members) < SPECK:
             depth = float(-state.deviation.distance[members].min())
-            warnings.append(
+            text = (
                 f"{error.place}, up to {depth:.3g} {state.unit} deep, are too few to bound a volume and were left out"
             )
+            warnings.append(Reason("speck", text, amount=depth, unit=state.unit))
         else:
             failures.append(error)
     return replace(work, failures=tuple(failures), warnings=(*work.warnings, *warnings))

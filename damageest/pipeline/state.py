@@ -23,6 +23,7 @@ from damageest.artefacts import (
     Mesh,
     Part,
     Pose,
+    Reason,
     Rims,
     Samples,
     Scan,
@@ -31,12 +32,15 @@ from damageest.artefacts import (
     Surface,
 )
 from damageest.checks.coverage import SkinView
+from damageest.checks.free_pose import Dependence
 from damageest.checks.model_fit import FittedModel
+from damageest.checks.uncertainty import SiteError
 from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
 from damageest.findings import Coverage, Interval, Surplus, Uncertainty, Verdict
 from damageest.pipeline.cache import digest
 from damageest.result import Result
+from damageest.rules import ScanFacts
 from damageest.stages.export import ExportedFiles, PathWriter, Writer
 from damageest.stages.report import ReportFiles
 
@@ -111,6 +115,7 @@ class JobState(State):
     corrected_scale = Value[float]()
     fitted = Value[FittedModel | None]()
     coverage = Value[Coverage]()
+    facts = Value[ScanFacts]()
     surplus = Value[tuple[Surplus, ...]]()
     volume_95 = Value[Interval | None]()
     enclosures = Value[Enclosures]()
@@ -167,8 +172,9 @@ class Candidate(_SiteState):
 class FoundSite(_SiteState):
     """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
     ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
-    ``questions``: what the scan leaves open about it; ``uncertainty``: of the volume of ``damage``; ``volume_rates``,
-    ``enclosures``: as in `Site`."""
+    ``displaced``, ``covered``: as in `SiteFacts`; ``uncertainty``: of the volume of ``damage``, and ``error``: the same
+    in a form that adds up over the sites; ``dependences``: on the free motions of the pose; ``enclosures``: as in
+    `Site`."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -178,10 +184,11 @@ class FoundSite(_SiteState):
     refused: bool = False
     verdict: Verdict = field(default_factory=Verdict)
     accepted: bool = True
-    doubts: tuple[str, ...] = ()
-    questions: tuple[str, ...] = ()
+    displaced: tuple[int, ...] = ()
+    covered: tuple[tuple[int, float], ...] = ()
     uncertainty: Uncertainty | None = None
-    volume_rates: tuple[float, ...] = ()
+    error: SiteError | None = None
+    dependences: tuple[Dependence, ...] = ()
     enclosures: tuple[Solid, ...] = ()
 
     damage = Value[Solid]()
@@ -204,5 +211,5 @@ class Work:
     candidates: tuple[Candidate, ...] = ()
     sites: tuple[FoundSite, ...] = ()
     failures: tuple[StageError, ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Reason, ...] = ()
     wanted: tuple[int, ...] | None = None

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import ADDED, DAMAGE, Sites
+from damageest.artefacts import ADDED, DAMAGE, Reason, Sites
 from damageest.checks.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
 from damageest.errors import DamageestError, StageError
 from damageest.findings import Surplus
@@ -46,7 +46,7 @@ def find_surplus(engine: Engine, work: Work) -> Work:
     try:
         clusters = own.call(Cluster, turned).sites
     except StageError as error:
-        warning = f"points outside the nominal surface could not be grouped: {error}"
+        warning = Reason("surplus", f"points outside the nominal surface could not be grouped: {error}")
         state = state.derive(JobState.surplus, (), JobState.deviation)
         return replace(work, job=state, warnings=(*work.warnings, warning))
     found = describe_surplus(clusters, state.sites, state.aligned, state.deviation, state.part, state.tolerance)
@@ -63,7 +63,8 @@ def find_surplus(engine: Engine, work: Work) -> Work:
 
 def relate_surplus(engine: Engine, work: Work) -> Work:
     """Names the surplus beside each site, and says what is to be done about surroundings."""
-    state, sites, warnings, done = work.job, list(work.sites), [], []
+    state, sites, done = work.job, list(work.sites), []
+    warnings: list[Reason] = []
     reach = max(2 * state.tolerance, 1.5 * state.aligned.spacing)
     for item in state.surplus:
         beside = [site for site in sites if set(site.clusters) & set(item.clusters)]
@@ -72,9 +73,8 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
         if item.kind == "surroundings":
             continue
         touching = {site.number for site in beside if _is_touching(state, item, site, reach)}
-        note = f"surplus {item.id} lies on its skin: whether more is lost under it cannot be seen"
-        sites = [replace(s, questions=(*s.questions, note)) if s.number in touching else s for s in sites]
-        warnings += [f"surplus {item.id}: {note}" for note in item.notes if item.solid is None]
+        covered = (item.id, item.area)
+        sites = [replace(s, covered=(*s.covered, covered)) if s.number in touching else s for s in sites]
         if item.kind == "displaced piece":
             of = " and ".join(f"site {site.number} with a volume of {site.damage.volume:.4g}" for site in beside)
             own = "" if item.volume is None else f" with a volume of {item.volume:.4g}"
@@ -88,22 +88,18 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
                     EQUAL_TOUCHING if site.number in touching else EQUAL,
                 )
             }
-            doubt = (
-                f"surplus {item.id} beside it{own} is as large: a piece of the part may be displaced, or the part be "
-                "bent, and no metal be lost"
+            sites = [replace(s, displaced=(*s.displaced, item.id)) if s.number in equal else s for s in sites]
+            text = f"surplus {item.id}{own} may be a piece of the part that was displaced" + (
+                f", and {of} its place" if of else ""
             )
-            sites = [replace(s, doubts=(*s.doubts, doubt)) if s.number in equal else s for s in sites]
-            warnings.append(
-                f"surplus {item.id}{own} may be a piece of the part that was displaced"
-                + (f", and {of} its place" if of else "")
-                + ": put it back and scan again, or repair the part as if the piece were lost"
-            )
+            remedy = "put it back and scan again, or repair the part as if the piece were lost"
+            warnings.append(Reason("displaced_piece", text, amount=item.volume, unit=f"{state.unit}³", remedy=remedy))
     if outside := [item for item in done if item.kind == "surroundings"]:
         names = "; ".join(f"surplus {item.id}: {item.share:.1%} of the scan, {item.notes[0]}" for item in outside[:5])
-        warnings.append(
-            f"{sum(item.share for item in outside):.1%} of the scan does not belong to the part ({names}). It was left "
-            "out; crop the scan to the part to be sure (scan: {crop: ...} in the job)"
-        )
+        share = sum(item.share for item in outside)
+        text = f"{share:.1%} of the scan does not belong to the part ({names}), and was left out"
+        remedy = "crop the scan to the part to be sure: scan: {crop: ...}"
+        warnings.append(Reason("surroundings", text, amount=share, remedy=remedy))
     key = digest("related", state.key("surplus"), [site.key("damage") for site in sites])
     state = state.with_value(JobState.surplus, tuple(done), key)
     return replace(work, job=state, sites=tuple(sites), warnings=(*work.warnings, *warnings))

@@ -1,15 +1,17 @@
-"""The step that measures how exactly the volumes are known, of each site and in total."""
+"""Steps that measure how exactly the volumes are known, of each site and in total."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints
+from damageest.artefacts import Flags, Ints
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
+from damageest.checks.free_pose import measure_dependence
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.scan_quality import describe_few
 from damageest.checks.uncertainty import (
@@ -17,7 +19,6 @@ from damageest.checks.uncertainty import (
     SiteError,
     combine_site,
     combine_total,
-    describe_fading,
     limit_beside,
     measure_site_error,
 )
@@ -26,6 +27,7 @@ from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.form import measure_at_site
+from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
 from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.stages.allowance import Allowance
 
@@ -36,70 +38,66 @@ BESIDE = 2.0
 
 
 def measure_uncertainty(engine: Engine, work: Work) -> Work:
-    """Gives each site the 95 % intervals of its volume and depth, and the job that of the total.
-
-    A site that is doubtful has none: what contradicts it is not an error that has a size. The total has one where each
-    accepted site has one, and no damage was left without a volume. Doubtful sites that are not accepted make it wide:
-    they may be damage, too. Where no site was found in a scan that could not show one, it is not known either.
-    """
+    """Gives each site the 95 % intervals of its volume and depth, with all causes that have a size."""
     state = work.job
     if not work.sites:
-        total = None if work.failures or _may_hide_loss(state) else (0.0, 0.0)
-        return replace(work, job=state.with_value(JobState.volume_95, total, digest("no sites", total is None)))
-    free = _list_free_motions(state)
-    pose = measure_pose_error(state.part, state.aligned, state.deviation, state.tolerance, free)
-    sites, errors, taken = [], [], _TakenSkin(state, work.sites)
-    for site in work.sites:
-        uncertainty, error = _measure_site(state, site, taken, pose)
-        sites.append(replace(site, uncertainty=uncertainty))
-        if site.accepted:
-            errors.append(error)
-    known = [error for error in errors if error is not None]
+        return work
+    pose = measure_pose_error(state.part, state.aligned, state.deviation, state.tolerance)
+    taken = _TakenSkin(state, work.sites)
+    sites = tuple(_measure_site(state, site, taken, pose) for site in work.sites)
+    return replace(work, sites=sites)
+
+
+def sum_uncertainty(engine: Engine, work: Work) -> Work:
+    """Gives the job the 95 % interval of its total volume.
+
+    There is one where each accepted site has one, and no damage was left without a volume. Sites that are not accepted
+    make its high end larger: they may be damage, too. Where no site was found in a scan that could not show one, it is
+    not known either.
+    """
+    state = work.job
+    if not work.sites and _may_hide_loss(state):
+        return replace(work, job=state.with_value(JobState.volume_95, None, digest("no sites")))
     lost = [error for error in work.failures if error.stage != Allowance.stage]
+    taken = [site for site in work.sites if site.accepted]
+    errors = [site.error for site in taken if site.error is not None]
     total = None
-    if len(known) == len(errors) and not lost:
+    if len(errors) == len(taken) and not lost:
         # collect_result moves it to the volume of the union, which is the same but for overlaps
-        volume = sum(site.damage.volume for site in sites if site.accepted)
-        total = combine_total(volume, known, sum(site.damage.volume for site in sites if not site.accepted))
-    key = digest("interval", total, [site.key("damage") for site in sites])
-    return replace(work, sites=tuple(sites), job=state.with_value(JobState.volume_95, total, key))
+        left = sum(site.damage.volume for site in work.sites if not site.accepted)
+        total = combine_total(sum(site.damage.volume for site in taken), errors, left)
+        if any(site.uncertainty and site.uncertainty.is_open for site in taken):
+            total = (total[0], math.inf)
+    key = digest("interval", total, [site.key("damage") for site in work.sites])
+    return replace(work, job=state.with_value(JobState.volume_95, total, key))
 
 
-def _measure_site(
-    state: JobState, site: FoundSite, taken: _TakenSkin, pose: PoseError
-) -> tuple[Uncertainty, SiteError | None]:
-    """A site's uncertainty, and its errors, None where there is no interval."""
-    if site.verdict.level == "doubtful":
-        return Uncertainty(None, None, reasons=("no interval, since the site is doubtful",)), None
+def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: PoseError) -> FoundSite:
+    """The site with its uncertainty and its errors; the latter are None where there is no interval."""
+    if site.method == BY_RAYS_ALONE:  # a whole body of the part: its volume is known
+        known = site.damage.volume
+        error = SiteError(known, 0.0, 0.0, 0.0, 0.0)
+        return replace(site, uncertainty=Uncertainty((known, known), None), error=error)
     points = state.aligned.points[site.members]
     inner = find_inner_faces(site.damage, state.part)
     # what the model fit gives is the 95 % bound of a deviation
-    error = measure_site_error(
-        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.tolerance,
-        form=measure_at_site(state, site) / WIDTH,
+    found = measure_site_error(
+        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts,
+        form=measure_at_site(state, site) / WIDTH, free=state.pose.free,
     )  # fmt: skip
-    if error is None:
-        return Uncertainty(None, None, reasons=("no interval, since no scan points lie on its inner surface",)), None
+    if found is None:
+        return replace(site, uncertainty=Uncertainty(None, None))
     reach = BESIDE * max(2 * state.tolerance, 1.5 * state.aligned.spacing)
     fading = _measure_fading(state, site, inner, taken, pose)
+    dependences = measure_dependence(site.damage, state.part, state.pose)
     error = replace(
-        error,
-        beside=limit_beside(state.coverage, site.damage, reach, error.depth),
+        found,
+        beside=limit_beside(state.coverage, site.damage, reach, found.depth),
         fading=fading.beyond if fading else 0.0,
+        rates=np.array([one.rate for one in dependences]),
+        motions=np.array([[one.motion.low, one.motion.high] for one in dependences]).reshape(-1, 2),
     )
     volume, depth = combine_site(error)
-    reasons = []
-    if error.beside > 0:
-        reasons.append(
-            f"skin beside it is not seen: the loss may be larger there by up to {error.beside:.3g} {state.unit}³"
-        )
-    if error.inside > 0:
-        reasons.append(
-            f"its inner surface has no scan points in one piece of {site.evidence.ids_gap:.3g} {state.unit}²: the loss "
-            f"may be larger there by up to {error.inside:.3g} {state.unit}³, and deeper than any scan point shows"
-        )
-    if fading:
-        reasons.append(describe_fading(fading, error.volume, state.unit, state.tolerance))
     uncertainty = Uncertainty(
         volume_95=volume,
         depth_95=depth,
@@ -109,12 +107,14 @@ def _measure_site(
         pose=float(np.linalg.norm(error.pose)),
         tessellation=error.tessellation,
         form=error.form,
+        outward=error.outward,
+        views=error.views,
+        free=error.free,
         inside=error.inside,
         beside=error.beside,
         fading=fading,
-        reasons=tuple(reasons),
     )
-    return uncertainty, error
+    return replace(site, uncertainty=uncertainty, error=error, dependences=dependences)
 
 
 def _may_hide_loss(state: JobState) -> bool:
@@ -124,19 +124,6 @@ def _may_hide_loss(state: JobState) -> bool:
     if describe_few(scan) or scan.spacing > COARSE * state.part.diagonal:
         return True
     return scan.spacing > tolerance and bool((state.deviation.distance < -2 * tolerance).any())
-
-
-def _list_free_motions(state: JobState) -> Floats | None:
-    """The motions that the scan does not fix: (6,F), a turn and a shift about the centre of the part's bounds, each as
-    far as it may go; None where there is none."""
-    centre = state.part.bounds.mean(axis=0)
-    columns = []
-    for one in state.pose.free:
-        far, direction = max(-one.low, one.high), np.array(one.direction)
-        turn = np.zeros(3) if one.point is None else one.turn * direction
-        shift = direction if one.point is None else np.cross(turn, centre - np.array(one.point))
-        columns.append(far / WIDTH * np.concatenate([turn, shift]))
-    return np.column_stack(columns) if columns else None
 
 
 def _measure_fading(

@@ -7,19 +7,25 @@ from dataclasses import replace
 
 import numpy as np
 
+from damageest.artefacts import Reason
 from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.evidence import weigh_evidence
-from damageest.checks.free_pose import ask_free_pose, measure_dependence
-from damageest.checks.unseen_rim import ask_unseen_rim
-from damageest.checks.verdict import judge_site, measure_limits
+from damageest.checks.free_pose import compare_other_poses, describe_motion
+from damageest.checks.scan_facts import gather_scan_facts
+from damageest.checks.two_sheets import measure_two_sheets
+from damageest.checks.unseen_rim import measure_unseen_rim
+from damageest.checks.verdict import ask_rules, decide, open_end
 from damageest.errors import StageError
+from damageest.findings import Level
 from damageest.geometry.solids import to_solid, unite
 from damageest.geometry.voxels import measure_area
+from damageest.job.model import Accept
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
-from damageest.pipeline.state import FoundSite, Work
+from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.rules import FreePose, SiteFacts
 from damageest.stages.align import Align
 
 BY_RAYS = 0.5
@@ -33,58 +39,98 @@ def choose_sites(engine: Engine, work: Work) -> Work:
     for group in choice.merge:
         _check_numbers("sites.merge", group, work.sites)
     sites = {site.number: site for site in work.sites if site.number not in choice.drop}
-    warnings = [f"site {number} was dropped, as the job says" for number in choice.drop]
+    warnings = [Reason("site_dropped", f"site {number} was dropped, as the job says") for number in choice.drop]
     for group in choice.merge:
         members = [sites.pop(number) for number in sorted(set(group)) if number in sites]
         if members:
             sites[members[0].number] = _merge(engine, members)
-            warnings.append(f"sites {', '.join(str(one.number) for one in members)} were merged, as the job says")
+            named = ", ".join(str(one.number) for one in members)
+            warnings.append(Reason("sites_merged", f"sites {named} were merged, as the job says"))
     if choice.keep is not None:
         low, high = np.array(choice.keep.min), np.array(choice.keep.max)
         for number, site in list(sites.items()):
             middle = site.damage.bounds.mean(axis=0)
             if not ((middle >= low) & (middle <= high)).all():
                 del sites[number]
-                warnings.append(f"site {number} was dropped: its middle is outside the box of sites.keep")
+                text = f"site {number} was dropped: its middle is outside the box of sites.keep"
+                warnings.append(Reason("site_dropped", text))
     ordered = tuple(sites[number] for number in sorted(sites))
     return replace(work, sites=ordered, warnings=(*work.warnings, *warnings))
 
 
-def judge_sites(engine: Engine, work: Work) -> Work:
-    """Gives each site its verdict. A doubtful site is no part of the damage unless the job accepts it."""
-    state, accept = work.job, engine.job.accept
-    if accept != "all":
-        _check_numbers("accept", accept, work.sites)
-    limits = measure_limits(
-        state.skin, state.aligned, state.deviation, state.surplus, state.tolerance, state.unit,
+def gather_facts(engine: Engine, work: Work) -> Work:
+    """Measures what the whole scan says about skin that deviates and is not damaged."""
+    state = work.job
+    facts = gather_scan_facts(
+        state.skin, state.aligned, state.deviation, state.surplus, state.pose,
+        None if state.fitted is None else state.fitted.fit, state.tolerance, state.unit,
         is_fitted=engine.job.implementations[Align].name != "none" and not state.pose.is_held,
     )  # fmt: skip
+    sources = (JobState.skin, JobState.aligned, JobState.deviation, JobState.surplus, JobState.pose, JobState.fitted)
+    return replace(work, job=state.derive(JobState.facts, facts, *sources, JobState.tolerance))
+
+
+def judge_sites(engine: Engine, work: Work) -> Work:
+    """Gives each site its verdict, and takes as damage those that the job accepts."""
+    accept = engine.job.accept
+    if not isinstance(accept, str):
+        _check_numbers("accept", accept, work.sites)
     done = []
-    reach = 2 * max(state.tolerance, state.aligned.spacing)
     for site in work.sites:
-        area = measure_area(state.aligned.points[site.members], state.skin.cells.edge) if len(site.members) else 0.0
-        dependences = measure_dependence(site.damage, state.part, state.pose)
-        against, questions = ask_free_pose(dependences, site.damage.volume, state.unit)
-        by_rays = _is_proven_by_rays(state.skin, site)
-        at_rim = ask_unseen_rim(site.damage, state.part, state.coverage, reach)
-        against, questions = (*against, *at_rim[0]), (*questions, *at_rim[1])
-        if not by_rays:
-            beyond = ask_beyond_points(
-                site.damage, state.part, state.aligned.points[site.members], state.aligned.points,
-                state.aligned.noise, state.aligned.spacing, state.tolerance, state.unit,
-            )  # fmt: skip
-            if beyond.is_contradicted:
-                against = (*against, beyond.reason)
-            elif beyond.reason:
-                questions = (*questions, beyond.reason)
-        verdict = judge_site(
-            site.evidence, -state.deviation.distance[site.members], area, state.pose, limits,
-            by_rays, site.damage.area, (*site.questions, *questions), (*site.doubts, *against),
-        )  # fmt: skip
-        accepted = verdict.level != "doubtful" or accept == "all" or site.number in accept
-        rates = tuple(one.rate for one in dependences)
-        done.append(replace(site, verdict=verdict, accepted=accepted, volume_rates=rates))
+        facts = _gather_site_facts(work.job, site)
+        reasons = ask_rules(engine.registry.rules, facts, work.job.facts)
+        interval = open_end(facts.interval, reasons)
+        verdict = decide(facts.volume, interval, reasons)
+        uncertainty = replace(site.uncertainty, volume_95=interval) if site.uncertainty else None
+        done.append(
+            replace(
+                site, verdict=verdict, uncertainty=uncertainty, accepted=is_accepted(accept, verdict.level, site.number)
+            )
+        )
     return replace(work, sites=tuple(done))
+
+
+def is_accepted(accept: Accept, level: Level, number: int) -> bool:
+    """Whether a site is part of the damage: a word names the least level; numbers add doubtful sites to `likely`."""
+    if accept == "all":
+        return True
+    if accept == "proven":
+        return level == "proven"
+    return level != "doubtful" or (not isinstance(accept, str) and number in accept)
+
+
+def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
+    depth, points = -state.deviation.distance[site.members], state.aligned.points
+    beyond = ask_beyond_points(
+        site.damage, state.part, points[site.members], points, state.aligned.noise, state.aligned.spacing,
+        state.tolerance, state.unit,
+    )  # fmt: skip
+    typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
+    return SiteFacts(
+        volume=site.damage.volume,
+        area=measure_area(points[site.members], state.skin.cells.edge) if len(depth) else 0.0,
+        damage_area=site.damage.area,
+        count=len(depth),
+        typical=typical,
+        deepest=deepest,
+        evidence=site.evidence,
+        interval=site.uncertainty.volume_95 if site.uncertainty else None,
+        uncertainty=site.uncertainty,
+        by_rays=_is_proven_by_rays(state.skin, site),
+        rim_unseen=measure_unseen_rim(
+            site.damage, state.part, state.coverage, 2 * max(state.tolerance, state.aligned.spacing)
+        ),
+        two_sheets=measure_two_sheets(state.aligned, state.deviation, state.part, site.members, state.tolerance),
+        other_poses=compare_other_poses(site.damage, state.part, state.pose, state.tolerance),
+        free=tuple(
+            FreePose(describe_motion(one.motion, state.unit), *one.ends, one.moved * one.reach)
+            for one in site.dependences
+        ),
+        displaced=site.displaced,
+        covered=site.covered,
+        beyond=beyond.amount,
+        beyond_words=beyond.reason,
+    )
 
 
 def _check_numbers(field: str, numbers: Iterable[int], sites: tuple[FoundSite, ...]) -> None:

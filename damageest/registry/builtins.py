@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from damageest.registry.hookspecs import hookimpl
 
 if TYPE_CHECKING:
+    from damageest.rules import Rule
     from damageest.stages import Stage
     from damageest.stages.export import PathWriter, Writer
 
@@ -57,6 +58,32 @@ def damageest_stages() -> list[type[Stage]]:
         Adaptive, Implicit,
         NoRepair, Manifold, NoAllowance, Milling, NoPath, Files, Uniform, CloudDistance, SignedDistance,
         PartFromScan, Html, NoReport,
+    ]  # fmt: skip
+
+
+@hookimpl
+def damageest_rules() -> list[type[Rule]]:
+    """Every built-in rule, in the order in which reasons of equal effect are told."""
+    from damageest.rules.beside import Beside
+    from damageest.rules.beyond_points import BeyondPointsRule
+    from damageest.rules.covered import Covered
+    from damageest.rules.displaced import Displaced
+    from damageest.rules.fading import FadingOut
+    from damageest.rules.few_points import FewPoints
+    from damageest.rules.free_pose import FreePoseRule
+    from damageest.rules.inner_surface import InnerSurface
+    from damageest.rules.intact_inside import IntactInside
+    from damageest.rules.intact_over import IntactOver
+    from damageest.rules.nothing import Nothing
+    from damageest.rules.off_boundary import OffBoundary
+    from damageest.rules.pose import PoseDoubt
+    from damageest.rules.terms import Terms
+    from damageest.rules.two_sheets import TwoSheets
+    from damageest.rules.wide_loss import WideLoss
+
+    return [
+        Nothing, PoseDoubt, Displaced, TwoSheets, OffBoundary, IntactInside, IntactOver, BeyondPointsRule, WideLoss,
+        InnerSurface, Beside, Covered, FreePoseRule, FewPoints, FadingOut, Terms,
     ]  # fmt: skip
 
 

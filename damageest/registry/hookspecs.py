@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import typer
 
     from damageest.result import Conversion
+    from damageest.rules import Rule
     from damageest.stages import Stage
     from damageest.stages.export import PathWriter, Writer
 
@@ -43,6 +44,11 @@ def damageest_path_writers() -> Mapping[str, PathWriter]:  # type: ignore[empty-
 def damageest_conversions() -> Mapping[str, Conversion]:  # type: ignore[empty-body]
     """Gives what this plugin can convert a result to, by the name that `Result.convert` calls it by. The function gets
     the result, what of it ("damage"), and the number of a site or None."""
+
+
+@hookspec
+def damageest_rules() -> Sequence[type[Rule]]:  # type: ignore[empty-body]
+    """Gives the rules that this plugin adds: each looks at the facts about a site and gives reasons for its verdict."""
 
 
 @hookspec

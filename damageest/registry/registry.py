@@ -19,6 +19,7 @@ from damageest.registry import bundled
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
 from damageest.registry.loading import Broken, Provider, describe_broken, ignore_shadow_warnings, load
 from damageest.result import Conversion
+from damageest.rules import Rule
 from damageest.stages import Stage
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.export import PathWriter, Writer
@@ -48,7 +49,8 @@ class Implementation:
 class Registry:
     """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them.
     ``writers``: the formats that `export` can write, by name; ``formats``: the provider of each. ``path_writers``:
-    the formats of paths, by name. ``conversions``: what a result can be converted to, by name."""
+    the formats of paths, by name. ``conversions``: what a result can be converted to, by name. ``rules``: those that
+    give reasons for verdicts."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]
@@ -59,6 +61,7 @@ class Registry:
     formats: Mapping[str, Provider] = field(default_factory=dict, compare=False)
     path_writers: Mapping[str, PathWriter] = field(default_factory=dict, compare=False)
     conversions: Mapping[str, Conversion] = field(default_factory=dict, compare=False)
+    rules: tuple[Rule, ...] = field(default=(), compare=False)
 
     @classmethod
     def discover(cls, observers: Iterable[object] = ()) -> Registry:
@@ -69,6 +72,7 @@ class Registry:
         path_writers: dict[str, PathWriter] = {}
         formats: dict[str, Provider] = {}
         conversions: dict[str, Conversion] = {}
+        rules: dict[str, Rule] = {}
         for plugin, provider in loaded:
             try:
                 with ignore_shadow_warnings():
@@ -76,11 +80,13 @@ class Registry:
                     added = _read_writers(plugin, "damageest_writers", Writer, writers)
                     added_paths = _read_writers(plugin, "damageest_path_writers", PathWriter, path_writers)
                     converts = _read_conversions(plugin, conversions)
+                    added_rules = _read_rules(plugin, rules)
             except BaseException as error:
                 broken.append(describe_broken(error, provider))
                 continue
             writers |= added
             path_writers |= added_paths
+            rules |= added_rules
             formats |= dict.fromkeys(added, provider)
             conversions |= converts
             for stage in classes:
@@ -95,7 +101,10 @@ class Registry:
         single = tuple(group[0] for group in groups.values() if len(group) == 1)
         clashes = tuple(group for group in groups.values() if len(group) > 1)
         providers = tuple(dict.fromkeys([p for _, p in loaded] + [b.provider for b in broken]))
-        made = cls(single, providers, tuple(broken), clashes, manager, writers, formats, path_writers, conversions)
+        made = cls(
+            single, providers, tuple(broken), clashes, manager, writers, formats, path_writers, conversions,
+            tuple(rules.values()),
+        )  # fmt: skip
         for kind, package in bundled.CONVERSIONS.items():
             if kind not in conversions:
                 conversions[kind] = partial(_refuse, f"'{kind}' needs {made.describe_plugin(package)}")
@@ -205,6 +214,22 @@ def _read_conversions(plugin: Any, known: Mapping[str, Conversion]) -> dict[str,
 
 def _refuse(why: str, *values: object) -> NoReturn:
     raise InputError(why)
+
+
+def _read_rules(plugin: Any, known: Mapping[str, Rule]) -> dict[str, Rule]:
+    """The rules that a plugin adds, by their code. Raises PluginError for what is no rule, or has a code twice."""
+    found = plugin.damageest_rules() if hasattr(plugin, "damageest_rules") else []
+    rules: dict[str, Rule] = {}
+    for cls in found:
+        if not (isinstance(cls, type) and issubclass(cls, Rule)):
+            raise PluginError(f"its hook damageest_rules gave {cls!r}, which is no class derived from Rule")
+        named = ("code", "meaning", "threshold")
+        if missing := [name for name in named if not isinstance(getattr(cls, name, None), str)]:
+            raise PluginError(f"its rule {cls.__qualname__} has no {', no '.join(missing)}")
+        if cls.code in known or cls.code in rules:
+            raise PluginError(f"its rule {cls.__qualname__} has the code '{cls.code}', which another rule has")
+        rules[cls.code] = cls()
+    return rules
 
 
 def _check_defaults(cls: type[Stage]) -> None:

@@ -27,7 +27,7 @@ def middle(body: Manifold) -> list[float]:
 def test_the_true_damage_is_consistent(name: str) -> None:
     case = scene(name)
     found = evidence(case, case.truth)
-    assert found.consistent, found.reasons
+    assert found.consistent, found.causes
     assert found.ids_residual < case.tolerance
     assert found.intact_points_inside == 0
 
@@ -53,7 +53,7 @@ def test_a_wrong_damage_is_refuted_with_a_reason(name: str, kind: str) -> None:
     assert iou(wrong, case.truth) < 0.93
     found = evidence(case, wrong)
     assert not found.consistent
-    assert found.reasons
+    assert found.causes
 
 
 def test_damage_that_goes_on_where_nothing_was_seen_is_doubted() -> None:

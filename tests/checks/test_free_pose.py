@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import FreeMotion, Part, Pose, Solid
-from damageest.checks.free_pose import ask_free_pose, measure_dependence
+from damageest.checks.free_pose import compare_other_poses, describe_motion, measure_dependence
 
 LENGTH, WIDTH, HEIGHT, DEPTH = 40.0, 30.0, 20.0, 0.5
 
@@ -35,15 +36,26 @@ def test_rates_are_those_of_the_inner_surface(motion: FreeMotion, rate: float, m
     assert found.moved == pytest.approx(moved, rel=0.05, abs=1e-6)
 
 
-@pytest.mark.parametrize(("reach", "level"), [(0.005, "proven"), (0.03, "likely"), (0.4, "doubtful")])
-def test_the_level_follows_from_the_share_of_the_volume(reach: float, level: str) -> None:
+def test_the_ends_are_the_volumes_at_the_ends_of_the_motion() -> None:
     part, damage = make_slab()
-    pose = Pose(np.eye(4), free=(FreeMotion((0, 0, 1), -reach, 0.0),))
-    against, questions = ask_free_pose(measure_dependence(damage, part, pose), damage.volume, "mm")
-    assert {"proven": (0, 0), "likely": (0, 1), "doubtful": (1, 0)}[level] == (len(against), len(questions))
-    for text in (*against, *questions):
-        assert "(0.000, 0.000, 1.000)" in text
-        assert f"{damage.volume:.4g}" in text
+    pose = Pose(np.eye(4), free=(FreeMotion((0, 0, 1), -0.1, 0.05),))
+    (found,) = measure_dependence(damage, part, pose)
+    assert found.ends == pytest.approx((-0.05 * LENGTH * WIDTH, 0.1 * LENGTH * WIDTH))
+    assert describe_motion(pose.free[0], "mm")
+
+
+def turn_about_z(degrees: float) -> np.ndarray:
+    T = np.eye(4)
+    T[:2, :2] = Rotation.from_euler("z", degrees, degrees=True).as_matrix()[:2, :2]
+    return T
+
+
+@pytest.mark.parametrize(("degrees", "low", "high"), [(180, 0.0, 0.0), (90, 0.2, 0.4)])
+def test_another_pose_matters_where_its_skin_is_elsewhere(degrees: float, low: float, high: float) -> None:
+    part, damage = make_slab()
+    pose = Pose(np.eye(4), alternatives=turn_about_z(degrees)[None])
+    assert low <= compare_other_poses(damage, part, pose, 0.1) <= high
+    assert compare_other_poses(damage, part, Pose(np.eye(4)), 0.1) == 0
 
 
 def test_a_pose_that_is_fixed_asks_nothing() -> None:

@@ -69,14 +69,6 @@ def test_a_direction_that_nothing_fixes_is_off_by_a_tolerance_and_changes_no_vol
     assert np.abs(off).max() < 1e-6 * areas.sum()
 
 
-def test_free_directions_are_added() -> None:
-    free = np.zeros((6, 1))
-    free[3] = 0.7
-    error = measure(damaged_box.box(), free=free)
-    assert error.spread.shape == (6, 7)
-    assert error.of_distance(np.array([20.0, 0, 0]), np.array([1.0, 0, 0])) == pytest.approx(0.7, rel=0.01)
-
-
 def test_form_of_the_skin_is_systematic_and_noise_is_not() -> None:
     part = damaged_box.box()
     assert measure(part).systematic < 0.06 * SIGMA

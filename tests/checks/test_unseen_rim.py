@@ -41,7 +41,10 @@ def test_a_rim_that_the_scan_shows_has_no_share() -> None:
 def test_the_share_is_that_of_the_rim_in_the_unseen_skin(kept: float, share: float) -> None:
     result, damage = scan_dent(kept)
     assert measure(result, damage) == pytest.approx(share, abs=0.12)
-    assert result.sites[0].verdict.level == "doubtful"
+    site = result.sites[0]
+    assert site.verdict.level == "likely"
+    assert site.volume_95 is not None
+    assert site.volume_95[0] <= damage.volume < site.volume_95[1] == np.inf
 
 
 def test_a_solid_without_a_rim_has_no_share() -> None:

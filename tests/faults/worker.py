@@ -41,7 +41,7 @@ def try_job(path: str, whole: bool, registry: Any) -> dict[str, Any]:
         job = load(path, registry, ["report=none"])
         if whole:
             result = damageest.run(job, registry=registry, limits=Limits(seconds=SECONDS))
-            return {"outcome": "done", "volume": result.damage_volume, "words": "; ".join(result.warnings)}
+            return {"outcome": "done", "volume": result.damage_volume, "words": "; ".join(map(str, result.warnings))}
         state = follow(
             (ReadPart, ReadScan, crop_scan), Engine(job, registry, limits=Limits(seconds=SECONDS)), start(job)
         ).job

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from damageest.artefacts import Floats, Part, Scan
+from damageest.artefacts import Floats, Part, Reason, Scan
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
 from damageest.stages.align._check_pose import check_pose
@@ -28,7 +28,7 @@ MIN_GAIN, MIN_BESIDE, LARGE_GAIN = 0.05, 0.02, 0.4
 the first, with the second beside the part in the given pose, where no damage explains it; or the third alone."""
 
 
-def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[str, ...]:
+def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Reason, ...]:
     """What is doubtful about a pose ``T`` (4,4).
 
     Raises StageError where the scan does not lie on the part, and where a pose nearby, found by the robust fit,
@@ -65,10 +65,12 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[st
             f"the scan does not lie on the part in the given pose: {given.describe()}",
             "give the right T_part_scan, or use align: register, which needs none; check unit and part as well",
         )
-    doubts = [note.replace("in the best pose", "in the given pose") for note in given.note_doubts()]
+    doubts = given.note_doubts()
     if differs and gain > SMALL_GAIN:
-        doubts.append(
+        text = (
             f"in a pose that moves the part's surface by {moved:.3g} {part.unit}, {fitted.on:.0%} of the scan lies on "
-            f"the part, in the given one {given.on:.0%}: wear or a wrong pose; if it is the pose, use align: icp"
+            f"the part, in the given one {given.on:.0%}: wear or a wrong pose"
         )
-    return tuple(doubts)
+        # the pose was given, and wear explains it as well: it is told, and is no contradiction
+        doubts += (Reason("given_pose", text, "open", moved, part.unit, remedy="if it is the pose, use align: icp"),)
+    return doubts

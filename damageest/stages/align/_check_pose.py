@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Reason
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
 from damageest.stages.align._field import PartSurface
@@ -70,14 +70,15 @@ class PoseCheck:
             f"outside) and covers {self.cover:.0%} of the part's surface"
         )
 
-    def note_doubts(self) -> tuple[str, ...]:
-        """A note where the pose is acceptable, but little of the scan agrees with the part."""
+    def note_doubts(self) -> tuple[Reason, ...]:
+        """A doubt where the pose is acceptable, but little of the scan agrees with the part."""
         if self.agreement >= DOUBTFUL_AGREEMENT:
             return ()
-        return (
-            f"only {self.agreement:.0%} of the scan near the part lies on its surface in the best pose: it may show "
-            "another part, or another revision of it",
+        text = (
+            f"only {self.agreement:.0%} of the scan near the part lies on its surface in the pose: it may show another "
+            "part, or another revision of it"
         )
+        return (Reason("another_part", text, "contradicts", self.agreement),)
 
     def build_error(self, remedy: str) -> StageError:
         """The error for a pose that is not acceptable."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Reason
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align._counterparts import turn_poses
 from damageest.stages.align._evidence import DECISIVE, weigh_poses
@@ -40,6 +40,8 @@ SAME = 0.002
 RIVAL, MAX_RIVALS = 0.15, 8
 """How much more, for each point, a pose may cost than the best one for them to be compared by patches, and how
 many are."""
+
+REMEDY = "where the pose is known, give it to align: icp or align: none"
 
 
 @dataclass(frozen=True)
@@ -231,8 +233,8 @@ def is_worse(cost: Floats, best: Floats) -> bool:
     return total > 0.0005 * len(more) and total > 5 * float(np.sqrt((more**2).sum()))
 
 
-def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[str, ...]:
-    """A note where the scan does not fix the pose; empty where it does.
+def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[Reason, ...]:
+    """A doubt where the scan does not fix the pose; empty where it does.
 
     A bar with both ends missing or unseen fits at any place along its axis. Each motion that hardly changes the points'
     distances to their planes is tried, by a few bands in both directions.
@@ -250,11 +252,11 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
             if differs > 0.002 and not is_worse(
                 robust_cost(target.closest(move_points(points, D @ pose))[0], band), here
             ):
-                return (
+                text = (
                     "the scan does not fix the pose: the part can be moved or turned a little and fits as well, "
-                    "because the surface that would prevent it is missing or was not seen; where the pose is known, "
-                    "give it to align: none",
+                    "because the surface that would prevent it is missing or was not seen"
                 )
+                return (Reason("pose_free", text, "contradicts", remedy=REMEDY),)
     return ()
 
 
@@ -272,8 +274,8 @@ def describe_choice(choice: Choice) -> tuple[str, ...]:
     return ()
 
 
-def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[str, ...]:
-    """A note where other poses fit as well and are not symmetries of the part; empty where there are none."""
+def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[Reason, ...]:
+    """A doubt where other poses fit as well and are not symmetries of the part; empty where there are none."""
     if not len(choice.others):
         return ()
     surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
@@ -285,8 +287,9 @@ def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[str, ...]:
     apart = max(float((np.abs(target.closest(move_points(surface, D))[0]) > band).mean()) for D in motions)
     if apart <= 0.002:
         return ()
-    return (
+    text = (
         f"the poses that fit are not all symmetries of the part (up to {apart:.1%} of its surface differs): the "
         "surface that would distinguish them is missing, was not seen, or does so by no more than the errors of the "
-        "scan, so the damage found depends on the pose; where the pose is known, give it to align: icp or align: none",
+        "scan, so the damage found depends on the pose"
     )
+    return (Reason("other_poses", text, "contradicts", apart, remedy=REMEDY),)

@@ -50,9 +50,11 @@ def fit_from_start(
             f"of the scan points to the surface by {best.residue * frame.size:.3g} {part.unit} (rms)",
             "raise iterations, or use align: register",
         )
-    doubts = result.note_doubts() + note_free_motion(best.pose, frame.target, points, best.band)
+    doubts = result.note_doubts()
+    if not finish.free:  # those have amounts, and are terms of the intervals
+        doubts += note_free_motion(best.pose, frame.target, points, best.band)
     pose = frame.unscale_pose(best.pose)
-    notes = doubts + finish.notes
+    notes = (*map(str, doubts), *finish.notes)
     return Pose(
         pose, result.rms * frame.size, result.inliers, notes=notes, doubts=doubts,
         free=finish.free, is_held=finish.is_held,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Reason
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
 from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, NEAR, PoseCheck, check_pose
@@ -83,7 +83,7 @@ class Handedness:
 
     better: Fit | None = None
     others: Floats = field(default_factory=lambda: NONE)
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[Reason, ...] = ()
 
 
 def ask_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random.Generator) -> Handedness:
@@ -185,12 +185,13 @@ def _shows_symmetric(test: MirrorTest, best: Fit, mirrored: Fit) -> bool:
     return bool((np.abs(target.closest(move_points(seen, onto))[0]) > OFF).mean() < SYMMETRIC)
 
 
-def _describe_doubt(check: PoseCheck, mirrored: PoseCheck) -> str:
-    return (
+def _describe_doubt(check: PoseCheck, mirrored: PoseCheck) -> Reason:
+    text = (
         f"{mirrored.agreement:.0%} of what the scan shows near the part would lie on its surface if it were mirrored, "
         f"{check.agreement:.0%} does in the best pose: it may show a mirror image of the part; it covers only "
-        f"{check.cover:.0%} of the part's surface, which is too little to tell: scan more of the part"
+        f"{check.cover:.0%} of the part's surface, which is too little to tell"
     )
+    return Reason("mirrored", text, "contradicts", mirrored.agreement, remedy="scan more of the part")
 
 
 def _build_error(check: PoseCheck, mirrored: PoseCheck) -> StageError:

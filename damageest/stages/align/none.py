@@ -46,4 +46,4 @@ class KnownPose(Align):
         distance = PartSurface(part).closest(move_points(points, T))[0]
         hit = np.abs(distance) <= tolerance
         rms = float(np.sqrt((distance[hit] ** 2).mean())) if hit.any() else 0.0
-        return Pose(T, rms, float(hit.mean()), notes=doubts, doubts=doubts)
+        return Pose(T, rms, float(hit.mean()), notes=tuple(map(str, doubts)), doubts=doubts)

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field as Option
 
-from damageest.artefacts import Part, Pose, Scan
+from damageest.artefacts import Part, Pose, Reason, Scan
 from damageest.stages.align import Align
 from damageest.stages.align._datum import NO_DATUM, Datum
 
@@ -85,7 +85,7 @@ class Register(Align):
             choice = choice.keep(prefer_outward(target, given, choice.poses, choice.band))
         last = LastFit(frame, fine, dense, noise, tolerance / frame.size, part.unit, datum)
         finish, check = last.run(fit(target, fine, choice.pose, COARSE / 2, noise, 30))
-        doubts: tuple[str, ...] = ()
+        doubts: tuple[Reason, ...] = ()
         if check.agreement < 1 - MIN_GAIN:  # else no mirrored pose can be that much better
             test = MirrorTest(prepared, oriented, fine, dense, noise, tolerance / frame.size, self.trials)
             hand = ask_handedness(test, finish.fit, check, rng)
@@ -102,14 +102,11 @@ class Register(Align):
             turns = choice.others @ np.linalg.inv(choice.pose)
             poses = turns @ best.pose if finish.is_changed else choice.others
             others = np.array([frame.unscale_pose(pose) for pose in poses])
-        doubts = (
-            check.note_doubts()
-            + doubts
-            + note_ambiguity(choice, target)
-            + note_free_motion(best.pose, target, fine, best.band)
-        )
+        doubts = check.note_doubts() + doubts + note_ambiguity(choice, target)
+        if not finish.free:  # those have amounts, and are terms of the intervals
+            doubts += note_free_motion(best.pose, target, fine, best.band)
         told = note_inward(target, frame, scan, best)
-        notes = describe_choice(choice) + told + doubts + finish.notes
+        notes = (*describe_choice(choice), *told, *map(str, doubts), *finish.notes)
         pose = frame.unscale_pose(best.pose)
         rms = check.rms * frame.size
         return Pose(pose, rms, check.inliers, others, notes, doubts, finish.free, finish.is_held)

@@ -18,6 +18,7 @@ from damageest.errors import StageError
 from damageest.io import colours
 from damageest.io.files import file_sha256
 from damageest.result import Result
+from damageest.rules.notes import fold_notes
 from damageest.stages.report import _style as style
 from damageest.stages.report._scene import LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
@@ -72,6 +73,7 @@ def fill_page(
         unit=result.units,
         r=content,
         sites=sites,
+        notes=list(map(str, fold_notes(result.warnings))),
         drawn=MOST_DRAWN,
         heights=max((item["height"] for item in scene.objects), default=0),
         verdict=describe_run(result),

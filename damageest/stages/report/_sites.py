@@ -122,7 +122,7 @@ def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
         colour=colours.colour_site(site.id),
         level=site.verdict.level,
         accepted=site.accepted,
-        reasons=[*site.verdict.reasons, *site.warnings],
+        reasons=list(map(str, (*site.verdict.reasons, *site.warnings))),
         volume=f"{style.format_number(site.damage.volume)} {unit}³",
         interval=show_site_interval(site, unit),
         depth=f"{style.format_number(site.max_depth, 3)} {unit}",

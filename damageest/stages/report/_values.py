@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from damageest.findings import Interval
 from damageest.result import Result, Site
 from damageest.stages.report._style import THIN, format_number, format_share
@@ -12,6 +14,8 @@ def show_interval(interval: Interval | None, unit: str) -> str:
     if interval is None:
         return ""
     low, high = interval
+    if not math.isfinite(high):
+        return f"at least {format_number(low)}{THIN}{unit}"
     return f"{format_number(low)} … {format_number(high)}{THIN}{unit}"
 
 

@@ -174,7 +174,7 @@ def _score_result(result: Result, part: Part, scan: Scan) -> dict[str, Any]:
         "methods": sorted({site.method for site in result.sites}),
         "flagged": not consistent or result.status != "ok",
         "failures": [text.replace("\n", " ") for text in result.failures],
-        "reasons": [reason for site in result.sites for reason in site.evidence.reasons],
+        "reasons": [reason.code for site in result.sites for reason in site.verdict.reasons],
         "stage_seconds": stages,
     }
 

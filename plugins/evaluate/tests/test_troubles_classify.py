@@ -16,7 +16,7 @@ from damageest_evaluate.troubles.classify import (
     measure_seen_error,
 )
 
-from damageest.artefacts import Deviation, Evidence, Part, Pose, Scan, Solid, Surface
+from damageest.artefacts import Deviation, Evidence, Part, Pose, Reason, Scan, Solid, Surface
 from damageest.findings import Coverage, Surplus, UnseenRegion, Verdict
 from damageest.geometry.solids import to_arrays
 from damageest.result import Result, Site
@@ -42,7 +42,11 @@ BOTH = Solid(
 
 def _make_site(solid: Solid, accepted: bool = True, **fields: Any) -> Site:
     ids = Surface(solid.vertices, solid.faces)
-    verdict = Verdict() if accepted else Verdict("doubtful", ("its depth of 0.3 is near the tolerance",))
+    verdict = (
+        Verdict()
+        if accepted
+        else Verdict("doubtful", (Reason("nothing", "its depth of 0.3 is near the tolerance", "widens"),))
+    )
     points = np.empty(0, np.int64)
     site = Site(1, (1,), points, solid, ids, None, "implicit", Evidence(), 4.0, verdict=verdict, accepted=accepted)
     return replace(site, **fields)
@@ -144,11 +148,17 @@ def test_a_wrong_volume_is_silent_and_shallow_damage_has_wider_limits() -> None:
 
 def test_a_text_that_names_the_trouble_needs_an_amount() -> None:
     sites = (_make_site(DENT),)
-    said = _judge(_make_result(*sites, warnings=("a wall of 1.2 mm3 may be lost",)), BOTH, "may be lost")
+    said = _judge(_make_result(*sites, warnings=(Reason("x", "a wall of 1.2 mm3 may be lost"),)), BOTH, "may be lost")
     assert said.outcome == "said"
     assert said.reason.startswith("named: 1 damages missed")
-    assert _judge(_make_result(*sites, warnings=("a wall may be lost",)), BOTH, "may be lost").outcome == "silent"
-    assert _judge(_make_result(*sites, warnings=("12 points are stray",)), BOTH, "may be lost").outcome == "silent"
+    assert (
+        _judge(_make_result(*sites, warnings=(Reason("x", "a wall may be lost"),)), BOTH, "may be lost").outcome
+        == "silent"
+    )
+    assert (
+        _judge(_make_result(*sites, warnings=(Reason("x", "12 points are stray"),)), BOTH, "may be lost").outcome
+        == "silent"
+    )
     surplus = Surplus(1, np.arange(5), 0.2, None, 3.0, 10.0, "surroundings")
     assert _judge(_make_result(*sites, surplus=(surplus,)), BOTH, "surroundings").outcome == "said"
 

@@ -169,6 +169,6 @@ def test_a_whole_job_warns_of_what_was_dropped(capfd: pytest.CaptureFixture[str]
     (site,) = result.sites
     assert site.method == "poisson_subtract"
     assert isinstance(site.damage, Solid)
-    assert any("slivers" in warning for warning in site.warnings)
-    assert any("were dropped" in warning for warning in result.warnings)
+    assert any("slivers" in warning.text for warning in site.warnings)
+    assert any("were dropped" in warning.text for warning in result.warnings)
     assert capfd.readouterr().out == ""

@@ -11,7 +11,7 @@ from tempfile import mkdtemp
 import numpy as np
 
 import damageest
-from damageest.artefacts import DAMAGE, Deviation, Scan
+from damageest.artefacts import DAMAGE, Deviation, Reason, Scan
 from damageest.findings import Verdict
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.sampling import sample_by_area
@@ -39,7 +39,13 @@ def two_sites(count: int = 12_000) -> Result:
     number = np.where(label == DAMAGE, 1 + np.argmin(near, axis=0), 0).astype(np.int32)
     scan = Scan(points, noise=0.02, spacing=0.5)
     sites = tuple(replace(site, points=np.flatnonzero(number == site.id)) for site in plain.sites)
-    sites = (sites[0], replace(sites[1], verdict=Verdict("likely", ("a part of its rim was not seen",))))
+    sites = (
+        sites[0],
+        replace(
+            sites[1],
+            verdict=Verdict("likely", (Reason("beside", "a part of its rim was not seen", "open", 1.0, "mm³"),)),
+        ),
+    )
     return replace(
         plain, scan=scan, aligned=scan, deviation=Deviation(distance, face, label), site_label=number, sites=sites
     )

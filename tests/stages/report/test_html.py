@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import damageest
-from damageest.artefacts import Pose
+from damageest.artefacts import Pose, Reason
 from damageest.findings import Verdict
 from damageest.stages.report.html import Html
 from tests import damaged_box
@@ -88,9 +88,12 @@ def test_same_bytes_twice_but_for_dates() -> None:
 
 def test_markup_in_names_and_messages_does_no_harm(tmp_path: Path) -> None:
     nasty, result = pages.NASTY, pages.two_sites()
-    sites = tuple(replace(s, verdict=Verdict("doubtful", (nasty,)), warnings=(nasty,)) for s in result.sites)
+    sites = tuple(
+        replace(s, verdict=Verdict("doubtful", (Reason("pose", nasty),)), warnings=(Reason("x", nasty),))
+        for s in result.sites
+    )
     part = replace(result.part, path=str(tmp_path / nasty.replace("/", "")), notes=(nasty,))
-    told = replace(result, name=nasty, sites=sites, part=part, warnings=(nasty,), failures=(nasty,))
+    told = replace(result, name=nasty, sites=sites, part=part, warnings=(Reason("x", nasty),), failures=(nasty,))
     text = pages.write(replace(told, pose=Pose(np.eye(4), notes=(nasty,))), job_text=nasty).read_text()
     plain = Page(pages.write(result).read_text())
     count = {tag: sum(t == tag for t, _ in plain.tags) for tag in ("script", "img")}
@@ -136,6 +139,6 @@ def test_a_report_that_fails_is_a_warning(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr("damageest.stages.report._scene.build_scene", fail)
     result = damageest.run(damaged_box.write(tmp_path), output=tmp_path / "out", settings=["report=html"])
-    assert [text for text in result.warnings if "no such colour" in text and "without a report" in text]
+    assert [note for note in result.warnings if note.code == "report" and "no such colour" in note.text]
     assert (tmp_path / "out/result.json").is_file()
     assert "no such colour" in (tmp_path / "out/result.json").read_text()

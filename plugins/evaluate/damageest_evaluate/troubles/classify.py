@@ -234,9 +234,9 @@ def collect_texts(result: Result) -> list[str]:
         " ".join([f"{entry.kind}: height {entry.height:.3g}, area {entry.area:.3g}", *entry.notes])
         for entry in result.surplus
     ]
-    sites = [text for site in result.sites for text in site.warnings]
-    sites += [text for site in result.sites if not site.accepted for text in site.verdict.reasons]
-    return [*result.warnings, *result.failures, *surplus, *sites, *result.pose.notes]
+    sites = [str(note) for site in result.sites for note in site.warnings]
+    sites += [str(reason) for site in result.sites if not site.accepted for reason in site.verdict.reasons]
+    return [*map(str, result.warnings), *result.failures, *surplus, *sites, *result.pose.notes]
 
 
 def find_name(texts: Sequence[str], names: Sequence[str], with_amount: bool = True) -> str:

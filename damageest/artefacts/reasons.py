@@ -1,0 +1,33 @@
+"""What is said about a site or a run, as data that programs can read and a text that people can read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from damageest.artefacts.arrays import Vector
+
+Effect = Literal["contradicts", "open", "widens", "note"]
+"""What a reason does to a verdict. `contradicts`: the site is doubtful. `open`: something could not be seen; without an
+amount, the upper end of the interval is open. `widens`: it is a term of the interval. `note`: it changes no verdict."""
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One thing that was found out. No code reads ``text``: it may be reworded at any time.
+
+    ``code``: a word that stays the same from version to version. ``amount``: its size in ``unit`` (as "mm", "mm³"; ""
+    for a share or a number); None where it has none. ``place`` (3,): where, in the part's frame. ``remedy``: what to
+    do about it; empty where nothing helps.
+    """
+
+    code: str
+    text: str
+    effect: Effect = "note"
+    amount: float | None = None
+    unit: str = ""
+    place: Vector | None = None
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.text}; {self.remedy}" if self.remedy else self.text

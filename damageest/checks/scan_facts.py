@@ -1,0 +1,93 @@
+"""What the whole scan says about errors that no site is to be blamed on: skin that deviates, views that differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from damageest.artefacts import ADDED, Deviation, Pose, Scan
+from damageest.checks.coverage import SkinView
+from damageest.checks.skin_cells import AVERAGED
+from damageest.findings import ModelFit, Surplus
+from damageest.geometry.voxels import measure_area, number_cubes
+from damageest.rules import ScanFacts
+
+AGREE = 0.6
+"""Difference of the views, in tolerances, in four fifths of their overlap, up to which they agree."""
+FEWEST_OUTSIDE = 3
+"""Points in a cube of skin that lies outside; fewer may be noise."""
+FEWEST_OF_VIEW = 4
+"""Points of a view in a cube, for its mean to be compared."""
+FEWEST_CELLS = 30
+"""Cells of the skin, or cubes of an overlap, below which nothing is said of their spread."""
+LAYER = 5.0
+"""Height in tolerances up to which points outside count as skin that lies outside; higher ones are added metal."""
+
+
+def gather_scan_facts(
+    skin: SkinView, aligned: Scan, deviation: Deviation, surplus: Iterable[Surplus], pose: Pose, fit: ModelFit | None,
+    tolerance: float, unit: str, is_fitted: bool,
+) -> ScanFacts:  # fmt: skip
+    """Measures how far skin deviates that is not damaged. ``surplus``: higher one is left out, since it is metal."""
+    layer = (deviation.label == ADDED) & (deviation.distance < LAYER * tolerance)
+    for one in surplus:
+        if one.height > LAYER * tolerance or one.kind == "surroundings":
+            layer[one.points] = False
+    area, height = 0.0, 0.0
+    if layer.any():
+        area = measure_area(aligned.points[layer], skin.cells.edge, FEWEST_OUTSIDE)
+        height = float(np.quantile(deviation.distance[layer], 0.9))
+    return ScanFacts(
+        tolerance=tolerance,
+        spacing=aligned.spacing,
+        unit=unit,
+        noise=aligned.noise,
+        seen_area=float(skin.cells.areas[skin.seen].sum()),
+        is_fitted=is_fitted,
+        systematic=_measure_systematic(skin, aligned.noise),
+        outward_area=area,
+        outward_height=height,
+        between_views=_compare_views(aligned, deviation, skin.cells.edge, tolerance),
+        pose=pose.doubts,
+        fit=fit,
+    )
+
+
+def _measure_systematic(skin: SkinView, noise: float) -> float:
+    """Standard deviation of the mean distances of intact cells that noise does not explain.
+
+    The smaller of what the cells show inside and outside: wear below the tolerance lies inside alone, and is no error
+    of the scan.
+    """
+    distance = skin.distance[skin.perhaps_seen & np.isfinite(skin.distance)]
+    if len(distance) < FEWEST_CELLS:
+        return 0.0
+    # half the width of the middle 90 %, in standard deviations of a normal distribution
+    low, high = np.quantile(distance, [0.05, 0.95])
+    spread = max(float(min(-low, high)), 0.0) / 1.645
+    return float(np.sqrt(max(spread**2 - noise**2 / AVERAGED, 0.0)))
+
+
+def _compare_views(aligned: Scan, deviation: Deviation, edge: float, tolerance: float) -> float:
+    """How far the mean distances of the views differ in cubes that several views show; 0 where they agree."""
+    if aligned.view is None:
+        return 0.0
+    used = np.flatnonzero((aligned.view >= 0) & (np.abs(deviation.distance) < LAYER * tolerance))
+    if not len(used):
+        return 0.0
+    cube = np.unique(number_cubes(aligned.points[used], edge)[1], return_inverse=True)[1]
+    pair, group, count = np.unique(
+        cube * (int(aligned.view.max()) + 1) + aligned.view[used], return_inverse=True, return_counts=True
+    )
+    mean = np.bincount(group, weights=deviation.distance[used]) / count
+    many = count >= FEWEST_OF_VIEW
+    owner, mean = pair[many] // (int(aligned.view.max()) + 1), mean[many]
+    low, high = np.full(int(cube.max()) + 1, np.inf), np.full(int(cube.max()) + 1, -np.inf)
+    np.minimum.at(low, owner, mean)
+    np.maximum.at(high, owner, mean)
+    shared = np.bincount(owner, minlength=len(low)) > 1
+    if shared.sum() < FEWEST_CELLS:
+        return 0.0
+    apart = (high - low)[shared]
+    return float(np.quantile(apart, 0.98)) if float(np.quantile(apart, 0.8)) > AGREE * tolerance else 0.0

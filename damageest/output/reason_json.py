@@ -1,0 +1,27 @@
+"""What result.json says of a reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pydantic import Field
+
+from damageest.artefacts import Effect, Reason, Vector
+from damageest.output.base import JsonModel
+
+
+class ReasonReport(JsonModel):
+    code: str = Field(description="a word that stays the same from version to version; the documentation lists them")
+    effect: Effect = Field(
+        description="contradicts: the site is doubtful; open: something could not be seen, without an amount the upper "
+        "end of the interval is open; widens: a term of the interval; note: changes no verdict"
+    )
+    amount: float | None = Field(description="its size; null where it has none")
+    unit: str = Field(description="of the amount; empty for a share or a number")
+    place: Vector | None = Field(description="where, in the part's frame; null where it has no place")
+    text: str = Field(description="in words, which may change from version to version")
+    remedy: str = Field(description="what to do about it; empty where nothing helps")
+
+
+def report_reasons(reasons: Iterable[Reason]) -> list[ReasonReport]:
+    return [ReasonReport(**vars(reason)) for reason in reasons]

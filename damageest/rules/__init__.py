@@ -1,0 +1,105 @@
+"""The rules: each one looks at the facts about a site and gives a reason, or none.
+
+A rule is a class in a file of its own, with its thresholds. Plugins add rules by the hook `damageest_rules`. The
+verdict follows from the reasons and from the interval of the volume (`damageest.checks.verdict`). Rules compute
+nothing on points or triangles: the facts are measured before.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import ClassVar
+
+from damageest.artefacts import Evidence, Reason
+from damageest.findings import Interval, ModelFit, Uncertainty
+
+
+@dataclass(frozen=True)
+class FreePose:
+    """A motion that the scan does not exclude, seen from one site: ``text`` names it; ``low``, ``high``: change of the
+    site's volume at the ends of the motion; ``moved``: volume between the inner surface before and after it."""
+
+    text: str
+    low: float
+    high: float
+    moved: float
+
+
+@dataclass(frozen=True)
+class ScanFacts:
+    """What is known about the whole scan, in the job's ``unit``.
+
+    ``noise``, ``spacing``: of its points. ``seen_area``: skin that the scan shows. ``is_fitted``: whether the pose was
+    fitted to the scan, and no unworn skin is known to hold it. ``systematic``: standard deviation of the mean distances
+    of intact cells of the skin that noise does not explain. ``outward_area`` and ``outward_height``: skin that lies
+    outside the part by some tolerances, and by how much. ``between_views``: how far the views differ where they
+    overlap, 0 where they agree or are not known. ``pose``: reasons that the stage align gave against its pose.
+    ``fit``: how well the part as designed explains the intact skin; None where that was not measured.
+    """
+
+    tolerance: float
+    spacing: float
+    unit: str
+    noise: float = 0.0
+    seen_area: float = 0.0
+    is_fitted: bool = False
+    systematic: float = 0.0
+    outward_area: float = 0.0
+    outward_height: float = 0.0
+    between_views: float = 0.0
+    pose: tuple[Reason, ...] = ()
+    fit: ModelFit | None = None
+
+
+@dataclass(frozen=True)
+class SiteFacts:
+    """What is known about one site, in the job's unit.
+
+    ``volume``: of its damage volume (DV), and ``interval``: the 95 % interval of it with all terms of ``uncertainty``;
+    None where there is none. ``area``: skin that its points cover; ``damage_area``: of the whole surface of the DV;
+    ``count``: its scan points; ``typical`` and ``deepest``: median and 95th percentile of their depth below the skin.
+    ``evidence``: DV against scan. ``by_rays``: whether rays passed through the metal that it removes. ``rim_unseen``:
+    share of its rim beside skin that the scan does not show. ``two_sheets``: share of the skin that it removes on which
+    the points lie in two heaps. ``other_poses``: share of its skin that is not skin in another pose that fits as well.
+    ``free``: motions that the scan does not exclude. ``displaced``: numbers of the surplus as large as the loss.
+    ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no scan point shows, and
+    ``beyond_words``: how it was found.
+    """
+
+    volume: float
+    area: float
+    damage_area: float
+    count: int
+    typical: float
+    deepest: float
+    evidence: Evidence
+    interval: Interval | None = None
+    uncertainty: Uncertainty | None = None
+    by_rays: bool = False
+    rim_unseen: float = 0.0
+    two_sheets: float = 0.0
+    other_poses: float = 0.0
+    free: tuple[FreePose, ...] = ()
+    displaced: tuple[int, ...] = ()
+    covered: tuple[tuple[int, float], ...] = ()
+    beyond: float = 0.0
+    beyond_words: str = ""
+
+
+class Rule(ABC):
+    """One rule.
+
+    ``code``: of the reasons that it gives. ``meaning``: what the reason says; ``threshold``: from when on it is given;
+    ``remedy``: what to do. All three stand in the documentation.
+    """
+
+    code: ClassVar[str]
+    meaning: ClassVar[str]
+    threshold: ClassVar[str]
+    remedy: ClassVar[str] = ""
+
+    @abstractmethod
+    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+        """The reasons that these facts give, most often none or one."""

@@ -1,0 +1,38 @@
+"""Skin beside the site, or beside its rim, is not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from damageest.artefacts import Reason
+from damageest.rules import Rule, ScanFacts, SiteFacts
+
+SKIN, SKIN_OPEN = 0.25, 0.5
+"""Share of the skin beside a site without scan points from which it is told, and from which nothing shows where the
+damage ends."""
+RIM, RIM_OPEN = 0.08, 0.3
+"""The same for the share of the rim that lies beside unseen skin. A bore that was scanned from both ends looks worn at
+the ends; worn skin may go on where the scan does not show it."""
+
+
+class Beside(Rule):
+    code = "beside"
+    meaning = "skin beside the site is not seen: the damage may go on there"
+    threshold = (
+        f"{SKIN:.0%} of the skin beside it or {RIM:.0%} of its rim; from {SKIN_OPEN:.0%} or {RIM_OPEN:.0%} on the "
+        "upper end is open"
+    )
+    remedy = "scan the skin beside the damage"
+
+    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+        if site.by_rays:
+            return
+        skin, rim = site.evidence.skin_unseen, site.rim_unseen
+        if skin <= SKIN and rim < RIM:
+            return
+        is_open = skin > SKIN_OPEN or rim > RIM_OPEN
+        beside = site.uncertainty.beside if site.uncertainty else 0.0
+        words = [f"{skin:.0%} of the skin beside it has no scan points"] if skin > SKIN else []
+        words += [f"{rim:.0%} of its rim lies beside skin that the scan does not show"] if rim >= RIM else []
+        text = f"{' and '.join(words)}: the damage may go on there"
+        yield Reason(self.code, text, "open", None if is_open else beside, f"{scan.unit}³", remedy=self.remedy)

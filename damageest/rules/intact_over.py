@@ -1,0 +1,30 @@
+"""Intact points lie as densely on the removed skin as on other skin, rim included."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from damageest.artefacts import Reason
+from damageest.rules import Rule, ScanFacts, SiteFacts
+
+UNCLEAR, AGAINST = 0.3, 0.8
+"""Share of the removed skin with intact points from which the rim is not clear, and from which they contradict the
+site. On 183 troubled scans, a limit of 0.5 doubted chips two tolerances deep that were right: a quarter of their skin
+is shallower than half a tolerance. Shrunk parts and cracks have 0.8 and more."""
+
+
+class IntactOver(Rule):
+    code = "intact_over"
+    meaning = "intact scan points lie on the skin that the damage volume removes as densely as elsewhere, rim included"
+    threshold = f"on {UNCLEAR:.0%} of it the rim is not clear; on {AGAINST:.0%} they contradict the site"
+    remedy = "a smaller tolerance, if the noise allows it, or a denser scan"
+
+    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+        share = site.evidence.intact_share
+        if site.by_rays or share <= UNCLEAR:
+            return
+        text = f"intact points lie on {share:.0%} of the skin that it removes"
+        if share > AGAINST:
+            yield Reason(self.code, text, "contradicts", share, remedy=self.remedy)
+        else:
+            yield Reason(self.code, f"{text}: its rim is not clear", "open", share, remedy=self.remedy)

@@ -1,0 +1,96 @@
+"""What is said about a whole run: its codes, their order, and how many alike become one line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from damageest.artefacts import Reason
+
+
+@dataclass(frozen=True)
+class RunCode:
+    """``meaning`` of a code; ``rank``: 0 may change a decision about the part, 1 about how it was scanned, 2 tells what
+    was done. ``plural``: what many of them are together; empty where each stands for itself."""
+
+    meaning: str
+    rank: int
+    plural: str = ""
+
+
+RUN_CODES: dict[str, RunCode] = {
+    "displaced_piece": RunCode("what lies outside may be a displaced piece of the part", 0, "displaced pieces"),
+    "model_fit": RunCode("the part as designed does not explain the intact skin: bent, scaled, wavy, views apart", 0),
+    "align": RunCode("what the stage align says about the pose: symmetry, free motions, doubts", 0),
+    "unit": RunCode("the size of the part makes its unit doubtful", 0),
+    "thin_walls": RunCode("the tolerance is more than half the thickness of walls: no damage can be found there", 0),
+    "tolerance_small": RunCode("the tolerance is so small that intact skin may be taken for damage", 0),
+    "tolerance_raised": RunCode("tolerance: auto was raised, since intact skin deviates by more than the noise", 0),
+    "few_points": RunCode("the scan has too few points to show the skin between them", 0),
+    "fell_back": RunCode("method auto took the route surface, since implicit failed", 1),
+    "depth_steps": RunCode("the scan's depth has steps, as of a depth camera", 1),
+    "sparse_scan": RunCode("the points lie far apart for the tolerance", 1),
+    "coarse_part": RunCode("the part's triangles deviate from its CAD surface by more than half the tolerance", 1),
+    "surroundings": RunCode("part of the scan does not belong to the part and was left out", 1),
+    "far_points": RunCode("points far from all others were set aside", 1),
+    "surplus": RunCode("what lies outside the skin could not be grouped", 1),
+    "speck": RunCode("a few damaged points that bound no volume were left out", 1, "groups of a few damaged points"),
+    "segment": RunCode("what the stage segment says", 2),
+    "scraps": RunCode("pieces of a volume that no damaged point touches were dropped", 2),
+    "site_dropped": RunCode("a site was dropped, as the job says", 2),
+    "sites_merged": RunCode("sites were merged, as the job says", 2),
+    "cluster": RunCode("what the stage cluster says about how it grouped points", 2),
+    "export": RunCode("a file was written in another way than asked for, or not at all", 1),
+    "report": RunCode("the report failed, and the run went on without it", 1),
+}
+"""Codes of the notes of a run. Those of sites are the codes of rules, or of the stage that gave a note."""
+FOLDED = 3
+"""Notes of one code from which they become one line."""
+
+
+def make_notes(stage: str, notes: Iterable[str]) -> tuple[Reason, ...]:
+    """What a stage said in words, with the stage as its code."""
+    return tuple(Reason(stage, note) for note in notes)
+
+
+def rank_notes(notes: Iterable[Reason]) -> tuple[Reason, ...]:
+    """The notes without repetitions, those first that change a decision; those of equal rank in their order."""
+    last = RunCode("", 2)
+    return tuple(sorted(dict.fromkeys(notes), key=lambda note: RUN_CODES.get(note.code, last).rank))
+
+
+def fold_notes(notes: Sequence[Reason]) -> tuple[Reason, ...]:
+    """The notes with many of one code as one line, which gives their number and the sum of their amounts."""
+    folded: list[Reason] = []
+    done: set[str] = set()
+    for note in notes:
+        alike = [other for other in notes if other.code == note.code]
+        plural = RUN_CODES[note.code].plural if note.code in RUN_CODES else ""
+        if not plural or len(alike) < FOLDED:
+            folded.append(note)
+        elif note.code not in done:
+            done.add(note.code)
+            folded.append(
+                replace(note, text=f"{len(alike)} {plural}: {RUN_CODES[note.code].meaning}", amount=len(alike))
+            )
+    return tuple(folded)
+
+
+@dataclass(frozen=True)
+class SiteReason:
+    """One reason, and the numbers of the ``sites`` that have it in the same words."""
+
+    sites: tuple[int, ...]
+    reason: Reason
+
+    @property
+    def names(self) -> str:
+        return f"site {self.sites[0]}" if len(self.sites) == 1 else f"sites {', '.join(map(str, self.sites))}"
+
+
+def join_reasons(reasons: Iterable[tuple[int, Reason]]) -> tuple[SiteReason, ...]:
+    """Reasons of sites, each one once with all sites that have it."""
+    found: dict[Reason, list[int]] = {}
+    for number, reason in reasons:
+        found.setdefault(reason, []).append(number)
+    return tuple(SiteReason(tuple(numbers), reason) for reason, numbers in found.items())

@@ -1,0 +1,22 @@
+"""The damaged points do not lie on the damage volume's boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from damageest.artefacts import Reason
+from damageest.rules import Rule, ScanFacts, SiteFacts
+
+
+class OffBoundary(Rule):
+    code = "off_boundary"
+    meaning = "the damaged points of the site do not lie on the boundary of its damage volume"
+    threshold = "95 % of them lie within more than 1.5 tolerances and a quarter of the spacing"
+    remedy = "compare the volume with the points in the report, and try method: surface"
+
+    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+        if "residual" not in site.evidence.causes:
+            return
+        off = site.evidence.ids_residual
+        text = f"its boundary is off the damaged points (95 % within {off:.3g} {scan.unit})"
+        yield Reason(self.code, text, "contradicts", off, scan.unit, remedy=self.remedy)

@@ -1,0 +1,20 @@
+"""The tables of reasons in the documentation, from the rules themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from damageest.rules import Rule
+from damageest.rules.notes import RUN_CODES
+from damageest.rules.pose import POSE_CODES
+
+
+def format_reasons(rules: Iterable[Rule]) -> str:
+    """Markdown: the codes of reasons for verdicts, of those that align gives against a pose, and of notes of a run."""
+    lines = ["| code | meaning | from when on | what to do |", "| --- | --- | --- | --- |"]
+    lines += [f"| `{rule.code}` | {rule.meaning} | {rule.threshold} | {rule.remedy} |" for rule in rules]
+    lines += ["", "Against the pose, by the stage align (rule `pose`):", "", "| code | meaning |", "| --- | --- |"]
+    lines += [f"| `{code}` | {meaning} |" for code, meaning in POSE_CODES.items()]
+    lines += ["", "Notes of a run:", "", "| code | meaning |", "| --- | --- |"]
+    lines += [f"| `{code}` | {one.meaning} |" for code, one in sorted(RUN_CODES.items(), key=lambda item: item[1].rank)]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,46 @@
+"""The causes that make the interval of the volume wide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from damageest.artefacts import Reason
+from damageest.rules import Rule, ScanFacts, SiteFacts
+
+TOLD = 0.05
+"""Half-width that a cause gives the interval by itself, as a share of the volume, from which it is told."""
+CAUSES = {
+    "form": ("intact skin that deviates over whole areas", "find out whether the part is bent, or the scan scaled"),
+    "outward": ("skin that lies as far outside the part", "find out whether the pose is wrong, or the scan scaled"),
+    "views": ("views that differ where they overlap", "register the views to each other again"),
+    "pose": ("the fitted pose", "scan more of the intact skin, or name unworn faces in align.datum"),
+    "rim": ("where the inner surface meets the skin", "a smaller tolerance, if the noise allows it"),
+    "spacing": ("the gaps between the points", "scan this place more densely"),
+    "noise": ("the noise of the points", "scan with less noise, or more often"),
+    "tessellation": ("triangles in place of the CAD surface", "a finer part.chord"),
+}
+"""Each cause in words, and what makes it smaller."""
+
+
+class Terms(Rule):
+    code = "wide_interval"
+    meaning = "causes that have a size make the interval of the volume wide; result.json has each under uncertainty"
+    threshold = f"a half-width of {TOLD:.0%} of the volume by one cause alone"
+    remedy = "that of the largest cause, which the reason names"
+
+    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+        if site.uncertainty is None:
+            return
+        halves = {name: 2 * float(getattr(site.uncertainty, name)) for name in CAUSES}
+        told = sorted((name for name in halves if halves[name] > TOLD * site.volume), key=lambda name: -halves[name])
+        if not told:
+            return
+        words = [f"±{halves[name]:.3g} by {self._name(name, scan)}" for name in told]
+        text = f"its volume is uncertain, in {scan.unit}³: {', '.join(words)}"
+        yield Reason(self.code, text, "widens", halves[told[0]], f"{scan.unit}³", remedy=CAUSES[told[0]][1])
+
+    def _name(self, cause: str, scan: ScanFacts) -> str:
+        words = CAUSES[cause][0]
+        if cause == "form" and scan.fit is not None and scan.fit.model != "ok":
+            return f"{words} ({scan.fit.name})"
+        return words

@@ -1,0 +1,28 @@
+"""A shallow loss over much of the skin, in a pose that no unworn skin is known to hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from damageest.artefacts import Reason
+from damageest.rules import Rule, ScanFacts, SiteFacts
+
+WIDE, THIN = 0.12, 4.0
+"""A site over a larger share of the seen skin than the first, and shallower in tolerances than the second, may be an
+error of a fitted pose that no unworn skin is known to hold: worn metal, or a part of another size, moves it."""
+
+
+class WideLoss(Rule):
+    code = "wide_loss"
+    meaning = "a shallow loss covers much of the skin, and no unworn skin is known to hold the pose"
+    threshold = f"more than {WIDE:.0%} of the seen skin, and half of it shallower than {THIN:g} tolerances"
+    remedy = "name faces that are not worn in align.datum; where the pose is known, give it to align: none"
+
+    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+        if not scan.is_fitted or site.area <= WIDE * scan.seen_area or site.typical >= THIN * scan.tolerance:
+            return
+        text = (
+            f"it covers {site.area / scan.seen_area:.0%} of the skin that the scan shows, {site.typical:.3g} "
+            f"{scan.unit} deep, and the pose was fitted to the scan: the loss may lie elsewhere"
+        )
+        yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)

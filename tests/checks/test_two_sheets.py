@@ -1,0 +1,73 @@
+"""Two surfaces over the same skin are told from the rim of a loss, on a box with known truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import damageest
+from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Scan
+from damageest.checks.two_sheets import measure_two_sheets
+from damageest.geometry.distance import signed_distance
+from damageest.stages.scan.simulate import Simulate
+from tests.damaged_box import SIZE, box
+
+TOLERANCE, NOISE = 0.2, 0.05
+TOP = SIZE[2] / 2
+
+
+def scan_box(seed: int, *tools: dict[str, object], points: int = 20_000) -> Floats:
+    scanner = Simulate.model_validate({"damage": list(tools), "points": points, "noise": NOISE, "seed": seed})
+    return np.array(scanner.run("mm", box()).points)
+
+
+def lower_top(points: Floats, depth: float, where: Floats) -> Floats:
+    """The points with the top lower by ``depth`` where the scan shows it too deep."""
+    out = points.copy()
+    out[where & (points[:, 2] > TOP - 4 * NOISE), 2] -= depth
+    return out
+
+
+def measure(points: Floats) -> float:
+    part = box()
+    distance, face = signed_distance(points, part)
+    label = np.where(distance < -TOLERANCE, DAMAGE, INTACT).astype(np.uint8)
+    scan = Scan(points, noise=NOISE, spacing=0.6)
+    return measure_two_sheets(scan, Deviation(distance, face, label), part, np.flatnonzero(label == DAMAGE), TOLERANCE)
+
+
+@pytest.mark.parametrize("depth", [1.5, 2.0, 4.0])
+def test_a_second_view_below_the_first_is_found(depth: float) -> None:
+    first, second = scan_box(1), scan_box(2)
+    low = lower_top(second, depth * TOLERANCE, second[:, 0] > -8)
+    assert measure(np.concatenate([first, low])) > 0.5
+
+
+@pytest.mark.parametrize(
+    "tool",
+    [
+        {"tool": "sphere", "centre": [0, 0, TOP + 2], "radius": 6},
+        {"tool": "sphere", "centre": [0, 0, TOP + 7.5], "radius": 8},
+        {"tool": "box", "centre": [0, 0, TOP], "size": [12, 1.2, 1.0]},
+        {"tool": "box", "centre": [0, 0, TOP], "size": [14, 10, 0.9]},
+    ],
+)
+def test_the_rim_of_a_loss_is_no_second_surface(tool: dict[str, object]) -> None:
+    assert measure(scan_box(1, tool, points=40_000)) < 0.2
+
+
+@pytest.mark.parametrize("depth", [0.65, 0.8, 1.0])
+def test_wear_of_about_a_tolerance_is_one_surface_with_noise(depth: float) -> None:
+    points = scan_box(1, points=40_000)
+    assert measure(points) == 0
+    assert measure(lower_top(points, depth * TOLERANCE, points[:, 0] > -8)) < 0.1
+
+
+def test_a_false_site_of_a_misplaced_view_is_doubtful_and_names_the_cause() -> None:
+    first, second = scan_box(1), scan_box(2)
+    low = lower_top(second, 1.5 * TOLERANCE, np.linalg.norm(second[:, :2] - [4, 2], axis=1) < 7)
+    job = {"version": 1, "tolerance": TOLERANCE, "align": "none"}
+    result = damageest.run(job, part=box(), scan=Scan(np.concatenate([first, low])))
+    assert result.sites
+    assert not any(site.accepted for site in result.sites)
+    assert "two_sheets" in {reason.code for site in result.sites for reason in site.verdict.reasons}

@@ -1,0 +1,34 @@
+"""Notes of a run: in order of what they change, many alike as one line."""
+
+from __future__ import annotations
+
+from damageest.artefacts import Reason
+from damageest.rules.notes import RUN_CODES, fold_notes, join_reasons, rank_notes
+
+
+def test_what_changes_a_decision_comes_first_and_nothing_twice() -> None:
+    notes = [
+        Reason("cluster", "eps"),
+        Reason("surroundings", "a table"),
+        Reason("align", "free"),
+        Reason("align", "free"),
+    ]
+    assert [note.code for note in rank_notes(notes)] == ["align", "surroundings", "cluster"]
+    assert {note.code for note in notes} <= set(RUN_CODES)
+
+
+def test_many_specks_are_one_line_with_their_number_and_two_stay() -> None:
+    specks = [Reason("speck", f"{k} points", amount=0.1) for k in range(12)]
+    other = Reason("align", "free")
+    folded = fold_notes((other, *specks))
+    assert [note.code for note in folded] == ["align", "speck"]
+    assert folded[1].amount == 12
+    assert fold_notes(specks[:2]) == tuple(specks[:2])
+
+
+def test_a_reason_of_several_sites_is_told_once() -> None:
+    pose, own = Reason("pose", "free"), Reason("few_points", "3 points")
+    joined = join_reasons([(1, pose), (2, pose), (2, own), (5, pose)])
+    assert [(one.sites, one.reason) for one in joined] == [((1, 2, 5), pose), ((2,), own)]
+    assert joined[0].names == "sites 1, 2, 5"
+    assert joined[1].names == "site 2"
