@@ -10,6 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Solid
 from damageest.geometry.bodies import split_shells
+from damageest.geometry.body_repair import label_bodies
 from damageest_cadquery._facets import FLAT, Facet, find_facets, take_triangles, weld
 
 Shell = tuple[Floats, list[Facet]]
@@ -18,9 +19,20 @@ Shells = list[list[Shell]]
 """The shells of each body, the outer one first."""
 
 
+def split_solids(solid: Solid) -> list[tuple[Solid, list[Solid]]]:
+    """The bodies of a solid with their cavities. Those that touch in points alone are bodies of their own, as
+    OpenCASCADE reads them."""
+    label, count = label_bodies(solid.faces)
+    if count > 1:
+        size = len(solid.vertices)
+        used, faces = np.unique(label[:, None] * size + solid.faces, return_inverse=True)
+        solid = Solid(solid.vertices[used % size], faces.reshape(-1, 3))
+    return split_shells(solid)
+
+
 def find_shells(solid: Solid, joined: bool = True) -> Shells:
     """The shells of a solid's bodies; ``joined``: triangles in one plane are one face."""
-    bodies = [[weld(each) for each in (outer, *cavities)] for outer, cavities in split_shells(solid)]
+    bodies = [[weld(each) for each in (outer, *cavities)] for outer, cavities in split_solids(solid)]
     find = find_facets if joined else take_triangles
     return [[(shell.vertices, find(shell)) for shell in body] for body in bodies]
 

@@ -19,7 +19,9 @@ from damageest_cadquery._split import measure_volume
 
 SAME = 1e-3
 """Largest relative difference between a solid's volume, or a surface's area, in the file and before."""
-INVALID = "a solid in it is not valid (BRepCheck)"
+COMPLETE = "with all of its volume"
+"""How a fault ends of a file that lacks nothing."""
+INVALID = f"a solid in it is not valid (BRepCheck), {COMPLETE}"
 
 
 def find_fault(path: Path, shape: Any, volumes: Sequence[float] = ()) -> str:
@@ -38,7 +40,9 @@ def find_fault(path: Path, shape: Any, volumes: Sequence[float] = ()) -> str:
         return f"it cannot be read: {error}"
     solids, wanted = explore(found, TopAbs_SOLID), explore(shape, TopAbs_SOLID)
     if len(solids) != len(wanted):
-        return f"it holds {len(solids)} of {len(wanted)} solids"
+        fault = f"it holds {len(solids)} solids for {len(wanted)}"
+        whole = [sum(map(measure_quickly, each)) for each in (solids, wanted)]
+        return fault if not solids or _compare(whole[:1], whole[1:], "volume") else f"{fault}, {COMPLETE}"
     shells = [shell for solid in solids for shell in explore(solid, TopAbs_SHELL)]
     if not all(BRep_Tool.IsClosed_s(TopoDS.Shell_s(shell)) for shell in shells):
         return "a solid in it is open"

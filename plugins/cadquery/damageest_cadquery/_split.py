@@ -162,6 +162,8 @@ def is_near(shape: Any, mesh: Solid) -> bool:
 
     box = Bnd_Box()
     BRepBndLib.Add_s(shape, box, False)
+    if box.IsVoid():  # a solid without faces
+        return False
     bounds = np.array(box.Get()).reshape(2, 3)
     return bool((bounds[0] <= mesh.bounds[1]).all() and (bounds[1] >= mesh.bounds[0]).all())
 

@@ -15,12 +15,11 @@ from typing import Any
 
 from damageest.artefacts import Solid
 from damageest.errors import InputError, StageError
-from damageest.geometry.bodies import split_shells
 from damageest.geometry.units import MILLIMETRES
 from damageest.isolation import call_isolated
 from damageest.stages.export import Body, ExportedFiles
 from damageest_cadquery._header import set_header
-from damageest_cadquery._planar import build_shape, count_faces, find_shells
+from damageest_cadquery._planar import build_shape, count_faces, find_shells, split_solids
 
 UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
 MAX_FACES = 100_000
@@ -98,7 +97,7 @@ def write_facets(scratch: Path, path: Path, solid: Solid, name: str, unit: str, 
         return build_shape(shells, scale)
 
     volumes = [
-        (outer.volume - sum(cavity.volume for cavity in cavities)) * scale**3 for outer, cavities in split_shells(solid)
+        (outer.volume - sum(cavity.volume for cavity in cavities)) * scale**3 for outer, cavities in split_solids(solid)
     ]
 
     def write(place: Path, shape: Any) -> None:
@@ -114,11 +113,11 @@ def write_facets(scratch: Path, path: Path, solid: Solid, name: str, unit: str, 
 def write_first(scratch: Path, path: Path, ways: Iterable[Way], volumes: Sequence[float] = ()) -> Outcome:
     """Writes a file in the first of several ways in which it holds what it is to hold when it is read back.
 
-    Where there is none, the first is taken in which only OpenCASCADE's check of the geometry fails; else there is no
-    file. ``scratch``: where files are written and read back; ``volumes``: of the solids, where they are known better
-    than from the shape.
+    Where there is none, the first is taken that lacks nothing, though OpenCASCADE divides its solids in another way or
+    finds them not valid; else there is no file. ``scratch``: where files are written and read back; ``volumes``: of the
+    solids, where they are known better than from the shape.
     """
-    from damageest_cadquery._readback import INVALID, find_fault  # imported late: the caller does not need it
+    from damageest_cadquery._readback import COMPLETE, find_fault  # imported late: the caller does not need it
 
     faults: list[str] = []
     doubtful, spare = Outcome(None), scratch.with_name("doubtful.step")
@@ -142,9 +141,9 @@ def write_first(scratch: Path, path: Path, ways: Iterable[Way], volumes: Sequenc
                 else Outcome(made)
             )
         faults.append(fault)
-        if fault == INVALID and doubtful.made is None:
+        if fault.endswith(COMPLETE) and doubtful.made is None:
             shutil.move(scratch, spare)
-            doubtful = Outcome(made, f"may be refused by other programs: read back, {INVALID}", fault)
+            doubtful = Outcome(made, f"may be refused by other programs: read back, {fault}", fault)
     if doubtful.made is None:
         return Outcome(None, f"was not written: read back, {faults[0]}", faults[0])
     shutil.move(spare, path)
