@@ -121,7 +121,7 @@ def _unit(name: str) -> str | None:
 def _solids(shape: Any) -> tuple[list[Any], tuple[str, ...]]:
     from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 
-    solids = explore(shape, TopAbs_SOLID)
+    solids = [solid for solid in explore(shape, TopAbs_SOLID) if explore(solid, TopAbs_FACE)]
     if solids:
         return solids, ()
     if not explore(shape, TopAbs_FACE):

@@ -119,6 +119,21 @@ def test_surfaces_that_close_are_sewn_and_it_is_said(tmp_path: Path) -> None:
     assert any("sewn" in note for note in part.notes)
 
 
+def test_a_solid_without_faces_is_none(tmp_path: Path) -> None:
+    from damageest_cadquery._read import read
+    from OCP.BRep import BRep_Builder
+    from OCP.TopoDS import TopoDS_Compound, TopoDS_Solid
+
+    builder, whole, empty = BRep_Builder(), TopoDS_Compound(), TopoDS_Solid()
+    builder.MakeCompound(whole)
+    builder.MakeSolid(empty)
+    builder.Add(whole, empty)
+    builder.Add(whole, cq.Workplane().box(3, 4, 5).val().wrapped)
+    path = write(cq.Compound(whole), tmp_path / "a.brep")
+    assert len(read(path, ".brep").solids) == 1
+    assert Brep(path=path).run(unit="mm", tolerance=0.1).volume == pytest.approx(60)
+
+
 def test_an_open_skin_is_refused_with_its_open_edges(tmp_path: Path) -> None:
     faces = cq.Compound.makeCompound(cq.Workplane().box(3, 4, 5).val().Faces()[1:])
     with pytest.raises(InputError, match=r"skin\.step: .*no solid.*4 open edges"):
