@@ -20,6 +20,9 @@ APART = 0.85
 a loss. Half discs lie 1.2 apart, twice six points drawn at random 0.58."""
 FACING = 3.0
 """Weight of a difference of normals, in spacings: a thin wall has two sides."""
+EVEN = 0.35
+"""Spread of the depths of those below, as a share of their mean, up to which they are a surface. The points on a steep
+wall lie at all depths below the same skin."""
 MOST_ASKED = 2000
 """Points of the site that are asked; a share is right to two percent then."""
 
@@ -55,8 +58,18 @@ def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members:
     middle_on, middle_below = (_find_middle(offset, kind) for kind in (on, ~on & ~between))
     radius = np.sqrt(((offset - offset.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1))
     apart = np.linalg.norm(middle_on - middle_below, axis=1) / np.maximum(radius, 1e-300)
+    depth = -np.concatenate([deviation.distance[below], distance])[used][index]
+    mean, spread = _measure_spread(depth, ~on & ~between)
     is_mixed = (share > LEAST) & (share < MOST) & (between.mean(axis=1) < BETWEEN) & (apart < APART)
+    is_mixed &= spread < EVEN * mean
     return float(is_mixed.mean())
+
+
+def _measure_spread(values: Floats, chosen: Flags) -> tuple[Floats, Floats]:
+    """Mean and standard deviation (N,) of the chosen (N,M) of some values (N,M)."""
+    count = np.maximum(chosen.sum(axis=1), 1)
+    mean = (values * chosen).sum(axis=1) / count
+    return mean, np.sqrt((((values - mean[:, None]) * chosen) ** 2).sum(axis=1) / count)
 
 
 def _find_middle(offset: Floats, chosen: Flags) -> Floats:
