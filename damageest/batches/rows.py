@@ -81,7 +81,7 @@ def read_row(values: dict[str, Any]) -> Row:
     """The row of `Row.to_values`. Raises TypeError or ValueError for anything else."""
     interval = values.get("volume_95")
     lists = ("settings", "reasons", "remedies")
-    changed = {name: tuple(values[name]) for name in lists} | {
+    changed = {name: tuple(values[name]) for name in lists if name in values} | {
         "volume_95": None if interval is None else tuple(interval)
     }
     return Row(**{**values, **changed})

@@ -106,7 +106,9 @@ def measure_site_error(
     area = np.linalg.norm(damage.cross, axis=1) / 2
     skin = ~inner
     skin_area = float(area[skin].sum())
-    patches = max(1.0, skin_area / max(pose.patch_area, 1e-300))
+    # what deviates moves the inner surface against the skin: of a wall that broke off, the root alone
+    exposed = min(skin_area, float(area[inner].sum()))
+    patches = max(1.0, exposed / max(pose.patch_area, 1e-300))
     systematic = max(pose.systematic, scan.systematic)
     outward = _limit_outward(scan, skin_area)
     chord = part.tessellation_error * _measure_curved(damage, skin, area) if part.tessellation_error else 0.0
@@ -124,9 +126,9 @@ def measure_site_error(
         pose=pose.of_volume(damage.triangles[skin].mean(axis=1), damage.face_normals[skin], area[skin]),
         tessellation=chord / np.sqrt(3),
         # a form that a fit gives is common to the whole site; that of patches is different in each
-        form=float(max(form * skin_area, systematic * skin_area / np.sqrt(patches))),
-        outward=outward * skin_area / WIDTH,
-        views=scan.between_views * skin_area / WIDTH,
+        form=float(max(form * exposed, systematic * exposed / np.sqrt(patches))),
+        outward=outward * exposed / WIDTH,
+        views=scan.between_views * exposed / WIDTH,
         inside=HOLE * hole**1.5,
         depth=deepest.depth - surface.depth_excess,
         depth_error=float(np.sqrt(surface.depth**2 + beside)),

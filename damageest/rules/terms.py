@@ -8,7 +8,9 @@ from damageest.artefacts import Reason
 from damageest.rules import Rule, ScanFacts, SiteFacts
 
 TOLD = 0.05
-"""Half-width that a cause gives the interval by itself, as a share of the volume, from which it is told."""
+"""Half-width of the interval, as a share of the volume, from which its causes are told."""
+LARGE = 1 / 3
+"""Half-width that a cause gives by itself, as a share of the largest one, from which it is named."""
 CAUSES = {
     "form": ("intact skin that deviates over whole areas", "find out whether the part is bent, or the scan scaled"),
     "outward": ("skin that lies as far outside the part", "find out whether the pose is wrong, or the scan scaled"),
@@ -25,15 +27,18 @@ CAUSES = {
 class Terms(Rule):
     code = "wide_interval"
     meaning = "causes that have a size make the interval of the volume wide; result.json has each under uncertainty"
-    threshold = f"a half-width of {TOLD:.0%} of the volume by one cause alone"
+    threshold = f"a half-width of {TOLD:.0%} of the volume; causes of a third of the largest one are named"
     remedy = "that of the largest cause, which the reason names"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
-        if site.uncertainty is None:
+        if site.uncertainty is None or site.interval is None:
+            return
+        if site.interval[1] - site.interval[0] <= 2 * TOLD * site.volume:
             return
         halves = {name: 2 * float(getattr(site.uncertainty, name)) for name in CAUSES}
-        told = sorted((name for name in halves if halves[name] > TOLD * site.volume), key=lambda name: -halves[name])
-        if not told:
+        most = max(halves.values())
+        told = sorted((name for name in halves if halves[name] > LARGE * most), key=lambda name: -halves[name])
+        if not told:  # what makes it wide is told by other rules: free motions, what is not seen
             return
         words = [f"±{halves[name]:.3g} by {self._name(name, scan)}" for name in told]
         text = f"its volume is uncertain, in {scan.unit}³: {', '.join(words)}"

@@ -39,8 +39,13 @@ def run(whole: Manifold, left: Manifold, known: bool = True, views: list[list[in
 def test_what_broke_off_is_a_proven_site(name: str) -> None:
     result = run(BASE + LOST[name], BASE)
     truth = to_solid(LOST[name] - BASE)
-    assert [site.verdict.level for site in result.sites] == ["proven"], [site.verdict for site in result.sites]
+    (site,) = result.sites
+    # a wall of one tolerance is known to a tenth
+    assert site.verdict.level in (("proven", "likely") if "one" in name else ("proven",)), site.verdict
     assert iou(result.damage, truth) > 0.9
+    assert site.volume_95 is not None
+    assert truth is not None
+    assert site.volume_95[0] <= truth.volume <= site.volume_95[1]
 
 
 def test_a_whole_body_that_is_gone_is_a_proven_site() -> None:

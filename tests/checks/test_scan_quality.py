@@ -35,10 +35,10 @@ def test_auto_is_four_times_the_noise() -> None:
 def test_auto_with_steps() -> None:
     tolerance, warnings = choose_tolerance(None, SCAN, PART, step=1.0)
     assert tolerance == 1.5
-    assert "steps of 1" in warnings[0]
+    assert warnings[0].code == "depth_steps"
     tolerance, warnings = choose_tolerance(0.3, SCAN, PART, step=1.0)
     assert tolerance == 0.3
-    assert any("less than one step" in text for text in warnings)
+    assert "tolerance_small" in [note.code for note in warnings]
 
 
 @pytest.mark.parametrize("worn", [0.0, 0.3, 0.6])
@@ -55,7 +55,7 @@ def test_nothing_at_the_surface() -> None:
 def test_form_errors_raise_the_tolerance() -> None:
     tolerance, warnings = raise_tolerance(0.2, deviate(0.3, 0.2, 5.0), PART, 0.05)
     assert tolerance == pytest.approx(1.2, rel=0.1)
-    assert "was raised from 0.2" in warnings[0]
+    assert warnings[0].code == "tolerance_raised"
 
 
 def test_few_intact_points_stop_the_run() -> None:
@@ -68,4 +68,4 @@ def test_few_intact_points_stop_the_run() -> None:
 
 def test_a_tolerance_beyond_the_walls() -> None:
     assert not check_walls(0.2, PART)
-    assert "no damage can be found there" in check_walls(12.0, PART)[0]
+    assert [note.code for note in check_walls(12.0, PART)] == ["thin_walls"]

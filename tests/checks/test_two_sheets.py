@@ -51,7 +51,7 @@ def test_a_second_view_below_the_first_is_found(depth: float) -> None:
         {"tool": "box", "centre": [0, 0, TOP], "size": [12, 1.2, 1.0]},
         {"tool": "box", "centre": [0, 0, TOP], "size": [14, 10, 0.9]},
         {"tool": "box", "centre": [0, 0, TOP], "size": [3, 3, 5]},
-        {"tool": "cylinder", "point": [0, 0, TOP], "axis": [0, 0, 1], "radius": 2.5, "length": 6},
+        {"tool": "cylinder", "point": [0, 0, TOP - 3], "axis": [0, 0, 1], "radius": 2.5, "length": 8},
     ],
 )
 def test_the_rim_of_a_loss_is_no_second_surface(tool: dict[str, object]) -> None:

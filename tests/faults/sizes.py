@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 from damageest_evaluate.troubles.classify import TrueState, judge
-from damageest_evaluate.troubles.names import SPARSE
 
 import damageest
 from damageest.errors import InputError, StageError
@@ -35,8 +34,6 @@ DAMAGE: dict[str, dict[str, Any]] = {
     "ribbed_plate": {"tool": "box", "centre": [55, 30, 0], "size": [16, 14, 30], "rotation": [0, 0, 20]},  # an edge
     "blade": {"tool": "box", "centre": [0, 0, 80], "size": [60, 40, 20], "rotation": [10, 0, 0]},  # the tip
 }
-NAMES = (*SPARSE, r"sparse for its tolerance")
-"""What says that there are too few points."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +108,7 @@ def _describe(case: Case, found: Result | Exception, seconds: float) -> Row:
     assert true
     assert true.damage
     whole = true.damage.volume
-    judgement = judge(found, TrueState(found.part, true.damage, true.T_part_scan, NAMES, case.tolerance))
+    judgement = judge(found, TrueState(found.part, true.damage, true.T_part_scan, case.tolerance))
     low, high = (f"{value / whole:.9g}" for value in found.volume_95) if found.volume_95 else ("", "")
     unexpected = [text for text in found.failures if "unexpected" in text]
     return Row(

@@ -33,10 +33,11 @@ def command(
     ] = None,
     show: Annotated[bool, typer.Option("--list", help="Only list the cases.")] = False,
 ) -> None:
-    """Count right, wrong but said, and wrong and silent results on scans with known trouble.
+    """Count right, said and silent results on scans with known trouble.
 
     The troubles are those of real scans: lost walls, skin that was not scanned, a wrong part, frame or unit, fixtures,
-    misplaced views, and others. A result is silent where it is wrong and nothing in it says so.
+    misplaced views, and others. A result is silent where it is wrong, the truth is outside the
+    interval, and the site is not doubtful.
     """
     from damageest.registry import Registry
     from damageest_evaluate.job import fingerprint_code

@@ -25,8 +25,8 @@ from damageest.registry import Registry
 from damageest.result import Result
 from damageest_evaluate.processes import MARK
 from damageest_evaluate.troubles.classify import (
+    Judgement,
     TrueState,
-    collect_texts,
     judge,
     judge_error,
     measure_seen_error,
@@ -64,7 +64,15 @@ class TroubleCase:
         """The row of a case that has no result yet."""
         row = {name: value for name, value in vars(self).items() if name not in ("source", "varied")}
         row |= {"key": self.compute_key(), "outcome": "silent", "reason": "", "iou": None, "unseen": 0}
-        row |= {"cautious": False, "refused": False, "skipped": False, "error": "", "texts": [], "sites": 0}
+        row |= {
+            "cautious": False,
+            "refused": False,
+            "skipped": False,
+            "error": "",
+            "codes": [],
+            "groups": [],
+            "sites": 0,
+        }
         row |= {"accepted": 0, "true_volume": 0.0, "found_volume": 0.0, "seen": None, "seen_reported": None}
         return row | {"seen_error": None, "seconds": 0.0, "cpu_seconds": 0.0, "step_seconds": 0.0}
 
@@ -120,7 +128,6 @@ def run_case(case: TroubleCase) -> dict[str, Any]:
     scan, pose = make_scan(case, scene)
     row["true_volume"] = scene.damage.volume if scene.damage else 0.0
     row["seen"] = scene.seen
-    names = TROUBLES[case.kind].names
     scanning = Scanning(case.part, case.seed, amount=case.amount)
     settings = ["allowance=none", f"tolerance={scanning.tolerance:.6g}"]
     settings += ["align=none"] if case.pose == "known" else []
@@ -133,22 +140,28 @@ def run_case(case: TroubleCase) -> dict[str, Any]:
     except (StageError, InputError) as error:
         message = " ".join(str(error).split())
         row["seconds"] = time.perf_counter() - start
-        return row | vars(judge_error(message, names)) | {"iou": None, "error": message}
+        return row | _describe_judgement(judge_error(message)) | {"iou": None, "error": message}
     except DamageestError as error:  # the job of the evaluation itself is at fault
         raise RuntimeError(f"the job of case {case.number} is not valid: {error}") from error
     row["seconds"], row["cpu_seconds"] = time.perf_counter() - start, cpu_seconds() - cpu_start
     row["step_seconds"] = row["cpu_seconds"] - clock.stage_seconds
     row |= _describe_result(result, scene)
-    state = TrueState(scene.part, scene.damage, pose if scene.has_pose else None, names, scanning.tolerance)
-    row |= vars(judge(result, state))
+    state = TrueState(scene.part, scene.damage, pose if scene.has_pose else None, scanning.tolerance)
+    row |= _describe_judgement(judge(result, state))
     return {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in row.items()}
+
+
+def _describe_judgement(judgement: Judgement) -> dict[str, Any]:
+    """The fields of a row that come from the judgement; an open end of an interval is None."""
+    groups = [vars(one) | {"high": one.high if math.isfinite(one.high) else None} for one in judgement.groups]
+    return vars(judgement) | {"groups": groups}
 
 
 def _describe_result(result: Result, scene: TroubleScene) -> dict[str, Any]:
     """The fields of a row that come from the result."""
     reported = None if result.coverage is None else result.coverage.seen
     return {
-        "texts": [" ".join(text.split()) for text in collect_texts(result)],
+        "codes": sorted({reason.code for site in result.sites for reason in site.verdict.reasons}),
         "sites": len(result.sites),
         "accepted": sum(site.accepted for site in result.sites),
         "found_volume": sum(site.damage.volume for site in result.sites if site.accepted),

@@ -1,8 +1,7 @@
-"""Right, wrong but said, or wrong and silent: the definition, applied to one run."""
+"""Right, inside its interval, said, or silent: the definition, applied to one run. It reads values, and no sentence."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -15,7 +14,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.geometry.transforms import move_mesh
-from damageest.result import Result
+from damageest.result import Result, Site
 from damageest_evaluate.scores import MATCH, measure_depth, measure_pose_error, score, unite_solids
 
 RIGHT_IOU = 0.9
@@ -33,30 +32,51 @@ UNSEEN_SHARE = 0.5
 TOUCH = 1e-3
 """Share of a damage inside doubtful sites from which they are about this damage."""
 
-Outcome = Literal["right", "said", "silent"]
+Outcome = Literal["right", "inside", "said", "silent"]
 
 
 @dataclass(frozen=True, eq=False)
 class TrueState:
     """The truth of a run.
 
-    ``pose`` (4,4) T_part_scan, None where no pose is right; ``damage`` in the part's frame. ``names``: patterns that
-    name the trouble. ``tolerance``: the one that the scan allows; a larger one of the job does not make damage tiny or
-    a pose right.
+    ``pose`` (4,4) T_part_scan, None where no pose is right; ``damage`` in the part's frame. ``tolerance``: the one that
+    the scan allows; a larger one of the job does not make damage tiny or a pose right.
     """
 
     part: Part
     damage: Solid | None
     pose: Floats | None
-    names: tuple[str, ...] = ()
     tolerance: float = float("inf")
 
 
 @dataclass(frozen=True)
+class Group:
+    """Sites and bodies of the true damage that overlap. ``truth``: volume of the bodies; ``volume``: of the accepted
+    sites; ``low``, ``high``: their interval, to which doubtful sites of the group add; ``levels``: of all its sites."""
+
+    truth: float
+    volume: float
+    low: float
+    high: float
+    levels: tuple[str, ...]
+    accepted: int
+
+    @property
+    def holds(self) -> bool:
+        """Whether the truth lies in the interval."""
+        return self.low <= self.truth <= self.high
+
+
+@dataclass(frozen=True)
 class Judgement:
-    """The outcome of a run and why. ``unseen``: number of true damages that lie on skin reported as unseen. ``iou``: of
-    the accepted volumes and the true damage that is not unseen, NaN where there is neither. ``cautious``: it would be
-    right with its doubtful sites accepted. ``refused``: the run gave an error."""
+    """The outcome of a run and why.
+
+    `right`: pose, sites and volumes. `inside`: a volume is wrong, and the truth lies in its interval. `said`: what is
+    wrong is in doubtful sites, on skin reported as lost, or the run gave no interval of the total or was refused.
+    `silent`: anything else. ``unseen``: number of true damages that lie on skin reported as unseen. ``iou``: of the
+    accepted volumes and the true damage that is not unseen, NaN where there is neither. ``cautious``: it would be
+    right with its doubtful sites accepted. ``refused``: the run gave an error. ``groups``: what overlaps.
+    """
 
     outcome: Outcome
     reason: str
@@ -64,13 +84,12 @@ class Judgement:
     unseen: int = 0
     cautious: bool = False
     refused: bool = False
+    groups: tuple[Group, ...] = ()
 
 
-def judge_error(message: str, names: Sequence[str]) -> Judgement:
-    """The judgement on a run that was refused: said where the message names the trouble."""
-    if find_name([message], names, False):
-        return Judgement("said", f"refused: {message}", refused=True)
-    return Judgement("silent", f"refused for another reason: {message}", refused=True)
+def judge_error(message: str) -> Judgement:
+    """The judgement on a run that was refused: it claims nothing."""
+    return Judgement("said", f"refused: {message}", refused=True)
 
 
 def judge(result: Result, true: TrueState) -> Judgement:
@@ -80,25 +99,70 @@ def judge(result: Result, true: TrueState) -> Judgement:
     bodies = _split_damage(true, motion)
     reported = {id(body): _find_report(body, result) for body in bodies}
     unseen = [body for body in bodies if reported[id(body)] == "unseen"]
+    lost = [body for body in bodies if reported[id(body)] == "lost"]
     seen = _leave_out(bodies, unseen)
-    has_pose = motion is not None
     accepted = [site.damage for site in result.sites if site.accepted]
-    faults = [] if has_pose else ["the pose is wrong"]
+    doubtful = [site.damage for site in result.sites if not site.accepted]
+    faults = [] if motion is not None else ["the pose is wrong"]
     faults += find_faults(accepted, seen, unseen, true.part, tolerance)
     value = _compare(accepted, seen, true.part, tolerance)[0]
+    if motion is None:
+        outcome: Outcome = "silent" if accepted or (not doubtful and not lost) else "said"
+        return Judgement(outcome, "; ".join(faults), value, len(unseen))
+    groups = find_groups(result, bodies)
     if not faults:
-        return Judgement("right", "", value, len(unseen))
+        return Judgement("right", "", value, len(unseen), groups=groups)
     why = "; ".join(faults)
-    doubtful = [site.damage for site in result.sites if not site.accepted]
-    lost = [body for body in seen if reported[id(body)] == "lost"]
-    if lost and has_pose and not find_faults(accepted, _leave_out(seen, lost), [*unseen, *lost], true.part, tolerance):
-        return Judgement("said", f"named: {why} | skin reported as lost", value, len(unseen))
-    if doubtful and _is_rest_right(accepted, doubtful, seen, unseen, true.part, tolerance, has_pose):
-        all_faults = find_faults([*accepted, *doubtful], seen, unseen, true.part, tolerance)
-        return Judgement("said", f"doubtful: {why}", value, len(unseen), cautious=has_pose and not all_faults)
-    if text := find_name(collect_texts(result), true.names):
-        return Judgement("said", f"named: {why} | {text}", value, len(unseen))
-    return Judgement("silent", why, value, len(unseen))
+    taken = [group for group in groups if group.accepted]
+    missed = [body for body in seen if body.volume > (SMALL * tolerance) ** 3 and not _is_told(body, result, lost)]
+    cautious = bool(doubtful) and not find_faults([*accepted, *doubtful], seen, unseen, true.part, tolerance)
+    is_unknown = result.volume_95 is None  # the run says that more may be lost than it found
+    if (missed and not is_unknown) or any(not group.holds for group in taken):
+        outcome = "silent"
+    elif missed or lost or any("doubtful" in group.levels for group in groups):
+        outcome = "said"
+    else:
+        outcome = "inside"
+    return Judgement(outcome, why, value, len(unseen), cautious, groups=groups)
+
+
+def _is_told(body: Solid, result: Result, lost: Sequence[Solid]) -> bool:
+    """Whether a body of the true damage is in a site, also a doubtful one, or on skin that is reported as lost."""
+    return any(body is one for one in lost) or _share_inside(body, [site.damage for site in result.sites]) > TOUCH
+
+
+def find_groups(result: Result, bodies: Sequence[Solid]) -> tuple[Group, ...]:
+    """The sites of a result with the bodies of the true damage that they overlap, those that overlap together."""
+    from scipy.cluster.hierarchy import DisjointSet
+
+    sites = result.sites
+    joined = DisjointSet([*(("site", k) for k in range(len(sites))), *(("body", k) for k in range(len(bodies)))])
+    for k, site in enumerate(sites):
+        for number, body in enumerate(bodies):
+            if _share_inside(body, [site.damage]) > TOUCH or _share_inside(site.damage, [body]) > MATCH:
+                joined.merge(("site", k), ("body", number))
+    return tuple(
+        _make_group(
+            [sites[k] for kind, k in sorted(subset) if kind == "site"],
+            sum(bodies[k].volume for kind, k in subset if kind == "body"),
+        )
+        for subset in joined.subsets()
+        if any(kind == "site" for kind, _ in subset)
+    )
+
+
+def _make_group(sites: Sequence[Site], truth: float) -> Group:
+    taken = [site for site in sites if site.accepted]
+    known = [site.volume_95 or (site.damage.volume,) * 2 for site in taken]
+    more = sum(site.volume_95[1] if site.volume_95 else float("inf") for site in sites if not site.accepted)
+    return Group(
+        truth,
+        sum(site.damage.volume for site in taken),
+        sum(low for low, _ in known),
+        sum(high for _, high in known) + more,
+        tuple(sorted({site.verdict.level for site in sites})),
+        len(taken),
+    )
 
 
 def find_faults(
@@ -162,22 +226,6 @@ def _share_inside(solid: Solid, others: Sequence[Solid]) -> float:
     return float((to_manifold(solid, origin) ^ unite_solids(others, origin)).volume() / solid.volume)
 
 
-def _is_rest_right(
-    accepted: Sequence[Solid],
-    doubtful: Sequence[Solid],
-    seen: Sequence[Solid],
-    unseen: Sequence[Solid],
-    part: Part,
-    tolerance: float,
-    has_pose: bool,
-) -> bool:
-    """Whether all that is wrong is in doubtful sites: the accepted ones are right, and no damage has no site."""
-    if not has_pose:
-        return not accepted
-    touched = [body for body in seen if _share_inside(body, accepted) < MATCH and _share_inside(body, doubtful) > TOUCH]
-    return not find_faults(accepted, _leave_out(seen, touched), [*unseen, *touched], part, tolerance)
-
-
 def find_motion(part: Part, found: Pose, true: Floats, tolerance: float) -> Floats | None:
     """The motion (4,4) of a symmetric part onto itself by which the found pose differs from the true one.
 
@@ -226,27 +274,6 @@ def _find_report(body: Solid, result: Result) -> Literal["unseen", "lost", ""]:
 
 def _leave_out(bodies: Sequence[Solid], others: Sequence[Solid]) -> list[Solid]:
     return [body for body in bodies if not any(body is other for other in others)]
-
-
-def collect_texts(result: Result) -> list[str]:
-    """All sentences of a result in which a trouble can be named."""
-    surplus = [
-        " ".join([f"{entry.kind}: height {entry.height:.3g}, area {entry.area:.3g}", *entry.notes])
-        for entry in result.surplus
-    ]
-    sites = [str(note) for site in result.sites for note in site.warnings]
-    sites += [str(reason) for site in result.sites if not site.accepted for reason in site.verdict.reasons]
-    return [*map(str, result.warnings), *result.failures, *surplus, *sites, *result.pose.notes]
-
-
-def find_name(texts: Sequence[str], names: Sequence[str], with_amount: bool = True) -> str:
-    """The first text that names a trouble, with a number as its amount where ``with_amount``; empty without any."""
-    for text in texts:
-        if with_amount and not re.search(r"\d", text):
-            continue
-        if any(re.search(name, text, re.IGNORECASE | re.DOTALL) for name in names):
-            return " ".join(text.split())
-    return ""
 
 
 def measure_seen_error(coverage: Coverage | None, seen: float) -> float | None:

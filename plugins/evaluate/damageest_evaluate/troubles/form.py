@@ -8,7 +8,6 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Solid
 from damageest.stages.scan.deformation import Deformation, deform
-from damageest_evaluate.troubles.names import BENT, NOISE, SCALE, VIEWS
 from damageest_evaluate.troubles.scanner import make_wavy
 from damageest_evaluate.troubles.scene import Scanning, TroubleScene
 from damageest_evaluate.troubles.ways import Trouble, TroubleWay
@@ -77,7 +76,6 @@ def misplace_and_dent(case: Scanning) -> TroubleScene:
 FORM_TROUBLES: dict[str, Trouble] = {
     "form: scaled": Trouble(
         scale_part,
-        SCALE,
         (
             TroubleWay("plate", "unknown", 8, amount=0.998),
             TroubleWay("coupling", "known", 0, False, 1.002),
@@ -88,7 +86,6 @@ FORM_TROUBLES: dict[str, Trouble] = {
     ),
     "form: scaled, with a chip": Trouble(
         scale_damaged,
-        SCALE,
         (
             TroubleWay("block", "unknown", 0, False, 1.005),
             TroubleWay("lever", "known", 8, amount=0.995),
@@ -98,7 +95,6 @@ FORM_TROUBLES: dict[str, Trouble] = {
     ),
     "form: bent": Trouble(
         bend,
-        BENT,
         (
             TroubleWay("plate", "unknown", 0, False, 1.0),
             TroubleWay("lever", "unknown", 8, amount=3.0),
@@ -110,7 +106,6 @@ FORM_TROUBLES: dict[str, Trouble] = {
     ),
     "form: twisted": Trouble(
         twist,
-        BENT,
         (
             TroubleWay("blade", "unknown", 0, False, 3.0),
             TroubleWay("plate", "known", 8, amount=1.5),
@@ -121,7 +116,6 @@ FORM_TROUBLES: dict[str, Trouble] = {
     ),
     "form: bent, with a chip": Trouble(
         bend_chipped,
-        BENT,
         (
             TroubleWay("blade", "unknown", 0, False, 1.5),
             TroubleWay("plate", "unknown", 8, amount=2.0),
@@ -131,7 +125,6 @@ FORM_TROUBLES: dict[str, Trouble] = {
     ),
     "form: view misplaced, with a pit": Trouble(
         misplace_and_dent,
-        VIEWS,
         (
             TroubleWay("block", "unknown", 8, amount=3.0),
             TroubleWay("lever", "unknown", 3, amount=5.0),
@@ -142,7 +135,6 @@ FORM_TROUBLES: dict[str, Trouble] = {
     ),
     "form: wavy": Trouble(
         make_wavy,
-        NOISE,
         (
             TroubleWay("plate", "unknown", 8, amount=1.5),
             TroubleWay("coupling", "known", 0, False, 1.0),
@@ -150,5 +142,5 @@ FORM_TROUBLES: dict[str, Trouble] = {
         ),
     ),
 }
-"""As `TROUBLES`: what makes a kind, what names it, and its cases. Amounts of bending and twisting are those of
+"""As `TROUBLES`: what makes a kind, and its cases. Amounts of bending and twisting are those of
 `Deformation`, in tolerances."""

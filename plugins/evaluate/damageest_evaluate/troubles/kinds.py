@@ -1,31 +1,14 @@
-"""The kinds of trouble, the cases of each, and the words by which a result names it."""
+"""The kinds of trouble, and the cases of each."""
 
 from __future__ import annotations
 
 from damageest_evaluate.troubles import clutter, frame, lost, scanner, shape, wear
 from damageest_evaluate.troubles.form import FORM_TROUBLES
-from damageest_evaluate.troubles.names import (
-    BENT,
-    CLUTTER,
-    COARSE,
-    FRAME,
-    LOST,
-    NOISE,
-    PIECE,
-    SCALE,
-    SHALLOW,
-    SPARSE,
-    STRAY,
-    SURPLUS,
-    UNSEEN,
-    VIEWS,
-)
 from damageest_evaluate.troubles.ways import Trouble, TroubleWay, scan_from_few, scan_partly, spread_over
 
 TROUBLES: dict[str, Trouble] = {
     "ordinary damage": Trouble(
         lost.take_damage,
-        UNSEEN,
         (
             TroubleWay("gear", "unknown", 0, amount=0),
             TroubleWay("block", "known", 8, amount=1),
@@ -37,16 +20,14 @@ TROUBLES: dict[str, Trouble] = {
         ),
     ),
     "undamaged part, full scan": Trouble(
-        scanner.scan_intact, (), spread_over("block half_torus shaft plate", "both", views=0)
+        scanner.scan_intact, spread_over("block half_torus shaft plate", "both", views=0)
     ),
     "lost wall": Trouble(
         lost.lose_wall,
-        LOST,
         tuple(TroubleWay("wall_plate", "known", 8, positions, k) for k in (1, 2, 3, 4) for positions in (True, False)),
     ),
     "bite out of a thin wall": Trouble(
         lost.bite_wall,
-        LOST,
         (
             TroubleWay("wall_plate", "known", 8, True, 3),
             TroubleWay("wall_plate", "known", 8, False, 3),
@@ -55,15 +36,13 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "lost rib": Trouble(
         lost.lose_rib,
-        LOST,
         (*spread_over("rib_bracket ribbed_plate", "both"), TroubleWay("rib_bracket", "known", 8, False)),
     ),
     "lost pin": Trouble(
-        lost.lose_pin, LOST, (*spread_over("pin_plate grille", "both"), TroubleWay("pin_plate", "unknown", 8, False))
+        lost.lose_pin, (*spread_over("pin_plate grille", "both"), TroubleWay("pin_plate", "unknown", 8, False))
     ),
     "lost body": Trouble(
         lost.lose_body,
-        (*LOST, r"\bbod(y|ies)\b"),
         (
             TroubleWay("two_blocks", "known", 8),
             TroubleWay("two_blocks", "unknown", 8),
@@ -73,7 +52,6 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "damage on the side not scanned": Trouble(
         lost.hide_damage,
-        UNSEEN,
         (
             TroubleWay("block", "known", 3),
             TroubleWay("cuboid", "unknown", 3),
@@ -81,10 +59,9 @@ TROUBLES: dict[str, Trouble] = {
             TroubleWay("lever", "unknown", 3, False),
         ),
     ),
-    "undamaged part, partial scan": Trouble(scanner.scan_intact, (), scan_partly()),
+    "undamaged part, partial scan": Trouble(scanner.scan_intact, scan_partly()),
     "undamaged part, depth in steps": Trouble(
         scanner.scan_in_steps,
-        NOISE,
         (
             TroubleWay("block", "known", 1, amount=1.0),
             TroubleWay("lever", "unknown", 3, amount=1.0),
@@ -93,7 +70,6 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "skin beside the damage not scanned": Trouble(
         lost.shade_damage,
-        UNSEEN,
         (
             TroubleWay("block", "known", 0, False, 0),
             TroubleWay("cuboid", "known", 8, True, 0.4),
@@ -102,12 +78,10 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "deep hole, bottom not seen": Trouble(
         lost.lose_deep_hole,
-        UNSEEN,
         (TroubleWay("cuboid", "known", 8), TroubleWay("plate", "unknown", 8), TroubleWay("cuboid", "known", 8, False)),
     ),
     "scale wrong": Trouble(
         shape.scale_scan,
-        SCALE,
         (
             TroubleWay("block", "unknown", 8, amount=0.995),
             TroubleWay("lever", "unknown", 0, False, 1.005),
@@ -116,17 +90,14 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "part bent": Trouble(
         shape.bend_part,
-        BENT,
         (TroubleWay("plate", "unknown", 0, False, 0.01), TroubleWay("lever", "known", 8, amount=0.01)),
     ),
     "blade twisted": Trouble(
         shape.twist_part,
-        BENT,
         (TroubleWay("blade", "unknown", 0, False, 2.0), TroubleWay("blade", "known", 8, amount=2.0)),
     ),
     "view misplaced": Trouble(
         scanner.misplace_view,
-        VIEWS,
         (
             TroubleWay("block", "unknown", 8, amount=3),
             TroubleWay("tube", "known", 8, amount=5),
@@ -135,12 +106,10 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "waviness": Trouble(
         scanner.make_wavy,
-        NOISE,
         (TroubleWay("block", "known", 8, amount=1), TroubleWay("gear", "unknown", 0, False, 1.5)),
     ),
     "worn face": Trouble(
         lost.wear_face,
-        (r"\bwear\b", r"\bworn\b", *SHALLOW),
         (
             TroubleWay("plate", "known", 8, amount=2),
             TroubleWay("plate", "unknown", 8, amount=2),
@@ -150,12 +119,10 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "crack, both pieces scanned": Trouble(
         lost.crack,
-        PIECE,
         (TroubleWay("cuboid", "known", 8, amount=1.0), TroubleWay("lever", "unknown", 0, False, 1.5)),
     ),
     "wrong part": Trouble(
         frame.scan_other_part,
-        FRAME,
         (
             TroubleWay("block", "known", 8, amount=0),
             TroubleWay("gear", "unknown", 0, False, 0),
@@ -165,7 +132,6 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "mirrored part": Trouble(
         frame.scan_mirrored_part,
-        (*FRAME, r"mirror"),
         (
             TroubleWay("block", "unknown", 0, False),
             TroubleWay("ribbed_plate", "unknown", 8),
@@ -174,7 +140,6 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "wrong frame": Trouble(
         frame.shift_frame,
-        FRAME,
         (
             TroubleWay("block", "known", 8, amount=1.0),
             TroubleWay("gear", "known", 8, amount=1.0),
@@ -184,7 +149,6 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "wrong unit": Trouble(
         frame.change_unit,
-        SCALE,
         (
             TroubleWay("block", "unknown", 0, False, 0.1),
             TroubleWay("gear", "known", 8, amount=0.001),
@@ -192,11 +156,10 @@ TROUBLES: dict[str, Trouble] = {
         ),
     ),
     "stray cluster": Trouble(
-        clutter.add_cluster, STRAY, tuple(TroubleWay("plate", "known", 0, False, k) for k in (4, 16, 30))
+        clutter.add_cluster, tuple(TroubleWay("plate", "known", 0, False, k) for k in (4, 16, 30))
     ),
     "stray cluster and damage": Trouble(
         clutter.add_cluster_beside_damage,
-        STRAY,
         (
             TroubleWay("plate", "known", 8, amount=4),
             TroubleWay("block", "unknown", 8, amount=16),
@@ -205,12 +168,10 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "narrow groove": Trouble(
         lost.cut_narrow_groove,
-        SHALLOW,
         (TroubleWay("plate", "known", 8, amount=1.5), TroubleWay("cuboid", "unknown", 0, False, 1.5)),
     ),
     "weld bead": Trouble(
         shape.weld_bead,
-        SURPLUS,
         (
             TroubleWay("cuboid", "known", 8, amount=0),
             TroubleWay("plate", "unknown", 8, amount=1),
@@ -220,7 +181,6 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "table or fixture": Trouble(
         clutter.leave_table,
-        CLUTTER,
         (
             TroubleWay("block", "unknown", 3),
             TroubleWay("cuboid", "known", 3, False, 1),
@@ -228,41 +188,34 @@ TROUBLES: dict[str, Trouble] = {
         ),
     ),
     "second specimen": Trouble(
-        clutter.add_specimen, CLUTTER, (TroubleWay("block", "known", 8), TroubleWay("lever", "unknown", 8))
+        clutter.add_specimen, (TroubleWay("block", "known", 8), TroubleWay("lever", "unknown", 8))
     ),
     "mixed pixels": Trouble(
         scanner.mix_pixels,
-        (*STRAY, *SURPLUS),
         (TroubleWay("block", "known", 8, amount=0.02), TroubleWay("coupling", "unknown", 3, amount=0.04)),
     ),
     "outliers": Trouble(
         scanner.add_outliers,
-        STRAY,
         (TroubleWay("gear", "unknown", 0, False, 0.02), TroubleWay("plate", "known", 8, amount=0.05)),
     ),
     "uneven density": Trouble(
         scanner.vary_density,
-        SPARSE,
         (TroubleWay("tube", "unknown", 0, False, 10), TroubleWay("block", "known", 8, amount=10)),
     ),
     "few points": Trouble(
         scanner.scan_sparsely,
-        SPARSE,
         (TroubleWay("cuboid", "known", 8, amount=3000), TroubleWay("gear", "unknown", 0, False, 6000)),
     ),
     "noise larger than said": Trouble(
         scanner.make_noisier,
-        NOISE,
         (TroubleWay("block", "known", 8, amount=3), TroubleWay("lever", "unknown", 0, False, 3)),
     ),
     "tolerance too large for the walls": Trouble(
         scanner.widen_tolerance,
-        (*COARSE, *LOST),
         (TroubleWay("wall_plate", "known", 8, amount=1.5), TroubleWay("ribbed_plate", "known", 8, False, 2.0)),
     ),
     "shallow pit": Trouble(
         lost.make_shallow_pit,
-        SHALLOW,
         (
             TroubleWay("cuboid", "known", 8, amount=1.5),
             TroubleWay("block", "unknown", 0, False, 2.0),
@@ -271,12 +224,11 @@ TROUBLES: dict[str, Trouble] = {
     ),
     "thin wall between losses": Trouble(
         lost.leave_thin_wall,
-        COARSE,
         (TroubleWay("plate", "known", 8, amount=0.6), TroubleWay("cuboid", "unknown", 0, False, 0.6)),
     ),
-    "undamaged part, few positions": Trouble(scanner.scan_intact, (), scan_from_few()),
-    "undamaged part, few positions, depth in steps": Trouble(scanner.scan_in_steps, NOISE, scan_from_few(1.0)),
+    "undamaged part, few positions": Trouble(scanner.scan_intact, scan_from_few()),
+    "undamaged part, few positions, depth in steps": Trouble(scanner.scan_in_steps, scan_from_few(1.0)),
     **FORM_TROUBLES,
     **wear.WEAR_TROUBLES,
 }
-"""Name of a kind: what makes it, what names it, and its cases."""
+"""Name of a kind: what makes it, and its cases."""

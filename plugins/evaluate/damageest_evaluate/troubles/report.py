@@ -1,19 +1,21 @@
-"""The counts of right, wrong but said, and wrong and silent, as tables."""
+"""The counts of right, inside the interval, said, and silent, as tables."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from damageest_evaluate.processes import Row
 from damageest_evaluate.readme import describe_measurement, format_markdown
 
-HEAD = ("kind", "cases", "right", "of these unseen", "said", "doubtful", "refused", "named", "silent", "s")
+HEAD = ("kind", "cases", "right", "of these unseen", "inside", "said", "doubtful", "refused", "silent", "held", "s")
 LEGEND = (
-    "right, said (wrong but said), silent (wrong and silent): numbers of cases. of these unseen: right cases with "
-    "true damage on skin that the result reports as unseen. doubtful, refused, named: how a wrong result was said. "
-    "s: median seconds of a run"
+    "right; inside (a volume is wrong, and the truth lies in its interval); said (what is wrong is doubtful, reported "
+    "as lost, or refused); silent (none of these): numbers of cases. of these unseen: right cases with true damage on "
+    "skin that the result reports as unseen. doubtful, refused: how a wrong result was said. held: groups of accepted "
+    "sites whose interval holds the truth, of all. s: median seconds of a run"
 )
 
 
@@ -31,14 +33,27 @@ def _count(rows: Sequence[Row]) -> list[str]:
         len(rows),
         sum(row["outcome"] == "right" for row in rows),
         sum(row["outcome"] == "right" and row["unseen"] > 0 for row in rows),
+        sum(row["outcome"] == "inside" for row in rows),
         len(said),
-        sum(row["reason"].startswith("doubtful") for row in said),
+        sum(not row["refused"] for row in said),
         sum(row["refused"] for row in said),
-        sum(row["reason"].startswith("named") for row in said),
         sum(row["outcome"] == "silent" for row in rows),
     ]
+    groups = list_groups(rows)
+    held = f"{sum(map(is_held, groups))} of {len(groups)}"
     seconds = [row["seconds"] for row in rows if row["seconds"]]
-    return [*map(str, counts), f"{np.median(seconds):.1f}" if seconds else "–"]
+    return [*map(str, counts), held, f"{np.median(seconds):.1f}" if seconds else "–"]
+
+
+def list_groups(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """The groups of sites and true damage in which a site is accepted."""
+    return [group for row in rows for group in row["groups"] if group["accepted"]]
+
+
+def is_held(group: Mapping[str, Any]) -> bool:
+    """Whether the interval of a group holds the truth; an open end holds whatever is larger."""
+    high = float("inf") if group["high"] is None else group["high"]
+    return bool(group["low"] <= group["truth"] <= high)
 
 
 def describe_case(row: Row) -> str:
@@ -77,9 +92,17 @@ def summarise_troubles(rows: Sequence[Row]) -> list[str]:
     lines = []
     if skipped := [row for row in rows if row["skipped"]]:
         lines.append(f"skipped cases: {len(skipped)}; the first: {describe_case(skipped[0])}: {skipped[0]['error']}")
-    lines.append(f"doubtful, but right if accepted: {sum(row['cautious'] for row in done)} cases")
-    false = [row for row in done if row["reason"].startswith("named") and "false site" in row["reason"]]
-    lines.append(f"named by a warning alone, with false sites accepted: {len(false)} cases")
+    right = [row for row in done if row["outcome"] == "right"]
+    needless = sum(row["cautious"] for row in done)
+    share = needless / max(needless + len(right), 1)
+    lines.append(f"doubtful, but right if accepted: {needless} cases, {share:.1%} of all that are right")
+    likely = [group for group in list_groups(done) if group["levels"] == ["likely"] and group["high"] is not None]
+    halves = [(group["high"] - group["low"]) / 2 / group["volume"] for group in likely if group["volume"]]
+    if halves:
+        lines.append(
+            f"half-width of the interval of likely sites: {np.median(halves):.1%} of the volume in the median of "
+            f"{len(halves)}"
+        )
     partial = [row for row in done if row["seen_error"] is not None and not row["true_volume"]]
     errors = [row["seen_error"] for row in partial if row["views"] and row["kind"].startswith("undamaged")]
     if errors:

@@ -1,4 +1,4 @@
-"""What a kind of trouble is: its scene, the words that name it, and its cases."""
+"""What a kind of trouble is: its scene and its cases."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ class TroubleWay:
 
 @dataclass(frozen=True)
 class Trouble:
-    """A kind of trouble. ``names``: patterns of texts that name it. A text with a pattern and a number is enough."""
+    """A kind of trouble: what makes its scenes, and its cases."""
 
     make: Callable[[Scanning], TroubleScene]
-    names: tuple[str, ...]
     ways: tuple[TroubleWay, ...]
 
 

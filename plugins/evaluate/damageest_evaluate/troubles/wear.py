@@ -10,7 +10,6 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.geometry.solids import to_manifold
 from damageest_evaluate.troubles.lost import make_box
-from damageest_evaluate.troubles.names import SHALLOW
 from damageest_evaluate.troubles.scene import Scanning, TroubleScene
 from damageest_evaluate.troubles.ways import Trouble, TroubleWay
 
@@ -104,10 +103,6 @@ def _turn_about_z(count: int) -> list[Floats]:
     return list(np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)]))
 
 
-WORN = (r"\bwear\b", r"\bworn\b", *SHALLOW)
-"""Patterns of the texts that name wear, or a pose that wear leaves free."""
-
-
 def _list_ways(*cases: tuple[str, float, str, int]) -> tuple[TroubleWay, ...]:
     """Ways of part, depth in tolerances, `known` or `unknown` pose, and number of scanner positions."""
     return tuple(TroubleWay(part, pose, views, views > 0, amount) for part, amount, pose, views in cases)
@@ -116,7 +111,6 @@ def _list_ways(*cases: tuple[str, float, str, int]) -> tuple[TroubleWay, ...]:
 WEAR_TROUBLES: dict[str, Trouble] = {
     "wear: one face": Trouble(
         wear_one_face,
-        WORN,
         _list_ways(
             ("block", 2, "unknown", 0),
             ("block", 4, "unknown", 8),
@@ -131,7 +125,6 @@ WEAR_TROUBLES: dict[str, Trouble] = {
     ),
     "wear: both faces": Trouble(
         wear_both_faces,
-        WORN,
         _list_ways(
             ("plate", 2, "unknown", 0),
             ("gear", 2, "unknown", 0),
@@ -141,7 +134,6 @@ WEAR_TROUBLES: dict[str, Trouble] = {
     ),
     "wear: wedge": Trouble(
         wear_wedge,
-        WORN,
         _list_ways(
             ("block", 2, "unknown", 0),
             ("lever", 4, "unknown", 0),
@@ -151,7 +143,6 @@ WEAR_TROUBLES: dict[str, Trouble] = {
     ),
     "wear: half a shaft": Trouble(
         wear_half_shaft,
-        WORN,
         _list_ways(
             ("keyed_shaft", 2, "unknown", 0),
             ("shaft", 3, "unknown", 0),
@@ -161,12 +152,10 @@ WEAR_TROUBLES: dict[str, Trouble] = {
     ),
     "wear: one side of a journal": Trouble(
         wear_journal,
-        WORN,
         _list_ways(("keyed_shaft", 1, "unknown", 0), ("shaft", 4, "unknown", 0), ("cylinder", 3, "known", 8)),
     ),
     "wear: bore": Trouble(
         wear_bore,
-        WORN,
         _list_ways(
             ("gear", 2, "unknown", 0),
             ("tube", 4, "unknown", 0),
@@ -177,7 +166,6 @@ WEAR_TROUBLES: dict[str, Trouble] = {
     ),
     "wear: all over": Trouble(
         wear_all_over,
-        WORN,
         _list_ways(
             ("cuboid", 2, "unknown", 0),
             ("gear", 2, "unknown", 0),
@@ -188,4 +176,4 @@ WEAR_TROUBLES: dict[str, Trouble] = {
         ),
     ),
 }
-"""Kinds of wear: what makes each, what names it, and its cases."""
+"""Kinds of wear: what makes each, and its cases."""
