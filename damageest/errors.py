@@ -90,14 +90,16 @@ class PluginError(DamageestError):
 class StageError(DamageestError):
     """A stage failed, or refused an input that is valid.
 
-    Raise it with what is wrong and, as ``remedy``, what the user may try. The engine adds stage and site, or for points
-    that are no site yet their ``place``, in words.
+    Raise it with what is wrong and, as ``remedy``, what the user may try; ``method``: another method of the job that
+    may do it, which is added to the remedy. The engine adds stage and site, or for points that are no site yet their
+    ``place``, in words.
     """
 
     exit_status = 1
 
-    def __init__(self, message: str, remedy: str = "") -> None:
-        self.message, self.remedy = message, remedy
+    def __init__(self, message: str, remedy: str = "", method: str = "") -> None:
+        self.message, self.own_remedy, self.method = message, remedy, method
+        self.remedy = ", or ".join(part for part in (remedy, f"method: {method}" if method else "") if part)
         self.stage, self.use, self.site, self.place = "", "", 0, ""
         super().__init__(message)
 

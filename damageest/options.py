@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -30,7 +29,9 @@ _FIXED = ("metadata", "config", "serialization", "default", "expected", "functio
 
 def require_number(value: Any) -> Any:
     """Refuses what Python or pydantic would read as a number, but a reader of the job file would not."""
-    if isinstance(value, (bool, np.bool_, str, bytes)):
+    # numpy's truth value by its name: this module is imported for --help, which needs no numpy
+    is_numpy_bool = type(value).__module__ == "numpy" and type(value).__name__ in ("bool", "bool_")
+    if is_numpy_bool or isinstance(value, (bool, str, bytes)):
         raise PydanticCustomError("number", "expected a number")
     return value
 

@@ -56,13 +56,14 @@ def extract_contour(
     if (nodes := int(np.prod(shape))) > MOST_NODES:
         raise StageError(
             f"a voxel grid of {nodes:,} nodes, {cell:.3g} apart, does not fit in memory; at most {MOST_NODES:,} do",
-            f"a cell of {cell * (nodes / MOST_NODES) ** (1 / 3) * 1.05:.3g} or more, or method: implicit",
+            f"a cell of {cell * (nodes / MOST_NODES) ** (1 / 3) * 1.05:.3g} or more",
+            method="implicit",
         )
     require_memory(BYTES_OF_NODE * nodes, f"a voxel grid of {nodes:,} nodes, {cell:.3g} apart", "a larger tolerance")
     field = -_sample(distance, low, shape, cell, matters)
     solid = extract_region(Grid(low, cell, shape), np.ascontiguousarray(field, dtype=np.float64))
     if solid is None:
-        raise StageError("no node of the voxel grid is inside: the solid is empty", "another cell, or method: implicit")
+        raise StageError("no node of the voxel grid is inside: the solid is empty", "another cell", method="implicit")
     return solid
 
 

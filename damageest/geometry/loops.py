@@ -29,7 +29,8 @@ def trace_loops(faces: Ints) -> list[Ints]:
     if len(np.unique(starts)) != len(starts):
         raise StageError(
             "two boundary loops of the surface meet in a point and cannot be separated",
-            "another spacing, or method: implicit",
+            "another spacing",
+            method="implicit",
         )
     after = dict(zip(starts.tolist(), ends.tolist(), strict=True))
     found = []
@@ -53,6 +54,6 @@ def trace_rims(surface: Surface) -> list[Ints]:
         raise StageError(
             "the damage surface has no rim: it is closed, or none of its boundary loops has more than "
             f"{MOST_FLAW_VERTICES} vertices",
-            "method: implicit",
+            method="implicit",
         )
     return found

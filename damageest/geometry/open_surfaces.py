@@ -28,7 +28,7 @@ def centre_points(points: Floats) -> Floats:
     if len(points) < FEWEST:
         raise StageError(
             f"no inner damage surface could be reconstructed from {len(points)} points; at least {FEWEST} are needed",
-            "method: implicit",
+            method="implicit",
         )
     return np.asarray(points.mean(axis=0))
 
@@ -53,7 +53,8 @@ def thin_for_surface(points: Floats, cell: float) -> Floats:
         raise StageError(
             f"no inner damage surface could be reconstructed from {len(points)} points, {len(cloud)} after thinning; "
             f"at least {FEWEST} are needed",
-            "a smaller spacing, or method: implicit",
+            "a smaller spacing",
+            method="implicit",
         )
     return cloud
 
@@ -102,7 +103,8 @@ def trim_surface(vertices: Floats, faces: Ints, cloud: Floats, reach: float, par
     if not len(faces):
         raise StageError(
             "the reconstruction gives no inner damage surface near the points inside the part",
-            "another spacing, or method: implicit",
+            "another spacing",
+            method="implicit",
         )
     used, faces = np.unique(faces, return_inverse=True)
     surface = Surface(vertices[used], faces.reshape(-1, 3))

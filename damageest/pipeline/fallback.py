@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 from damageest.artefacts import Reason
@@ -42,14 +41,10 @@ def fall_back(first: Route, second: Route) -> Step:
     return run
 
 
-TRIED = re.compile(r"method: (implicit|surface)|the other method")
-
-
 def drop_tried(error: StageError) -> StageError:
-    """The error without the remedies that were tried already: both methods."""
-    clauses = re.split(r", or |, (?=[a-z]+: )|; ", error.remedy)
-    left = [clause for clause in clauses if clause and not TRIED.search(clause) and not clause.startswith("whose")]
-    error.remedy = ", or ".join(left) or "a smaller tolerance, or a denser scan of this place; both methods were tried"
+    """The error without the remedy that was tried already: the other method."""
+    tried = "a smaller tolerance, or a denser scan of this place; both methods were tried"
+    error.remedy, error.method = error.own_remedy or tried, ""
     return error
 
 

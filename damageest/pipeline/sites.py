@@ -54,7 +54,7 @@ def take_enclosures(engine: Engine, work: Work) -> Work:
         candidates.append(candidate.with_value(Candidate.solid, item.solid, key))
     failures = []
     for number in sorted(set(range(1, state.sites.count + 1)) - {site for c in candidates for site in c.clusters}):
-        error = StageError("gave no enclosure of its points", "the other method, or a smaller tolerance")
+        error = StageError("gave no enclosure of its points", "a smaller tolerance", method="surface")
         error.stage, error.use, error.site = EncloseAll.stage, method, number
         error.place = describe_points(state, (number,))
         failures.append(error)
@@ -90,7 +90,7 @@ def gather_sites(engine: Engine, work: Work) -> Work:
     failures = []
     for cluster in sorted({c for candidate in work.candidates for c in candidate.clusters} - covered):
         error = StageError(
-            "no damage volume could be computed from its points", "the other method, or a smaller tolerance"
+            "no damage volume could be computed from its points", "a smaller tolerance", name_other(method)
         )
         error.stage, error.use, error.site = "boolean", method, cluster
         error.place = describe_points(state, (cluster,))
@@ -103,6 +103,11 @@ def gather_sites(engine: Engine, work: Work) -> Work:
         work, candidates=(), sites=tuple(out), failures=(*work.failures, *failures),
         warnings=(*work.warnings, *warnings),
     )  # fmt: skip
+
+
+def name_other(method: str) -> str:
+    """The method to try where a method failed."""
+    return "implicit" if method == "surface" else "surface"
 
 
 def set_specks_aside(engine: Engine, work: Work) -> Work:

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import damageest
+from damageest.artefacts import Reason
 from damageest.cli.run import _print_table
 from tests import damaged_box
 from tests.cli.test_watched_stages import FAULTY, environment, write_job
@@ -197,7 +198,8 @@ def test_texts_of_plugins_are_shown_as_they_are(way: str, site: Site, ready: Pat
 
 def test_notes_and_failures_are_shown_as_they_are(ready: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = damageest.run(ready / "job.yaml", output=True)
-    told = replace(result, warnings=(HARMFUL, "x" * 50_000_000), failures=(HARMFUL,))
+    notes = (Reason("x", HARMFUL), Reason("y", "x" * 50_000_000))
+    told = replace(result, warnings=notes, failures=(HARMFUL,))
     _print_table(told, ready / "final [v2]")
     said = capsys.readouterr().out
     assert f"note: {SHOWN}" in said

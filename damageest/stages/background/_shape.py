@@ -47,7 +47,7 @@ class ShapeBackground(Background, ABC):
             body = refine_body(body, self.edge * max(tolerance, 0.5 * spacing), self.subdivide)
         solid = to_solid(body, origin)
         if solid is None:
-            raise StageError("the background is empty", "background: minkowski, or method: implicit")
+            raise StageError("the background is empty", "background: minkowski", method="implicit")
         return check_holds(solid, np.concatenate([part.vertices, part.triangles.mean(axis=1)]), surface)
 
     @abstractmethod
@@ -99,7 +99,7 @@ def _measure_longest(corners: Floats) -> float:
 def check_surface(surface: Surface) -> None:
     """Raises StageError for a damage surface without vertices."""
     if not len(surface.vertices):
-        raise StageError("the damage surface is empty", "another reconstruct, or method: implicit")
+        raise StageError("the damage surface is empty", "another reconstruct", method="implicit")
 
 
 def check_holds(background: Solid, skin: Floats, surface: Surface) -> Solid:
@@ -108,6 +108,7 @@ def check_holds(background: Solid, skin: Floats, surface: Surface) -> Solid:
     if outside := int((~is_inside(inner, background)).sum()):
         raise StageError(
             f"the background does not hold part and damage surface: {outside} of {len(inner)} points lie outside it",
-            "subdivide: linear, background: minkowski, or method: implicit",
+            "subdivide: linear, background: minkowski",
+            method="implicit",
         )
     return background

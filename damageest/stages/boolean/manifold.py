@@ -25,7 +25,7 @@ class Manifold(Boolean):
         try:
             bodies = to_manifold(part, origin), to_manifold(solid, origin)
         except ValueError as error:
-            raise StageError(str(error), "repair: pymeshfix, or method: implicit") from None
+            raise StageError(str(error), "repair: pymeshfix", method="implicit") from None
         common = bodies[0] ^ bodies[1]
         if common.status() != Error.NoError:
             raise StageError(

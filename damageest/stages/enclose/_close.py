@@ -20,7 +20,6 @@ MOST_WRONG = 0.03
 MOST_THROUGH = 0.1
 """Area of the strips inside the part, at most, as a share of the damage surface. Where the scan has a gap at the rim,
 the strip has to cross some metal."""
-REMEDY = "method: implicit"
 
 
 def close_enclosure(
@@ -48,7 +47,8 @@ def close_enclosure(
     ) > MOST_THROUGH:
         raise StageError(
             f"the strip from the rim to the background runs through the part (area: {share:.0%} of the damage surface)",
-            "background: minkowski, which stays close to the part, or method: implicit",
+            "background: minkowski, which stays close to the part",
+            method="implicit",
         )
     body = np.concatenate([fill_loops(wide), *strips])
     candidates = []
@@ -57,7 +57,7 @@ def close_enclosure(
         if side is not None:
             candidates.append(Mesh(vertices, np.concatenate([body[:, ::-1] if turned else body, side + start])))
     if not candidates:
-        raise NotSeparatedError("the paths on the background do not split it in two", REMEDY)
+        raise NotSeparatedError("the paths on the background do not split it in two", method="implicit")
     low, high = background.bounds
     near = intact[((intact > low) & (intact < high)).all(axis=1)]
     # Some thousand points are enough, without those outside the background, which may be made round the site alone.
@@ -69,16 +69,18 @@ def close_enclosure(
     best = int(np.argmin(inside))
     if inside[best] > 0.02:
         raise NotSeparatedError(
-            f"both sides of the damage surface hold intact points (at least {inside[best]:.0%} of them)", REMEDY
+            f"both sides of the damage surface hold intact points (at least {inside[best]:.0%} of them)",
+            method="implicit",
         )
     if len(candidates) > 1 and max(inside) - inside[best] < LEAST_DIFFERENCE:
         raise StageError(
             f"the intact points do not show which side is lost: the two sides hold {inside[0]:.0%} and {inside[1]:.0%}",
-            REMEDY,
+            method="implicit",
         )
     if (wrong := _measure_wrong_side(candidates[best], len(surface.faces), tolerance)) > MOST_WRONG:
         raise StageError(
-            f"the strip to the background crosses the damage surface ({wrong:.0%} of it is on the wrong side)", REMEDY
+            f"the strip to the background crosses the damage surface ({wrong:.0%} of it is on the wrong side)",
+            method="implicit",
         )
     return candidates[best]
 

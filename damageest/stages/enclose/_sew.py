@@ -28,7 +28,7 @@ def extend_rims(surface: Surface, rims: Rims, width: float) -> ExtendedSurface:
     Raises StageError where there is no rim.
     """
     if not rims.loops:
-        raise StageError("the damage surface has no rim to join to the background", "method: implicit")
+        raise StageError("the damage surface has no rim to join to the background", method="implicit")
     vertices, faces, ends = [surface.vertices], [surface.faces], []
     start = len(surface.vertices)
     for loop in rims.loops:
@@ -92,7 +92,7 @@ def trace_closed_path(vertices: Floats, faces: Ints, image: Ints) -> ClosedPath:
     after = np.roll(image, -1)
     moves = np.flatnonzero(image != after)
     if len(moves) < 3:
-        raise StageError(_COLLAPSED, "a smaller background edge, or method: implicit")
+        raise StageError(_COLLAPSED, "a smaller background edge", method="implicit")
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     used, edges = np.unique(edges, return_inverse=True)
     edges = edges.reshape(-1, 2)
@@ -110,9 +110,7 @@ def trace_closed_path(vertices: Floats, faces: Ints, image: Ints) -> ClosedPath:
             if np.isfinite(far[there]):
                 break
         if not np.isfinite(far[there]):
-            raise StageError(
-                "no closed path on the background follows the rim", "background: bbox, or method: implicit"
-            )
+            raise StageError("no closed path on the background follows the rim", "background: bbox", method="implicit")
         path = [there]
         while path[-1] != here:
             path.append(int(before[path[-1]]))
@@ -141,7 +139,7 @@ def _simplify_walk(walk: list[tuple[int, float]]) -> list[tuple[int, float]]:
         else:
             break
     if len(walk) < 3:
-        raise StageError(_COLLAPSED, "a smaller background edge, or method: implicit")
+        raise StageError(_COLLAPSED, "a smaller background edge", method="implicit")
     return walk
 
 

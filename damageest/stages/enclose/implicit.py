@@ -79,7 +79,7 @@ class Implicit(EncloseAll):
                 items.append(Enclosure(region, group.sites, notes))
         if not items:
             raise StageError(
-                "no closed surface could be reconstructed round the damage", "method: surface, or a larger tolerance"
+                "no closed surface could be reconstructed round the damage", "a larger tolerance", method="surface"
             )
         return Enclosures(tuple(items))
 

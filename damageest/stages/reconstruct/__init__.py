@@ -45,7 +45,7 @@ class Reconstruct(Stage, ABC):
                 try:
                     faces = Delaunay(flat).simplices
                 except QhullError:
-                    raise StageError("the points lie on a line", "method: implicit") from None
+                    raise StageError("the points lie on a line", method="implicit") from None
                 return trim_surface(points, faces, points, 3 * spacing, part, tolerance)
     """
 

@@ -19,5 +19,4 @@ class NoRepair(Repair):
         try:
             return Solid(enclosure.vertices, enclosure.faces)
         except ValueError as error:
-            remedy = "method: implicit, whose enclosures are always closed, or repair: pymeshfix"
-            raise StageError(f"the enclosure is {error}", remedy) from None
+            raise StageError(f"the enclosure is {error}", "repair: pymeshfix", method="implicit") from None

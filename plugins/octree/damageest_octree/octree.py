@@ -89,7 +89,8 @@ class Octree(EncloseAll):
         if not items:
             raise StageError(
                 f"no cell of {cube.cell:.3g} is lost: the damage is shallower than the cells",
-                "method: implicit, or a smaller enclose.cell",
+                "a smaller enclose.cell",
+                method="implicit",
             )
         # A site without an enclosure is named with the first one. No piece there touches its points, so that it is
         # reported as failed.

@@ -72,7 +72,8 @@ class PoissonSubtract(EncloseAll):
         if len(points) < FEWEST or np.linalg.eigvalsh(np.cov(points.T))[0] < THINNEST**2:
             raise StageError(
                 f"no closed body can be reconstructed from {len(points)} points that are too few or lie in one plane",
-                "method: implicit, or a denser scan",
+                "a denser scan",
+                method="implicit",
             )
         cell = max(tolerance, aligned.spacing) / size
         above = _compute_face_normals(part)[deviation.face[used]] * np.where(intact, INTACT_WEIGHT, 1.0)[used, None]
@@ -83,16 +84,16 @@ class PoissonSubtract(EncloseAll):
             body = to_manifold(mesh)
         except ValueError as error:
             raise StageError(
-                f"the Poisson body is not usable: {error}", "another enclose.depth, or method: implicit"
+                f"the Poisson body is not usable: {error}", "another enclose.depth", method="implicit"
             ) from None
         if body.volume() <= 0:
-            raise StageError("the Poisson body is inside out", "method: implicit, or a scan of all sides")
+            raise StageError("the Poisson body is inside out", "a scan of all sides", method="implicit")
         nominal = to_manifold(part, origin)
         lost = to_solid(nominal - body, origin)
         low, high = part.bounds - origin + MARGIN * size * np.array([[-1.0], [1.0]])
         around = to_solid(Manifold.cube(tuple(high - low)).translate(tuple(low)) - body, origin)
         if lost is None or around is None:
-            raise StageError("no metal of the part is outside the Poisson body", "method: implicit")
+            raise StageError("no metal of the part is outside the Poisson body", method="implicit")
         # By the rule by which the route drops pieces, so that the note counts what the route drops.
         reach = max(2 * tolerance, aligned.spacing)
         kept, dropped = find_pieces(lost, aligned.points[members], sites.label[members].astype(np.int64), reach)
@@ -133,7 +134,8 @@ def _reconstruct_body(points: Floats, above: Floats, cell: float, depth: int, sc
         except RuntimeError as error:
             raise StageError(
                 f"Open3D could not reconstruct a surface: {str(error).strip()}",
-                "another enclose.depth, or method: implicit",
+                "another enclose.depth",
+                method="implicit",
             ) from None
     return np.asarray(mesh.vertices).copy(), np.asarray(mesh.triangles).astype(np.int64)
 
@@ -146,7 +148,7 @@ def _keep_closed(vertices: Floats, faces: Ints) -> tuple[Mesh, tuple[str, ...]]:
     from damageest.geometry.bodies import label_pieces
 
     if not len(faces):
-        raise StageError("no Poisson body could be reconstructed", "method: implicit, or a denser scan")
+        raise StageError("no Poisson body could be reconstructed", "a denser scan", method="implicit")
     owner = label_pieces(faces)
     unpaired, crowded = _count_flawed_edges(faces)
     loose = np.bincount(owner, unpaired)
@@ -155,7 +157,8 @@ def _keep_closed(vertices: Floats, faces: Ints) -> tuple[Mesh, tuple[str, ...]]:
         raise StageError(
             f"the Poisson body is not watertight: {int(loose[largest])} of its edges have a triangle on one side "
             "only, as where one side of the part has no scan points",
-            "method: implicit, a scan of all sides, or a larger enclose.scale",
+            "a scan of all sides, or a larger enclose.scale",
+            method="implicit",
         )
     notes = []
     if sheets := int((loose > 0).sum()):

@@ -14,7 +14,6 @@ from damageest.stages.repair import Repair
 
 MOST_LOST = 0.01
 """Share of a shell's area that its repair may remove."""
-REMEDY = "method: implicit, whose enclosures are always closed"
 
 
 class PyMeshFix(Repair):
@@ -41,7 +40,7 @@ class PyMeshFix(Repair):
             return Solid(enclosure.vertices, enclosure.faces)
         except ValueError as error:
             if not len(enclosure.faces):
-                raise StageError(f"the enclosure cannot be repaired: {error}", REMEDY) from None
+                raise StageError(f"the enclosure cannot be repaired: {error}", method="implicit") from None
         mesh = drop_unused_vertices(enclosure.vertices, enclosure.faces)
         origin = mesh.bounds.mean(axis=0)
         mesh = Mesh(mesh.vertices - origin, mesh.faces)
@@ -70,19 +69,21 @@ class PyMeshFix(Repair):
             raise StageError(
                 f"{added:.1%} of the repaired mesh's area is farther than the tolerance from the enclosure: a hole is "
                 "too large to be filled",
-                f"{REMEDY}; where the filled hole is right, repair.invented: {1.1 * added:.2g}",
+                f"where the filled hole is right, repair.invented: {1.1 * added:.2g}",
+                method="implicit",
             )
         for piece in unclear:
             if (lost := min(_measure_share_off(piece, shell, tolerance) for shell in [*done, solid])) > MOST_LOST:
                 raise StageError(
                     f"a piece of the enclosure, {len(piece.faces)} triangles, cannot be closed or joined to another: "
                     f"{lost:.0%} of it would be lost",
-                    REMEDY,
+                    method="implicit",
                 )
         over = float(np.abs(solid.bounds - given.bounds).max())
         if over > tolerance:
             raise StageError(
-                f"the repaired mesh's bounds differ from the enclosure's by {over:.3g}, more than the tolerance", REMEDY
+                f"the repaired mesh's bounds differ from the enclosure's by {over:.3g}, more than the tolerance",
+                method="implicit",
             )
 
 
@@ -93,15 +94,15 @@ def _combine_shells(done: list[Solid], unclear: list[Mesh]) -> Solid:
 
     if not done:
         pieces = f", which is in {len(unclear)} pieces" if len(unclear) > 1 else ""
-        raise StageError(f"MeshFix could not close the enclosure{pieces}", REMEDY)
+        raise StageError(f"MeshFix could not close the enclosure{pieces}", method="implicit")
     if len(done) == 1:
         return done[0]
     try:
         solid = to_solid(combine_solids(done))
     except ValueError as error:
-        raise StageError(f"the repaired shells cannot be combined: {error}", REMEDY) from None
+        raise StageError(f"the repaired shells cannot be combined: {error}", method="implicit") from None
     if solid is None:
-        raise StageError("the repaired shells together enclose no volume", REMEDY)
+        raise StageError("the repaired shells together enclose no volume", method="implicit")
     return solid
 
 

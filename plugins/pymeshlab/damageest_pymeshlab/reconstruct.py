@@ -84,7 +84,7 @@ def _apply_filter(points: Floats, normals: Floats, name: str, parameters: dict[s
         meshes.apply_filter(name, **parameters)
     except pymeshlab.PyMeshLabException as error:
         raise StageError(
-            f"PyMeshLab could not reconstruct a surface: {str(error).strip()}", "another filter, or method: implicit"
+            f"PyMeshLab could not reconstruct a surface: {str(error).strip()}", "another filter", method="implicit"
         ) from None
     result = meshes.current_mesh()
     return np.asarray(result.vertex_matrix(), np.float64), result.face_matrix().astype(np.int64)

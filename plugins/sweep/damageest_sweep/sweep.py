@@ -12,7 +12,7 @@ from damageest.errors import StageError
 from damageest.geometry.distance import is_inside
 from damageest.stages.enclose import Enclose
 
-REMEDY = "enclose: adaptive, or method: implicit"
+REMEDY = "enclose: adaptive"
 MOST_FLAWED = 0.02
 """Share, of area or of points, up to which a check may fail: so much is a flaw of the scan, not the damage's shape."""
 
@@ -38,29 +38,36 @@ class Sweep(Enclose):
         from damageest_sweep._rim import extend_rim, fill_gaps, measure_overlap
 
         if len(rims.loops) != 1:
-            raise StageError(f"the damage surface has {len(rims.loops)} rims; a sweep can close only one", REMEDY)
+            raise StageError(
+                f"the damage surface has {len(rims.loops)} rims; a sweep can close only one", REMEDY, method="implicit"
+            )
         faces, rim, direction = orient_to_skin(surface, rims.loops[0], part)
         wide = fill_gaps(Mesh(surface.vertices, faces), rim)
         if (share := measure_steep_share(wide, direction, self.steepest)) > MOST_FLAWED:
             raise StageError(
-                f"{share:.0%} of the damage surface is steeper than {self.steepest:g} degrees to the sweep", REMEDY
+                f"{share:.0%} of the damage surface is steeper than {self.steepest:g} degrees to the sweep",
+                REMEDY,
+                method="implicit",
             )
         wide, rim = extend_rim(wide, rim, direction, self.overhang * tolerance, self.steepest)
         if (
             share := max(measure_steep_share(wide, direction, 90), measure_overlap(wide.vertices[rim], direction))
         ) > MOST_FLAWED:
-            raise StageError(f"{share:.0%} of the damage surface overlaps itself along the sweep", REMEDY)
+            raise StageError(
+                f"{share:.0%} of the damage surface overlaps itself along the sweep", REMEDY, method="implicit"
+            )
         mesh = sweep_surface(wide, rim, direction * find_clear_distance(wide.vertices, direction, part, 2 * tolerance))
         if loose := open_edges(mesh.faces):
             raise StageError(
                 f"the sweep is not watertight: {loose} of its edges are open, because the damage surface is torn",
                 REMEDY,
+                method="implicit",
             )
         beside = np.concatenate([surface.vertices, mesh.vertices[rim]])
         if (count := count_points_inside(mesh, intact, beside, (self.overhang + 1) * tolerance)) > MOST_FLAWED * len(
             points
         ):
-            raise StageError(f"{count} intact scan points lie inside the sweep", REMEDY)
+            raise StageError(f"{count} intact scan points lie inside the sweep", REMEDY, method="implicit")
         return mesh
 
 
@@ -78,7 +85,9 @@ def orient_to_skin(surface: Surface, rim: Ints, part: Part) -> tuple[Ints, Ints,
     mean = sign * surface.cross.sum(axis=0)
     if not np.linalg.norm(mean) > 0.1 * 2 * surface.area:
         raise StageError(
-            "the normals of the damage surface cancel out, so that it has no direction to be swept along", REMEDY
+            "the normals of the damage surface cancel out, so that it has no direction to be swept along",
+            REMEDY,
+            method="implicit",
         )
     return surface.faces[:, ::sign], rim[::sign], mean / np.linalg.norm(mean)
 
@@ -104,7 +113,7 @@ def find_clear_distance(vertices: Floats, direction: Floats, part: Part, margin:
         if lowest > margin / 2:
             return far
         far += margin - lowest
-    raise StageError("the swept surface does not leave the part", REMEDY)
+    raise StageError("the swept surface does not leave the part", REMEDY, method="implicit")
 
 
 def sweep_surface(mesh: Mesh, rim: Ints, move: Floats) -> Mesh:
