@@ -18,6 +18,7 @@ from damageest.geometry import (
     depth_steps,
     distance,
     duplicates,
+    face_labels,
     far_points,
     healing,
     height_spline,
@@ -32,6 +33,7 @@ from damageest.geometry import (
     poisson,
     rays,
     refinement,
+    slivers,
     solids,
     touching,
     transforms,
@@ -196,6 +198,13 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "refinement.insert_points": call_insert_points,
     "sampling.sample_by_area": call_sampling,
     "selectors.Selector": call_selector,
+    "face_labels.carry_labels": lambda r: expect(
+        face_labels.carry_labels(CUBE.vertices, CUBE.faces[: r.count], CUBE, np.arange(12)), (r.count,)
+    ),
+    "slivers.find_slivers": lambda r: expect(slivers.find_slivers(r.mesh.vertices, r.mesh.faces), (len(r.mesh.faces),)),
+    "solids.compose_shells": lambda r: expect(
+        np.asarray(solids.compose_shells([solids.to_manifold(CUBE)] * r.count).num_tri()), ()
+    ),
     "solids.to_manifold": lambda r: expect(np.asarray(solids.to_manifold(r.mesh).num_tri()), ()),
     "solids.concatenate_meshes": lambda r: expect(
         solids.concatenate_meshes([CUBE] * r.count), (8 * r.count, 3), (12 * r.count, 3), (12 * r.count,)
@@ -231,6 +240,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
 """What is called, by module and name; it checks the shapes of what comes back."""
 
 WITHOUT_ROWS: dict[str, str] = {
+    "transforms.turn_to_axis": "takes one vector",
     **dict.fromkeys(
         (
             "bodies.split_bodies", "bodies.split_shells", "rounding.round_to_single", "simplification.simplify_within",

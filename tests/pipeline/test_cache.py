@@ -23,6 +23,7 @@ from damageest.artefacts import (
     Mesh,
     Part,
     Pose,
+    Reason,
     Rims,
     Samples,
     Scan,
@@ -38,6 +39,7 @@ BOX = trimesh.creation.box((3, 2, 1))
 SOLID = Solid(BOX.vertices + 1 / 3, BOX.faces)
 POINTS = np.random.default_rng(0).normal(size=(7, 3))
 TURN = np.array([[0.0, -1, 0, 1 / 3], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]])
+REASON = Reason("other_poses", "two fit", "contradicts", 0.2, "mm", (1.0, 2.0, 3.0), "give it")
 FREE = FreeMotion((0.0, 0.6, 0.8), -0.1, 1 / 3, (1.0, 2.0, 3.0), 0.02, "a turn")
 UP = np.tile([0.0, 0.6, 0.8], (7, 1))
 UNREACHED = Unreached(1 / 3, "unsupported")
@@ -82,6 +84,8 @@ ARTEFACTS: list[Any] = [
     Pose(TURN, 0.01, 0.9, np.stack([TURN, np.eye(4)]), ("two ways",)),
     FREE,
     Pose(TURN, free=(FREE, FREE), is_held=True),
+    REASON,
+    Pose(TURN, doubts=(REASON, Reason("pose_free", "free"))),
     Deviation(POINTS[:, 0], np.arange(7), np.array([0, 1, 2, 3, 0, 1, 2], np.uint8)),
     Sites(np.array([0, 1, 2], np.int32), 2, ("a note",)),
     Rims((np.arange(5), np.arange(3))),
