@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,6 +27,8 @@ Show = Callable[[str], None]
 """Prints one line."""
 MOST_UNSEEN = 5
 """Unseen regions that are printed; result.json has all."""
+MOST_SURPLUS = 3
+"""Surpluses that are printed each by itself, largest first; result.json has all."""
 UNSEEN_WHY = {
     "hidden": "hidden by the part from every scanner position",
     "outside": "outside every view",
@@ -235,13 +237,31 @@ def _print_table(result: Result, target: Path) -> None:
     _print_coverage(result, show)
     if result.fit is not None and result.fit.model == "ok":  # otherwise it is among the notes
         show(f"fit: {result.fit.words}")
-    for item in result.surplus:
-        show(_describe_surplus(item, unit))
+    for text in _list_surplus(result.surplus, unit):
+        show(text)
     for text in result.failures:
         show(f" {text}", "failed:", "red")
     for text in _list_notes(result):
         show(f" {text}", "note:", "yellow")
     show(f"written to {target}")
+
+
+def _list_surplus(items: Sequence[Surplus], unit: str) -> list[str]:
+    """A line for each of the largest surpluses, and for those that a person has to decide about; the rest as one."""
+    small = [item for item in items if item.kind == "surplus"][MOST_SURPLUS:]
+    lines = [_describe_surplus(item, unit) for item in items if item not in small]
+    if not small:
+        return lines
+    closed = [item.volume for item in small if item.volume is not None]
+    volume = f"{sum(closed):.4g} {unit}³ together" if closed else "no closed volume"
+    open_ = (
+        f", {len(small) - len(closed)} of them without a closed volume" if closed and len(closed) < len(small) else ""
+    )
+    height, area = max(item.height for item in small), sum(item.area for item in small)
+    return [
+        *lines,
+        f"surplus: {len(small)} smaller ones, {volume}{open_}, up to {height:.4g} {unit} high, {area:.4g} {unit}²",
+    ]
 
 
 def _describe_surplus(item: Surplus, unit: str) -> str:
@@ -251,5 +271,5 @@ def _describe_surplus(item: Surplus, unit: str) -> str:
         size = f"up to {item.height:.4g} {unit} from the part"
     words = [*([volume] if item.kind != "surroundings" else []), size, f"{item.share:.1%} of the scan"]
     named = "" if item.kind == "surplus" else f" ({item.kind})"
-    notes = item.notes if item.kind == "surplus" and item.solid else ()  # the others are among the warnings
+    notes = item.notes if item.kind == "surplus" else ()  # the others are among the warnings
     return f"surplus {item.id}{named}: {', '.join(words)}" + "".join(f"; {note}" for note in notes)

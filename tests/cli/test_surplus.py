@@ -9,6 +9,8 @@ import jsonschema
 import numpy as np
 import trimesh
 
+from damageest.cli.run import MOST_SURPLUS, _list_surplus
+from damageest.findings import Surplus
 from damageest.io.meshes import write_points
 from damageest.output.result_json import result_schema
 from tests.cli.test_cli import call
@@ -37,3 +39,17 @@ def test_surplus_is_in_the_table_the_files_and_the_report(tmp_path: Path) -> Non
         mesh = trimesh.load_mesh(folder / "surplus/site-1.stl")
         assert mesh.is_watertight
         assert abs(mesh.volume - bead["volume"]) < 1e-3
+
+
+def make_surplus(number: int, kind: str = "surplus") -> Surplus:
+    return Surplus(number, np.arange(3), 0.01, None, 0.1 * number, 2.0, kind)  # type: ignore[arg-type]
+
+
+def test_many_small_surpluses_are_one_line_and_what_a_person_decides_keeps_its_own() -> None:
+    items = [*map(make_surplus, range(1, 13)), make_surplus(13, "displaced piece"), make_surplus(14, "surroundings")]
+    lines = _list_surplus(items, "mm")
+    assert len(lines) == MOST_SURPLUS + 3
+    assert "9 smaller ones" in lines[-1]
+    assert "1.2 mm high, 18 mm²" in lines[-1]
+    assert [f"surplus {number} (" in line for number, line in zip((13, 14), lines[-3:-1], strict=True)] == [True, True]
+    assert len(_list_surplus(items[:3], "mm")) == 3
