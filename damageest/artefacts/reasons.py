@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from damageest.artefacts.arrays import Vector
+from damageest.errors import clean_message
 
 Effect = Literal["contradicts", "open", "widens", "note"]
 """What a reason does to a verdict. `contradicts`: the site is doubtful. `open`: something could not be seen; without an
@@ -28,6 +29,10 @@ class Reason:
     unit: str = ""
     place: Vector | None = None
     remedy: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("text", "remedy"):
+            object.__setattr__(self, name, clean_message(getattr(self, name)))
 
     def __str__(self) -> str:
         return f"{self.text}; {self.remedy}" if self.remedy else self.text
