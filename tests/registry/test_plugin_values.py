@@ -39,7 +39,8 @@ class Posed(Align):
     do: str = ""
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         T = np.eye(4)
-        scope = {"T": T, "Pose": Pose, "np": np, "StageError": StageError, "given": Pose(T, 0.04, 0.9)}
+        scope = {"T": T, "Pose": Pose, "Reason": Reason, "np": np, "StageError": StageError}
+        scope["given"] = Pose(T, 0.04, 0.9)
         exec(self.do, scope)
         return scope["given"]
 
