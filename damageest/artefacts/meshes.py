@@ -12,6 +12,10 @@ from damageest.artefacts.arrays import Floats, Ints
 from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
 
 
+ROUNDING = 1e-9
+"""Relative error by which a mean of equal numbers may leave them."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh(Checked):
     """A triangle mesh: ``vertices`` (V,3) float64, ``faces`` (F,3) int64, counter-clockwise from outside."""
@@ -141,7 +145,8 @@ class Deposit(Solid):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.thickness and list(self.thickness) != sorted(self.thickness):
+        low, mean, high = self.thickness or (0.0, 0.0, 0.0)
+        if not low <= mean * (1 + ROUNDING) or not mean <= high * (1 + ROUNDING):
             raise ArtefactError(f"thickness: expected least, mean and largest, got {self.thickness}")
 
 
