@@ -11,7 +11,6 @@ import numpy as np
 from damageest.artefacts.arrays import Floats, Ints
 from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
 
-
 ROUNDING = 1e-9
 """Relative error by which a mean of equal numbers may leave them."""
 
