@@ -29,9 +29,11 @@ PUBLIC_MODULES = {
     "damageest.findings",
     "damageest.geometry",
     "damageest.io",
+    "damageest.options",
     "damageest.registry.contracts",
     "damageest.registry.system_libraries",
     "damageest.result",
+    "damageest.rules",
 }
 """Public modules, with the modules in them."""
 EXCEPTIONS = {

@@ -9,9 +9,12 @@ from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
 from damageest.geometry.vectors import normalise
 from damageest.stages.enclose._refit import fit_places
 
-WIDE = 2.0
+WIDE, WIDE_IF_DEEP = 2.0, 3.0
 """Gap between points, in cells, from which points are put between them. Nothing holds the solution in such a gap: it
-bulges there, by up to the gap."""
+bulges there, by up to the gap. The second for a deep loss, of which a bulge is a small share: more points gain less
+there than their own errors at the rim take."""
+DEEP = 4.0
+"""Depth of a loss in gaps between its points from which it is deep."""
 STEP = 0.8
 """Distance between the new points, in cells."""
 MOST_ALONG = 8
@@ -27,17 +30,18 @@ LOPSIDED = 0.3
 point would lie beyond the border of the points."""
 
 
-def fill_gaps(points: Floats, normals: Floats, cell: float) -> tuple[Floats, Floats]:
+def fill_gaps(points: Floats, normals: Floats, depth: Floats, cell: float) -> tuple[Floats, Floats]:
     """The points (N,3) and unit normals (N,3), and after them new ones in gaps that are wider than some cells.
 
-    The new points lie on the surface through their neighbours. None lies beyond the border of the points, nor in a
-    hole, which is wider than the usual gap there.
+    ``depth`` (N,): of the points below the skin. The new points lie on the surface through their neighbours. None lies
+    beyond the border of the points, nor in a hole, which is wider than the usual gap there.
     """
     if len(points) <= NEIGHBOURS:
         return points, normals
     distance, _ = find_neighbours(points, RING + 1)
     gap = distance[:, -1] * np.sqrt(np.pi / (RING + 1))
-    wide = np.flatnonzero(gap > WIDE * cell)
+    is_deep = float(np.quantile(depth, 0.95)) > DEEP * float(np.median(gap))
+    wide = np.flatnonzero(gap > (WIDE_IF_DEEP if is_deep else WIDE) * cell)
     if not len(wide):
         return points, normals
     places, source = _lay_out(points, normals, gap, wide, STEP * cell)

@@ -188,7 +188,7 @@ def _build_surface(
     # The local fits overlap much farther than this, so that more of them would add nothing.
     chosen = pick_one_per_cube(points, APART * cell)
     chosen = _thin_flat(points, chosen, counts, depth[first], noise, cell)
-    above = above[first][chosen]
+    above, depth = above[first][chosen], depth[first][chosen]
     points, normals = average_points(points, counts, noise, chosen)
     size, chosen = cell, np.arange(len(lost))
     while len(chosen) > MOST_LOST:
@@ -196,7 +196,7 @@ def _build_surface(
         chosen = pick_one_per_cube(lost, size)
     places = lost[chosen]
     normals = turn_toward_void(points, normals, above, places, lost_normals[chosen], measure_local_areas(places), cell)
-    points, normals = fill_gaps(points, normals, cell)
+    points, normals = fill_gaps(points, normals, depth, cell)
     return points, normals, measure_local_areas(points)
 
 

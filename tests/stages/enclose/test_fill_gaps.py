@@ -22,7 +22,7 @@ def ball(count: int, seed: int = 0) -> tuple[Floats, Floats]:
 
 def test_they_lie_on_the_surface_and_close_its_gaps() -> None:
     points, normals = ball(400)
-    more, ways = fill_gaps(points, normals, 0.1)
+    more, ways = fill_gaps(points, normals, np.zeros(len(points)), 0.1)
     new = more[len(points) :]
     assert len(new) > 10 * len(points)
     off = np.abs(np.linalg.norm(new, axis=1) - RADIUS)
@@ -38,7 +38,7 @@ def test_they_lie_on_the_surface_and_close_its_gaps() -> None:
 def test_none_lies_in_a_hole_or_beyond_the_border() -> None:
     points, normals = ball(400)
     kept = np.linalg.norm(points - [0, 0, RADIUS], axis=1) > 2
-    more, _ = fill_gaps(points[kept], normals[kept], 0.1)
+    more, _ = fill_gaps(points[kept], normals[kept], np.zeros(int(kept.sum())), 0.1)
     assert np.linalg.norm(more - [0, 0, RADIUS], axis=1).min() > 1.6
     assert more[:, 2].min() > -0.3
 
@@ -46,6 +46,6 @@ def test_none_lies_in_a_hole_or_beyond_the_border() -> None:
 @pytest.mark.parametrize("count", [0, 1, 8, 20_000])
 def test_few_points_and_close_points_stay_alone(count: int) -> None:
     points, normals = ball(count)
-    more, ways = fill_gaps(points, normals, 0.1)
+    more, ways = fill_gaps(points, normals, np.zeros(len(points)), 0.1)
     assert more.tobytes() == points.tobytes()
     assert ways.tobytes() == normals.tobytes()
