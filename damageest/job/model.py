@@ -40,7 +40,7 @@ class SiteChoice(Options):
     merge: tuple[tuple[PositiveInt, ...], ...] = Field(
         (), description="lists of numbers of sites that are one; the site gets the lowest number"
     )
-    keep: Box | None = Field(None, description="only sites whose centre of mass is in this box; default: all")
+    keep: Box | None = Field(None, description="only sites the middle of whose bounds is in this box; default: all")
 
 
 class Header(Options):

@@ -153,13 +153,14 @@ class Writer:
 class PathSettings:
     """How a path is written. ``unit``: of its lengths, one of um, mm, cm, m, in, ft. ``title``: of job and site.
     ``header``, ``footer``: templates of the first and last lines, None for the writer's own. ``options``: what else the
-    job says for the writer, by name."""
+    job says for the writer, by name. ``site``: number of the site."""
 
     unit: str
     title: str
     header: str | None = None
     footer: str | None = None
     options: Mapping[str, str] = field(default_factory=dict)
+    site: int = 1
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest_paths.gauges import Gauge, Together
+from damageest_paths.gauges import Gauge, LeastGauge
 from damageest_paths.process import Pass, Process, measure_along
 from damageest_paths.sweeps import Sweeps
 
@@ -81,7 +81,7 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
     taken so often that nothing comes nearer by more than half of the process's step in between. ``least``: number of
     points of a run.
     """
-    ways, around = list_ways(normals, process), Together(parts)
+    ways, around = list_ways(normals, process), LeastGauge(parts)
     tried = [_measure(points, ways[0], around, process)]
     if not (tried[0].gaps >= process.gap).all() and len(ways) > 1:
         sparse = np.unique(np.linspace(0, len(points) - 1, SPARSE).round().astype(int))
