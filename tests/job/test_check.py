@@ -243,6 +243,7 @@ def test_a_part_of_doubtful_size_is_named(job_file: JobFile, registry: Registry)
     """Part and scan in metres, in a job in millimetres: only their size shows it."""
     head = "version: 1\npart: {path: box.stl, unit: um}\nscan: {use: simulate, points: 4000}\n"
     doubts = inspect_inputs(load(job_file("", head=head), registry), registry)[3]
-    assert any("the part is 0.04 mm across; is `units: mm` right?" in doubt for doubt in doubts)
+    assert any("the part is 0.04 mm across; is `units: mm` right?" in doubt.text for doubt in doubts)
     head = head.replace("unit: um", "unit: mm")
-    assert not any("across" in doubt for doubt in inspect_inputs(load(job_file("", head=head), registry), registry)[3])
+    doubts = inspect_inputs(load(job_file("", head=head), registry), registry)[3]
+    assert not any("across" in doubt.text for doubt in doubts)
