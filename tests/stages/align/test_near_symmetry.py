@@ -30,7 +30,7 @@ def test_a_camera_does_not_show_which_hole_is_larger() -> None:
     scan, tolerance = watch_by_camera(part, 1, 4000, 0.3)
     pose = Register().run(scan, part, tolerance)
     assert is_told(part, scan, pose)
-    assert any("not all symmetries" in doubt for doubt in pose.doubts)
+    assert any("not all symmetries" in doubt.text for doubt in pose.doubts)
 
 
 def test_a_fine_scan_shows_it() -> None:

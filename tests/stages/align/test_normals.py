@@ -63,7 +63,7 @@ def test_a_run_with_flipped_normals_finds_the_damage_alone() -> None:
     result = damageest.run({"version": 1, "tolerance": 0.25, "allowance": "none"}, part=part, scan=flipped)
     assert len(result.sites) == 1
     assert not result.surplus
-    assert any("normals in the file" in text for text in result.warnings)
+    assert any("normals in the file" in note.text for note in result.warnings)
 
 
 def test_a_scanner_position_vouches_for_normals() -> None:

@@ -85,7 +85,7 @@ def test_two_fractures_that_are_nearly_parallel_to_the_skin() -> None:
         pose = Register(seed=seed).run(scan, part, 4 * noise)
         assert pose.alternatives is not None
         assert min(error(part, T, scan) for T in [pose.T_part_scan, *pose.alternatives]) < 0.5
-        assert any("may show another part" in note for note in pose.doubts)
+        assert any("may show another part" in note.text for note in pose.doubts)
 
 
 def test_the_same_pose_with_one_thread_and_with_two(monkeypatch: pytest.MonkeyPatch) -> None:
