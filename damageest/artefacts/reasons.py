@@ -1,4 +1,4 @@
-"""What is said about a site or a run, as data that programs can read and a text that people can read."""
+"""A finding about a site or a run: data for programs, and a text for people."""
 
 from __future__ import annotations
 

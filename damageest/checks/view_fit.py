@@ -164,7 +164,7 @@ def _fit_one(
 
 
 def _find_shown(skin: Skin, form: Form, points: Floats, gap: float, tolerance: float) -> Floats:
-    """(6,S) the motions that the whole scan shows: a turn of a shaft about its axis is none of them."""
+    """(6,S) the motions that the whole scan shows: a turn of a shaft about its axis is not among them."""
     cells = find_feet(skin, form, points, 4 * gap, REACH * tolerance, tolerance).summarise(form)
     weight = cells.count / cells.count.sum()
     size, motions = np.linalg.eigh(cells.jacobian.T @ (cells.jacobian * weight[:, None]))

@@ -147,7 +147,7 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
 
 
 def _list_notes(result: Result) -> list[str]:
-    """What is said about the run, and about its sites: each reason once, with the sites that have it."""
+    """The notes on the run and on its sites: each reason once, with the sites that have it."""
     from damageest.rules.notes import fold_notes, join_reasons
 
     notes = [str(note) for note in fold_notes(result.warnings)]

@@ -106,7 +106,7 @@ class OutputFolder:
 
 
 def open_output(folder: Path) -> OutputFolder:
-    """Reads result.json of an output folder. Raises InputError where there is none that can be read."""
+    """Reads result.json of an output folder. Raises InputError where it is missing or cannot be read."""
     path = folder / "result.json"
     if not path.is_file():
         raise InputError(

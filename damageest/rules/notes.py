@@ -1,4 +1,4 @@
-"""What is said about a whole run: its codes, their order, and how many alike become one line."""
+"""Notes on a whole run: their codes, their order, and how many of one code are joined into one line."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from damageest.artefacts import Reason
 
 @dataclass(frozen=True)
 class RunCode:
-    """``meaning`` of a code; ``rank``: 0 may change a decision about the part, 1 about how it was scanned, 2 tells what
-    was done. ``plural``: what many of them are together; empty where each stands for itself."""
+    """``meaning`` of a code; ``rank``: 0 may change a decision about the part, 1 about how it was scanned, 2 says what
+    was done. ``plural``: the name of many of them in one line; empty where each has its own line."""
 
     meaning: str
     rank: int
@@ -49,7 +49,7 @@ FOLDED = 3
 
 
 def make_notes(stage: str, notes: Iterable[str]) -> tuple[Reason, ...]:
-    """What a stage said in words, with the stage as its code."""
+    """The notes of a stage as reasons, with the stage as their code."""
     return tuple(Reason(stage, note) for note in notes)
 
 

@@ -71,7 +71,7 @@ class Register(Align):
             )
         prepared = prepare_part(target, self.seed)
         target, field = prepared.surface, prepared.grid
-        # Signs that nothing vouches for: poses are searched for without them first, and then with them.
+        # Signs that no scanner position confirms: poses are searched for without them first, and then with them.
         oriented = replace(given, signed=given.signed and normals.is_proven)
         rough = propose_poses(oriented, prepared.pairs, self.trials, rng)
         few = oriented.take(draw_stratified(len(oriented.points), 1500, rng))

@@ -78,8 +78,8 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
     """The runs of a pass with points (N,3), N at least 2, and normals (N,3), along which the nozzle is clear.
 
     Between two points, point and axis change evenly, the axis not faster than the machine may turn it. The distance is
-    taken so often that nothing comes nearer by more than half of the process's step in between. ``least``: number of
-    points of a run.
+    taken so often that between two places nothing comes nearer by more than half of the process's step. ``least``:
+    number of points of a run.
     """
     ways, around = list_ways(normals, process), LeastGauge(parts)
     tried = [_measure(points, ways[0], around, process)]
