@@ -71,7 +71,7 @@ def measure_fit(
     views: ViewFits | None, corrected_scale: float = 1.0,
 ) -> FittedModel | None:  # fmt: skip
     """Measures the fit of points (N,3) in the part's frame with their signed ``distance`` (N,); None where too few lie
-    near the skin. ``views``: the comparison of the views, before they were put right."""
+    near the skin. ``views``: the comparison of the views, before they were corrected."""
     choice = choose_form(part, points, distance, noise, tolerance)
     if choice is None:
         return None

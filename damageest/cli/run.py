@@ -135,8 +135,8 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
         if result.sites and not any(site.accepted for site in result.sites):
             status = max(status, 1)
             say(
-                f"error: {job.source}: all sites are doubtful, and none is part of the damage; see the reasons, and "
-                "take over those that are damage with  accept: [1]  or  accept: all  in the job",
+                f"error: {job.source}: none of the sites is accepted as damage; see the reasons of each, and "
+                "name those that are damage in the job:  accept: [1],  or  accept: all",
                 err=True,
             )
         if result.failures:

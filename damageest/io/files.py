@@ -39,7 +39,7 @@ def read_json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:
-        raise ValueError("its values are inside each other too often") from None
+        raise ValueError("its values are nested too deeply") from None
 
 
 def working_folder() -> Path:

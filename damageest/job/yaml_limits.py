@@ -48,7 +48,7 @@ def check_events(events: Iterable[Any], source: str) -> None:
         if count > MOST_VALUES:
             text = f"its aliases stand for more than {MOST_VALUES} values, or contain themselves; write the values out"
             if not has_alias:
-                text = f"more than {MOST_VALUES} values, so it is no job"
+                text = f"more than {MOST_VALUES} values, which no job has"
             raise _refuse(event, text, source)
 
 
@@ -57,7 +57,7 @@ def find_bad_character(text: str) -> str:
     if "\0" in text:
         return "has a NUL character, which no name or path can have"
     if any("\ud800" <= letter <= "\udfff" for letter in text):
-        return "has half of a surrogate pair, which is no character"
+        return "has half of a surrogate pair, which is not a character"
     return ""
 
 

@@ -110,7 +110,7 @@ def open_output(folder: Path) -> OutputFolder:
     path = folder / "result.json"
     if not path.is_file():
         raise InputError(
-            f"{folder}: there is no result.json, so this is no output folder; name the folder that `damageest run` "
+            f"{folder}: there is no result.json, so this is not an output folder; name the folder that `damageest run` "
             "wrote, as out/<name>"
         )
     try:

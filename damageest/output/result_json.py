@@ -58,7 +58,7 @@ class AlignmentReport(JsonModel):
 
 class ExportReport(JsonModel):
     files: list[str] = Field(description="all that were written; those below scan_frame/ are in the scan's frame")
-    notes: list[str] = Field(description="what was written in another way than asked for, and why")
+    notes: list[str] = Field(description="what differs from what the job asks for, and why")
 
 
 class TruthReport(JsonModel):

@@ -46,7 +46,7 @@ def correct_scan(engine: Engine, work: Work) -> Work:
 
 
 def _take_corrected(engine: Engine, state: JobState, aligned: Scan) -> JobState:
-    """The state with views put right: noise, spacing and a tolerance `auto` are measured again."""
+    """The state with corrected views: noise, spacing and a tolerance `auto` are measured again."""
     noise, spacing = measure_noise_and_spacing(aligned.points)
     aligned = replace(aligned, noise=noise, spacing=spacing)
     state = state.derive(JobState.aligned, aligned, JobState.aligned, JobState.views)

@@ -291,7 +291,7 @@ SPOILED: dict[str, tuple[str, Callable[[dict[str, Any]], Any], str]] = {
         "has no CAD face 4",
     ),
     "a file that is not there": ("Export", lambda g: ExportedFiles(("b.txt",)), "'b.txt' is no file in the output"),
-    "a file elsewhere": ("Report", lambda g: ReportFiles(("../a.txt",)), "is no file in the output folder"),
+    "a file elsewhere": ("Report", lambda g: ReportFiles(("../a.txt",)), "is not a file in the output folder"),
 }
 
 

@@ -30,7 +30,7 @@ class Register(Align):
     fit_views: bool = Option(
         True,
         description="whether each view of a scan with known views is fitted to the part where the views disagree: a "
-        "misplaced one is put right, if it fixes its pose by itself",
+        "misplaced one is corrected, if it fixes its pose by itself",
     )
     datum: Datum = NO_DATUM
 
