@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from damageest.artefacts.arrays import Vector
+from damageest.errors import clean_message
 
 Effect = Literal["contradicts", "open", "widens", "note"]
 """What a reason does to a verdict. `contradicts`: the site is doubtful. `open`: something could not be seen; without an
@@ -28,6 +29,11 @@ class Reason:
     unit: str = ""
     place: Vector | None = None
     remedy: str = ""
+
+    def __post_init__(self) -> None:
+        """Cuts and cleans the texts: those of plugins may be of any length, with any characters."""
+        object.__setattr__(self, "text", clean_message(self.text))
+        object.__setattr__(self, "remedy", clean_message(self.remedy))
 
     def __str__(self) -> str:
         return f"{self.text}; {self.remedy}" if self.remedy else self.text

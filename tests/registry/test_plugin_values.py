@@ -25,7 +25,7 @@ __all__ = ["site"]
 STAGES = '''
 from dataclasses import replace
 import numpy as np
-from damageest.artefacts import Deviation, Part, Pose, Samples, Scan, Sites
+from damageest.artefacts import Deviation, Part, Pose, Reason, Samples, Scan, Sites
 from damageest.errors import StageError
 from damageest.stages.align import Align
 from damageest.stages.cluster import Cluster
@@ -39,7 +39,8 @@ class Posed(Align):
     do: str = ""
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         T = np.eye(4)
-        scope = {"T": T, "Pose": Pose, "np": np, "StageError": StageError, "given": Pose(T, 0.04, 0.9)}
+        scope = {"T": T, "Pose": Pose, "Reason": Reason, "np": np, "StageError": StageError}
+        scope["given"] = Pose(T, 0.04, 0.9)
         exec(self.do, scope)
         return scope["given"]
 
@@ -216,7 +217,7 @@ LOUD = {
     "a refusal": "raise StageError('\\x1b[2J\\x07' + 'x' * 50_000_000, '\\x1b[31m' + 'y' * 50_000_000)",
     "an error": "raise ValueError('\\x1b[2J' + 'x' * 50_000_000)",
     "a note": "given = Pose(T, 0.04, 0.9, notes=('\\x1b[2J' + 'x' * 50_000_000,))",
-    "a doubt": "given = Pose(T, 0.04, 0.9, doubts=('\\x1b[2J' + 'x' * 50_000_000,))",
+    "a doubt": "given = Pose(T, 0.04, 0.9, doubts=(Reason('a', '\\x1b[2J' + 'x' * 50_000_000, 'contradicts'),))",
     "a broken text": "given = Pose(T, 0.04, 0.9, notes=('\\ud800', '\\x00'))",
 }
 

@@ -72,7 +72,8 @@ class Dbscan(Cluster):
         label[damage] = number[inverse.ravel()]
         noise = int((label[damage] == 0).sum())
         notes = [
-            f"points within {eps:.4g} are one site (eps, {why}; {dense} neighbours); {noise} of {len(damage)} are in none"
+            f"damaged points nearer than {eps:.4g} to each other are grouped (eps, {why}; {dense} neighbours): "
+            f"{noise} of {len(damage)} are in no group"
         ]
         if eps < bridging / 2:
             notes.append(
