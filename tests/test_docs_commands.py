@@ -123,6 +123,14 @@ def test_the_first_repair_goes_as_its_page_says(tmp_path: Path) -> None:
     assert (tmp_path / "jobs" / "out" / "block_wedge" / "deposit" / "site-1.stl").is_file()
 
 
+def test_pages_show_the_same_table_of_the_same_run() -> None:
+    """README and Uncertainty show what First repair shows, and a slow test compares that with a run."""
+    (shown,) = blocks(ROOT / "docs" / "first-repair.md", "text")
+    (first,) = blocks(ROOT / "README.md", "text")
+    assert first == shown
+    assert blocks(ROOT / "docs" / "uncertainty.md", "text")[0] == "".join(shown.splitlines(keepends=True)[:3])
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_to_files(page: Path) -> None:
     targets = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text())
