@@ -91,8 +91,8 @@ class StageError(DamageestError):
     """A stage failed, or refused an input that is valid.
 
     Raise it with what is wrong and, as ``remedy``, what the user may try; ``method``: another method of the job that
-    may do it, which is added to the remedy. The engine adds stage and site, or for points that are no site yet their
-    ``place``, in words.
+    may do it, which is added to the remedy. The engine adds stage and site; for points that are no site yet, a
+    description of their ``place``.
     """
 
     exit_status = 1
@@ -136,7 +136,7 @@ def find_missing_library(error: BaseException) -> str:
 
 
 def describe_missing_library(error: BaseException) -> StageError | None:
-    """The error in words for the user where a Python module or a shared library does not load; None for another."""
+    """A message for the user where a Python module or a shared library does not load; None for another error."""
     if library := find_missing_library(error):
         return StageError(
             f"the system library {library} is missing",

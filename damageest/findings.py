@@ -104,7 +104,7 @@ class PatchDeviation:
 class ViewFit:
     """How one view lies against the part: ``shift`` (3,) of the part's centre and ``turn`` in degrees that would put it
     right, in the part's frame; ``apart``: how far it lies from the other views where they overlap. ``is_determined``:
-    whether it fixes its pose by itself. ``is_corrected``: whether it was put right."""
+    whether it fixes its pose by itself. ``is_corrected``: whether it was moved to its place."""
 
     number: int
     shift: Floats

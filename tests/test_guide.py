@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -91,6 +92,9 @@ def test_the_job_of_the_second_runs(installed: tuple[Path, dict[str, str]], tmp_
     done = call(["run", str(job)], tmp_path, env)
     assert done.returncode == 0, done.stderr
     assert "segment two_sided took" in done.stdout, "its observer is called"
+    (site,) = json.loads((tmp_path / "out" / "job" / "result.json").read_text())["sites"]
+    assert site["verdict"]["level"] == "likely", "its rule keeps a sparse site from being proven"
+    assert "acme_density" in [one["code"] for one in site["verdict"]["reasons"]]
     import trimesh
 
     written = trimesh.load_mesh(tmp_path / "out" / "job" / "damage" / "site-1.off")
@@ -101,6 +105,32 @@ def test_the_job_of_the_second_runs(installed: tuple[Path, dict[str, str]], tmp_
     done = call(["run", str(job)], tmp_path, env)
     assert done.returncode == 0, done.stderr
     assert "repair fan took" in done.stdout
+
+
+def test_its_rule_and_its_nested_options_are_listed(installed: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
+    folder, env = installed
+    assert "fewer scan points lie on the site than the house's" in call(["schema", "reasons"], folder, env).stdout
+    assert "limits" in call(["stages", "segment", "two_sided"], folder, env).stdout
+    assert "height beyond which a point is added metal" in call(["schema", "job"], folder, env).stdout
+    job = damaged_box.write_small(tmp_path, "segment: {use: two_sided, limits: {outside: '3'}}\n")
+    refused = call(["validate", str(job)], tmp_path, env)
+    assert refused.returncode == 2
+    assert "segment.limits.outside" in refused.stderr + refused.stdout
+
+
+def test_its_conversion_gives_an_object_of_the_other_library(
+    installed: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    _, env = installed
+    job = damaged_box.write_small(tmp_path)
+    script = f"""
+import damageest
+result = damageest.run({str(job)!r})
+mesh = result.convert("pyvista", "damage", 1)
+print(type(mesh).__name__, round(mesh.volume / result.damage_volume, 3))
+"""
+    done = subprocess.run([sys.executable, "-c", script], env=env, capture_output=True, text=True, check=False)
+    assert done.stdout.endswith("PolyData 1.0\n"), done.stderr
 
 
 @pytest.mark.parametrize(("plugin", "least"), [("first", 6), ("trial", 30)])

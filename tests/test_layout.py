@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -57,3 +58,23 @@ def test_architecture_names_each_folder() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text()
     folders = {path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "damageest").glob("*/__init__.py")}
     assert not [folder for folder in folders if f"{folder.split('/')[1]}/" not in text]
+
+
+LISTED = ("artefacts", "batches", "checks", "io", "isolation", "job", "registry")
+"""Folders of which ARCHITECTURE.md lists the modules: every one, so that a reader who looks for one finds it."""
+
+
+@pytest.mark.parametrize("folder", LISTED)
+def test_architecture_names_each_module_of_a_folder_that_it_lists(folder: str) -> None:
+    rows = (ROOT / "ARCHITECTURE.md").read_text().splitlines()
+    (row,) = [line for line in rows if line.startswith(f"| `{folder}/` |")]
+    modules = [path.name for path in (ROOT / "damageest" / folder).glob("*.py") if path.name != "__init__.py"]
+    assert not [name for name in modules if f"`{name}`" not in row]
+
+
+def test_architecture_names_no_module_that_is_not_there() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text()
+    there = {path.name for folder in ("damageest", "plugins", "tests") for path in (ROOT / folder).rglob("*.py")}
+    named = {Path(name).name for name in re.findall(r"`([\w/]+\.py)`", text)}
+    assert named
+    assert not named - there

@@ -42,7 +42,7 @@ class Enclosure(Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.sites:
-            raise ArtefactError("sites: an enclosure is that of one site or more")
+            raise ArtefactError("sites: an enclosure belongs to one site or more")
 
 
 @dataclass(frozen=True, eq=False)

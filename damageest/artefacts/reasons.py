@@ -1,4 +1,4 @@
-"""What is said about a site or a run, as data that programs can read and a text that people can read."""
+"""A finding about a site or a run: data for programs, and a text for people."""
 
 from __future__ import annotations
 
@@ -31,8 +31,9 @@ class Reason:
     remedy: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("text", "remedy"):
-            object.__setattr__(self, name, clean_message(getattr(self, name)))
+        """Cuts and cleans the texts: those of plugins may be of any length, with any characters."""
+        object.__setattr__(self, "text", clean_message(self.text))
+        object.__setattr__(self, "remedy", clean_message(self.remedy))
 
     def __str__(self) -> str:
         return f"{self.text}; {self.remedy}" if self.remedy else self.text

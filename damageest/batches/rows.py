@@ -1,4 +1,4 @@
-"""The row of a job: what came out, or why nothing did."""
+"""The row of a job: its result, or why it has none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks on a Dask cluster: each has an end, whatever becomes of the workers."""
+"""Tasks on a Dask cluster: each one ends with a result or a reason, also where workers die."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ POLL = 0.5
 
 @dataclass(frozen=True)
 class Ended:
-    """A task that has ended. ``value``: what the function gave; None where ``why`` says why there is none. ``tries``:
-    how many workers it was given to."""
+    """A task that has ended. ``value``: what the function gave; None if there is none, and then
+    ``why`` says why. ``tries``: how many workers it was given to."""
 
     name: str
     value: Any

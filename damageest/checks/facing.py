@@ -11,7 +11,7 @@ from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, make
 from damageest.geometry.voxels import number_cubes
 
 STEP = 1.25
-"""How far from a point the part is asked for metal, in tolerances."""
+"""How far from a point metal of the part is looked for, in tolerances."""
 DEPTH = 0.35
 """Depth inside the part, in tolerances, from which there is metal on a side of a point."""
 TURNED = 0.85

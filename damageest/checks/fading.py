@@ -45,7 +45,7 @@ def measure_fading(
     Args:
         inner: (F,) which faces of ``damage`` are on its inner surface.
         systematic: how far intact skin deviates over whole areas: less is no loss.
-        others: gives the cells (C,) of the skin that other sites remove; it is asked for a shallow loss alone.
+        others: gives the cells (C,) of the skin that other sites remove; it is called for a shallow loss only.
     """
     on_skin = np.flatnonzero(~inner & (np.linalg.norm(damage.cross, axis=1) > 0))
     if not len(on_skin) or not inner.any():

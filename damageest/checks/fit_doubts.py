@@ -25,8 +25,8 @@ def find_fit_doubts(
     pose: Pose, verdicts: Mapping[int, Verdict], surplus: tuple[Surplus, ...], displaced: frozenset[int],
     aligned: Scan, deviation: Deviation, skin: SkinView,
 ) -> tuple[str, ...]:  # fmt: skip
-    """What speaks against the statement that the part as designed explains the intact skin, in words; empty where
-    nothing does.
+    """Reasons to doubt that the part as designed explains the intact skin, as clauses of a sentence; empty where there
+    is none.
 
     Args:
         verdicts: of the sites, by their numbers. displaced: the numbers of sites beside a piece that may be displaced.

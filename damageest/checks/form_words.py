@@ -53,11 +53,11 @@ def _describe_views(fit: ModelFit, unit: str) -> str:
     open_ = [str(view.number + 1) for view in fit.views if not view.is_determined and view.left > 0.5 * apart]
     words = f"the views of the scan disagree by {apart:.3g} {unit} where they overlap"
     if moved:
-        words += "; put right: " + ", ".join(moved)
+        words += "; corrected: " + ", ".join(moved)
     if left:
-        words += "; misplaced, and not put right: " + ", ".join(left)
+        words += "; misplaced, and not corrected: " + ", ".join(left)
     if open_:
-        words += f"; by themselves, these do not fix their pose, and were not moved: view {', '.join(open_)}"
+        words += f"; these do not fix their pose by themselves, and were not moved: view {', '.join(open_)}"
     return words
 
 

@@ -23,10 +23,10 @@ FEWEST_PATCHES, FEWEST_POINTS = 12, 6
 LEAST_AMOUNT = 0.15
 """Displacement of the skin, in tolerances, below which a form does not matter."""
 LARGEST_AMOUNT, LARGEST_SCALE = 15.0, 0.04
-"""Displacement of the skin in tolerances, and relative change of length, beyond which a form is none: a face of a
-fracture was taken for skin."""
+"""Displacement of the skin in tolerances, and relative change of length, beyond which a form is not believed: a face of
+a fracture was mistaken for skin."""
 CERTAIN = 5.0
-"""How many standard errors a form has to be away from none."""
+"""How many standard errors the amount of a form has to be above zero."""
 OUTSIDE = 0.2
 """How much skin that lies outside a form has to explain, compared with skin inside that it explains: wear and loss put
 none outside."""
@@ -71,7 +71,7 @@ def measure_fit(
     views: ViewFits | None, corrected_scale: float = 1.0,
 ) -> FittedModel | None:  # fmt: skip
     """Measures the fit of points (N,3) in the part's frame with their signed ``distance`` (N,); None where too few lie
-    near the skin. ``views``: the comparison of the views, before they were put right."""
+    near the skin. ``views``: the comparison of the views, before they were corrected."""
     choice = choose_form(part, points, distance, noise, tolerance)
     if choice is None:
         return None
@@ -85,7 +85,7 @@ def measure_fit(
     elif model == "ok":
         amount = 0.0
     deviations, waviness = _measure_patches(choice, choice.form if form else choice.rigid, noise, tolerance)
-    if waviness > WAVY * tolerance:  # what fields of low order explain is none
+    if waviness > WAVY * tolerance:  # what fields of low order explain is no waviness
         waviness = min(waviness, _measure_patches(choice, choice.every, noise, tolerance)[1])
     if waviness > WAVY * tolerance and amount < PLAIN * waviness:
         model, form, deformation, amount = "wavy", None, (), 0.0

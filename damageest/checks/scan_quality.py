@@ -66,7 +66,7 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
     elif tolerance < 3 * scan.noise:
         text = (
             f"the tolerance {tolerance:.3g} {unit} is less than three times the scan's noise of {scan.noise:.3g} "
-            f"{unit}: intact surface may be taken for damage"
+            f"{unit}: intact surface may be mistaken for damage"
         )
         remedy = f"{AUTO_TOLERANCE * scan.noise:.3g} {unit} would be safe"
         found.append(Reason("tolerance_small", text, amount=scan.noise, unit=unit, remedy=remedy))
@@ -75,7 +75,7 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
             f"the part's triangles deviate from the CAD surface by up to {part.tessellation_error:.3g} {unit}, more "
             f"than half the tolerance of {tolerance:.3g} {unit}"
         )
-        remedy = "ask for a finer part.chord, or for a smaller part.angle if that is no help"
+        remedy = "set a finer part.chord, or a smaller part.angle if that does not help"
         found.append(Reason("coarse_part", text, amount=part.tessellation_error, unit=unit, remedy=remedy))
     if scan.spacing > 5 * tolerance:
         text = (

@@ -142,7 +142,7 @@ def _name_kind(
     if beyond > FAR_SHARE or (is_flat and patch.covered < 0.35 * patch.area):
         what = "it may be a fixture, a table or another object"
         if is_flat:
-            what = "it is a plane, as a table is"
+            what = "it is a plane, like a table"
         elif _resembles(patch, part):
             what = "it has the size and the area of the part, and may be a second specimen of it"
         return replace(surplus, kind="surroundings", notes=(what,))

@@ -48,7 +48,7 @@ class ViewFits:
     common: Floats
 
     def apply(self, aligned: Scan) -> Scan:
-        """The scan with the views put right: the corrected ones by their own motion, the others by the common one."""
+        """The scan with corrected views: the corrected ones by their own motion, the others by the common one."""
         assert aligned.view is not None
         assert aligned.viewpoints is not None
         points, scanners = aligned.points.copy(), aligned.viewpoints.copy()
@@ -66,7 +66,7 @@ def fit_views(part: Part, aligned: Scan, tolerance: float, is_correcting: bool) 
     """Compares the views where they overlap, and where they disagree, fits each of them to the part by itself.
 
     ``aligned``: the scan in the part's frame. ``is_correcting``: views that are determined by themselves and lie
-    elsewhere are put right. None for a scan without views, or of a single one. A part that is bent or of another size
+    elsewhere are corrected. None for a scan without views, or of a single one. A part that is bent or of another size
     shows as such: its views agree where they overlap.
     """
     if aligned.view is None or aligned.viewpoints is None or len(aligned.viewpoints) < 2:
@@ -164,7 +164,7 @@ def _fit_one(
 
 
 def _find_shown(skin: Skin, form: Form, points: Floats, gap: float, tolerance: float) -> Floats:
-    """(6,S) the motions that the whole scan shows: a turn of a shaft about its axis is none of them."""
+    """(6,S) the motions that the whole scan shows: a turn of a shaft about its axis is not among them."""
     cells = find_feet(skin, form, points, 4 * gap, REACH * tolerance, tolerance).summarise(form)
     weight = cells.count / cells.count.sum()
     size, motions = np.linalg.eigh(cells.jacobian.T @ (cells.jacobian * weight[:, None]))

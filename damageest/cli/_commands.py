@@ -1,4 +1,4 @@
-"""The commands of the command line: the built-in ones, and those of plugins where they are asked for."""
+"""The commands of the command line: the built-in ones, and those of plugins, loaded when they are called."""
 
 from __future__ import annotations
 

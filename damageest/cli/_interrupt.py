@@ -1,4 +1,4 @@
-"""What is said after Ctrl-C."""
+"""What is printed after Ctrl-C."""
 
 from __future__ import annotations
 

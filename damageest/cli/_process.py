@@ -14,7 +14,7 @@ import typer
 from damageest.cli._streams import say
 from damageest.errors import StageError
 from damageest.isolation import supervise as watching
-from damageest.isolation.supervise import IS_POSSIBLE, end_alike, supervise
+from damageest.isolation.supervise import IS_POSSIBLE, end_like_fork, supervise
 
 LATE = "note: the work is done, but a thread of a plugin or a library went on; its process was ended\n"
 is_command = False
@@ -49,13 +49,13 @@ def end_with_each(
         if end.error is None:
             if end.late:
                 sys.stderr.write(LATE)
-            end_alike(end.status if end.status < 0 else max(status, end.status))
+            end_like_fork(end.status if end.status < 0 else max(status, end.status))
         if sys.stderr.isatty():
             sys.stderr.write("\x1b[?25h")  # a live display hides the cursor
         sys.stderr.write("\n")
         status = max(status, report(end.error, names[start + max(end.job, 0)]))
         first = start + end.job + 1 if end.job >= 0 else len(names)
-    end_alike(status)
+    end_like_fork(status)
 
 
 def bound_end(error: BaseException | None) -> None:

@@ -26,6 +26,8 @@ SECONDS = {"sample": 0.3, "align": 4.0, "segment": 0.4, "cluster": 0.2, "enclose
 """About how long a stage takes for 100,000 scan points, on one core; measured on the example jobs."""
 LONG = 1.0
 """Seconds from which on a stage has a bar."""
+IDLE = {("allowance", "none"), ("path", "none"), ("report", "none")}
+"""Stages with implementations that do nothing. They are not listed; result.json has them."""
 
 
 class _Bar(ProgressColumn):
@@ -61,6 +63,7 @@ class Progress:
         self.points = self.sites = 0
         self.finished: list[str] = []
         self.current = ""
+        self.is_idle = False
         self._begin_group("", "")
 
     @contextmanager
@@ -92,6 +95,9 @@ class Progress:
 
     @hookimpl
     def damageest_before_stage(self, stage: str, use: str, site: int) -> None:
+        self.is_idle = (stage, use) in IDLE
+        if self.is_idle:
+            return
         label = self.current = _format_label(stage, use, site)
         if self.live is None:
             if not self.console.quiet:
@@ -106,6 +112,8 @@ class Progress:
 
     @hookimpl
     def damageest_after_stage(self, stage: str, site: int, output: object, seconds: float, cached: bool) -> None:
+        if self.is_idle:
+            return
         self.points = len(output.points) if isinstance(output, Scan) else self.points
         self.sites = output.count if isinstance(output, Sites) else self.sites
         self.sites = len(output.items) if isinstance(output, Enclosures) else self.sites

@@ -32,7 +32,7 @@ def say(text: object = "", err: bool = False) -> None:
 
 
 def say_result(text: str) -> None:
-    """Prints a line for programs, as it is: such as JSON."""
+    """Prints a line for programs unchanged, such as JSON."""
     stream = _results or sys.stdout
     stream.write(text + "\n")
     stream.flush()

@@ -137,8 +137,8 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
         if result.sites and not any(site.accepted for site in result.sites):
             status = max(status, 1)
             say(
-                f"error: {job.source}: all sites are doubtful, and none is part of the damage; see the reasons, and "
-                "take over those that are damage with  accept: [1]  or  accept: all  in the job",
+                f"error: {job.source}: none of the sites is accepted as damage; see the reasons of each, and "
+                "name those that are damage in the job:  accept: [1],  or  accept: all",
                 err=True,
             )
         if result.failures:
@@ -149,7 +149,7 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
 
 
 def _list_notes(result: Result) -> list[str]:
-    """What is said about the run, and about its sites: each reason once, with the sites that have it."""
+    """The notes on the run and on its sites: each reason once, with the sites that have it."""
     from damageest.rules.notes import fold_notes, join_reasons
 
     notes = [str(note) for note in fold_notes(result.warnings)]

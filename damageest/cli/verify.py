@@ -42,7 +42,7 @@ def _check(folder: Path, rerun: bool) -> int:
 
 
 def _run_again(folder: Path, content: dict[str, object]) -> list[str]:
-    """What a repeated run gives otherwise, in words; also printed."""
+    """The differences of a repeated run, as sentences; also printed."""
     import tempfile
     from typing import Any
 

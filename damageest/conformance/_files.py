@@ -183,7 +183,7 @@ class ExportContract(StageContract):
     def test_another_result_another_file(self) -> None:
         result = make_result()
         fewer = self.write_files(result=replace(result, sites=result.sites[:1]))
-        assert name_changes(self.write_files(), fewer), "the files of two results are alike"
+        assert name_changes(self.write_files(), fewer), "the files of two different results are identical"
 
     def test_nothing_lost(self) -> None:
         result = make_result()

@@ -71,7 +71,7 @@ class ReportContract(StageContract):
 
 
 def describe(result: Any) -> dict[str, Any]:
-    """The content of result.json of a result, as far as a report may ask for it."""
+    """The content of result.json of a result that a report may use."""
     sites = [
         {
             "id": site.id,

@@ -10,7 +10,7 @@ from damageest.geometry.voxels import measure_bounds
 FEWEST = 0.01
 """Share of the points of the largest group below which a group is set aside."""
 MOST = 0.05
-"""Largest share of all points that is set aside; beyond it, they are no strays."""
+"""Largest share of all points that is set aside; above it, they are not taken for strays."""
 
 
 def find_far(points: Floats, size: float) -> Flags:

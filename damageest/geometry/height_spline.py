@@ -61,7 +61,8 @@ def fit_parametric_spline(
     """Knots in both directions and poles (U,V,K) of the spline nearest to values (N,K) at parameters (N,2).
 
     By least squares. ``spans``: of the longer side. It ends ``margin`` of that side beyond the parameters, and goes on
-    as straight as it can where there are none. Raises ValueError where there are fewer than two different parameters.
+    as straight as possible where there are no points. Raises ValueError where there are fewer than two different
+    parameters.
     """
     if not len(uv) or not np.ptp(uv, axis=0).any():
         raise ValueError(f"no spline for {len(uv)} points at fewer than two places")

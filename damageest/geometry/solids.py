@@ -121,7 +121,7 @@ def subtract_lost(whole: Any, lost: Any) -> Any:
 def iou(first: Mesh | None, second: Mesh | None) -> float:
     """Intersection over union of two solids by volume, from 0 to 1.
 
-    None and a mesh without triangles stand for no solid: 1 where there is none twice, 0 where once. Raises ValueError
+    None and a mesh without triangles mean that there is no solid: two of them give 1, one of them 0. Raises ValueError
     where manifold3d rejects one.
     """
     first, second = (mesh if mesh is not None and len(mesh.faces) else None for mesh in (first, second))

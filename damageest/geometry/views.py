@@ -19,7 +19,7 @@ OVERVIEWS = np.array([(x, y, 0.8) for x, y in ((-1.0, -1.0), (1.0, -1.0), (-1.0,
 OVERVIEWS /= np.linalg.norm(OVERVIEWS, axis=1)[:, None]
 """Directions that all of a part is looked at from: askew and from above."""
 PROBES = 150
-"""Points of a damage surface that are asked for from where they are seen."""
+"""Points of a damage surface for which it is tested from where they are seen."""
 
 
 GRAZING = 0.1

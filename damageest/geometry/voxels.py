@@ -30,7 +30,7 @@ def measure_bounds(points: Floats) -> Floats:
     has no bounds.
     """
     if not len(points):
-        raise ValueError("measure_bounds: got no points, and nothing has no bounds; ask only where there are points")
+        raise ValueError("measure_bounds: there are no points, and so no bounds; call it only with points")
     return np.array([[column.min() for column in points.T], [column.max() for column in points.T]])
 
 

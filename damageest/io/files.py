@@ -11,7 +11,7 @@ from typing import Any
 from damageest.errors import DamageestError, InputError, describe_missing_library, is_interrupt
 
 WITHOUT_HOLES = 64 * 2**20
-"""Size in bytes from which a file is asked whether it was written as a whole."""
+"""Size in bytes from which on it is checked that a file was written completely."""
 
 
 def check_file(path: Path, suffixes: tuple[str, ...], what: str) -> str:
@@ -39,7 +39,7 @@ def read_json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:
-        raise ValueError("its values are inside each other too often") from None
+        raise ValueError("its values are nested too deeply") from None
 
 
 def working_folder() -> Path:
@@ -110,7 +110,7 @@ def _describe_holes(path: Path) -> str:
 
 
 def resolve_path(path: Path, folder: Path) -> Path:
-    """The absolute path of one that is given in a folder, without symbolic links as far as they lead somewhere."""
+    """The absolute path of a path relative to a folder; symbolic links are resolved where that is possible."""
     return Path(os.path.realpath(folder / expand_home(path)))
 
 

@@ -1,4 +1,4 @@
-"""How a call in a worker ends without a value, in words for the user."""
+"""Messages for the user about calls in a worker that ended without a value."""
 
 from __future__ import annotations
 

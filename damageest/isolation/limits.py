@@ -39,14 +39,14 @@ def parse_memory(text: str, option: str = "--memory") -> int:
 
 
 def format_bytes(size: float) -> str:
-    """A size in words, as ``6 GB``."""
+    """A size as text, such as ``6 GB``."""
     unit = "GB" if size >= 1e9 else "MB"
     return f"{size / (1e9 if unit == 'GB' else 1e6):.3g} {unit}"
 
 
 def measure_free_memory() -> int | None:
     """Bytes that can still be allocated: the least of what the machine, its control group (version 1 or 2) and the
-    process' own limit of address space (``ulimit -v``) leave. None where the system tells none of them."""
+    process' own limit of address space (``ulimit -v``) leave. None where the system gives none of them."""
     known = [value for value in (_machine_free(), _group_free(), _address_space_free()) if value is not None]
     return max(0, min(known)) if known else None
 

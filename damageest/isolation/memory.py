@@ -9,7 +9,7 @@ from damageest.errors import StageError
 from damageest.isolation.limits import format_bytes, measure_free_memory
 
 WORTH_ASKING = 10 * 10**6
-"""Bytes below which nothing is asked: the answer would take longer than it is worth."""
+"""Bytes below which free memory is not checked: the check would cost more than it saves."""
 
 
 FEWER_POINTS = "fewer scan points (scan.most_points), or more memory (--memory)"

@@ -19,7 +19,7 @@ _page: mmap.mmap | None = None
 class Entry:
     """``what`` is at work, as "cluster: dbscan"; ``owner``: whose code it is; ``seconds``: its time limit, 0 for none.
 
-    ``job`` counts from 0. ``count`` grows with each change. ``open`` until the process has come to its end by
+    ``job`` counts from 0. ``count`` grows with each change. ``open`` until the process has ended by
     itself, then with an exit ``status``.
     """
 
@@ -70,7 +70,7 @@ def note_job(number: int) -> None:
 
 
 def close_entry(status: int, seconds: float = 0.0) -> None:
-    """Notes that the process comes to its end by itself, with this exit status, within so many seconds."""
+    """Notes that the process ends by itself, with this exit status, within so many seconds."""
     _change(open=False, seconds=seconds, status=status)
 
 

@@ -77,8 +77,9 @@ def supervise(work: Callable[[], int]) -> End:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def end_alike(status: int) -> NoReturn:
-    """Ends this process as its fork ended, without the libraries' own ends; ``status`` as of subprocess."""
+def end_like_fork(status: int) -> NoReturn:
+    """Ends this process in the way its fork ended, without the exit handlers of libraries; ``status`` as of
+    subprocess."""
     sys.stdout.flush()
     sys.stderr.flush()
     if status < 0:
@@ -107,7 +108,7 @@ def _wait(child: int) -> tuple[int, bool]:
 
 
 def _describe(status: int, late: bool, entry: Entry) -> End:
-    """How the fork ended. A crash after it had come to its end, as of a library that is unloaded, is none."""
+    """How the fork ended. A crash after its work was done, as of a library that is unloaded, does not count."""
     if not late and -status in PASSED:
         return End(status)
     if not entry.open:

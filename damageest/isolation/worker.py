@@ -1,4 +1,4 @@
-"""The caller's side: warm worker processes, one for each owner, and what becomes of a call that goes wrong."""
+"""The caller's side: warm worker processes, one for each owner, and how a failed call is reported."""
 
 from __future__ import annotations
 

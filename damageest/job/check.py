@@ -106,9 +106,7 @@ class _Check:
         pairs = {c: chosen.get(c) or self.find_default(c, method) for c in contracts if c not in self.given}
         stages = {c: self.check_stage(pair[0], pair[1]) for c, pair in pairs.items() if pair}
         if header and not header.output and (header.name or stem) in (".", ".."):
-            self.add_fault(
-                "'.' and '..' name no folder of its own for the output; give another name, or  output", "name"
-            )
+            self.add_fault("'.' and '..' do not name a folder for the output; give another name, or  output", "name")
         if self.faults or header is None:
             raise JobError(sorted(self.faults, key=lambda f: (f.line, f.column)), self.source)
         name = header.name or stem

@@ -36,11 +36,11 @@ class Box(Options):
 class SiteChoice(Options):
     """What a person decides about the sites, by their numbers in the table of a run without these decisions."""
 
-    drop: tuple[PositiveInt, ...] = Field((), description="numbers of sites that are no damage")
+    drop: tuple[PositiveInt, ...] = Field((), description="numbers of sites that are not damage")
     merge: tuple[tuple[PositiveInt, ...], ...] = Field(
         (), description="lists of numbers of sites that are one; the site gets the lowest number"
     )
-    keep: Box | None = Field(None, description="only sites whose centre of mass is in this box; default: all")
+    keep: Box | None = Field(None, description="only sites the middle of whose bounds is in this box; default: all")
 
 
 class Header(Options):

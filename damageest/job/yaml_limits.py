@@ -19,7 +19,7 @@ def check_events(events: Iterable[Any], source: str) -> None:
     """Raises JobError for a text whose values are too many or too deep, whose aliases stand for too many values or for
     themselves, and for tags, which name types of Python or of other programs.
 
-    ``events``: those of ruamel.yaml's parser, which reads on only as far as they are asked for.
+    ``events``: those of ruamel.yaml's parser, which reads no further than the events that are requested.
     """
     open_nodes: list[tuple[str | None, int]] = []  # the anchor of each open list or mapping, and the count before it
     known: dict[str, int] = {}
@@ -48,16 +48,16 @@ def check_events(events: Iterable[Any], source: str) -> None:
         if count > MOST_VALUES:
             text = f"its aliases stand for more than {MOST_VALUES} values, or contain themselves; write the values out"
             if not has_alias:
-                text = f"more than {MOST_VALUES} values, so it is no job"
+                text = f"more than {MOST_VALUES} values, which no job has"
             raise _refuse(event, text, source)
 
 
 def find_bad_character(text: str) -> str:
-    """What is wrong with a text that no name of a file can have; empty where nothing is."""
+    """Why a text cannot be the name of a file; empty where it can."""
     if "\0" in text:
         return "has a NUL character, which no name or path can have"
     if any("\ud800" <= letter <= "\udfff" for letter in text):
-        return "has half of a surrogate pair, which is no character"
+        return "has half of a surrogate pair, which is not a character"
     return ""
 
 

@@ -35,7 +35,7 @@ def _read_text(path: Path) -> str:
         raise JobError([Fault("is not a regular file; a job is a YAML file on disk")], str(path))
     try:
         if path.stat().st_size > MOST_BYTES:
-            raise JobError([Fault(f"is larger than {MOST_BYTES // 1024} kB, so it is no job file")], str(path))
+            raise JobError([Fault(f"is larger than {MOST_BYTES // 1024} kB, so it is not a job file")], str(path))
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise JobError([Fault("there is no such file")], str(path)) from None

@@ -37,12 +37,12 @@ class DeformationReport(_Model):
 
 class ViewReport(_Model):
     number: int = Field(description="from 1 up, in the order of the scan's views")
-    shift: Vector = Field(description="of the part's centre, that puts the view right, in the part's frame")
-    turn: float = Field(description="in degrees, that puts the view right")
+    shift: Vector = Field(description="of the part's centre, by which the view is corrected, in the part's frame")
+    turn: float = Field(description="in degrees, by which the view is corrected")
     apart: float = Field(description="how far it lies from the other views where they overlap")
-    left: float = Field(description="the same with the views put right that are determined")
+    left: float = Field(description="the same after the views that fix their pose were corrected")
     is_determined: bool = Field(description="whether its points fix its pose")
-    is_corrected: bool = Field(description="whether it was put right")
+    is_corrected: bool = Field(description="whether it was moved to its place")
 
 
 class FitReport(_Model):

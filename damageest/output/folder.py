@@ -106,11 +106,11 @@ class OutputFolder:
 
 
 def open_output(folder: Path) -> OutputFolder:
-    """Reads result.json of an output folder. Raises InputError where there is none that can be read."""
+    """Reads result.json of an output folder. Raises InputError where it is missing or cannot be read."""
     path = folder / "result.json"
     if not path.is_file():
         raise InputError(
-            f"{folder}: there is no result.json, so this is no output folder; name the folder that `damageest run` "
+            f"{folder}: there is no result.json, so this is not an output folder; name the folder that `damageest run` "
             "wrote, as out/<name>"
         )
     try:

@@ -19,7 +19,7 @@ class ReasonReport(JsonModel):
     amount: float | None = Field(description="its size; null where it has none")
     unit: str = Field(description="of the amount; empty for a share or a number")
     place: Vector | None = Field(description="where, in the part's frame; null where it has no place")
-    text: str = Field(description="in words, which may change from version to version")
+    text: str = Field(description="what was found; its words may change from version to version")
     remedy: str = Field(description="what to do about it; empty where nothing helps")
 
 

@@ -49,7 +49,7 @@ class AlignmentReport(JsonModel):
     inliers: float = Field(description="share of the scan's points")
     alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
     notes: list[str]
-    doubts: list[ReasonReport] = Field(description="what speaks against the pose, and so against every site")
+    doubts: list[ReasonReport] = Field(description="reasons against the pose, and so against every site")
     free: list[FreeMotionReport] = Field(
         description="motions after which the scan fits as well, since no unworn skin holds it"
     )
@@ -58,7 +58,7 @@ class AlignmentReport(JsonModel):
 
 class ExportReport(JsonModel):
     files: list[str] = Field(description="all that were written; those below scan_frame/ are in the scan's frame")
-    notes: list[str] = Field(description="what was written in another way than asked for, and why")
+    notes: list[str] = Field(description="what differs from what the job asks for, and why")
 
 
 class TruthReport(JsonModel):

@@ -23,7 +23,7 @@ def read_provenance(folder: Path, content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def find_changes(folder: Path, content: Mapping[str, Any]) -> list[str]:
-    """What no longer agrees with the result: of its own file, the files beside it, and the inputs; in words."""
+    """What no longer agrees with the result: of its own file, the files beside it, and the inputs; as sentences."""
     provenance = read_provenance(folder, content)
     changes = [] if seal(content) == provenance["sha256"] else ["result.json: was changed after it was written"]
     for kind in ("outputs", "inputs"):

@@ -230,7 +230,7 @@ def _locate(error: Exception, item: Implementation, state: JobState | Candidate 
 
 
 def describe_points(state: JobState, clusters: tuple[int, ...]) -> str:
-    """Where the points of some clusters lie, in words: they have no site number, since they are no site yet."""
+    """A description of where the points of some clusters lie: they have no site number, since they are no site yet."""
     if not {"sites", "aligned"} <= set(state.values):
         return ""
     members = np.flatnonzero(np.isin(state.sites.label, clusters))

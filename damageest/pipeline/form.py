@@ -46,7 +46,7 @@ def correct_scan(engine: Engine, work: Work) -> Work:
 
 
 def _take_corrected(engine: Engine, state: JobState, aligned: Scan) -> JobState:
-    """The state with views put right: noise, spacing and a tolerance `auto` are measured again."""
+    """The state with corrected views: noise, spacing and a tolerance `auto` are measured again."""
     noise, spacing = measure_noise_and_spacing(aligned.points)
     aligned = replace(aligned, noise=noise, spacing=spacing)
     state = state.derive(JobState.aligned, aligned, JobState.aligned, JobState.views)
@@ -113,7 +113,7 @@ def fit_model(engine: Engine, work: Work) -> Work:
 
 
 def question_fit(engine: Engine, work: Work) -> Work:
-    """Takes back that the part as designed explains the intact skin, where something speaks against it."""
+    """Withdraws the statement that the part as designed explains the intact skin, where there are doubts."""
     state = work.job
     if state.fitted is None or state.fitted.fit.model != "ok":
         return work
@@ -127,7 +127,7 @@ def question_fit(engine: Engine, work: Work) -> Work:
     fit = describe_fit(replace(before, model="open"), state.unit, state.tolerance, doubts)
     key = digest("questioned", state.key("fitted"), doubts)
     state = state.with_value(JobState.fitted, replace(state.fitted, fit=fit), key)
-    # a scale that was corrected was told as a note, in words that are true no more
+    # a corrected scale was reported in a note whose text is no longer true
     warnings = tuple(note for note in work.warnings if note.code != "model_fit")
     return replace(work, job=state, warnings=(*warnings, Reason("model_fit", fit.words)))
 

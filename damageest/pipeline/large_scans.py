@@ -87,7 +87,7 @@ class _Place:
         return list_distinct(cubes[:, None] + around)
 
     def is_in(self, points: Floats, cubes: Ints) -> Flags:
-        """Whether each of the points (N,3) of the scan is in one of the cubes, which ascend."""
+        """Whether each of the points (N,3) of the scan is in one of the cubes, whose numbers are sorted."""
         number = self._number(points)[1]
         found = np.minimum(np.searchsorted(cubes, number), len(cubes) - 1)
         return np.asarray(cubes[found] == number)

@@ -137,7 +137,7 @@ def _rename_free(path: Path, said: Path) -> Path:
 
 
 def _read_named(folder: Path) -> set[str]:
-    """The files that an earlier result.json lists; none where there is none that can be read."""
+    """The files that an earlier result.json lists; empty where it is missing or cannot be read."""
     try:
         return set(read_json(folder / "result.json")["export"]["files"])
     except (OSError, ValueError, KeyError, TypeError):

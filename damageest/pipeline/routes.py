@@ -76,7 +76,7 @@ SHOW: Route = (Report,)
 
 
 def route_of(method: str) -> Route:
-    """The route of a job's `method`. One that is none of the three belongs to an implementation that takes all sites at
+    """The route of a job's `method`. Any other than the three belongs to an implementation that takes all sites at
     once, as `octree`."""
     middle = {"surface": BY_SITE, "auto": (fall_back(AT_ONCE, BY_SITE),)}.get(method, (where_damaged(*AT_ONCE),))
     return (*ACQUIRE, *middle, *CLOSE)

@@ -202,7 +202,7 @@ class FoundSite(_SiteState):
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """What goes along the route: the job, the candidates or the sites that came of them, and what is to be told.
+    """What goes along the route: the job, the candidates or the sites made of them, failures and warnings.
 
     ``failures``: the sites that have no damage volume or no deposit. ``wanted``: the clusters to take; None: all.
     """

@@ -63,7 +63,7 @@ def damageest_stages() -> list[type[Stage]]:
 
 @hookimpl
 def damageest_rules() -> list[type[Rule]]:
-    """Every built-in rule, in the order in which reasons of equal effect are told."""
+    """Every built-in rule, in the order in which reasons of equal effect are listed."""
     from damageest.rules.beside import Beside
     from damageest.rules.beyond_points import BeyondPointsRule
     from damageest.rules.covered import Covered

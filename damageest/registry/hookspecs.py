@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement: five that add, three that only observe.
+"""The hooks a plugin may implement: six that add, three that only observe.
 
 What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
 what they return is ignored.

@@ -156,7 +156,7 @@ def _check_files(written: ExportedFiles | ReportFiles, get: Get) -> None:
     for name in written.files:
         path = PurePosixPath(name)
         if path.is_absolute() or ".." in path.parts or not (folder / path).is_file():
-            raise ArtefactError(f"files: {name!r} is no file in the output folder")
+            raise ArtefactError(f"files: {name!r} is not a file in the output folder")
 
 
 CHECKS: Mapping[Contract, Callable[[Any, Get], None]] = {

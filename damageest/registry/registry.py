@@ -222,7 +222,7 @@ def _read_rules(plugin: Any, known: Mapping[str, Rule]) -> dict[str, Rule]:
     rules: dict[str, Rule] = {}
     for cls in found:
         if not (isinstance(cls, type) and issubclass(cls, Rule)):
-            raise PluginError(f"its hook damageest_rules gave {cls!r}, which is no class derived from Rule")
+            raise PluginError(f"its hook damageest_rules gave {cls!r}, which is not a class derived from Rule")
         named = ("code", "meaning", "threshold")
         if missing := [name for name in named if not isinstance(getattr(cls, name, None), str)]:
             raise PluginError(f"its rule {cls.__qualname__} has no {', no '.join(missing)}")

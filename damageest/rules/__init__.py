@@ -62,7 +62,7 @@ class SiteFacts:
     ``count``: its scan points; ``typical`` and ``deepest``: median and 95th percentile of their depth below the skin.
     ``evidence``: DV against scan. ``by_rays``: whether rays passed through the metal that it removes. ``rim_unseen``:
     share of its rim beside skin that the scan does not show. ``two_sheets``: share of the skin that it removes on which
-    the points lie in two heaps. ``other_poses``: share of its skin that is not skin in another pose that fits as well.
+    the points lie in two layers. ``other_poses``: share of its skin that is not skin in another pose that fits as well.
     ``free``: motions that the scan does not exclude. ``displaced``: numbers of the surplus as large as the loss.
     ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no scan point shows, and
     ``beyond_words``: how it was found.
@@ -91,8 +91,8 @@ class SiteFacts:
 class Rule(ABC):
     """One rule.
 
-    ``code``: of the reasons that it gives. ``meaning``: what the reason says; ``threshold``: from when on it is given;
-    ``remedy``: what to do. All three stand in the documentation.
+    ``code``: of the reasons that it gives. ``meaning``: what the reason says; ``threshold``: when it is given;
+    ``remedy``: what to do. All three are printed in the documentation.
     """
 
     code: ClassVar[str]

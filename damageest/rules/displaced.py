@@ -10,14 +10,14 @@ from damageest.rules import Rule, ScanFacts, SiteFacts
 
 class Displaced(Rule):
     code = "displaced"
-    meaning = "surplus beside the site is as large as the loss: a piece may be displaced, or the part be bent"
+    meaning = "surplus beside the site is as large as the loss: a piece may be displaced, or the part may be bent"
     threshold = "volumes within 35 %; within 10 % where the surplus touches the site"
     remedy = "put the piece back and scan again, or accept the site to repair it as if the piece were lost"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for number in site.displaced:
             text = (
-                f"surplus {number} beside it is as large: a piece of the part may be displaced, or the part be bent, "
-                "and no metal be lost"
+                f"surplus {number} beside it is as large: a piece of the part may be displaced, or the part may be "
+                "bent, and no metal lost"
             )
             yield Reason(self.code, text, "contradicts", site.volume, f"{scan.unit}³", remedy=self.remedy)

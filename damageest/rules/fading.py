@@ -12,7 +12,7 @@ class FadingOut(Rule):
     code = "fading"
     meaning = "the loss is shallow and has no edge: its volume depends on the depth from which it counts"
     threshold = "half of its skin is shallower than four tolerances"
-    remedy = "say which of the volumes counts: a smaller tolerance takes in more"
+    remedy = "decide which of the volumes counts: a smaller tolerance includes more"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         fading = site.uncertainty.fading if site.uncertainty else None

@@ -14,7 +14,7 @@ FEW, TOO_FEW = 100, 12
 class FewPoints(Rule):
     code = "few_points"
     meaning = "few scan points lie on the site"
-    threshold = f"fewer than {FEW}; with fewer than {TOO_FEW}, stray points explain it"
+    threshold = f"fewer than {FEW}; with fewer than {TOO_FEW}, they may all be stray"
     remedy = "scan this place more densely"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
@@ -22,6 +22,6 @@ class FewPoints(Rule):
             return
         text = f"only {site.count} scan points lie on it"
         if site.count < TOO_FEW:
-            yield Reason(self.code, f"{text}: stray points explain it", "contradicts", site.count, remedy=self.remedy)
+            yield Reason(self.code, f"{text}: they may all be stray", "contradicts", site.count, remedy=self.remedy)
         else:
             yield Reason(self.code, text, "widens", site.count, remedy=self.remedy)

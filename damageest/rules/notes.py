@@ -1,4 +1,4 @@
-"""What is said about a whole run: its codes, their order, and how many alike become one line."""
+"""Notes on a whole run: their codes, their order, and how many of one code are joined into one line."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from damageest.artefacts import Reason
 
 @dataclass(frozen=True)
 class RunCode:
-    """``meaning`` of a code; ``rank``: 0 may change a decision about the part, 1 about how it was scanned, 2 tells what
-    was done. ``plural``: what many of them are together; empty where each stands for itself."""
+    """``meaning`` of a code; ``rank``: 0 may change a decision about the part, 1 about how it was scanned, 2 says what
+    was done. ``plural``: the name of many of them in one line; empty where each has its own line."""
 
     meaning: str
     rank: int
@@ -24,7 +24,7 @@ RUN_CODES: dict[str, RunCode] = {
     "align": RunCode("what the stage align says about the pose: symmetry, free motions, doubts", 0),
     "unit": RunCode("the size of the part makes its unit doubtful", 0),
     "thin_walls": RunCode("the tolerance is more than half the thickness of walls: no damage can be found there", 0),
-    "tolerance_small": RunCode("the tolerance is so small that intact skin may be taken for damage", 0),
+    "tolerance_small": RunCode("the tolerance is so small that intact skin may be mistaken for damage", 0),
     "tolerance_raised": RunCode("tolerance: auto was raised, since intact skin deviates by more than the noise", 0),
     "few_points": RunCode("the scan has too few points to show the skin between them", 0),
     "fell_back": RunCode("method auto took the route surface, since implicit failed", 1),
@@ -40,7 +40,7 @@ RUN_CODES: dict[str, RunCode] = {
     "site_dropped": RunCode("a site was dropped, as the job says", 2),
     "sites_merged": RunCode("sites were merged, as the job says", 2),
     "cluster": RunCode("what the stage cluster says about how it grouped points", 2),
-    "export": RunCode("a file was written in another way than asked for, or not at all", 1),
+    "export": RunCode("a file was not written as the job asks for, or not at all", 1),
     "report": RunCode("the report failed, and the run went on without it", 1),
 }
 """Codes of the notes of a run. Those of sites are the codes of rules, or of the stage that gave a note."""
@@ -49,7 +49,7 @@ FOLDED = 3
 
 
 def make_notes(stage: str, notes: Iterable[str]) -> tuple[Reason, ...]:
-    """What a stage said in words, with the stage as its code."""
+    """The notes of a stage as reasons, with the stage as their code."""
     return tuple(Reason(stage, note) for note in notes)
 
 

@@ -11,7 +11,7 @@ from damageest.rules import Rule, ScanFacts, SiteFacts
 class OffBoundary(Rule):
     code = "off_boundary"
     meaning = "the damaged points of the site do not lie on the boundary of its damage volume"
-    threshold = "95 % of them lie within more than 1.5 tolerances and a quarter of the spacing"
+    threshold = "5 % of them are farther from it than 1.5 tolerances and a quarter of the spacing"
     remedy = "compare the volume with the points in the report, and try method: surface"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:

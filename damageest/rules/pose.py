@@ -14,7 +14,7 @@ decides which metal is lost."""
 
 POSE_CODES = {
     "another_part": "little of the scan near the part lies on its surface: it may show another part or revision",
-    "other_poses": "poses fit that are no symmetries of the part; it concerns sites whose metal is another one in them",
+    "other_poses": "poses fit that are not symmetries of the part; it matters where other metal is lost in them",
     "pose_free": "the part can be moved or turned a little and fits as well",
     "mirrored": "the scan fits better mirrored, and shows too little of the part to tell",
     "given_pose": "in a pose nearby more of the scan lies on the part than in the given one",

@@ -11,7 +11,7 @@ from damageest.rules.pose import POSE_CODES
 
 def format_reasons(rules: Iterable[Rule]) -> str:
     """Markdown: the codes of reasons for verdicts, of those that align gives against a pose, and of notes of a run."""
-    lines = ["| code | meaning | from when on | what to do |", "| --- | --- | --- | --- |"]
+    lines = ["| code | meaning | given from | what to do |", "| --- | --- | --- | --- |"]
     lines += [f"| `{rule.code}` | {rule.meaning} | {rule.threshold} | {rule.remedy} |" for rule in rules]
     lines += ["", "Against the pose, by the stage align (rule `pose`):", "", "| code | meaning |", "| --- | --- |"]
     lines += [f"| `{code}` | {meaning} |" for code, meaning in POSE_CODES.items()]

@@ -1,4 +1,4 @@
-"""Over the same skin the points fall in two heaps: one on the skin, one in the site."""
+"""Over the same skin the points lie in two layers: one on the skin, one in the site."""
 
 from __future__ import annotations
 

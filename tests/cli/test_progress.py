@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
 import re
@@ -79,6 +80,36 @@ def test_on_a_terminal_sites_are_counted(monkeypatch: pytest.MonkeyPatch) -> Non
     assert re.search(r"cluster: dbscan +1\.50 s", text)
     assert re.search(r"boolean: manifold, 2 sites +0\.50 s", text)
     assert re.search(r"export: files +from an earlier run", text)
+
+
+def test_stages_that_do_nothing_are_not_listed_and_stay_in_the_result(tmp_path: Path) -> None:
+    job = damaged_box.write(tmp_path)
+    done = subprocess.run([*MAIN, "run", str(job)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "boolean: manifold, site 1" in done.stderr
+    listed = re.findall(r"^  (\w+): \w+", done.stderr, re.MULTILINE)
+    assert listed == ["part", "scan", "sample", "align", "segment", "cluster", "enclose", "boolean", "export"]
+    stages = json.loads((tmp_path / "out/job/result.json").read_text())["stages"]
+    assert {("allowance", "none"), ("path", "none")} <= {(one["stage"], one["use"]) for one in stages}
+
+
+@needs_terminal()
+def test_on_a_terminal_a_stage_that_does_nothing_is_not_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    master, slave = pty.openpty()
+    monkeypatch.setattr(sys, "stderr", os.fdopen(slave, "w"))
+    monkeypatch.setenv("TERM", "xterm")
+    progress = Progress(quiet=False)
+    with progress.show_job("part"):
+        for stage, use in (("boolean", "manifold"), ("allowance", "none"), ("boolean", "manifold")):
+            progress.damageest_before_stage(stage, use, 1)
+            progress.damageest_after_stage(stage, 1, None, 0.25, False)
+    sys.stderr.flush()
+    shown = b""
+    while select.select([master], [], [], 1.0)[0]:
+        shown += os.read(master, 1 << 16)
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
+    assert "allowance" not in text
+    assert re.search(r"boolean: manifold, 2 sites +0\.50 s", text)
 
 
 def test_quiet_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:

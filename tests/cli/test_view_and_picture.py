@@ -129,7 +129,7 @@ def test_a_machine_without_opengl_says_what_to_install(
     [
         ({"side": "left"}, "there are: iso, x, y, z"),
         ({"show": ["damages"]}, "did you mean 'damage'"),
-        ({"size": "9x"}, "'9x' is no size"),
+        ({"size": "9x"}, "'9x' is not a size"),
         ({"site": [1, 1]}, "given 2 times for 1 folders"),
         ({"output": Path("picture.jpg")}, "name it with .png"),
     ],

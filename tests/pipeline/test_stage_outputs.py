@@ -290,8 +290,8 @@ SPOILED: dict[str, tuple[str, Callable[[dict[str, Any]], Any], str]] = {
         lambda g: Deposit(g["damage"].vertices, g["damage"].faces, touched=(4,)),
         "has no CAD face 4",
     ),
-    "a file that is not there": ("Export", lambda g: ExportedFiles(("b.txt",)), "'b.txt' is no file in the output"),
-    "a file elsewhere": ("Report", lambda g: ReportFiles(("../a.txt",)), "is no file in the output folder"),
+    "a file that is not there": ("Export", lambda g: ExportedFiles(("b.txt",)), "'b.txt' is not a file in the output"),
+    "a file elsewhere": ("Report", lambda g: ReportFiles(("../a.txt",)), "is not a file in the output folder"),
 }
 
 

@@ -70,7 +70,7 @@ def _check_chunks(stream: BinaryIO, start: int, size: int) -> None:
     """Raises FormatError where the table of a LAZ file's compressed pieces cannot be in the file."""
     stream.seek(start)
     (table,) = struct.unpack("<q", stream.read(8).ljust(8, b"\0"))
-    if table == -1:  # it was not known when the file was begun, and stands at the end
+    if table == -1:  # it was not known when the file was begun, and is at the end
         stream.seek(max(size - 8, 0))
         (table,) = struct.unpack("<q", stream.read(8).ljust(8, b"\0"))
     if not start < table <= size - 8:

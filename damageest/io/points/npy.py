@@ -29,7 +29,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
 
 
 def _check_size(path: Path) -> None:
-    """Raises ValueError where the header promises more than the file has, before memory is asked for it."""
+    """Raises ValueError where the header announces more than the file has, before memory is allocated for it."""
     with path.open("rb") as stream:
         version = np.lib.format.read_magic(stream)
         read_header = {(1, 0): np.lib.format.read_array_header_1_0}.get(version, np.lib.format.read_array_header_2_0)

@@ -34,7 +34,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     """The fields x, y, z and, if present, normal_x, normal_y, normal_z.
 
     The scanner position is the origin of a range image of a camera (HEIGHT above 1), else the VIEWPOINT. The default
-    VIEWPOINT, 0 0 0 1 0 0 0, stands in files of any origin: then the position is not known.
+    VIEWPOINT, 0 0 0 1 0 0 0, is found in files of any origin: then the position is not known.
     """
     data = path.read_bytes()
     head, start = _read_header(data)

@@ -33,7 +33,7 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
 
     Raises StageError where the scan does not lie on the part, and where a pose nearby, found by the robust fit,
     explains it much better. Damage and wear are no reason: in the given pose they lie inside the part, and in the pose
-    nearby as well. A correction that moves the part's surface by less than the tolerance is none either.
+    nearby as well. A correction that moves the part's surface by less than the tolerance is not counted either.
     """
     frame = Frame.build(scan, part)
     noise, band = scan.noise / frame.size, tolerance / frame.size

@@ -17,7 +17,7 @@ NO_DATUM: Datum = Option(
     (),
     description="faces that fix the pose in the last fit, as an inspector aligns on datums: numbers or names of CAD "
     "faces, or selectors of skin (box, half_space, facing, faces, kind); what they do not fix is fixed by the rest, "
-    "and said; default: all of the skin",
+    "and reported; default: all of the skin",
 )
 
 

@@ -1,4 +1,4 @@
-"""Which of two poses the scan speaks for, by the patches that tell them apart and by the noise of patches."""
+"""Which of two poses the scan favours, by the patches that distinguish them and by the noise of patches."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ DECISIVE = 8.0
 
 
 def weigh_poses(target: PartSurface, points: Floats, pose: Floats, other: Floats, noise: float) -> float:
-    """By how much the scan speaks for ``pose`` (4,4) against ``other`` (4,4): the logarithm of the odds.
+    """By how much the scan favours ``pose`` (4,4) over ``other`` (4,4): the logarithm of the odds.
 
     Single points are no independent witnesses: a scanner's steps and waves move neighbours alike. So points are
     averaged over patches, the scatter of the patches is measured and not derived from the noise, and the sum is divided

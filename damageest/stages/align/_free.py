@@ -78,8 +78,8 @@ def _are_as_good(patches: Patches, motions: Floats, band: Floats, datum: Flags |
     gained = (np.abs(offset) < 1) @ (usable * (np.abs(start) >= 1)) / total
     outside = np.clip(offset - WIDER, 0, 1)
     pushed = outside @ (patches.weight * (start < 1)) / total
-    # Smooth skin that lies outside now and does not then speaks against the present pose: no wear explains it. On added
-    # metal it does too, but there the move pushes the opposite skin outside.
+    # Smooth skin that lies outside now and does not then is a reason against the present pose: no wear explains it. On
+    # added metal it does too, but there the move pushes the opposite skin outside.
     relieved = (np.clip(start - WIDER, 0, 1) - outside) @ (usable * (start >= 1)) / total
     good = gained + OUTSIDE * relieved + CHANCE > MIN_GAIN * lost + OUTSIDE * pushed
     if datum is not None:

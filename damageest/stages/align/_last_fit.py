@@ -1,4 +1,4 @@
-"""From a rough pose to the one that is given: the fits that follow each other, and the check of what they found."""
+"""From a rough pose to the final one: the fits that follow each other, and the check of what they found."""
 
 from __future__ import annotations
 

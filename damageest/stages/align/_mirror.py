@@ -33,7 +33,7 @@ the points near the part that lies on it only where the scan is mirrored."""
 
 SUSPECT = 0.82
 """Share of the points near the part on its surface below which poses are searched for from the beginning once more, of
-the mirrored scan and of the scan as it is."""
+the mirrored scan and of the unmirrored one."""
 
 MIN_GAIN = 0.015
 """Least such share in any case. Where less of the scan is off the part, it is not searched for mirrored."""
@@ -78,7 +78,7 @@ class MirrorTest:
 
 @dataclass(frozen=True)
 class Handedness:
-    """What came of the test: a pose of the scan as it is that explains it better than the one given, or None, and
+    """The outcome of the test: a pose of the unmirrored scan that explains it better than the one given, or None, and
     ``others`` (K,4,4) that the scan does not exclude beside it, and ``doubts`` for the user."""
 
     better: Fit | None = None
@@ -118,7 +118,7 @@ def ask_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random
 
 
 def _is_better(mirrored: PoseCheck, check: PoseCheck) -> bool:
-    """Whether the mirrored scan lies on the part clearly more than the scan as it is."""
+    """Whether the mirrored scan lies on the part clearly better than the unmirrored one."""
     gain = mirrored.agreement - check.agreement
     return gain > LARGE_GAIN or (gain > MIN_GAIN and 1 - mirrored.agreement < LESS * (1 - check.agreement))
 

@@ -22,7 +22,7 @@ ASKED = 10_000
 GRAZING = 0.2
 """Cosine of the angle between a normal and the way to the scanner below which its sign is not asked."""
 KNOWN = 0.8
-"""Share of the points whose scanner position has to be known for it to vouch for the normals."""
+"""Share of the points whose scanner position has to be known before it can confirm the normals."""
 WRONG = 0.03
 """Share of normals that point the wrong way from which signs are not believed, and from which it is told."""
 PARALLEL = 0.8
@@ -34,7 +34,7 @@ ALONG, AGAINST = 0.1, 0.5
 @dataclass(frozen=True)
 class SignedNormals:
     """``normals`` (N,3) of a scan, or None, turned to the scanner where its position is known; ``is_proven``: whether
-    such positions vouch for them, and the file agrees."""
+    such positions confirm them, and the file agrees."""
 
     normals: Floats | None
     is_proven: bool

@@ -25,7 +25,7 @@ REFINED = 160
 """Poses that are fitted."""
 ROUNDS = 12
 MOVED = 0.9
-"""Quantile of the movements of the patches that stands for a motion."""
+"""Quantile of the movements of the patches that measures a motion."""
 DAMPING = 1e-3
 
 

@@ -1,4 +1,4 @@
-"""Motions of the scan as shifts and turns of the part's frame, and in words."""
+"""Motions of the scan as shifts and turns of the part's frame, and as text."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Register(Align):
     fit_views: bool = Option(
         True,
         description="whether each view of a scan with known views is fitted to the part where the views disagree: a "
-        "misplaced one is put right, if it fixes its pose by itself",
+        "misplaced one is corrected, if it fixes its pose by itself",
     )
     datum: Datum = NO_DATUM
 
@@ -71,7 +71,7 @@ class Register(Align):
             )
         prepared = prepare_part(target, self.seed)
         target, field = prepared.surface, prepared.grid
-        # Signs that nothing vouches for: poses are searched for without them first, and then with them.
+        # Signs that no scanner position confirms: poses are searched for without them first, and then with them.
         oriented = replace(given, signed=given.signed and normals.is_proven)
         rough = propose_poses(oriented, prepared.pairs, self.trials, rng)
         few = oriented.take(draw_stratified(len(oriented.points), 1500, rng))

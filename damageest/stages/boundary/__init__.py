@@ -39,7 +39,7 @@ class Boundary(Stage, ABC):
             shortest: int = Field(40, ge=10, description="fewest nodes of a rim; the longest loop is always one")
 
             def run(self, surface: Surface) -> Rims:
-                loops = trace_rims(surface)  # longest first; raises StageError where there is none
+                loops = trace_rims(surface)  # longest first; raises StageError where there is no rim
                 return Rims((loops[0], *(loop for loop in loops[1:] if len(loop) >= self.shortest)))
     """
 

@@ -71,14 +71,19 @@ class Dbscan(Cluster):
         number[order] = np.arange(1, len(order) + 1)
         label[damage] = number[inverse.ravel()]
         noise = int((label[damage] == 0).sum())
-        notes = [f"eps {eps:.4g} ({why}), {dense} neighbours: {noise} of {len(damage)} damage points are noise"]
+        notes = [
+            f"damaged points nearer than {eps:.4g} to each other are grouped (eps, {why}; {dense} neighbours): "
+            f"{noise} of {len(damage)} are in no group"
+        ]
         if eps < bridging / 2:
             notes.append(
                 f"eps is shorter than the distance that bridges the gaps of the scan ({bridging:.4g}): damage sites "
                 "may be split or missed; use a larger eps"
             )
         if dense < self.neighbours:
-            notes.append(f"the scan is sparse for its tolerance: {dense} neighbours instead of {self.neighbours}")
+            notes.append(
+                f"the scan is sparse for its tolerance: {dense} neighbours are asked for, not {self.neighbours}"
+            )
         return Sites(label, len(order), tuple(notes))
 
     def _choose_eps(self, points: Floats, tolerance: float, bridging: float) -> tuple[float, str]:

@@ -66,7 +66,7 @@ def find_held(
     """Which of the skin samples ``asked`` (K,) an intact scan point shows to be there, though damaged points are near.
 
     In a sparse scan the rim lies somewhere in a gap between damaged and intact points, and skin beyond the intact ones
-    is not free. Compared are distances along the skin. Beside a deep loss none is held: the points on its wall show
+    is not free. Compared are distances along the skin. Beside a deep loss no skin is held: the points on its wall show
     where the rim is. ``damaged``: the numbers of the damaged points in the scan.
     """
     if not len(asked):

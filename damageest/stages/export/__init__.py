@@ -18,7 +18,7 @@ from damageest.stages import Stage, asked_by_name
 class ExportedFiles(Checked):
     """What an export wrote.
 
-    ``files``: paths relative to the output folder. ``notes``: what was written otherwise than asked for, or left out.
+    ``files``: paths relative to the output folder. ``notes``: what differs from what the job asks for.
     ``splines``: for each site, by its number, how well a spline fits its inner damage surface; empty where the job asks
     for none. ``exact``: for each site, by its number, whether its solid has the CAD's own faces; empty where none was
     asked for. ``warnings``: those of the notes that the user is told at the end of the run.
@@ -134,8 +134,8 @@ class Writer:
 
     ``write``: writes solids. ``one_file``: whether all solids of a result go into one file. ``simplify``: whether it
     gets simplified solids, because each facet makes the file much larger. ``patch``: writes a spline, with the
-    arguments ``path, name, patch, unit``, and gives what is to be said of the file in words that follow its name, empty
-    for nothing; None where the format cannot hold one. ``exact``: writes solids whose outer
+    arguments ``path, name, patch, unit``, and gives a note on the file that follows its name, empty
+    for none; ``patch`` is None where the format cannot hold one. ``exact``: writes solids whose outer
     faces are those of the part's CAD file; None where the format has only facets.
     ``single``: whether readers round coordinates to single precision; it then gets solids that this does not open, with
     the same triangles in each frame.
@@ -153,13 +153,14 @@ class Writer:
 class PathSettings:
     """How a path is written. ``unit``: of its lengths, one of um, mm, cm, m, in, ft. ``title``: of job and site.
     ``header``, ``footer``: templates of the first and last lines, None for the writer's own. ``options``: what else the
-    job says for the writer, by name."""
+    job says for the writer, by name. ``site``: number of the site."""
 
     unit: str
     title: str
     header: str | None = None
     footer: str | None = None
     options: Mapping[str, str] = field(default_factory=dict)
+    site: int = 1
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def write_paths(
     for site in result.sites:
         if site.path is None:
             continue
-        settings = PathSettings(result.units, f"{result.name} site {site.id}", header, footer, options)
+        settings = PathSettings(result.units, f"{result.name} site {site.id}", header, footer, options, site.id)
         for writer in (writers[name] for name in names):
             name = f"{place}path/site-{site.id}.{writer.suffix}"
             (folder / name).parent.mkdir(parents=True, exist_ok=True)

@@ -74,8 +74,10 @@ class Files(Export):
         ("csv", "apt", "rs274"),
         description="formats of deposition paths, where the job plans them: csv, apt (CLDATA), rs274 (G-code)",
     )
-    path_header: JobPath | None = Field(None, description="file with the first lines of G-code; $title and $units work")
-    path_footer: JobPath | None = Field(None, description="file with the last lines of G-code")
+    path_header: JobPath | None = Field(
+        None, description="file with the first lines of G-code, in which $title, $units and $site are replaced"
+    )
+    path_footer: JobPath | None = Field(None, description="file with the last lines of G-code, as path_header")
     path_options: Mapping[str, str] = Field(
         {},
         description="for the writers of paths; rs274: on, off (default M3, M5), tcpm_on, tcpm_off (G43.4 H1, G49), "

@@ -20,7 +20,8 @@ OPTIONS = {"on": "M3", "off": "M5", "rotary": "auto", "tcpm_on": "G43.4 H1", "tc
 
 
 def write_rs274(file: Path, path: DepositPath, settings: PathSettings) -> None:
-    """Blocks of G1, travel too, since its speed is given. ``$title``, ``$units``, ``$site`` of a template are replaced.
+    """Blocks of G1, travel too, since its speed is given. ``$title``, ``$units`` and ``$site`` are replaced in
+    the templates of the first and last lines.
 
     Coordinates are those of the frame asked for: the control's tool centre point function turns them. The tool axis is
     Rz(C) Rx(A) z for AC, and Rz(C) Ry(B) z for BC. Raises StageError for a tilted tool without rotary axes, or for an
@@ -40,6 +41,7 @@ def write_rs274(file: Path, path: DepositPath, settings: PathSettings) -> None:
     words = {
         "title": settings.title.replace("(", "[").replace(")", "]"),
         "units": "G20" if settings.unit in TO_INCH else "G21",
+        "site": str(settings.site),
     }
     lines = [f"({words['title']})", *_fill_in(HEADER if settings.header is None else settings.header, words)]
     angles = _find_angles(path.axes, rotary)

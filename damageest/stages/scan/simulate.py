@@ -68,7 +68,7 @@ class Simulate(ReadScan):
         (), description="tools that are bodies beside the part, such as a fixture: scanned with it, and they hide it"
     )
     deform: Deformation | None = Field(
-        None, description="how the part with its damage is bent and twisted before it is scanned; default: not"
+        None, description="how the part with its damage is bent and twisted before it is scanned; default: not at all"
     )
     table: Table | None = Field(None, description="a plane plate that the part stands on; default: none")
     points: kinds.PositiveInt = Field(150_000, description="number of points, outliers included")

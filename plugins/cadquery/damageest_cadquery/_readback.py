@@ -25,7 +25,7 @@ INVALID = f"a solid in it is not valid (BRepCheck), {COMPLETE}"
 
 
 def find_fault(path: Path, shape: Any, volumes: Sequence[float] = ()) -> str:
-    """What is wrong with a file that was to hold ``shape``, in words; empty where nothing is.
+    """Why a file does not hold ``shape`` as it should; empty where it does.
 
     ``volumes``: of the solids in mm³, where they are known better than from the shape.
     """

@@ -84,7 +84,7 @@ def _call(function: Callable[..., str], scratch: Path, path: Path, values: Seque
 
 
 def write_facets(scratch: Path, path: Path, solid: Solid, name: str, unit: str, most: int) -> str:
-    """Writes a solid with planar faces; gives what is to be said of the file, empty where it is as it is to be.
+    """Writes a solid with planar faces; gives a note on the file, empty where it was written as asked for.
 
     Raises TooManyFacesError where it has more than ``most``.
     """
@@ -113,7 +113,7 @@ def write_facets(scratch: Path, path: Path, solid: Solid, name: str, unit: str, 
 def write_first(scratch: Path, path: Path, ways: Iterable[Way], volumes: Sequence[float] = ()) -> Outcome:
     """Writes a file in the first of several ways in which it holds what it is to hold when it is read back.
 
-    Where there is none, the first is taken that lacks nothing, though OpenCASCADE divides its solids in another way or
+    Where there is none, the first complete one is taken, though OpenCASCADE divides its solids in another way or
     finds them not valid; else there is no file. ``scratch``: where files are written and read back; ``volumes``: of the
     solids, where they are known better than from the shape.
     """

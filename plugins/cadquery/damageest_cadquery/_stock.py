@@ -59,7 +59,7 @@ def build_stock(bases: Sequence[Base]) -> list[Any]:
     edges = find_edges([base.face for base in bases])
     heights = [base.height for base in bases]
     if any(edge.kind == "mixed" for edge in edges):
-        raise StockError("an edge between its faces is sharp in part only, or convex and concave by turns")
+        raise StockError("an edge between its faces is sharp in part only, or changes between convex and concave")
     joined = [edge for edge in edges if edge.kind == "smooth" and heights[edge.first] == heights[edge.second]]
     rows = ([edge.first for edge in joined], [edge.second for edge in joined])
     graph = coo_array((np.ones(len(joined), bool), rows), shape=(len(bases),) * 2)

@@ -222,7 +222,7 @@ def _list_members(ball: Ints) -> Ints:
 
 
 def _take_least(least: Floats, pose: Ints, found: Floats) -> None:
-    """Lowers each of ``least`` (N,) to the values ``found`` (M,) of its ``pose`` (M,), which ascends."""
+    """Lowers each of ``least`` (N,) to the values ``found`` (M,) of its ``pose`` (M,), which is sorted."""
     if len(pose):
         starts = np.flatnonzero(np.concatenate([[True], pose[1:] != pose[:-1]]))
         own = pose[starts]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest_paths.gauges import Gauge, Together
+from damageest_paths.gauges import Gauge, LeastGauge
 from damageest_paths.process import Pass, Process, measure_along
 from damageest_paths.sweeps import Sweeps
 
@@ -78,10 +78,10 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
     """The runs of a pass with points (N,3), N at least 2, and normals (N,3), along which the nozzle is clear.
 
     Between two points, point and axis change evenly, the axis not faster than the machine may turn it. The distance is
-    taken so often that nothing comes nearer by more than half of the process's step in between. ``least``: number of
-    points of a run.
+    taken so often that between two places nothing comes nearer by more than half of the process's step. ``least``:
+    number of points of a run.
     """
-    ways, around = list_ways(normals, process), Together(parts)
+    ways, around = list_ways(normals, process), LeastGauge(parts)
     tried = [_measure(points, ways[0], around, process)]
     if not (tried[0].gaps >= process.gap).all() and len(ways) > 1:
         sparse = np.unique(np.linspace(0, len(points) - 1, SPARSE).round().astype(int))

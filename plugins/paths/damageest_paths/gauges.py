@@ -18,7 +18,7 @@ class Gauge(Protocol):
     def bound_turns(self, axes: Floats) -> Floats: ...
 
 
-class Together:
+class LeastGauge:
     """The least of the distances that several gauges of one nozzle measure."""
 
     def __init__(self, parts: Sequence[Gauge]) -> None:

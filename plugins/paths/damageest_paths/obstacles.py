@@ -51,7 +51,8 @@ class Obstacles:
         self, meshes: Sequence[Mesh], low: Floats, high: Floats, width: float, ranks: Sequence[int] | None = None
     ) -> None:
         """``low``, ``high`` (3,): the box round the deposit, near which the points are dense; ``width`` of a bead;
-        ``ranks``: of each mesh, ascending: when it comes to stand. All stand from the beginning by default."""
+        ``ranks``: for each mesh, ascending, the order in which it is built up; by default all are there from the
+        beginning."""
         self.trees: list[Any] = [make_tree(mesh) for mesh in meshes]
         self.ranks: list[int] = [0] * len(meshes) if ranks is None else list(ranks)
         parts = [_cut_triangles(mesh.triangles, low, high, width) for mesh in meshes]

@@ -85,7 +85,7 @@ def orient_to_skin(surface: Surface, rim: Ints, part: Part) -> tuple[Ints, Ints,
     mean = sign * surface.cross.sum(axis=0)
     if not np.linalg.norm(mean) > 0.1 * 2 * surface.area:
         raise StageError(
-            "the normals of the damage surface cancel out, so that it has no direction to be swept along",
+            "the normals of the damage surface cancel out, so there is no direction to sweep along",
             REMEDY,
             method="implicit",
         )

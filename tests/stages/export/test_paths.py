@@ -6,17 +6,20 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from damageest.artefacts import DepositPath, Floats
 from damageest.errors import StageError
+from damageest.registry import Registry
 from damageest.stages.export import PathSettings
 from damageest.stages.export.path_apt import write_apt
 from damageest.stages.export.path_csv import HEAD, write_csv
 from damageest.stages.export.rs274 import write_rs274
 from tests.path_shapes import corner, dent, plan
+from tests.stages.export import results
 
 SETTINGS = PathSettings("mm", "block site 1")
 
@@ -121,6 +124,20 @@ def test_templates_and_options(tmp_path: Path) -> None:
     assert lines[1:3] == ["(begin block site 1)", "G21 G54"]
     assert lines[-1] == "M30"
     assert lines.count("M100") == lines.count("M101") == make_path(False).passes
+
+
+def test_the_templates_of_a_job_get_title_units_and_site(tmp_path: Path, registry: Registry) -> None:
+    (tmp_path / "head").write_text("(of $title)\n$units\nO${site}00\n")
+    (tmp_path / "tail").write_text("M30 (end of site $site)\n")
+    result = results.make()
+    sites = tuple(replace(site, path=make_path(False)) for site in result.sites)
+    cls = registry.get("export", "files").cls
+    export: Any = cls(paths=["rs274"], path_header=tmp_path / "head", path_footer=tmp_path / "tail")
+    export.run(replace(result, sites=sites), tmp_path, registry.writers, registry.path_writers)
+    for site in (1, 2):
+        lines = (tmp_path / f"path/site-{site}.ngc").read_text().splitlines()
+        assert lines[1:4] == [f"(of two site {site})", "G21", f"O{site}00"]
+        assert lines[-1] == f"M30 (end of site {site})"
 
 
 def test_rotary_axes_b_and_c(tmp_path: Path) -> None:
