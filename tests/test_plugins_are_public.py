@@ -34,7 +34,6 @@ PUBLIC_MODULES = {
     "damageest.registry.contracts",
     "damageest.registry.system_libraries",
     "damageest.result",
-    "damageest.rules",
 }
 """Public modules, with the modules in them."""
 EXCEPTIONS = {
