@@ -44,7 +44,8 @@ BEYOND = 0.02
 """Largest share of the stock's surface that may be farther than a quarter tolerance from the mesh's."""
 OUTLINE, FARTHEST = 1.5, 4.0
 """Nearer than the first to the outline of the damage, in tolerances, only the second counts: sides stand on the outline
-of the exact damage volume, which the mesh rounds, or draws out where the loss fades."""
+of the exact damage volume, which the mesh rounds, or draws out where the loss fades. It counts on the skin: over a
+convex face the sides are farther apart by as much as the offset is longer than the face."""
 SAME = 5e-4
 """Largest relative difference between the volume of the deposit and those of its parts, all of them as triangles: of
 splines with long outlines OpenCASCADE's integrals are wrong by some tenths of a percent."""
@@ -160,16 +161,18 @@ def _compare(
     vertices, faces, _ = concatenate_meshes(meshes)
     made = Mesh(vertices, faces)
     rim = cKDTree(lost.vertices[np.unique(find_rim(lost.faces[outside]))])
-    far, off = [], []
+    stretch = _measure_stretch(bases, len(part.face_kinds) or int(part.faces_brep.max()) + 1)
+    far, off, strayed = [], [], False
     for one, other in ((made, deposit), (deposit, made)):
-        points, foot = _sample_above(one, part, tolerance)
+        points, foot, number = _sample_above(one, part, tolerance)
         off.append(distance_to_mesh(points, other))
         far.append(np.asarray(rim.query(foot)[0]) > OUTLINE * tolerance)
+        strayed |= bool((off[-1] > FARTHEST * tolerance * np.where(far[-1], 1.0, stretch[number])).any())
     farthest = float(max(each.max(initial=0.0) for each in off))
     beyond = max(
         float((each[away] > tolerance / 4).mean()) if away.any() else 0.0 for each, away in zip(off, far, strict=True)
     )
-    if beyond > BEYOND or farthest > FARTHEST * tolerance:
+    if beyond > BEYOND or strayed:
         raise StockError(f"its stock is up to {farthest:.3g} from the mesh, {beyond:.1%} more than a quarter tolerance")
     inside = [each[away] for each, away in zip(off, far, strict=True)]
     return float(max(np.quantile(each, 0.95) if len(each) else 0.0 for each in inside)), farthest, difference
@@ -186,8 +189,32 @@ def _compare_outlines(bases: Sequence[Base], lost: Solid, outside: Ints, part: P
     return more - sum(height * float(areas[number == face].sum()) for face, height in heights.items())
 
 
-def _sample_above(mesh: Mesh, part: Part, tolerance: float) -> tuple[Floats, Floats]:
-    """(N,3) places on a mesh, evenly by area, that lie above the part's skin, and (N,3) the nearest places on it."""
+def _measure_stretch(bases: Sequence[Base], count: int) -> Floats:
+    """(F,) by how much longer the offset of each CAD face is at most than the face, at the border of its stock."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve2d, BRepAdaptor_Surface
+    from OCP.BRepLProp import BRepLProp_SLProps
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED
+    from OCP.TopoDS import TopoDS
+
+    stretch = np.ones(count)
+    for base in bases:
+        properties = BRepLProp_SLProps(BRepAdaptor_Surface(base.face, False), 2, 1e-7)
+        sign = 1.0 if base.face.Orientation() == TopAbs_REVERSED else -1.0  # curvatures count towards the normal
+        for edge in explore(base.face, TopAbs_EDGE):
+            curve = BRepAdaptor_Curve2d(TopoDS.Edge_s(edge), base.face)
+            for at in np.linspace(curve.FirstParameter(), curve.LastParameter(), 9).tolist():
+                place = curve.Value(at)
+                properties.SetParameters(place.X(), place.Y())
+                if properties.IsCurvatureDefined():
+                    bend = max(sign * properties.MinCurvature(), sign * properties.MaxCurvature())
+                    stretch[base.number] = max(stretch[base.number], 1 + base.height * bend)
+    return stretch
+
+
+def _sample_above(mesh: Mesh, part: Part, tolerance: float) -> tuple[Floats, Floats, Ints]:
+    """(N,3) places on a mesh, evenly by area, that lie above the part's skin; (N,3) the nearest places on it, and (N,)
+    the CAD faces that these are on."""
+    assert part.faces_brep is not None
     rng = np.random.default_rng(31)
     total = np.cumsum(np.linalg.norm(mesh.cross, axis=1))
     face = np.minimum(np.searchsorted(total, rng.random(SAMPLES) * total[-1], side="right"), len(total) - 1)
@@ -195,7 +222,10 @@ def _sample_above(mesh: Mesh, part: Part, tolerance: float) -> tuple[Floats, Flo
     a, b, c = np.moveaxis(mesh.triangles[face], 1, 0)
     points = np.asarray(a * (1 - u) + b * u * (1 - v) + c * u * v)
     points = points[signed_distance(points, part)[0] > tolerance / 8]
-    return points, closest_on_mesh(points, part)[2] if len(points) else points
+    if not len(points):
+        return points, points, np.empty(0, np.int64)
+    _, nearest, foot = closest_on_mesh(points, part)
+    return points, foot, part.faces_brep[nearest]
 
 
 def _join(

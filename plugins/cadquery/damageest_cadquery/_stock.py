@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from damageest.artefacts import Floats
-from damageest_cadquery._edges import Edge, find_edges
+from damageest_cadquery._edges import Edge, find_edges, measure_normals
 from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, close, combine, explore_faces, orient_solid, sew
@@ -24,6 +24,8 @@ from damageest_cadquery._split import Piece, is_watertight, measure_volume
 
 FLAT = 1e-6
 """Volume of a corner, in cubes of the height, below which there is none."""
+SAME = 1e-4
+"""Distance between corners of mitres, in extents of what fills the corner, within which they are one."""
 CHORDS = 16
 """Chords of triangles in a height of the stock, where it is tried whether triangles of a solid close."""
 
@@ -104,12 +106,37 @@ def _thicken(faces: Sequence[Any], height: float) -> Any:
         if plane.Direct() == (faces[0].Orientation() == TopAbs_REVERSED):
             normal.Reverse()
         return orient_solid(BRepPrimAPI_MakePrism(shape, normal.Multiplied(height)).Shape())
-    maker = BRepOffset_MakeSimpleOffset(shell, height)
-    maker.Perform()
-    if not maker.IsDone():
-        raise StockError("OpenCASCADE finds no offset of a face")
-    walls = [BRepFill.Face_s(edge, TopoDS.Edge_s(maker.Generated(edge))) for edge in _find_border(faces)]
-    return orient_solid(close([*faces, *explore_faces(maker.GetResultShape()), *walls]))
+    border = _find_border(faces)
+    for way in (height, -height):  # for some cones OpenCASCADE takes the normal that points the other way
+        maker = BRepOffset_MakeSimpleOffset(shell, way)
+        maker.Perform()
+        if not maker.IsDone():
+            raise StockError("OpenCASCADE finds no offset of a face")
+        tops = [TopoDS.Edge_s(maker.Generated(edge)) for edge in border]
+        if _is_outside(faces, border, tops):
+            walls = [BRepFill.Face_s(edge, top) for edge, top in zip(border, tops, strict=True)]
+            return orient_solid(close([*faces, *explore_faces(maker.GetResultShape()), *walls]))
+    raise StockError("OpenCASCADE finds no offset of a face on its outer side")
+
+
+def _is_outside(faces: Sequence[Any], border: Sequence[Any], tops: Sequence[Any]) -> bool:
+    """Whether the edges ``tops``, which lie over the edges of the border, lie on the outer side of the faces."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.TopAbs import TopAbs_EDGE
+    from OCP.TopoDS import TopoDS
+
+    index = {hash(edge): k for k, edge in enumerate(border)}
+    rises = []
+    for face in faces:
+        for edge in explore(face, TopAbs_EDGE):
+            k = index.get(hash(edge))
+            if k is None or not edge.IsSame(border[k]):
+                continue
+            curve, top = BRepAdaptor_Curve(border[k]), BRepAdaptor_Curve(tops[k])
+            at, end = (each.FirstParameter() + 0.5 * (each.LastParameter() - each.FirstParameter()) for each in (curve, top))
+            normal = measure_normals(TopoDS.Edge_s(edge), face, np.array([at]))[0]
+            rises.append(normal @ np.subtract(top.Value(end).Coord(), curve.Value(at).Coord()))
+    return sum(rises) >= 0
 
 
 def _find_border(faces: Sequence[Any]) -> list[Any]:
@@ -151,6 +178,9 @@ def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]
             continue
         points = np.concatenate([places[key][None], *cloud])
         size = float(np.ptp(points, axis=0).max())
+        points = _merge_points(points, SAME * size)
+        if len(points) < 4:
+            continue
         flat = np.linalg.svd((points - points.mean(axis=0)) / size, compute_uv=False)[2]
         if flat < 1e-3:
             continue  # an edge that goes straight on
@@ -159,6 +189,15 @@ def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]
             continue
         solids.append(_build_hull(hull))
     return solids
+
+
+def _merge_points(points: Floats, near: float) -> Floats:
+    """(K,3) points (N,3) without those within ``near`` of an earlier one: mitres of edges that end on one face have a
+    corner in common, but for rounding errors, between which a hull has slivers."""
+    taken = np.ones(len(points), bool)
+    for one, two in sorted(cKDTree(points).query_pairs(near)):
+        taken[two] &= not taken[one]
+    return np.asarray(points[taken])
 
 
 def _build_hull(hull: ConvexHull) -> Any:
