@@ -16,16 +16,19 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
 from damageest.artefacts import Floats
+from damageest.errors import InputError
 from damageest_cadquery._edges import Edge, find_edges, measure_normals
 from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, close, combine, explore_faces, orient_solid, sew
-from damageest_cadquery._split import Piece, is_watertight, measure_volume
+from damageest_cadquery._split import Piece, is_watertight, measure_volume, triangulate
 
 FLAT = 1e-6
 """Volume of a corner, in cubes of the height, below which there is none."""
 SAME = 1e-4
 """Distance between corners of mitres, in extents of what fills the corner, within which they are one."""
+UNION = 1e-2
+"""Share of a volume by which that of triangles may be wrong."""
 CHORDS = 16
 """Chords of triangles in a height of the stock, where it is tried whether triangles of a solid close."""
 
@@ -77,7 +80,7 @@ def build_stock(bases: Sequence[Base]) -> list[Any]:
         return solids
     apart = all(edge.kind in ("smooth", "convex") for edge in edges)
     found = sew(solids) if apart else None
-    return _merge(_fuse(solids) if found is None else found[0], bases)
+    return _merge(_fuse(solids, min(heights) / CHORDS) if found is None else found[0], bases)
 
 
 def _thicken(faces: Sequence[Any], height: float) -> Any:
@@ -259,11 +262,33 @@ def _build_hull(hull: ConvexHull) -> Any:
     return orient_solid(build_solid(Solid(points, faces))[0])
 
 
-def _fuse(solids: Sequence[Any]) -> list[Any]:
+def _fuse(solids: Sequence[Any], chord: float) -> list[Any]:
+    """The solids as one, or as few as they touch in. All at once where that is sound, else one after the other: where
+    several have faces that nearly coincide, as mitres and walls at a corner, OpenCASCADE leaves pieces out."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
     from OCP.TopAbs import TopAbs_SOLID
 
-    return explore(combine(BRepAlgoAPI_Fuse(), solids[:1], solids[1:]), TopAbs_SOLID)
+    volumes = [triangulate(solid, chord).volume for solid in solids]
+    joined = explore(combine(BRepAlgoAPI_Fuse(), solids[:1], solids[1:]), TopAbs_SOLID)
+    if _is_union(joined, volumes, chord):
+        return joined
+    order = np.argsort(volumes, kind="stable")[::-1].tolist()
+    joined = [solids[order[0]]]
+    for rank, k in enumerate(order[1:], start=2):
+        joined = explore(combine(BRepAlgoAPI_Fuse(), joined, [solids[k]]), TopAbs_SOLID)
+        if not _is_union(joined, [volumes[n] for n in order[:rank]], chord):
+            raise StockError("OpenCASCADE loses stock where that of several faces meets")
+    return joined
+
+
+def _is_union(joined: Sequence[Any], volumes: Sequence[float], chord: float) -> bool:
+    """Whether solids can be the union of some with the ``volumes`` (N,): their triangles close, and they are at least
+    as large as the largest and at most as all. By triangles: integrals over walls on splines are wrong by percents."""
+    try:
+        volume = sum(triangulate(solid, chord).volume for solid in joined)
+    except (InputError, ValueError):
+        return False
+    return max(volumes) * (1 - UNION) <= volume <= sum(volumes) * (1 + UNION)
 
 
 def _merge(solids: Sequence[Any], bases: Sequence[Base]) -> list[Any]:
