@@ -61,9 +61,7 @@ def close(faces: Sequence[Any]) -> Any:
     from OCP.TopoDS import TopoDS
 
     for distance in _list_distances(faces):
-        shells = [
-            TopoDS.Shell_s(shell) for shell in explore(_sew_faces(faces, distance).SewedShape(), TopAbs_SHELL)
-        ]
+        shells = [TopoDS.Shell_s(shell) for shell in explore(_sew_faces(faces, distance).SewedShape(), TopAbs_SHELL)]
         if len(shells) == 1 and BRep_Tool.IsClosed_s(shells[0]):
             return BRepBuilderAPI_MakeSolid(shells[0]).Solid()
     raise StockError("the offset of a face and its sides do not close")

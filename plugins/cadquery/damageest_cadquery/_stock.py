@@ -22,6 +22,7 @@ from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, close, combine, explore_faces, orient_solid, sew
 from damageest_cadquery._split import Piece, is_watertight, measure_volume, triangulate
+from damageest_cadquery._walls import build_wall
 
 FLAT = 1e-6
 """Volume of a corner, in cubes of the height, below which there is none."""
@@ -61,6 +62,12 @@ def take_bases(piece: Piece, heights: Mapping[int, float]) -> list[Base]:
 
 def build_stock(bases: Sequence[Base]) -> list[Any]:
     """The solids of the stock; they share no volume. Raises StockError where OpenCASCADE cannot make them."""
+    return join_stock(build_parts(bases), bases)
+
+
+def build_parts(bases: Sequence[Base]) -> list[Any]:
+    """Solids whose union is the stock: over smooth faces, over sharp edges and at corners. In concave corners they
+    share volume. Raises StockError where OpenCASCADE cannot make them."""
     edges = find_edges([base.face for base in bases])
     heights = [base.height for base in bases]
     if any(edge.kind == "mixed" for edge in edges):
@@ -75,12 +82,17 @@ def build_stock(bases: Sequence[Base]) -> list[Any]:
         solids.append(_thicken([base.face for base in mine], mine[0].height))
     sharp = [edge for edge in edges if edge.kind == "convex"]
     solids += [build_mitre(edge, heights[edge.first], heights[edge.second]) for edge in sharp]
-    solids += _build_corners(sharp, heights)
-    if len(solids) == 1:
-        return solids
-    apart = all(edge.kind in ("smooth", "convex") for edge in edges)
-    found = sew(solids) if apart else None
-    return _merge(_fuse(solids, min(heights) / CHORDS) if found is None else found[0], bases)
+    return solids + _build_corners(sharp, heights)
+
+
+def join_stock(parts: Sequence[Any], bases: Sequence[Base]) -> list[Any]:
+    """The union of the parts of the stock on some faces. Raises StockError where OpenCASCADE cannot make it."""
+    if len(parts) == 1:
+        return list(parts)
+    apart = all(edge.kind in ("smooth", "convex") for edge in find_edges([base.face for base in bases]))
+    found = sew(parts) if apart else None
+    least = min(base.height for base in bases)
+    return _merge(_fuse(parts, least / CHORDS) if found is None else found[0], bases)
 
 
 def _thicken(faces: Sequence[Any], height: float) -> Any:
@@ -116,54 +128,9 @@ def _thicken(faces: Sequence[Any], height: float) -> Any:
             raise StockError("OpenCASCADE finds no offset of a face")
         tops = [TopoDS.Edge_s(maker.Generated(edge)) for edge in border]
         if _is_outside(faces, border, tops):
-            walls = [_build_wall(edge, top) for edge, top in zip(border, tops, strict=True)]
+            walls = [build_wall(edge, top) for edge, top in zip(border, tops, strict=True)]
             return orient_solid(close([*faces, *explore_faces(maker.GetResultShape()), *walls]))
     raise StockError("OpenCASCADE finds no offset of a face on its outer side")
-
-
-def _build_wall(edge: Any, top: Any) -> Any:
-    """The side between an edge and the edge over it: a plane, cone or cylinder where it is one, with which Booleans are
-    faster and safer than with a ruled spline."""
-    from OCP.BRepAdaptor import BRepAdaptor_Curve
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
-    from OCP.BRepFill import BRepFill
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeRevol
-    from OCP.GeomAbs import GeomAbs_Circle, GeomAbs_Line
-    from OCP.gp import gp_Pnt
-    from OCP.TopoDS import TopoDS
-
-    low, high = BRepAdaptor_Curve(edge), BRepAdaptor_Curve(top)
-    ends = [(curve.FirstParameter(), curve.LastParameter()) for curve in (low, high)]
-    below, above = (
-        np.array([curve.Value(at).Coord() for at in np.linspace(*span, 9).tolist()])
-        for curve, span in zip((low, high), ends, strict=True)
-    )
-    near = 1e-6 * float(np.linalg.norm(above - below, axis=1).max())
-    ruled = BRepFill.Face_s(edge, top)
-    if low.GetType() == GeomAbs_Line:
-        corners = np.array([below[0], below[-1], above[-1], above[0]])
-        line = above[0] + np.linspace(0, 1, 9)[:, None] * (above[-1] - above[0])
-        flat = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)[2] <= near
-        if flat and np.abs(line - above).max() <= near:
-            outline = BRepBuilderAPI_MakePolygon(*(gp_Pnt(*corner.tolist()) for corner in corners), True)
-            made = BRepBuilderAPI_MakeFace(outline.Wire(), True)
-            return made.Face() if made.IsDone() else ruled
-    if low.GetType() == GeomAbs_Circle:
-        circle = low.Circle()
-        axis, centre = np.array(circle.Axis().Direction().Coord()), np.array(circle.Location().Coord())
-        frames = []
-        for points in (below, above):
-            spokes = points - centre
-            along = spokes @ axis
-            frames.append((np.linalg.norm(spokes - along[:, None] * axis, axis=1), along))
-        radial = below - centre
-        turn = np.abs(np.einsum("ij,j->i", np.cross(radial, above - below), axis)) / circle.Radius()
-        round_ = all(np.ptp(values) <= near for frame in frames for values in frame) and turn.max() <= near
-        if round_ and frames[1][0][0] > near:
-            segment = BRepBuilderAPI_MakeEdge(gp_Pnt(*below[0].tolist()), gp_Pnt(*above[0].tolist())).Edge()
-            made = BRepPrimAPI_MakeRevol(segment, circle.Axis(), ends[0][1] - ends[0][0])
-            return TopoDS.Face_s(made.Shape()) if made.IsDone() else ruled
-    return ruled
 
 
 def _is_outside(faces: Sequence[Any], border: Sequence[Any], tops: Sequence[Any]) -> bool:
@@ -180,10 +147,12 @@ def _is_outside(faces: Sequence[Any], border: Sequence[Any], tops: Sequence[Any]
             if k is None or not edge.IsSame(border[k]):
                 continue
             curve, top = BRepAdaptor_Curve(border[k]), BRepAdaptor_Curve(tops[k])
-            at, end = (each.FirstParameter() + 0.5 * (each.LastParameter() - each.FirstParameter()) for each in (curve, top))
+            at, end = (
+                each.FirstParameter() + 0.5 * (each.LastParameter() - each.FirstParameter()) for each in (curve, top)
+            )
             normal = measure_normals(TopoDS.Edge_s(edge), face, np.array([at]))[0]
             rises.append(normal @ np.subtract(top.Value(end).Coord(), curve.Value(at).Coord()))
-    return sum(rises) >= 0
+    return bool(sum(rises) >= 0)
 
 
 def _find_border(faces: Sequence[Any]) -> list[Any]:
@@ -225,7 +194,7 @@ def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]
             continue
         points = np.concatenate([places[key][None], *cloud])
         size = float(np.ptp(points, axis=0).max())
-        points = _merge_points(points, SAME * size)
+        points = merge_points(points, SAME * size)
         if len(points) < 4:
             continue
         flat = np.linalg.svd((points - points.mean(axis=0)) / size, compute_uv=False)[2]
@@ -238,7 +207,7 @@ def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]
     return solids
 
 
-def _merge_points(points: Floats, near: float) -> Floats:
+def merge_points(points: Floats, near: float) -> Floats:
     """(K,3) points (N,3) without those within ``near`` of an earlier one: mitres of edges that end on one face have a
     corner in common, but for rounding errors, between which a hull has slivers."""
     taken = np.ones(len(points), bool)

@@ -46,7 +46,9 @@ CASES = {
 QUICK = ("CrankArm.brep", "component8.step")
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CASES])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CASES]
+)
 def test_damage_and_deposit_are_read_back_as_they_are(name: str, tmp_path: Path) -> None:
     case, out = CASES[name], tmp_path / "out"
     damageest.run(write_job(name, case), output=out)
@@ -80,7 +82,7 @@ def write_job(name: str, case: Case) -> dict[str, object]:
 
 
 def measure_file(path: Path) -> float:
-    """The volume of a STEP file's solids, by triangles; all of them are valid and closed, and their faces have names."""
+    """The volume of a STEP file's solids, by triangles; all are valid and closed, and their faces have names."""
     from damageest_cadquery._faces import list_faces
     from damageest_cadquery._read import explore, read
     from damageest_cadquery._split import triangulate

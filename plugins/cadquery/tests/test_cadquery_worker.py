@@ -134,6 +134,7 @@ worker.start(sys.argv[1:])
 """
 
 
+@pytest.mark.slow
 def test_a_site_without_an_exact_form_costs_only_its_own_solid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two solids, each with a bite; that of the round one gets facets."""
     from damageest_cadquery._assembly import NamedShape, write_assembly
