@@ -43,7 +43,7 @@ CASES = {
     "Motor-c.brep": Case((-34.0, 0.0, -1.5), 297.305),
     "Axis_of_bearing.brep": Case((-42.545, -78.741, 0.0), 142.345, narrow=True),
 }
-QUICK = ("CrankArm.brep", "component8.step")
+QUICK = ("CrankArm.brep",)
 
 
 @pytest.mark.parametrize(
@@ -51,13 +51,15 @@ QUICK = ("CrankArm.brep", "component8.step")
 )
 def test_damage_and_deposit_are_read_back_as_they_are(name: str, tmp_path: Path) -> None:
     case, out = CASES[name], tmp_path / "out"
-    damageest.run(write_job(name, case), output=out)
+    error = damageest.run(write_job(name, case), output=out).part.tessellation_error
     (site,) = json.loads((out / "result.json").read_text())["sites"]
     exact = site["exact"]
     assert exact["form"] != "none", exact["tried"]
-    lost = measure_file(out / "damage/site-1.step")
-    assert lost == pytest.approx(site["volume"], rel=3e-3)
-    built = measure_file(out / "deposit/site-1.step")
+    lost, curved = measure_file(out / "damage/site-1.step", 1e-4 * case.diagonal)
+    assert abs(lost - site["volume"]) <= 3e-3 * site["volume"] + error * curved, (
+        "beside the chords of the part's triangles"
+    )
+    built, _ = measure_file(out / "deposit/site-1.step", 1e-4 * case.diagonal)
     mesh = site["deposit"]["volume"]
     assert exact["deposit"]["reason"].startswith(case.facets) if case.facets else exact["deposit"]["reason"] == ""
     if case.facets:
@@ -81,8 +83,9 @@ def write_job(name: str, case: Case) -> dict[str, object]:
     }  # fmt: skip
 
 
-def measure_file(path: Path) -> float:
-    """The volume of a STEP file's solids, by triangles; all are valid and closed, and their faces have names."""
+def measure_file(path: Path, chord: float) -> tuple[float, float]:
+    """The volume of a STEP file's solids, by triangles, and the area of their curved faces that are the part's; all
+    solids are valid and closed, and their faces have names."""
     from damageest_cadquery._faces import list_faces
     from damageest_cadquery._read import explore, read
     from damageest_cadquery._split import triangulate
@@ -96,5 +99,7 @@ def measure_file(path: Path) -> float:
     assert all(BRepCheck_Analyzer(solid).IsValid() for solid in found.solids)
     shells = [TopoDS.Shell_s(shell) for solid in found.solids for shell in explore(solid, TopAbs_SHELL)]
     assert all(BRep_Tool.IsClosed_s(shell) for shell in shells)
-    assert all(face.name for face in list_faces(found, 1.0))
-    return sum(triangulate(solid, 0.01).volume for solid in found.solids)
+    faces = list_faces(found, 1.0)
+    assert all(face.name for face in faces)
+    curved = sum(face.area for face in faces if face.kind != "plane" and " inner " not in face.name)
+    return sum(triangulate(solid, chord).volume for solid in found.solids), curved
