@@ -78,8 +78,13 @@ def test_a_terminated_run_leaves_no_process_at_its_export(tmp_path: Path) -> Non
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     workers: list[int] = []
+
+    def is_seen() -> bool:
+        workers.extend(find_workers(tmp_path))
+        return bool(workers) or run.poll() is not None
+
     try:
-        wait_for(lambda: workers.extend(find_workers(tmp_path)) or bool(workers) or run.poll() is not None, 120)
+        wait_for(is_seen, 120)
         assert workers, "the run ended before its export was seen"
         run.send_signal(signal.SIGTERM)
         run.wait(timeout=30)
