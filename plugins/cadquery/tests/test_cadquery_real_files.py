@@ -66,7 +66,7 @@ def test_damage_and_deposit_are_read_back_as_they_are(name: str, tmp_path: Path)
         assert built == pytest.approx(mesh, rel=3e-3)
         return
     assert exact["deposit"]["offsets"] > 0
-    # the mesh's stock is higher by a quarter of the tolerance; it draws out the outline, by up to 1.2 % of a small deposit
+    # the mesh's stock is higher by a quarter of the tolerance, and its outline is drawn out
     least = lost + (mesh - lost) * STOCK / (STOCK + case.diagonal * 0.003 / 4)
     assert least - 0.02 * mesh < built < mesh
 
