@@ -41,7 +41,8 @@ CASES = {
     "linkrods.step": Case((3.358, 3.25, 0.0), 5.727),
     "screw.step": Case((-22.898, -0.826, 0.436), 50.886),
     "Motor-c.brep": Case((-34.0, 0.0, -1.5), 297.305),
-    "Axis_of_bearing.brep": Case((-42.545, -78.741, 0.0), 142.345, narrow=True),
+    # a fillet touches a bore along a circle: the stock of both fills a gap that closes to nothing
+    "Axis_of_bearing.brep": Case((-42.545, -78.741, 0.0), 142.345, facets="OpenCASCADE ", narrow=True),
 }
 QUICK = ("CrankArm.brep",)
 
