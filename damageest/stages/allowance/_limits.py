@@ -41,6 +41,17 @@ class StockConflict:
             f"the stock is {self.height[worst]:.4g} high{both}"
         )
 
+    def select(self, rows: NDArray[np.bool_]) -> StockConflict | None:
+        """The places (N,) that are selected; None without any."""
+        if not rows.any():
+            return None
+        return StockConflict(self.points[rows], self.clearance[rows], self.height[rows], self.opposite[rows])
+
+    def touches(self, part: Part) -> NDArray[np.bool_]:
+        """(N,) whether skin and wall touch there, as where a pin of an assembly sits in its bore. Each of them is known
+        within the error of the triangles only, so what is free between them may be no gap; there is nothing to mill."""
+        return np.asarray(self.clearance <= 2 * part.tessellation_error)
+
 
 def place_probes(skin: SkinFaces, seed: int = 11) -> tuple[Floats, NDArray[np.int64]]:
     """Points (N,3) spread over the skin and in the middle of its triangles, and the face of each."""

@@ -10,6 +10,7 @@ from pydantic import Field
 from damageest.artefacts import Deposit, Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.stages.allowance import Allowance
+from damageest.stages.allowance._limits import StockConflict
 from damageest.stages.allowance._selectors import KeepOut, StockPlan, StockTarget
 
 MAX_DUST = 1e-6
@@ -87,8 +88,9 @@ class Milling(Allowance):
         conflicts = [
             conflict for each in skins if (conflict := find_stock_conflict(each, part, tolerance, origin)) is not None
         ]
-        if conflicts and self.crowded == "refuse":
-            raise StageError(str(conflicts[0]), "use targets with a smaller outer there, keep_out, or crowded: clip")
+        narrow = [found for each in conflicts if (found := each.select(~each.touches(part))) is not None]
+        if narrow and self.crowded == "refuse":
+            raise StageError(str(narrow[0]), "use targets with a smaller outer there, keep_out, or crowded: clip")
         stock = sum((build_stock(each, tolerance / 2, has_room=not conflicts) for each in skins), Manifold())
         stock = simplify_exactly(stock, part.diagonal)
         for body in (left, barred):
@@ -104,7 +106,8 @@ class Milling(Allowance):
         body = separate_sheets(deposit, origin, tolerance)
         if body is None:
             raise StageError("the deposit is empty", "use a slightly different outer")
-        notes = [f"{conflict}; clipped there" for conflict in conflicts[:1]]
+        notes = [f"{conflict}; clipped there" for conflict in narrow[:1]]
+        notes += _describe_touching(conflicts, part)
         notes += _describe_stock(thickness, skins)
         return Deposit(
             body.vertices,
@@ -118,6 +121,15 @@ class Milling(Allowance):
             overlap=0.0 if band is None else self.overlap,
             notes=tuple(notes),
         )
+
+
+def _describe_touching(conflicts: list[StockConflict], part: Part) -> list[str]:
+    """What to say of skin that touches other metal, as in an assembly."""
+    touching = [found for each in conflicts if (found := each.select(each.touches(part))) is not None]
+    if not touching:
+        return []
+    near = ", ".join(f"{value:.4g}" for value in touching[0].points[0])
+    return [f"skin that touches an opposite wall, within the error of the triangles, gets no stock: near ({near})"]
 
 
 def _describe_stock(thickness: tuple[float, float, float] | None, skins: list[Any]) -> list[str]:

@@ -12,7 +12,7 @@ from damageest_cadquery._read import explore
 from damageest_cadquery._split import ShapeMap, measure_volume
 
 SEWN = 2e-5
-"""Distance in millimetres within which edges of faces are one edge."""
+"""Distance in millimetres within which edges of faces are one edge, where they do not claim to be less exact."""
 
 
 class StockError(Exception):
@@ -56,18 +56,37 @@ def _place_faces(shape: Any) -> Any:
 def close(faces: Sequence[Any]) -> Any:
     """The solid that faces bound. Raises StockError where they leave a gap."""
     from OCP.BRep import BRep_Tool
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid
     from OCP.TopAbs import TopAbs_SHELL
     from OCP.TopoDS import TopoDS
 
-    sewing = BRepBuilderAPI_Sewing(SEWN)
+    for distance in _list_distances(faces):
+        shells = [TopoDS.Shell_s(shell) for shell in explore(_sew_faces(faces, distance).SewedShape(), TopAbs_SHELL)]
+        if len(shells) == 1 and BRep_Tool.IsClosed_s(shells[0]):
+            return BRepBuilderAPI_MakeSolid(shells[0]).Solid()
+    raise StockError("the offset of a face and its sides do not close")
+
+
+def _sew_faces(faces: Sequence[Any], distance: float) -> Any:
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+
+    sewing = BRepBuilderAPI_Sewing(distance)
     for face in faces:
         sewing.Add(face)
     sewing.Perform()
-    shells = [TopoDS.Shell_s(shell) for shell in explore(sewing.SewedShape(), TopAbs_SHELL)]
-    if len(shells) != 1 or not BRep_Tool.IsClosed_s(shells[0]):
-        raise StockError("the offset of a face and its sides do not close")
-    return BRepBuilderAPI_MakeSolid(shells[0]).Solid()
+    return sewing
+
+
+def _list_distances(faces: Sequence[Any]) -> list[float]:
+    """The distances, in millimetres, within which edges of faces are tried as one: a curve where two splines meet lies
+    on each of them only within the edge's own tolerance, and what is built on it is no nearer."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_EDGE
+    from OCP.TopoDS import TopoDS
+
+    edges = (TopoDS.Edge_s(edge) for face in faces for edge in explore(face, TopAbs_EDGE))
+    claimed = 2 * max((BRep_Tool.Tolerance_s(edge) for edge in edges), default=0.0)
+    return [SEWN] if claimed <= SEWN else [SEWN, claimed]
 
 
 def combine(algorithm: Any, arguments: Sequence[Any], tools: Sequence[Any], fuzzy: float = 1e-6) -> Any:
@@ -109,37 +128,38 @@ def sew(solids: Sequence[Any]) -> tuple[list[Any], ShapeMap] | None:
 
     None where the rest does not close.
     """
+    faces = [(number, k, face) for number, solid in enumerate(solids) for k, face in enumerate(explore_faces(solid))]
+    for distance in _list_distances([face for _, _, face in faces]):
+        inside = _find_twins([face for _, _, face in faces], [number for number, _, _ in faces], 5 * distance)
+        outer = [each for each, twin in zip(faces, inside.tolist(), strict=True) if not twin]
+        sewing = _sew_faces([face for _, _, face in outer], distance)
+        joined = _take_solids(sewing.SewedShape())
+        if joined:
+            known = ShapeMap()
+            for number, k, face in outer:
+                known.set(sewing.Modified(face) if sewing.IsModified(face) else face, (number, k))
+            return joined, known
+    return None
+
+
+def _take_solids(sewn: Any) -> list[Any]:
+    """The solids that the shells of a shape bound; none where one is open or bounds none that is sound."""
     from OCP.BRep import BRep_Tool
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid
     from OCP.TopAbs import TopAbs_SHELL
     from OCP.TopoDS import TopoDS
 
-    faces = [(number, k, face) for number, solid in enumerate(solids) for k, face in enumerate(explore_faces(solid))]
-    inside = _find_twins([face for _, _, face in faces], [number for number, _, _ in faces])
-    sewing = BRepBuilderAPI_Sewing(SEWN)
-    outer = [each for each, twin in zip(faces, inside.tolist(), strict=True) if not twin]
-    for _, _, face in outer:
-        sewing.Add(face)
-    sewing.Perform()
-    joined = []
-    for shell in explore(sewing.SewedShape(), TopAbs_SHELL):
-        if not BRep_Tool.IsClosed_s(TopoDS.Shell_s(shell)):
-            return None
-        joined.append(BRepBuilderAPI_MakeSolid(TopoDS.Shell_s(shell)).Solid())
+    shells = [TopoDS.Shell_s(shell) for shell in explore(sewn, TopAbs_SHELL)]
+    if not all(BRep_Tool.IsClosed_s(shell) for shell in shells):
+        return []
     try:
-        joined = [orient_solid(solid) for solid in joined]
+        return [orient_solid(BRepBuilderAPI_MakeSolid(shell).Solid()) for shell in shells]
     except StockError:
-        return None
-    if not joined:
-        return None
-    known = ShapeMap()
-    for number, k, face in outer:
-        known.set(sewing.Modified(face) if sewing.IsModified(face) else face, (number, k))
-    return joined, known
+        return []
 
 
-def _find_twins(faces: Sequence[Any], owners: Sequence[int]) -> Any:
-    """(F,) whether another solid has the same face, by its centre and area."""
+def _find_twins(faces: Sequence[Any], owners: Sequence[int], near: float) -> Any:
+    """(F,) whether another solid has the same face, by its centre and area, within ``near``."""
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
     from scipy.spatial import cKDTree
@@ -151,7 +171,7 @@ def _find_twins(faces: Sequence[Any], owners: Sequence[int]) -> Any:
         rows.append((*sizes.CentreOfMass().Coord(), np.sqrt(max(sizes.Mass(), 0.0))))
     values: Floats = np.array(rows)
     twins = np.zeros(len(faces), bool)
-    for one, two in cKDTree(values).query_pairs(5 * SEWN):
+    for one, two in cKDTree(values).query_pairs(near):
         if owners[one] != owners[two]:
             twins[[one, two]] = True
     return twins

@@ -13,17 +13,23 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from damageest.artefacts import Floats
-from damageest_cadquery._edges import Edge, find_edges
+from damageest.errors import InputError
+from damageest_cadquery._edges import Edge, find_edges, measure_normals
 from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, close, combine, explore_faces, orient_solid, sew
-from damageest_cadquery._split import Piece, is_watertight, measure_volume
+from damageest_cadquery._split import Piece, is_watertight, measure_volume, triangulate
+from damageest_cadquery._walls import build_wall
 
 FLAT = 1e-6
 """Volume of a corner, in cubes of the height, below which there is none."""
+SAME = 1e-4
+"""Distance between corners of mitres, in extents of what fills the corner, within which they are one."""
+UNION = 1e-2
+"""Share of a volume by which that of triangles may be wrong."""
 CHORDS = 16
 """Chords of triangles in a height of the stock, where it is tried whether triangles of a solid close."""
 
@@ -56,6 +62,12 @@ def take_bases(piece: Piece, heights: Mapping[int, float]) -> list[Base]:
 
 def build_stock(bases: Sequence[Base]) -> list[Any]:
     """The solids of the stock; they share no volume. Raises StockError where OpenCASCADE cannot make them."""
+    return join_stock(build_parts(bases), bases)
+
+
+def build_parts(bases: Sequence[Base]) -> list[Any]:
+    """Solids whose union is the stock: over smooth faces, over sharp edges and at corners. In concave corners they
+    share volume. Raises StockError where OpenCASCADE cannot make them."""
     edges = find_edges([base.face for base in bases])
     heights = [base.height for base in bases]
     if any(edge.kind == "mixed" for edge in edges):
@@ -70,19 +82,23 @@ def build_stock(bases: Sequence[Base]) -> list[Any]:
         solids.append(_thicken([base.face for base in mine], mine[0].height))
     sharp = [edge for edge in edges if edge.kind == "convex"]
     solids += [build_mitre(edge, heights[edge.first], heights[edge.second]) for edge in sharp]
-    solids += _build_corners(sharp, heights)
-    if len(solids) == 1:
-        return solids
-    apart = all(edge.kind in ("smooth", "convex") for edge in edges)
-    found = sew(solids) if apart else None
-    return _merge(_fuse(solids) if found is None else found[0], bases)
+    return solids + _build_corners(sharp, heights)
+
+
+def join_stock(parts: Sequence[Any], bases: Sequence[Base]) -> list[Any]:
+    """The union of the parts of the stock on some faces. Raises StockError where OpenCASCADE cannot make it."""
+    if len(parts) == 1:
+        return list(parts)
+    apart = all(edge.kind in ("smooth", "convex") for edge in find_edges([base.face for base in bases]))
+    found = sew(parts) if apart else None
+    least = min(base.height for base in bases)
+    return _merge(_fuse(parts, least / CHORDS) if found is None else found[0], bases)
 
 
 def _thicken(faces: Sequence[Any], height: float) -> Any:
     """The solid between faces that are smooth together and their offset."""
     from OCP.BRep import BRep_Builder
     from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.BRepFill import BRepFill
     from OCP.BRepOffset import BRepOffset_MakeSimpleOffset
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
     from OCP.GeomAbs import GeomAbs_Plane
@@ -104,12 +120,39 @@ def _thicken(faces: Sequence[Any], height: float) -> Any:
         if plane.Direct() == (faces[0].Orientation() == TopAbs_REVERSED):
             normal.Reverse()
         return orient_solid(BRepPrimAPI_MakePrism(shape, normal.Multiplied(height)).Shape())
-    maker = BRepOffset_MakeSimpleOffset(shell, height)
-    maker.Perform()
-    if not maker.IsDone():
-        raise StockError("OpenCASCADE finds no offset of a face")
-    walls = [BRepFill.Face_s(edge, TopoDS.Edge_s(maker.Generated(edge))) for edge in _find_border(faces)]
-    return orient_solid(close([*faces, *explore_faces(maker.GetResultShape()), *walls]))
+    border = _find_border(faces)
+    for way in (height, -height):  # for some cones OpenCASCADE takes the normal that points the other way
+        maker = BRepOffset_MakeSimpleOffset(shell, way)
+        maker.Perform()
+        if not maker.IsDone():
+            raise StockError("OpenCASCADE finds no offset of a face")
+        tops = [TopoDS.Edge_s(maker.Generated(edge)) for edge in border]
+        if _is_outside(faces, border, tops):
+            walls = [build_wall(edge, top) for edge, top in zip(border, tops, strict=True)]
+            return orient_solid(close([*faces, *explore_faces(maker.GetResultShape()), *walls]))
+    raise StockError("OpenCASCADE finds no offset of a face on its outer side")
+
+
+def _is_outside(faces: Sequence[Any], border: Sequence[Any], tops: Sequence[Any]) -> bool:
+    """Whether the edges ``tops``, which lie over the edges of the border, lie on the outer side of the faces."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.TopAbs import TopAbs_EDGE
+    from OCP.TopoDS import TopoDS
+
+    index = {hash(edge): k for k, edge in enumerate(border)}
+    rises = []
+    for face in faces:
+        for edge in explore(face, TopAbs_EDGE):
+            k = index.get(hash(edge))
+            if k is None or not edge.IsSame(border[k]):
+                continue
+            curve, top = BRepAdaptor_Curve(border[k]), BRepAdaptor_Curve(tops[k])
+            at, end = (
+                each.FirstParameter() + 0.5 * (each.LastParameter() - each.FirstParameter()) for each in (curve, top)
+            )
+            normal = measure_normals(TopoDS.Edge_s(edge), face, np.array([at]))[0]
+            rises.append(normal @ np.subtract(top.Value(end).Coord(), curve.Value(at).Coord()))
+    return bool(sum(rises) >= 0)
 
 
 def _find_border(faces: Sequence[Any]) -> list[Any]:
@@ -151,6 +194,9 @@ def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]
             continue
         points = np.concatenate([places[key][None], *cloud])
         size = float(np.ptp(points, axis=0).max())
+        points = merge_points(points, SAME * size)
+        if len(points) < 4:
+            continue
         flat = np.linalg.svd((points - points.mean(axis=0)) / size, compute_uv=False)[2]
         if flat < 1e-3:
             continue  # an edge that goes straight on
@@ -159,6 +205,15 @@ def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]
             continue
         solids.append(_build_hull(hull))
     return solids
+
+
+def merge_points(points: Floats, near: float) -> Floats:
+    """(K,3) points (N,3) without those within ``near`` of an earlier one: mitres of edges that end on one face have a
+    corner in common, but for rounding errors, between which a hull has slivers."""
+    taken = np.ones(len(points), bool)
+    for one, two in sorted(cKDTree(points).query_pairs(near)):
+        taken[two] &= not taken[one]
+    return np.asarray(points[taken])
 
 
 def _build_hull(hull: ConvexHull) -> Any:
@@ -176,11 +231,33 @@ def _build_hull(hull: ConvexHull) -> Any:
     return orient_solid(build_solid(Solid(points, faces))[0])
 
 
-def _fuse(solids: Sequence[Any]) -> list[Any]:
+def _fuse(solids: Sequence[Any], chord: float) -> list[Any]:
+    """The solids as one, or as few as they touch in. All at once where that is sound, else one after the other: where
+    several have faces that nearly coincide, as mitres and walls at a corner, OpenCASCADE leaves pieces out."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
     from OCP.TopAbs import TopAbs_SOLID
 
-    return explore(combine(BRepAlgoAPI_Fuse(), solids[:1], solids[1:]), TopAbs_SOLID)
+    volumes = [triangulate(solid, chord).volume for solid in solids]
+    joined = explore(combine(BRepAlgoAPI_Fuse(), solids[:1], solids[1:]), TopAbs_SOLID)
+    if _is_union(joined, volumes, chord):
+        return joined
+    order = np.argsort(volumes, kind="stable")[::-1].tolist()
+    joined = [solids[order[0]]]
+    for rank, k in enumerate(order[1:], start=2):
+        joined = explore(combine(BRepAlgoAPI_Fuse(), joined, [solids[k]]), TopAbs_SOLID)
+        if not _is_union(joined, [volumes[n] for n in order[:rank]], chord):
+            raise StockError("OpenCASCADE loses stock where that of several faces meets")
+    return joined
+
+
+def _is_union(joined: Sequence[Any], volumes: Sequence[float], chord: float) -> bool:
+    """Whether solids can be the union of some with the ``volumes`` (N,): their triangles close, and they are at least
+    as large as the largest and at most as all. By triangles: integrals over walls on splines are wrong by percents."""
+    try:
+        volume = sum(triangulate(solid, chord).volume for solid in joined)
+    except (InputError, ValueError):
+        return False
+    return max(volumes) * (1 - UNION) <= volume <= sum(volumes) * (1 + UNION)
 
 
 def _merge(solids: Sequence[Any], bases: Sequence[Base]) -> list[Any]:

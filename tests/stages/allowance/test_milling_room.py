@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -71,6 +72,22 @@ def test_an_intact_wall_in_the_way_is_refused() -> None:
     deposit = deposit_on(comb(3.0), tool, outer=3.5, crowded="clip")
     left = comb(3.0) - tool
     assert (to_manifold(deposit) ^ left).volume() < 1e-6
+
+
+@pytest.mark.parametrize(("less", "error", "fits"), [(0.0, 0.003, True), (0.0, 0.0, False), (0.05, 0.003, False)])
+def test_a_pin_that_touches_its_bore_is_no_gap_without_room(less: float, error: float, fits: bool) -> None:
+    """Between their triangles, which are not the same, slits are left that neither of them has. A real gap is none."""
+    pin = Manifold.cylinder(12, 5 - less, 5 - less, 96).rotate((0, 0, 180 / 96)).translate((15, 10, 0))
+    foot = Manifold.cylinder(1, 6, 6, 96).translate((15, 10, 0))
+    body, tool = bored() + pin + foot, Manifold.cube((8, 12, 4)).translate((13, 4, 9))
+    part = replace(part_of(body), tessellation_error=error)
+    if not fits:
+        with pytest.raises(StageError, match="no room for the stock"):
+            deposit_on(body, tool, part=part, outer=0.5)
+        return
+    deposit = deposit_on(body, tool, part=part, outer=0.5)
+    assert deposit.stock_volume == pytest.approx(8 * 12 * (0.5 + TOLERANCE / 4), rel=0.01)
+    assert any("touches an opposite wall" in note for note in deposit.notes)
 
 
 @pytest.mark.parametrize("shape", [bracket, dovetail])
