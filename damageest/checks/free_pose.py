@@ -55,6 +55,17 @@ def measure_dependence(damage: Solid, part: Part, pose: Pose) -> tuple[Dependenc
     return tuple(found)
 
 
+def measure_hidden_wear(part: Part, pose: Pose) -> float:
+    """The most metal that may be worn without a site: what the skin sweeps, to one side, in the largest free motion.
+
+    Wear of a whole face moves the pose, and the scan then lies on the part as if nothing were lost.
+    """
+    centres, outward = part.triangles.mean(axis=1), part.cross / 2
+    swept = [np.einsum("ij,ij->i", motion.move(centres), outward) for motion in pose.free]
+    reach = [max(motion.high, -motion.low) for motion in pose.free]
+    return max((float(np.abs(one).sum()) / 2 * far for one, far in zip(swept, reach, strict=True)), default=0.0)
+
+
 def describe_motion(motion: FreeMotion, unit: str) -> str:
     """The motion in a few words."""
     x, y, z = motion.direction

@@ -11,7 +11,7 @@ import numpy as np
 from damageest.artefacts import Flags, Ints
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
-from damageest.checks.free_pose import measure_dependence
+from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.scan_quality import describe_few
 from damageest.checks.uncertainty import (
@@ -56,8 +56,9 @@ def sum_uncertainty(engine: Engine, work: Work) -> Work:
     not known either.
     """
     state = work.job
-    if not work.sites and _may_hide_loss(state):
-        return replace(work, job=state.with_value(JobState.volume_95, None, digest("no sites")))
+    if not work.sites:
+        found = None if work.failures or _may_hide_loss(state) else (0.0, measure_hidden_wear(state.part, state.pose))
+        return replace(work, job=state.with_value(JobState.volume_95, found, digest("no sites", found)))
     lost = [error for error in work.failures if error.stage != Allowance.stage]
     taken = [site for site in work.sites if site.accepted]
     errors = [site.error for site in taken if site.error is not None]

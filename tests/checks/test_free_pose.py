@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import FreeMotion, Part, Pose, Solid
-from damageest.checks.free_pose import compare_other_poses, describe_motion, measure_dependence
+from damageest.checks.free_pose import compare_other_poses, describe_motion, measure_dependence, measure_hidden_wear
 
 LENGTH, WIDTH, HEIGHT, DEPTH = 40.0, 30.0, 20.0, 0.5
 
@@ -56,6 +56,13 @@ def test_another_pose_matters_where_its_skin_is_elsewhere(degrees: float, low: f
     pose = Pose(np.eye(4), alternatives=turn_about_z(degrees)[None])
     assert low <= compare_other_poses(damage, part, pose, 0.1) <= high
     assert compare_other_poses(damage, part, Pose(np.eye(4)), 0.1) == 0
+
+
+def test_wear_of_a_face_that_moves_the_pose_is_what_the_face_sweeps() -> None:
+    part, _ = make_slab()
+    free = FreeMotion((0, 0, 1), -0.3, 0.1)
+    assert measure_hidden_wear(part, Pose(np.eye(4), free=(free,))) == pytest.approx(0.3 * LENGTH * WIDTH)
+    assert measure_hidden_wear(part, Pose(np.eye(4))) == 0
 
 
 def test_a_pose_that_is_fixed_asks_nothing() -> None:

@@ -116,7 +116,8 @@ def judge(result: Result, true: TrueState) -> Judgement:
     taken = [group for group in groups if group.accepted]
     missed = [body for body in seen if body.volume > (SMALL * tolerance) ** 3 and not _is_told(body, result, lost)]
     cautious = bool(doubtful) and not find_faults([*accepted, *doubtful], seen, unseen, true.part, tolerance)
-    is_unknown = result.volume_95 is None  # the run says that more may be lost than it found
+    low, high = result.volume_95 or (0.0, float("inf"))  # without one, more may be lost than was found
+    is_unknown = low <= sum(body.volume for body in seen) <= high
     if (missed and not is_unknown) or any(not group.holds for group in taken):
         outcome = "silent"
     elif missed or lost or any("doubtful" in group.levels for group in groups):
