@@ -236,9 +236,7 @@ def _print_table(result: Result, target: Path) -> None:
         show(f"no damage deeper than the tolerance of {depth} was found{_on_seen(result)}")
         if result.volume_95 and result.volume_95[1] > 0:
             most = f"{result.volume_95[1]:.4g} {unit}³"
-            show(
-                f"the pose is free: wear of up to {most} over a whole face would not show; name unworn faces in align.datum"
-            )
+            show(f"the pose is free: wear of up to {most} over a whole face would not show; see align.datum")
     _print_coverage(result, show)
     if result.fit is not None and result.fit.model == "ok":  # otherwise it is among the notes
         show(f"fit: {result.fit.words}")
