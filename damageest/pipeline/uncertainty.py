@@ -65,12 +65,19 @@ def sum_uncertainty(engine: Engine, work: Work) -> Work:
     total = None
     if len(errors) == len(taken) and not lost:
         # collect_result moves it to the volume of the union, which is the same but for overlaps
-        left = sum(site.damage.volume for site in work.sites if not site.accepted)
+        left = sum(_limit_doubtful(site) for site in work.sites if not site.accepted)
         total = combine_total(sum(site.damage.volume for site in taken), errors, left)
         if any(site.uncertainty and site.uncertainty.is_open for site in taken):
             total = (total[0], math.inf)
     key = digest("interval", total, [site.key("damage") for site in work.sites])
     return replace(work, job=state.with_value(JobState.volume_95, total, key))
+
+
+def _limit_doubtful(site: FoundSite) -> float:
+    """How large the loss of a site that is not accepted may be: the high end of its interval. Where that is open, its
+    volume: what contradicts the site does not open the total."""
+    interval = site.uncertainty.volume_95 if site.uncertainty else None
+    return interval[1] if interval and math.isfinite(interval[1]) else site.damage.volume
 
 
 def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: PoseError) -> FoundSite:

@@ -93,7 +93,7 @@ def test_a_doubtful_site_has_an_interval_and_raises_the_total() -> None:
     assert site.volume_95 is not None
     assert site.volume_95[0] < site.damage.volume < site.volume_95[1]
     assert "contradicts" in [reason.effect for reason in site.verdict.reasons]
-    assert result.volume_95 == pytest.approx((0.0, site.damage.volume))
+    assert result.volume_95 == pytest.approx((0.0, site.volume_95[1]))
 
 
 def test_table_and_result_json_have_the_interval(tmp_path: Path) -> None:
