@@ -54,8 +54,9 @@ class SiteError:
 
     ``pose`` (K,): signed, by the columns of `PoseError.spread`; ``excess``: by how much the volume is too large on
     average; ``rates`` (M,): change of the volume for each unit of each free motion, and ``motions`` (M,2): their ends;
-    ``inside``, ``beside``, ``fading``: by how much the loss may be larger. ``depth``: of the damage volume, corrected
-    for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free motions.
+    ``inside``, ``beside``, ``fading``: by how much the loss may be larger; ``less``: by how much it may be smaller,
+    since the inner surface was closed across what was not seen. ``depth``: of the damage volume, corrected for its mean
+    error; ``depth_error``: one standard deviation; ``depth_free``: change by the free motions.
     ``measured``: the largest depth of a scan point, with what its noise, the pose and the skin may be off.
     """
 
@@ -72,6 +73,7 @@ class SiteError:
     rates: Floats = field(default_factory=lambda: np.empty(0))
     motions: Floats = field(default_factory=lambda: np.empty((0, 2)))
     inside: float = 0.0
+    less: float = 0.0
     beside: float = 0.0
     fading: float = 0.0
     depth: float = 0.0
@@ -130,6 +132,7 @@ def measure_site_error(
         outward=outward * exposed / WIDTH,
         views=scan.between_views * exposed / WIDTH,
         inside=HOLE * hole**1.5,
+        less=damage.volume * evidence.ids_unseen if hole else 0.0,
         depth=deepest.depth - surface.depth_excess,
         depth_error=float(np.sqrt(surface.depth**2 + beside)),
         measured=deepest.measured + WIDTH * by_point,
@@ -161,7 +164,7 @@ def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 
     more = sum(one.inside + one.beside + one.fading for one in errors)
     free = _sweep(np.sum([one.rates for one in errors], axis=0), errors[0].motions)
     middle = volume - sum(one.excess for one in errors)
-    low = min(middle - WIDTH * deviation, volume) + free[0]
+    low = min(middle - WIDTH * deviation, volume) + free[0] - sum(one.less for one in errors)
     high = max(middle + WIDTH * deviation, volume) + free[1] + more
     return max(low, 0.0), high + doubtful
 

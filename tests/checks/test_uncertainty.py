@@ -22,6 +22,7 @@ ERRORS = st.builds(
     pose=st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3).map(np.array),
     form=SIZES,
     inside=SIZES,
+    less=SIZES,
     depth=st.floats(1.0, 20.0),
     depth_error=st.floats(0.0, 0.5),
 )
@@ -47,7 +48,9 @@ def test_total_is_no_wider_than_the_sites_together(errors: list[SiteError]) -> N
 
 
 @given(
-    ERRORS, st.sampled_from(["noise", "spacing", "rim", "form", "tessellation", "inside", "beside", "fading"]), SIZES
+    ERRORS,
+    st.sampled_from(["noise", "spacing", "rim", "form", "tessellation", "inside", "less", "beside", "fading"]),
+    SIZES,
 )
 def test_a_larger_error_never_makes_the_interval_narrower(error: SiteError, name: str, more: float) -> None:
     wider = replace(error, **{name: getattr(error, name) + more})
