@@ -94,11 +94,13 @@ def test_kinds_and_parts_are_chosen_by_their_names() -> None:
 def test_the_table_counts_and_names_the_silent_cases() -> None:
     wall = [case for case in CASES if case.kind == "lost wall"][:3]
     right, said, silent = (case.make_blank_row() | {"seconds": 2.0, "cpu_seconds": 1.5} for case in wall)
-    right |= {"outcome": "right", "unseen": 1, "iou": 0.99, "step_seconds": 0.5}
+    held = {"truth": 10.0, "volume": 10.5, "low": 9.0, "high": None, "levels": ["likely"], "accepted": 1}
+    missed = {**held, "low": 11.0, "high": 12.0}
+    right |= {"outcome": "right", "unseen": 1, "iou": 0.99, "step_seconds": 0.5, "groups": [held, missed]}
     said |= {"outcome": "said", "reason": "doubtful: 1 damages missed", "cautious": True}
     silent |= {"reason": "1 damages missed", "seen_error": 1.5}
     text = make_trouble_tables([right, said, silent], "damageest evaluate honesty")
-    assert "| lost wall | 3 | 1 | 1 | 1 | 1 | 0 | 0 | 1 | 2.0 |" in text
+    assert "| lost wall | 3 | 1 | 1 | 0 | 1 | 1 | 0 | 1 | 1 of 2 | 2.0 |" in text
     assert f"1 damages missed. `damageest evaluate honesty --case {wall[2].number} --seeds 0 --points 400`" in text
     assert "oubtful, but right if accepted: 1 cases" in text
     assert "right, 2.0 s: IoU 0.990" in format_trouble_row(right)
