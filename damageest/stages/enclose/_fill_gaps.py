@@ -9,7 +9,7 @@ from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
 from damageest.geometry.vectors import normalise
 from damageest.stages.enclose._refit import fit_places
 
-WIDE, WIDE_IF_DEEP = 2.0, 6.0
+WIDE, WIDE_IF_DEEP = 2.0, 4.7
 """Gap between points, in cells, from which points are put between them. Nothing holds the solution in such a gap: it
 bulges there, by up to the gap. The second for a deep loss, of which a bulge is a small share: more points gain less
 there than their own errors at the rim take."""
