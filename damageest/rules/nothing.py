@@ -8,8 +8,8 @@ from damageest.artefacts import Reason
 from damageest.rules import Rule, ScanFacts, SiteFacts
 
 NOTHING = 0.2
-"""Low end of the interval, as a share of the volume, up to which a site may be no loss. Measured on 498 groups of
-sites of 183 troubled scans: larger shares doubt more that is right, and find no more that is wrong."""
+"""Low end of the interval, as a share of the volume, up to which a site may be no loss. Tried at this value alone, in a
+simulation on 498 groups of sites of 183 troubled scans."""
 
 
 class Nothing(Rule):

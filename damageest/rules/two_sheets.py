@@ -8,8 +8,8 @@ from damageest.artefacts import Reason
 from damageest.rules import Rule, ScanFacts, SiteFacts
 
 AGAINST = 0.3
-"""Share of a site's points that lie among intact points. At the rim of a real step it is below 0.15, of two views that
-are 1.5 tolerances apart 0.6 and more."""
+"""Share of a site's points that lie among points on the skin. On a box it is below 0.2 at the rims of real losses, and
+above 0.5 for a view that is 1.5 tolerances and more too deep."""
 
 
 class TwoSheets(Rule):
