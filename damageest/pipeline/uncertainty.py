@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from damageest.artefacts import Flags, Ints
+from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
 from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
@@ -88,9 +89,14 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         return replace(site, uncertainty=Uncertainty((known, known), None), error=error)
     points = state.aligned.points[site.members]
     inner = find_inner_faces(site.damage, state.part)
+    beyond = ask_beyond_points(
+        site.damage, state.part, points, state.aligned.points, state.aligned.noise, state.aligned.spacing,
+        state.tolerance, state.unit,
+    )  # fmt: skip
+    site = replace(site, beyond=beyond)
     # what the model fit gives is the 95 % bound of a deviation
     found = measure_site_error(
-        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts,
+        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts, beyond,
         form=measure_at_site(state, site) / WIDTH, free=state.pose.free,
     )  # fmt: skip
     if found is None:
