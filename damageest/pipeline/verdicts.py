@@ -61,11 +61,19 @@ def gather_facts(engine: Engine, work: Work) -> Work:
     """Measures what the whole scan says about skin that deviates and is not damaged."""
     state = work.job
     facts = gather_scan_facts(
-        state.skin, state.aligned, state.deviation, state.surplus, state.pose,
+        state.skin, state.part, state.aligned, state.deviation, state.surplus, state.pose,
         None if state.fitted is None else state.fitted.fit, state.tolerance, state.unit,
         is_fitted=engine.job.implementations[Align].name != "none" and not state.pose.is_held,
     )  # fmt: skip
-    sources = (JobState.skin, JobState.aligned, JobState.deviation, JobState.surplus, JobState.pose, JobState.fitted)
+    sources = (
+        JobState.skin,
+        JobState.part,
+        JobState.aligned,
+        JobState.deviation,
+        JobState.surplus,
+        JobState.pose,
+        JobState.fitted,
+    )
     return replace(work, job=state.derive(JobState.facts, facts, *sources, JobState.tolerance))
 
 
