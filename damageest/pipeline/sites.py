@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Reason
+from damageest.artefacts import Ints, Reason
 from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, Step, describe_points, follow
-from damageest.pipeline.state import Candidate, FoundSite, Work
+from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
 from damageest.registry.contracts import Contract
 from damageest.stages.enclose import Enclose, EncloseAll
 
@@ -110,6 +110,12 @@ def name_other(method: str) -> str:
     return "implicit" if method == "surface" else "surface"
 
 
+def find_place(state: JobState, members: Ints) -> tuple[float, float, float]:
+    """Where scan points ``members`` (M,) lie, in the part's frame."""
+    x, y, z = np.median(state.aligned.points[members], axis=0).tolist()
+    return x, y, z
+
+
 def set_specks_aside(engine: Engine, work: Work) -> Work:
     """Turns failures on clusters that are too small to be enclosed into warnings: stray points form such clusters."""
     failures, warnings = [], []
@@ -121,7 +127,8 @@ def set_specks_aside(engine: Engine, work: Work) -> Work:
             text = (
                 f"{error.place}, up to {depth:.3g} {state.unit} deep, are too few to bound a volume and were left out"
             )
-            warnings.append(Reason("speck", text, amount=depth, unit=state.unit))
+            place = find_place(state, members)
+            warnings.append(Reason("speck", text, amount=depth, unit=state.unit, place=place))
         else:
             failures.append(error)
     return replace(work, failures=tuple(failures), warnings=(*work.warnings, *warnings))

@@ -16,6 +16,7 @@ from damageest.geometry.pieces import JoinedPieces, find_pieces, join_pieces
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.sites import find_place
 from damageest.pipeline.state import FoundSite, JobState, Work
 from damageest.stages.cluster import Cluster
 from damageest.stages.enclose import EncloseAll
@@ -93,7 +94,10 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
                 f", and {of} its place" if of else ""
             )
             remedy = "put it back and scan again, or repair the part as if the piece were lost"
-            warnings.append(Reason("displaced_piece", text, amount=item.volume, unit=f"{state.unit}³", remedy=remedy))
+            place = find_place(state, item.points)
+            warnings.append(
+                Reason("displaced_piece", text, amount=item.volume, unit=f"{state.unit}³", place=place, remedy=remedy)
+            )
     if outside := [item for item in done if item.kind == "surroundings"]:
         names = "; ".join(f"surplus {item.id}: {item.share:.1%} of the scan, {item.notes[0]}" for item in outside[:5])
         share = sum(item.share for item in outside)
