@@ -11,6 +11,7 @@ from damageest.artefacts import Reason
 from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import compare_other_poses, describe_motion
+from damageest.checks.one_motion import is_one_motion
 from damageest.checks.scan_facts import gather_scan_facts
 from damageest.checks.two_sheets import measure_two_sheets
 from damageest.checks.unseen_rim import measure_unseen_rim
@@ -124,6 +125,7 @@ def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
             site.damage, state.part, state.coverage, 2 * max(state.tolerance, state.aligned.spacing)
         ),
         two_sheets=measure_two_sheets(state.aligned, state.deviation, state.part, site.members, state.tolerance),
+        one_motion=is_one_motion(state.aligned, state.deviation, state.part, site.members, state.tolerance),
         other_poses=compare_other_poses(site.damage, state.part, state.pose, state.tolerance),
         free=tuple(
             FreePose(describe_motion(one.motion, state.unit), *one.ends, one.moved * one.reach)
