@@ -131,7 +131,10 @@ def test_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
     assert run_one(job, "part=none").outcome == "refused"  # the process has started, and is used again
     row = run_one(job, "part=hanging", timeout=4)
     assert row.outcome == "timeout"
-    assert row.error == "part: hanging: not finished after 4 s (--timeout)"
+    assert row.error == "part: hanging: was ended: not finished after 4 s, the time limit of a job"
+    row = run_one(job, "part=hanging", stage_timeout=1)
+    assert row.outcome == "timeout", "a stage without a process of its own has its time limit too"
+    assert row.error == "part: hanging: was ended: not finished after 1 s, the time limit of a stage"
 
 
 BATCH = """
