@@ -9,8 +9,10 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+from damageest.batches.files import keep_picture
 from damageest.batches.jobs import MATRIX
 from damageest.batches.rows import describe_result
 from damageest.errors import DamageestError, StageError, clean_message
@@ -18,6 +20,8 @@ from damageest.isolation import Limits, ProcessError, Usage, call_isolated, end_
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
 from damageest.registry import Registry
+from damageest.registry.hookspecs import hookimpl
+from damageest.stages.report import ReportFiles
 
 _OUTCOMES = {"time": "timeout", "memory": "memory", "crash": "crashed", "exit": "crashed"}
 CHECKED = 1.0
@@ -61,11 +65,13 @@ def run_job(task: dict[str, Any]) -> dict[str, Any]:
 
     key = ""
     try:
-        registry = _discover()
+        registry, pictures = _discover()
+        pictures.last = b""
         job = load_job(task["job"], task["settings"], registry)
         key = compute_key(job, registry)
         limits = Limits(task["memory"], task["stage_timeout"])
         result = run(job, output=task["output"], cache=task["cache"], registry=registry, limits=limits)
+        keep_picture(Path(task["output"]), pictures.last)
         done = describe_result(result)
     except MemoryError:
         raise
@@ -88,10 +94,23 @@ def compute_key(job: Job, registry: Registry) -> str:
     return digest(stages, fixed, sorted(provider.fingerprint for provider in registry.providers))
 
 
+class _Pictures:
+    """Takes the picture of a run from its report."""
+
+    def __init__(self) -> None:
+        self.last = b""
+
+    @hookimpl
+    def damageest_after_stage(self, stage: str, output: object) -> None:
+        if stage == "report" and isinstance(output, ReportFiles):
+            self.last = output.picture
+
+
 @functools.cache
-def _discover() -> Registry:
-    """All that is installed; once for each process, which runs many jobs."""
-    return Registry.discover()
+def _discover() -> tuple[Registry, _Pictures]:
+    """All that is installed, and what observes it; once for each process, which runs many jobs."""
+    pictures = _Pictures()
+    return Registry.discover([pictures]), pictures
 
 
 @contextlib.contextmanager
