@@ -3,41 +3,24 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
 import itertools
-import json
 import os
 import pickle
-import selectors
-import signal
-import socket
-import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from damageest.errors import StageError
 from damageest.isolation import serve
-from damageest.isolation.clock import TICK, Clock
 from damageest.isolation.failures import ProcessError, RemoteTraceback, blame_authors, describe_end, describe_memory
 from damageest.isolation.limits import Limits, format_bytes, measure_free_memory, own_memory
-from damageest.isolation.notes import Page, set_place
-from damageest.isolation.one_thread import ONE_THREAD
+from damageest.isolation.notes import set_place
+from damageest.isolation.process import Answer, Call, Ended, WorkerProcess
 from damageest.isolation.serve import Usage
-from damageest.isolation.transfer import receive, send
 
 T = TypeVar("T")
-START_SECONDS = 120.0
-"""Longest time from the start of a worker until it answers."""
-_CODE = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1])\n"
-    "from damageest.isolation.serve import main; main(*map(int, sys.argv[2:]))"
-)
-_MOST_OUTPUT = 1 << 16
-"""Bytes of a worker's output that are kept until the call ends."""
 _workers: dict[tuple[int, str], _Worker] = {}
 _workers_lock = threading.Lock()
 _numbers = itertools.count()
@@ -80,7 +63,7 @@ def call_isolated(
         found = _workers.get(key)
         if found is None:
             found = _workers[key] = _Worker()
-    call = _Call(function, arguments, limits or Limits(), owner, show, nested, processor_time)
+    call = Call(function, arguments, limits or Limits(), owner, show, nested, processor_time)
     try:
         answer = found.answer(call, tell)
     finally:
@@ -113,63 +96,35 @@ def end_workers(beginning: str = "") -> None:
 atexit.register(end_workers)
 
 
-@dataclass(frozen=True)
-class _Call:
-    """The arguments of `call_isolated`."""
-
-    function: Callable[..., Any]
-    arguments: Mapping[str, Any]
-    limits: Limits
-    owner: str
-    show: bool
-    nested: bool
-    processor_time: bool
-
-
-@dataclass(frozen=True)
-class _Answer:
-    """What `serve` sends, and the bytes of ``memory`` that the process could allocate."""
-
-    kind: str
-    value: Any
-    what: str
-    usage: Usage
-    memory: int
-
-
 class _Worker:
-    """One process, started with its first call and after each crash. Calls from several threads wait for each other."""
+    """A process, started with its first call and after each crash. Calls from several threads wait for each other."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
-        self._output = bytearray()
+        self._process: WorkerProcess | None = None
 
-    def answer(self, call: _Call, tell: Callable[[Usage], None] | None) -> _Answer:
+    def answer(self, call: Call, tell: Callable[[Usage], None] | None) -> Answer:
         """What the process answers. Raises ProcessError where it ends before."""
         global _cpu_seconds
         with self._lock:
             memory = _share_memory(call.limits, call.owner)
-            if self._process is None or self._process.poll() is not None:
-                self._start()
-            assert self._process is not None
+            process = self._find_process()
             try:
-                clock = Clock(self._page, self._process.pid if call.processor_time else None)
-                answer = self._exchange(call, memory, clock)
-            except _Ended as end:
-                status = None if end.seconds else self._wait_for_end()
-                what = self._page.read().what
-                self.kill()
+                answer = process.ask(call, memory)
+            except Ended as end:
+                status = None if end.seconds else process.wait_for_end()
+                what = process.page.read().what
+                process.kill()
                 limits = Limits(call.limits.memory, end.seconds) if end.is_step else call.limits
-                error = describe_end(status, self._take_output(), memory, limits, call.owner)
+                error = describe_end(status, process.take_output(), memory, limits, call.owner)
                 set_place(error, what)
                 raise error  # noqa: B904  (it has a cause)
             except BaseException:  # as Ctrl-C: the worker may be anywhere in the call
-                self.kill()
+                process.kill()
                 raise
             if answer.kind in ("exit", "memory"):
-                self.kill()  # what it had allocated may still be there
-            output = self._take_output()
+                process.kill()  # what it had allocated may still be there
+            output = process.take_output()
             if call.show and output:
                 sys.stderr.write(output)
         _cpu_seconds += answer.usage.seconds
@@ -177,118 +132,27 @@ class _Worker:
             tell(answer.usage)
         return answer
 
-    def _start(self) -> None:
-        self._close()
-        self._channel, other = socket.socketpair()
-        leash, self._leash = os.pipe()
-        self._page = Page()
-        self._output = bytearray()
-        files = (other.fileno(), leash, self._page.file)
-        with other:
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _CODE, json.dumps(sys.path), *map(str, files)],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                pass_fds=files,
-                env={**os.environ, **ONE_THREAD},
-                start_new_session=True,  # Ctrl-C reaches the caller alone, which then ends the worker
-            )
-        os.close(leash)
-        self._reader = threading.Thread(target=self._collect, args=(self._process, self._output), daemon=True)
-        self._reader.start()
-        try:
-            self._wait(START_SECONDS)
-            receive(self._channel, copy=True)
-        except (_Ended, EOFError):
-            self.kill()
-            last = _last_line(self._take_output())
-            raise StageError(f"its worker process did not start: {last or 'no message'}", "install it again") from None
-
-    def _exchange(self, call: _Call, memory: int, clock: Clock) -> _Answer:
-        try:
-            send(self._channel, (sys.path, memory, call.nested))
-            send(self._channel, (call.function, dict(call.arguments)))
-            self._wait(call.limits.seconds, clock)
-            kind, value, what, usage = receive(self._channel, copy=True)
-        except (EOFError, ConnectionError):
-            raise _Ended from None
-        return _Answer(kind, value, what, usage, memory)
-
-    def _wait(self, seconds: float, clock: Clock | None = None) -> None:
-        """Waits for an answer. Raises _Ended where there is none in time, or the process has ended."""
-        end = time.monotonic() + seconds if seconds else float("inf")
-        with selectors.PollSelector() as selector:  # not select(): it takes no file numbers above 1023
-            selector.register(self._channel, selectors.EVENT_READ)
-            while True:
-                left = end - time.monotonic()
-                if selector.select(max(0.0, min(left, TICK))):
-                    return
-                # a process that the worker started may hold the channel open
-                if self._process is None or self._process.poll() is not None:
-                    raise _Ended
-                if left <= 0:
-                    raise _Ended(seconds)
-                if clock and (late := clock.find_late()):
-                    raise _Ended(late.seconds, is_step=True)
+    def _find_process(self) -> WorkerProcess:
+        """The process, a new one where there is none that runs."""
+        if self._process is None or not self._process.is_running:
+            if self._process is not None:
+                self._process.kill()
+            self._process = WorkerProcess()
+            self._process.wait_for_start()
+        return self._process
 
     def end(self) -> bool:
         """Ends the process, from any thread. Gives whether no call was in progress; one that was raises then."""
         if self._lock.acquire(blocking=False):
             try:
-                self.kill()
+                if self._process is not None:
+                    self._process.kill()
             finally:
                 self._lock.release()
             return True
-        if self._process is not None and self._process.poll() is None:
-            with contextlib.suppress(OSError):
-                os.killpg(self._process.pid, signal.SIGKILL)
-        return False
-
-    def kill(self) -> None:
-        """Ends the process and what it started."""
         if self._process is not None:
-            with contextlib.suppress(OSError):
-                os.killpg(self._process.pid, signal.SIGKILL)
-            self._process.wait()
-            self._reader.join(timeout=1)
-        self._close()
-
-    def _wait_for_end(self) -> int | None:
-        """The exit status of a process that ends by itself; None where it does not."""
-        assert self._process is not None
-        try:
-            return self._process.wait(timeout=5)
-        except subprocess.TimeoutExpired:
-            return None
-
-    def _close(self) -> None:
-        if hasattr(self, "_channel"):
-            self._channel.close()
-            os.close(self._leash)
-            self._page.close()
-            del self._channel, self._leash, self._page
-
-    @staticmethod
-    def _collect(process: subprocess.Popen[bytes], output: bytearray) -> None:
-        """Reads what the worker prints, so that it never waits for a reader. The end of it is kept."""
-        assert process.stdout is not None
-        with process.stdout as stream:
-            while text := os.read(stream.fileno(), 1 << 16):
-                output += text
-                del output[:-_MOST_OUTPUT]
-
-    def _take_output(self) -> str:
-        text = bytes(self._output).decode(errors="replace")
-        self._output.clear()
-        return text
-
-
-class _Ended(Exception):  # noqa: N818
-    """The worker gives no answer: it has ended, or is late after ``seconds``, the limit of the call or of a step."""
-
-    def __init__(self, seconds: float = 0.0, is_step: bool = False) -> None:
-        self.seconds, self.is_step = seconds, is_step
+            self._process.interrupt()
+        return False
 
 
 def _share_memory(limits: Limits, owner: str) -> int:
@@ -309,7 +173,7 @@ _LEAST_MEMORY = 100 * 10**6
 """A worker needs about this much to start."""
 
 
-def _unpack(answer: _Answer, call: _Call) -> tuple[BaseException, BaseException | None]:
+def _unpack(answer: Answer, call: Call) -> tuple[BaseException, BaseException | None]:
     """What the function raised, and its cause."""
     if answer.kind == "exit":
         text = f"called sys.exit({answer.value}), which would end the run"
@@ -321,8 +185,3 @@ def _unpack(answer: _Answer, call: _Call) -> tuple[BaseException, BaseException 
     if not isinstance(error, (Exception, KeyboardInterrupt)):  # as GeneratorExit: it would end more than the call
         error = ProcessError("exit", f"raised {name}{f' ({text})' if text else ''}", blame_authors(call.owner))
     return error, RemoteTraceback(trace)
-
-
-def _last_line(output: str) -> str:
-    lines = output.strip().splitlines()
-    return lines[-1][:400] if lines else ""
