@@ -239,7 +239,7 @@ def _fit_vertices(mesh: Mesh, free: Flags, points: Floats, tolerance: float) -> 
     """Moves ``free`` (V,) vertices along their normals, by less than half the tolerance, so that triangles pass through
     ``points`` (N,3) by least squares: without it, chords over a curved surface lie all on one side."""
     _, face, place = closest_on_mesh(points, mesh)
-    weights = find_barycentric(mesh.triangles[face], place)
+    weights = find_barycentric(mesh.triangles[face], place, clip=False)
     along = mesh.face_normals[face]
     offset = np.einsum("ij,ij->i", points - place, along)
     normal = mesh.vertex_normals
