@@ -1,16 +1,11 @@
-"""Whether a scan that is drawn again gives the same verdicts, and volumes inside the intervals.
-
-``python -m damageest_evaluate.troubles.steady CASE`` runs one case, given as JSON, and prints its row.
-"""
+"""Whether a scan that is drawn again gives the same verdicts, and volumes inside the intervals."""
 
 from __future__ import annotations
 
-import json
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +14,7 @@ from damageest.errors import DamageestError, StageError
 from damageest.geometry.solids import to_manifold
 from damageest.geometry.transforms import move_mesh
 from damageest.result import Result, Site
-from damageest_evaluate.processes import MARK, Row
+from damageest_evaluate.processes import Row
 from damageest_evaluate.troubles.case import TroubleCase, make_scan, make_scene
 from damageest_evaluate.troubles.scene import Scanning
 
@@ -78,11 +73,12 @@ DRAWS: Mapping[str, Draw] = {
 class SteadyCase(TroubleCase):
     """A case of the honesty suite whose scan is drawn again."""
 
-    module: ClassVar[str] = "damageest_evaluate.troubles.steady"
-
     def make_blank_row(self) -> Row:
         row = {name: getattr(self, name) for name in ("kind", "part", "pose", "number", "seed", "points")}
         return row | {"key": self.compute_key(), "sites": [], "error": "", "seconds": 0.0}
+
+    def run(self) -> Row:
+        return run_steady(self)
 
 
 def run_steady(case: SteadyCase) -> Row:
@@ -190,7 +186,3 @@ def _count(sites: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
     inside = sum(site["inside"] for site in again)
     return [str(len(sites)), *(f"{one / len(sites):.0%}" for one in counts), f"{inside / max(len(again), 1):.0%}"]
-
-
-if __name__ == "__main__":
-    print(MARK + json.dumps(run_steady(SteadyCase(**json.loads(sys.argv[1])))), flush=True)
