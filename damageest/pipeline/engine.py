@@ -153,7 +153,7 @@ class Engine:
         return state
 
     def _run(self, step: Step[..., Any], state: JobState) -> Any:
-        own = {"engine": self, "state": state.select(step.takes)} if "state" in step.passed else {"engine": self}
+        own = {"engine": self, "state": state.select(step.takes)}
         return step.function(**{name: own[name] if name in own else state.get(name) for name in step.passed})
 
     def describe(self, contract: Contract) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Floats, Part, Pose, Reason, Scan
+from damageest.artefacts import Deviation, Floats, Ints, Part, Pose, Reason, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.fit_doubts import find_fit_doubts
 from damageest.checks.form_words import describe_fit
@@ -17,7 +17,7 @@ from damageest.checks.view_fit import ViewFits, fit_views
 from damageest.findings import Surplus
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import measure_noise_and_spacing
-from damageest.pipeline.state import FoundSite, JobState, Reasons
+from damageest.pipeline.state import FoundSite, Reasons
 from damageest.pipeline.steps import step
 from damageest.stages.align import Align
 from damageest.stages.scan import ReadScan
@@ -117,14 +117,16 @@ def question_fit(
     return replace(fitted, fit=fit), [*kept, Reason("model_fit", fit.words)]
 
 
-def measure_at_site(state: JobState, site: FoundSite) -> float:
-    """How far intact skin deviates at a site by the model that the fit names; 0 where the part is as designed."""
-    members = site.members
-    if state.fitted is None or state.fitted.fit.model == "ok" or not len(members):
+def measure_at_site(
+    fitted: FittedModel | None, part: Part, aligned: Scan, deviation: Deviation, members: Ints
+) -> float:
+    """How far intact skin deviates at the points ``members`` of a site by the model that the fit names; 0 where the
+    part is as designed."""
+    if fitted is None or fitted.fit.model == "ok" or not len(members):
         return 0.0
-    normals = state.part.face_normals[state.deviation.face[members]]
-    places = state.aligned.points[members] - state.deviation.distance[members, None] * normals
-    return measure_local(state.fitted, places, normals)
+    normals = part.face_normals[deviation.face[members]]
+    places = aligned.points[members] - deviation.distance[members, None] * normals
+    return measure_local(fitted, places, normals)
 
 
 def measure_local(fitted: FittedModel, places: Floats, normals: Floats) -> float:

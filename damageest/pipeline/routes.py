@@ -1,7 +1,9 @@
 """The routes: which contracts are called in which order, and the steps between them.
 
-A contract calls the implementation that the job names, once per job or once per site as the contract says. A step takes
-all of the work and gives it changed; some steps call contracts themselves, and have them as arguments.
+A contract calls the implementation that the job names, once per job or once per site as the contract says. A step is
+the code between them. Beside each stands what it takes and what it gives, by the names of `JobState` and, for what is
+called once per site, of `Candidate`; ``+``: it adds to what is there; ``calls``: contracts that a step calls itself. A
+test compares these lines with the code.
 """
 
 from __future__ import annotations
@@ -54,18 +56,77 @@ from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
-    ReadPart, check_selections, ReadScan, crop_scan, set_far_aside, measure_scan, take_tolerance, Sample, Align,
-    place_scan, note_pose, where_thinned(add_points_near_damage, place_scan), correct_views, correct_scale,
-    settle_tolerance, Segment, check_intact, inspect_skin, fit_model, Cluster, find_surplus, gather_intact,
-)  # fmt: skip
-BY_SITE: Route = (take_clusters, Reconstruct, Boundary, enclose_grouped, Repair, Boolean, gather_sites)
-AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
+    ReadPart,  # unit, tolerance -> part
+    check_selections,  # part ->
+    ReadScan,  # unit, part -> scan
+    crop_scan,  # scan, reader -> scan
+    set_far_aside,  # scan, part -> scan, +warnings
+    measure_scan,  # scan, part -> noise, spacing, depth_step
+    take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
+    Sample,  # part, tolerance -> samples
+    Align,  # scan, part, samples, tolerance -> pose
+    place_scan,  # scan, pose -> aligned, noise, spacing
+    note_pose,  # pose -> +warnings
+    where_thinned(  # scan, reader
+        add_points_near_damage,  # reader, scan, pose, part, tolerance, unit -> scan
+        place_scan,  # scan, pose -> aligned, noise, spacing
+    ),
+    correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner
+    #     -> views, pose, aligned, noise, spacing, tolerance
+    correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader -> scan, pose, aligned, corrected_scale
+    settle_tolerance,  # tolerance, asked_tolerance, part, aligned, noise -> tolerance, +warnings
+    Segment,  # aligned, part, samples, tolerance -> deviation
+    check_intact,  # deviation, tolerance, part, segmenter ->
+    inspect_skin,  # part, aligned, deviation, tolerance -> skin, deviation
+    fit_model,  # part, aligned, deviation, tolerance, unit, views, corrected_scale -> fitted, +warnings
+    Cluster,  # aligned, deviation, tolerance -> sites
+    find_surplus,  # calls Cluster, EncloseAll: unit, aligned, deviation, tolerance, part, sites, samples
+    #     -> surplus, deviation, +warnings
+    gather_intact,  # aligned, deviation, sites -> intact, +warnings
+)
+BY_SITE: Route = (
+    take_clusters,  # aligned, sites, encloser, wanted -> candidates
+    Reconstruct,  # points, part, tolerance, spacing, noise -> surface
+    Boundary,  # surface, part, tolerance -> rims
+    enclose_grouped,  # calls Background, Enclose: candidates, aligned, sites, part, tolerance, spacing, intact, samples
+    #     -> candidates, +failures
+    Repair,  # enclosure, tolerance -> solid
+    Boolean,  # solid, part -> damage
+    gather_sites,  # candidates, aligned, deviation, sites, part, tolerance, unit -> found, +failures, +warnings
+)
+AT_ONCE: Route = (
+    EncloseAll,  # part, aligned, deviation, sites, samples, tolerance -> enclosures
+    take_enclosures,  # enclosures, aligned, sites, encloser_at_once -> candidates, +failures
+    Boolean,  # solid, part -> damage
+    gather_sites,  # candidates, aligned, deviation, sites, part, tolerance, unit -> found, +failures, +warnings
+)
 CLOSE: Route = (
-    add_lost_bodies, set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus, gather_facts,
-    measure_uncertainty, judge_sites, question_fit, make_deposits, separate_deposits, plan_paths, sum_uncertainty,
-    collect_result,
-)  # fmt: skip
-WRITE: Route = (Export, describe_output, show_result, write_output)
+    add_lost_bodies,  # part, skin, found -> found
+    set_specks_aside,  # failures, sites, deviation, unit -> failures, +warnings
+    number_sites,  # found -> found
+    choose_sites,  # found, choice, aligned, deviation, part, tolerance -> found, +warnings
+    describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
+    relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
+    gather_facts,  # skin, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner -> facts
+    measure_uncertainty,  # found, part, aligned, deviation, skin, coverage, facts, fitted, pose, tolerance -> found
+    judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit
+    #     -> found
+    question_fit,  # fitted, surplus, found, pose, aligned, deviation, skin, unit, tolerance, warnings
+    #     -> fitted, warnings
+    make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
+    separate_deposits,  # found, tolerance -> found
+    plan_paths,  # calls Path: found, part, tolerance -> found, +failures
+    sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance -> volume_95
+    collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
+    #     coverage, surplus, fitted, volume_95, conversions
+    #     -> result
+)
+WRITE: Route = (
+    Export,  # result, folder, writers, path_writers -> written
+    describe_output,  # result, written, target -> result, content, job_text
+    show_result,  # calls Report: written, result, folder, content, job_text -> result, written
+    write_output,  # result, written, folder, target ->
+)
 """After one of the routes, where the result goes to files."""
 
 

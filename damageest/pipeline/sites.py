@@ -62,14 +62,14 @@ def take_enclosures(
     return tuple(candidates), failures
 
 
-@step(gives=("candidates", "found", "failures", "warnings"))
+@step(gives=("found", "failures", "warnings"))
 def gather_sites(
-    candidates: tuple[Candidate, ...], found: tuple[FoundSite, ...], aligned: Scan, deviation: Deviation, sites: Sites,
-    part: Part, tolerance: float, unit: str,
-) -> tuple[tuple[Candidate, ...], tuple[FoundSite, ...], Failures, Reasons]:  # fmt: skip
+    candidates: tuple[Candidate, ...], aligned: Scan, deviation: Deviation, sites: Sites, part: Part, tolerance: float,
+    unit: str,
+) -> tuple[tuple[FoundSite, ...], Failures, Reasons]:  # fmt: skip
     """Turns damage volumes into sites, each compared with the scan. Clusters left without a volume are failures."""
     if not candidates:
-        return (), found, (), ()
+        return (), (), ()
     method = candidates[0].method
     reach = max(2 * tolerance, aligned.spacing)
     pieces, dropped = [], 0.0
@@ -103,7 +103,7 @@ def gather_sites(
     if dropped > 1e-3 * sum(site.damage.volume for site in out):
         text = f"pieces of {dropped:.3g} {unit}³ that no damaged point touches were dropped"
         warnings.append(Reason("scraps", text, amount=dropped, unit=f"{unit}³"))
-    return (), tuple(out), failures, warnings
+    return tuple(out), failures, warnings
 
 
 def name_other(method: str) -> str:

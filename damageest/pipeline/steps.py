@@ -93,7 +93,8 @@ def _check(function: Callable[..., Any], named: Sequence[str], reads: Sequence[s
         if not accepts(hints[name], kinds[name]):
             raise TypeError(f"{_where(function)} takes {_show(name, hints[name])}; it is a {_show(name, kinds[name])}")
     result = hints["return"]
-    returned = () if result is type(None) else (result,) if len(given) == 1 else typing.get_args(result)
+    is_tuple = typing.get_origin(result) is tuple and len(given) != 1
+    returned = typing.get_args(result) if is_tuple else () if result is type(None) else (result,)
     if len(returned) != len(given):
         raise TypeError(
             f"{_where(function)} gives {', '.join(given) or 'nothing'}, but returns {describe_type(result)}"

@@ -39,7 +39,7 @@ BESIDE = 2.0
 @step(
     gives="found",
     reads=(
-        "found", "part", "aligned", "deviation", "skin", "coverage", "facts", "fitted", "pose", "tolerance", "unit",
+        "found", "part", "aligned", "deviation", "skin", "coverage", "facts", "fitted", "pose", "tolerance",
     ),
 )  # fmt: skip
 def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
@@ -95,7 +95,8 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     # what the model fit gives is the 95 % bound of a deviation
     found = measure_site_error(
         site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts,
-        form=measure_at_site(state, site) / WIDTH, free=state.pose.free,
+        free=state.pose.free,
+        form=measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH,
     )  # fmt: skip
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))
