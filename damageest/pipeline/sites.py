@@ -10,7 +10,8 @@ from damageest.artefacts import Deviation, Enclosures, Part, Reason, Scan, Sites
 from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
-from damageest.pipeline.engine import AnyStep, Branch, Engine, describe_points, follow
+from damageest.pipeline.engine import AnyStep, Branch, Engine, follow
+from damageest.pipeline.stage_errors import describe_points
 from damageest.pipeline.state import Candidate, Failures, FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.registry.contracts import Contract

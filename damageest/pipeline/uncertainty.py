@@ -38,10 +38,8 @@ BESIDE = 2.0
 
 @step(
     gives="found",
-    reads=(
-        "found", "part", "aligned", "deviation", "skin", "coverage", "facts", "fitted", "pose", "tolerance",
-    ),
-)  # fmt: skip
+    reads=("found", "part", "aligned", "deviation", "skin", "coverage", "facts", "fitted", "pose", "tolerance"),
+)
 def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
     """Gives each site the 95 % intervals of its volume and depth, with all causes that have a size."""
     if not state.found:
