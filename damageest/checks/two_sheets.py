@@ -40,7 +40,6 @@ def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members:
     low, high = aligned.points[below].min(axis=0), aligned.points[below].max(axis=0)
     near = find_in_box(aligned.points, low - 3 * tolerance - 3 * spacing, high + 3 * tolerance + 3 * spacing)
     # whatever their label: among damaged points, means of neighbours make damage of points on the skin
-    # whatever their label: among damaged points, means of neighbours make damage of points on the skin
     distance = deviation.distance[near]
     near, distance = near[distance < ON_SKIN * tolerance], distance[distance < ON_SKIN * tolerance]
     is_on = np.concatenate([np.zeros(len(below), bool), distance > -ON_SKIN * tolerance])

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Evidence, Flags, Floats, FreeMotion, Part, Scan, Solid
+from damageest.checks.beyond_points import BeyondPoints
 from damageest.checks.inner_surface import measure_inner_surface, pair_faces
 from damageest.checks.pose_error import PoseError
 from damageest.findings import Coverage, Interval
@@ -54,10 +55,10 @@ class SiteError:
 
     ``pose`` (K,): signed, by the columns of `PoseError.spread`; ``excess``: by how much the volume is too large on
     average; ``rates`` (M,): change of the volume for each unit of each free motion, and ``motions`` (M,2): their ends;
-    ``inside``, ``beside``, ``fading``: by how much the loss may be larger; ``less``: by how much it may be smaller,
-    since the inner surface was closed across what was not seen. ``depth``: of the damage volume, corrected for its mean
-    error; ``depth_error``: one standard deviation; ``depth_free``: change by the free motions.
-    ``measured``: the largest depth of a scan point, with what its noise, the pose and the skin may be off.
+    ``inside`` (where points do not bound it), ``beside``, ``fading``: by how much the loss may be larger; ``less``: by
+    how much it may be smaller, since the inner surface was closed across what was not seen. ``depth``: of the damage
+    volume, corrected for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free
+    motions. ``measured``: the largest depth of a scan point, with what its noise, the pose and the skin may be off.
     """
 
     volume: float
@@ -89,7 +90,7 @@ class SiteError:
 
 def measure_site_error(
     damage: Solid, inner: Flags, part: Part, aligned: Scan, members: Floats, evidence: Evidence, pose: PoseError,
-    scan: ScanFacts, form: float = 0.0, free: Sequence[FreeMotion] = (),
+    scan: ScanFacts, beyond: BeyondPoints, form: float = 0.0, free: Sequence[FreeMotion] = (),
 ) -> SiteError | None:  # fmt: skip
     """The errors of one site; None where no scan point lies on its inner surface.
 
@@ -97,6 +98,7 @@ def measure_site_error(
         inner: (F,) which faces of ``damage`` are on its inner surface, as `find_inner_faces` gives them.
         members: (M,3) its scan points, in the part's frame.
         scan: what the whole scan says about skin that deviates.
+        beyond: how the damage volume lies against its points.
         form: standard deviation by which the skin deviates systematically, in the job's unit, as a fit of the model
             gives it; where it is less than what the intact skin shows, the latter counts.
         free: motions that the scan does not exclude.
@@ -131,7 +133,7 @@ def measure_site_error(
         form=float(max(form * exposed, systematic * exposed / np.sqrt(patches))),
         outward=outward * exposed / WIDTH,
         views=scan.between_views * exposed / WIDTH,
-        inside=HOLE * hole**1.5,
+        inside=HOLE * hole**1.5 + beyond.short,
         less=damage.volume * evidence.ids_unseen if hole else 0.0,
         depth=deepest.depth - surface.depth_excess,
         depth_error=float(np.sqrt(surface.depth**2 + beside)),

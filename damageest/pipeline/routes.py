@@ -108,7 +108,8 @@ CLOSE: Route = (
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
     gather_facts,  # skin, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner -> facts
-    measure_uncertainty,  # found, part, aligned, deviation, skin, coverage, facts, fitted, pose, tolerance -> found
+    measure_uncertainty,  # found, part, aligned, deviation, skin, coverage, facts, fitted, pose, tolerance, unit
+    #     -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit
     #     -> found
     question_fit,  # fitted, surplus, found, pose, aligned, deviation, skin, unit, tolerance, warnings

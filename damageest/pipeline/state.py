@@ -32,6 +32,7 @@ from damageest.artefacts import (
     Solid,
     Surface,
 )
+from damageest.checks.beyond_points import BeyondPoints
 from damageest.checks.coverage import SkinView
 from damageest.checks.free_pose import Dependence
 from damageest.checks.model_fit import FittedModel
@@ -150,8 +151,8 @@ class FoundSite(_SiteState):
     """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
     ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
     ``displaced``, ``covered``: as in `SiteFacts`; ``uncertainty``: of the volume of ``damage``, and ``error``: the same
-    in a form that adds up over the sites; ``dependences``: on the free motions of the pose; ``enclosures``: as in
-    `Site`."""
+    in a form that adds up over the sites; ``beyond``: how ``damage`` lies against its points; ``dependences``: on the
+    free motions of the pose; ``enclosures``: as in `Site`."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -165,6 +166,7 @@ class FoundSite(_SiteState):
     covered: tuple[tuple[int, float], ...] = ()
     uncertainty: Uncertainty | None = None
     error: SiteError | None = None
+    beyond: BeyondPoints = field(default_factory=BeyondPoints)
     dependences: tuple[Dependence, ...] = ()
     enclosures: tuple[Solid, ...] = ()
 

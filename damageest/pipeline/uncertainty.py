@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from damageest.artefacts import Deviation, Flags, Ints, Part, Pose, Scan
+from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
 from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
@@ -38,7 +39,7 @@ BESIDE = 2.0
 
 @step(
     gives="found",
-    reads=("found", "part", "aligned", "deviation", "skin", "coverage", "facts", "fitted", "pose", "tolerance"),
+    reads=("found", "part", "aligned", "deviation", "skin", "coverage", "facts", "fitted", "pose", "tolerance", "unit"),
 )
 def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
     """Gives each site the 95 % intervals of its volume and depth, with all causes that have a size."""
@@ -90,9 +91,14 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         return replace(site, uncertainty=Uncertainty((known, known), None), error=error)
     points = state.aligned.points[site.members]
     inner = find_inner_faces(site.damage, state.part)
+    beyond = ask_beyond_points(
+        site.damage, state.part, points, state.aligned.points, state.aligned.noise, state.aligned.spacing,
+        state.tolerance, state.unit,
+    )  # fmt: skip
+    site = replace(site, beyond=beyond)
     # what the model fit gives is the 95 % bound of a deviation
     found = measure_site_error(
-        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts,
+        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts, beyond,
         free=state.pose.free,
         form=measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH,
     )  # fmt: skip

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Deviation, Part, Pose, Reason, Scan
-from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import compare_other_poses, describe_motion
@@ -105,10 +104,6 @@ def is_accepted(accept: Accept, level: Level, number: int) -> bool:
 
 def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
     depth, points = -state.deviation.distance[site.members], state.aligned.points
-    beyond = ask_beyond_points(
-        site.damage, state.part, points[site.members], points, state.aligned.noise, state.aligned.spacing,
-        state.tolerance, state.unit,
-    )  # fmt: skip
     typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
     return SiteFacts(
         volume=site.damage.volume,
@@ -132,8 +127,8 @@ def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
         ),
         displaced=site.displaced,
         covered=site.covered,
-        beyond=beyond.amount,
-        beyond_words=beyond.reason,
+        beyond=site.beyond.amount,
+        beyond_words=site.beyond.reason,
     )
 
 

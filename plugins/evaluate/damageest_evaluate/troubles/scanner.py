@@ -50,6 +50,25 @@ def make_wavy(case: Scanning) -> TroubleScene:
     return scene.with_points(scene.points + height[:, None] * find_normals(case, scene.points))
 
 
+def make_hollow(case: Scanning) -> TroubleScene:
+    """As `make_wavy`, with waves that only go inward; what lies outside is on the skin."""
+    scene = case.scan(case.part, None, noise=0)
+    waves, phases = make_random_waves(case.part.diagonal / 6, case.make_rng(7))
+    height = case.amount * case.tolerance * np.minimum(evaluate_waves(scene.points, waves, phases), 0)
+    noise = case.make_rng(12).normal(scale=case.noise, size=scene.points.shape)
+    return scene.with_points(scene.points + height[:, None] * find_normals(case, scene.points) + noise)
+
+
+def lay_sheets(case: Scanning) -> TroubleScene:
+    """The second view is ``amount`` tolerances too deep, away from its scanner; the part is undamaged."""
+    scene = case.scan(case.part, None)
+    assert scene.view is not None
+    assert scene.scanners is not None
+    way = case.part.bounds.mean(axis=0) - scene.scanners[1]
+    deeper = case.amount * case.tolerance * way / np.linalg.norm(way)
+    return scene.with_points(scene.points + (scene.view == 1)[:, None] * deeper)
+
+
 def find_normals(case: Scanning, points: Floats) -> Floats:
     """The outward unit normal (N,3) of the face of the part that is nearest to each point."""
     cross = case.part.cross[closest_on_mesh(points, case.part)[1]]
