@@ -102,12 +102,12 @@ AT_ONCE: Route = (
 )
 CLOSE: Route = (
     add_lost_bodies,  # part, skin, found -> found
-    set_specks_aside,  # failures, sites, deviation, unit -> failures, +warnings
+    set_specks_aside,  # failures, sites, aligned, deviation, unit -> failures, +warnings
     number_sites,  # found -> found
     choose_sites,  # found, choice, aligned, deviation, part, tolerance -> found, +warnings
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
-    gather_facts,  # skin, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner -> facts
+    gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner -> facts
     measure_uncertainty,  # found, part, aligned, deviation, skin, coverage, facts, fitted, pose, tolerance, unit
     #     -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Enclosures, Part, Reason, Scan, Sites
+from damageest.artefacts import Deviation, Enclosures, Floats, Ints, Part, Reason, Scan, Sites
 from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
@@ -112,8 +112,16 @@ def name_other(method: str) -> str:
     return "implicit" if method == "surface" else "surface"
 
 
+def find_place(points: Floats, members: Ints) -> tuple[float, float, float]:
+    """Where scan points ``members`` (M,) lie, of ``points`` (N,3) in the part's frame."""
+    x, y, z = np.median(points[members], axis=0).tolist()
+    return x, y, z
+
+
 @step(gives=("failures", "warnings"))
-def set_specks_aside(failures: Failures, sites: Sites, deviation: Deviation, unit: str) -> tuple[Failures, Reasons]:
+def set_specks_aside(
+    failures: Failures, sites: Sites, aligned: Scan, deviation: Deviation, unit: str
+) -> tuple[Failures, Reasons]:
     """Turns failures on clusters that are too small to be enclosed into warnings: stray points form such clusters."""
     kept, warnings = [], []
     for error in failures:
@@ -121,7 +129,8 @@ def set_specks_aside(failures: Failures, sites: Sites, deviation: Deviation, uni
         if 0 < len(members) < SPECK:
             depth = float(-deviation.distance[members].min())
             text = f"{error.place}, up to {depth:.3g} {unit} deep, are too few to bound a volume and were left out"
-            warnings.append(Reason("speck", text, amount=depth, unit=unit))
+            place = find_place(aligned.points, members)
+            warnings.append(Reason("speck", text, amount=depth, unit=unit, place=place))
         else:
             kept.append(error)
     return kept, warnings

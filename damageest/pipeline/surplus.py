@@ -15,6 +15,7 @@ from damageest.geometry.complement import complement_deviation, complement_part,
 from damageest.geometry.pieces import JoinedPieces, find_pieces, join_pieces
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.sites import find_place
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.stages.cluster import Cluster
@@ -91,7 +92,10 @@ def relate_surplus(
                 f", and {of} its place" if of else ""
             )
             remedy = "put it back and scan again, or repair the part as if the piece were lost"
-            warnings.append(Reason("displaced_piece", text, amount=item.volume, unit=f"{unit}³", remedy=remedy))
+            place = find_place(aligned.points, item.points)
+            warnings.append(
+                Reason("displaced_piece", text, amount=item.volume, unit=f"{unit}³", place=place, remedy=remedy)
+            )
     if outside := [item for item in done if item.kind == "surroundings"]:
         names = "; ".join(f"surplus {item.id}: {item.share:.1%} of the scan, {item.notes[0]}" for item in outside[:5])
         share = sum(item.share for item in outside)

@@ -12,6 +12,7 @@ from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import compare_other_poses, describe_motion
 from damageest.checks.model_fit import FittedModel
+from damageest.checks.one_motion import is_one_motion
 from damageest.checks.scan_facts import gather_scan_facts
 from damageest.checks.two_sheets import measure_two_sheets
 from damageest.checks.unseen_rim import measure_unseen_rim
@@ -62,12 +63,12 @@ def choose_sites(
 
 @step(gives="facts")
 def gather_facts(
-    skin: SkinView, aligned: Scan, deviation: Deviation, surplus: tuple[Surplus, ...], pose: Pose,
+    skin: SkinView, part: Part, aligned: Scan, deviation: Deviation, surplus: tuple[Surplus, ...], pose: Pose,
     fitted: FittedModel | None, tolerance: float, unit: str, aligner: Align | None,
 ) -> ScanFacts:  # fmt: skip
     """Measures what the whole scan says about skin that deviates and is not damaged."""
     return gather_scan_facts(
-        skin, aligned, deviation, surplus, pose, None if fitted is None else fitted.fit, tolerance, unit,
+        skin, part, aligned, deviation, surplus, pose, None if fitted is None else fitted.fit, tolerance, unit,
         is_fitted=getattr(aligner, "use", "none") != "none" and not pose.is_held,
     )  # fmt: skip
 
@@ -120,6 +121,7 @@ def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
             site.damage, state.part, state.coverage, 2 * max(state.tolerance, state.aligned.spacing)
         ),
         two_sheets=measure_two_sheets(state.aligned, state.deviation, state.part, site.members, state.tolerance),
+        one_motion=is_one_motion(state.aligned, state.deviation, state.part, site.members, state.tolerance),
         other_poses=compare_other_poses(site.damage, state.part, state.pose, state.tolerance),
         free=tuple(
             FreePose(describe_motion(one.motion, state.unit), *one.ends, one.moved * one.reach)
