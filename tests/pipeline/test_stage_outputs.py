@@ -25,9 +25,8 @@ from damageest.artefacts import (
     Solid,
 )
 from damageest.errors import StageError
-from damageest.pipeline.engine import follow
+from damageest.pipeline.engine import follow, start
 from damageest.pipeline.sites import take_enclosures
-from damageest.pipeline.state import JobState, Work
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS
 from damageest.registry.outputs import CHECKS
@@ -278,9 +277,10 @@ def test_a_site_without_an_enclosure_is_a_failure(registry: Registry, folder: Pa
     """It would be missing in the result else, without a word."""
     value = Enclosures((Enclosure(make_given(folder)["background"], (2,)),))
     engine = call(NAMES["EncloseAll"], lambda: value, registry, folder, give_engine=True)
-    given = make_given(folder)
-    state = JobState(given, dict.fromkeys(given, "k"))
-    work = follow((NAMES["EncloseAll"], take_enclosures), engine, Work(state))
+    state = start(engine)
+    for name, given in make_given(folder).items():
+        state = state.with_named(name, given, "k")
+    work = follow((NAMES["EncloseAll"], take_enclosures), engine, state)
     assert [candidate.clusters for candidate in work.candidates] == [(2,)]
     (failure,) = work.failures
     assert str(failure).startswith("enclose: fake (")
