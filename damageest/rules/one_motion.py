@@ -10,9 +10,7 @@ from damageest.rules import Rule, ScanFacts, SiteFacts
 
 class OneMotion(Rule):
     code = "one_motion"
-    meaning = (
-        "one motion brings the site's points, on faces of several directions, back onto the skin: a view is misplaced"
-    )
+    meaning = "one motion brings the site's points, on several faces, back onto the skin: a view is misplaced"
     threshold = "what is left is the noise, in nine tenths of its points; a site of 5% of the scan's points or more"
     remedy = "register the views to each other again, or give them as a list of files, so that they can be compared"
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
-from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Scan
+from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Part, Scan
 from damageest.checks.one_motion import is_one_motion
 from damageest.geometry.distance import signed_distance
 from damageest.stages.scan.simulate import Simulate
@@ -48,6 +49,19 @@ def test_a_shifted_view_is_found(shift: float) -> None:
 )
 def test_losses_are_no_motion(tool: dict[str, object]) -> None:
     assert not ask(scan_box(tool))
+
+
+def test_a_journal_that_is_worn_on_one_side_is_no_motion() -> None:
+    mesh = trimesh.creation.cylinder(10, 40, sections=180)
+    part = Part(mesh.vertices, mesh.faces)
+    points, index = trimesh.sample.sample_surface(mesh, 20_000, seed=1)
+    worn = (points[:, 0] > 0) & (np.abs(mesh.face_normals[index][:, 2]) < 0.5)
+    points = points + np.random.default_rng(1).normal(scale=NOISE, size=points.shape)
+    points[worn] -= [0.8, 0, 0]
+    distance, face = signed_distance(points, part)
+    label = np.where(distance < -TOLERANCE, DAMAGE, INTACT).astype(np.uint8)
+    scan, members = Scan(points, noise=NOISE, spacing=0.6), np.flatnonzero(label == DAMAGE)
+    assert not is_one_motion(scan, Deviation(distance, face, label), part, members, TOLERANCE)
 
 
 def test_wear_of_all_faces_is_no_motion() -> None:
