@@ -25,8 +25,13 @@ ON_SKIN = 0.5
 """Largest depth, in tolerances, of the upper surface over a site."""
 FACING = 3.0
 """Weight of a difference of normals, in spacings: a thin wall has two sides."""
+STRAIGHT = 0.15
+"""Difference of a point's distances to the skin and to the plane of the nearest triangle, in tolerances, up to which it
+lies straight over that triangle. What is nearest to an edge, as the root of a wall that is gone, lies beside it."""
 LAYER = 5.0
 """Distance from the skin, in tolerances, up to which the whole scan is asked."""
+FEWEST_POINTS = 25
+"""Points of a site among two surfaces below which nothing is said: at the roots of walls that are gone are some."""
 MOST_ASKED, ALL_ASKED = 2000, 4000
 """Points of a site, and of the whole scan, that are asked; a share is right to two percent, and to 0.2 percent."""
 
@@ -49,9 +54,11 @@ def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members:
     margin = 3 * tolerance + 3 * aligned.spacing
     low, high = aligned.points[members].min(axis=0) - margin, aligned.points[members].max(axis=0) + margin
     near = find_in_box(aligned.points, low, high)
-    asked = members[:: max(1, len(members) // MOST_ASKED)]
+    step = max(1, len(members) // MOST_ASKED)
+    asked = members[::step]
     is_double, upper, _ = _find_double(aligned, deviation, part, asked, near, tolerance)
-    return float((is_double & (upper < ON_SKIN * tolerance)).mean())
+    is_double &= upper < ON_SKIN * tolerance
+    return float(is_double.mean()) if step * is_double.sum() >= FEWEST_POINTS else 0.0
 
 
 def measure_sheets(aligned: Scan, deviation: Deviation, part: Part, tolerance: float) -> Sheets:
@@ -73,6 +80,13 @@ def _find_double(
     one and how far below it the lower one lies (A,)."""
     noise = max(aligned.noise, LEAST_NOISE * tolerance)
     weight = FACING * max(aligned.spacing, 1e-300)
+    is_asked_straight, is_near_straight = (
+        _is_straight(aligned, deviation, part, index, STRAIGHT * tolerance) for index in (asked, near)
+    )
+    near = near[is_near_straight]
+    if len(near) < NEIGHBOURS:
+        nothing = np.zeros(len(asked))
+        return nothing > 0, nothing, nothing
     feet, own = (_find_feet(aligned, deviation, part, index, weight) for index in (near, asked))
     index = find_neighbours(own, NEIGHBOURS, feet)[1]
     depth, offset = -deviation.distance[near][index], feet[index] - own[:, None]
@@ -87,8 +101,15 @@ def _find_double(
     side = np.linalg.norm(_find_middle(offset, is_lower) - _find_middle(offset, ~is_lower), axis=1)
     radius = np.sqrt(((offset - offset.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1))
     is_double = (lower - upper > SEPARATE * noise) & (gaps.max(axis=1) > EMPTY * noise) & (side < APART * radius)
-    is_double &= np.maximum(lower_spread, upper_spread) < INSIDE * noise
+    is_double &= is_asked_straight & (np.maximum(lower_spread, upper_spread) < INSIDE * noise)
     return is_double, upper, lower - upper
+
+
+def _is_straight(aligned: Scan, deviation: Deviation, part: Part, index: Ints, most: float) -> Flags:
+    """Which points lie straight over or under their nearest triangle, and not beside an edge of it."""
+    face = deviation.face[index]
+    height = np.einsum("ij,ij->i", aligned.points[index] - part.triangles[face, 0], part.face_normals[face])
+    return np.asarray(np.abs(height - deviation.distance[index]) < most)
 
 
 def _measure_spread(values: Floats, chosen: Flags) -> tuple[Floats, Floats]:
