@@ -58,11 +58,11 @@ def sum_uncertainty(
     """Gives the job the 95 % interval of its total volume.
 
     There is one where each accepted site has one, and no damage was left without a volume. Sites that are not accepted
-    make its high end larger: they may be damage, too. Where no site was found in a scan that could not show one, it is
-    not known either.
+    make its high end larger: they may be damage, too. Where no site was found in a scan that could not show one, or in
+    a pose that is doubted, it is not known either.
     """
     if not found:
-        is_unknown = failures or _may_hide_loss(part, aligned, deviation, tolerance)
+        is_unknown = failures or pose.doubts or _may_hide_loss(part, aligned, deviation, tolerance)
         return None if is_unknown else (0.0, measure_hidden_wear(part, pose))
     lost = [error for error in failures if error.stage != Allowance.stage]
     taken = [site for site in found if site.accepted]

@@ -11,8 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 import damageest
-from damageest.artefacts import Floats, Scan
+from damageest.artefacts import Deviation, Floats, Pose, Reason, Scan
 from damageest.cli import app
+from damageest.pipeline.uncertainty import sum_uncertainty
 from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate
 from tests import damaged_box
@@ -107,3 +108,12 @@ def test_table_and_result_json_have_the_interval(tmp_path: Path) -> None:
     assert site["depth_95"][0] < 6 < site["depth_95"][1]
     assert site["uncertainty"]["noise"] > 0
     assert f"{low:.4g} to {high:.4g}" in done.output
+
+
+def test_without_sites_nothing_is_lost_unless_the_pose_is_doubted() -> None:
+    part, points = damaged_box.box(), np.array(run(20_000, 0.04).scan.points)
+    scan = Scan(points, noise=0.04, spacing=0.5)
+    skin = Deviation(np.zeros(len(points)), np.zeros(len(points), int), np.zeros(len(points), np.uint8))
+    other = Pose(np.eye(4), doubts=(Reason("other_poses", "two fit", "contradicts"),))
+    assert sum_uncertainty((), (), part, Pose(np.eye(4)), scan, skin, 0.16) == (0.0, 0.0)
+    assert sum_uncertainty((), (), part, other, scan, skin, 0.16) is None
