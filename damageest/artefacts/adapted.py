@@ -22,7 +22,8 @@ class AdaptedPart(Checked):
     ``modes`` (K,V,3): how exactly the displacement is known: independent errors, each as one standard deviation.
     ``amount``, ``rms``: largest and root of the mean square of the displacement over the seen skin. ``growth``: the
     uniform scale in it, less 1; ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells along
-    the axes, (0, 0, 0) for a polynomial. ``gain``: share by which it explains held-out patches of the scan better than
+    the axes, (0, 0, 0) for a polynomial; ``functions``: how many smooth functions a coordinate the field is a sum of.
+    ``gain``: share by which it explains held-out patches of the scan better than
     a rigid part. ``notes`` are warnings.
     """
 
@@ -35,6 +36,7 @@ class AdaptedPart(Checked):
     growth: float = 0.0
     strain: float = 0.0
     lattice: tuple[int, int, int] = (0, 0, 0)
+    functions: int = 0
     gain: float = 0.0
     notes: tuple[str, ...] = ()
     _dtypes: ClassVar[dict[str, Any]] = {

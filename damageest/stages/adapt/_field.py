@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.artefacts import Flags, Floats, Mesh
+from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import SurfaceTree
 from damageest.geometry.vectors import normalise
 from damageest.stages.adapt._basis import Basis
@@ -32,13 +34,24 @@ class Body:
 
     ``mesh``: the part's skin as designed, of triangles small enough; ``inside`` (P,3): places in its metal where the
     strain is asked for. ``step``: the deviation that a strain of its bound counts like; ``noise``: standard deviation of
-    the points.
+    the points. ``basis``: the functions of the fields that are fitted.
     """
 
     mesh: Mesh
     inside: Floats
     step: float
     noise: float
+    basis: Basis
+
+    @cached_property
+    def columns(self) -> Floats:
+        """(V,M) the functions at the vertices."""
+        return self.basis.evaluate(self.mesh.vertices)
+
+    @cached_property
+    def slopes(self) -> Floats:
+        """(P,M,3) their derivatives at the places inside."""
+        return self.basis.differentiate(self.inside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +102,7 @@ class Match:
 def match(field: Field, points: Floats, body: Body) -> Match:
     """The nearest places on the deformed part."""
     mesh = body.mesh
-    moved = Mesh(field.move(mesh.vertices), mesh.faces)
+    moved = Mesh(mesh.vertices + body.columns @ field.coefficients, mesh.faces)
     distance, face, place = SurfaceTree(moved).closest(points)
     normal = moved.face_normals[face]
     away = points - place
@@ -98,17 +111,6 @@ def match(field: Field, points: Floats, body: Body) -> Match:
     weights = find_barycentric(moved.triangles[face], place)
     material = np.einsum("nk,nkj->nj", weights, mesh.triangles[face])
     return Match(points, material, normal, signed, off <= NEAREST * np.maximum(distance, 0.1 * body.step))
-
-
-def find_barycentric(corners: Floats, places: Floats) -> Floats:
-    """(N,3) the weights of the corners (N,3,3) of triangles at places (N,3) on them."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    u, v, w = b - a, c - a, places - a
-    uu, uv, vv = (np.einsum("ij,ij->i", s, t) for s, t in ((u, u), (u, v), (v, v)))
-    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
-    size = np.maximum(uu * vv - uv**2, 1e-300)
-    second, third = (vv * wu - uv * wv) / size, (uu * wv - uv * wu) / size
-    return np.clip(np.stack([1 - second - third, second, third], axis=1), 0, 1)
 
 
 def weigh(found: Match, scale: float, noise: float) -> Floats:
@@ -162,8 +164,8 @@ def weigh_strain(field: Field, body: Body, bound: float) -> Equations:
     """The mean square of the strain, less a uniform growth, in units of ``bound``. Co-rotated about the field: a bend
     turns the metal by large angles and hardly strains it."""
     basis, count = field.basis, field.basis.count
-    slopes = basis.differentiate(body.inside)
-    u, _, v = np.linalg.svd(field.differentiate(body.inside))
+    slopes = body.slopes
+    u, _, v = np.linalg.svd(np.eye(3) + np.einsum("nma,mk->nka", slopes, field.coefficients))
     turn = u @ v
     rows, right = [], []
     for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):

@@ -39,7 +39,8 @@ def find_modes(
     _, main = np.linalg.eigh(spread.T @ spread)
     largest = columns @ main[:, ::-1][:, :MODES]
     modes = np.einsum("vm,mkc->cvk", field.basis.evaluate(places), largest)
-    freer = next((one for one in trials[trials.index(chosen) + 1 :]), None)
+    at = [one.freedom for one in trials].index(chosen.freedom) + 1
+    freer = trials[at] if at < len(trials) else None
     if freer is None:
         return np.asarray(modes)
     return np.concatenate([modes, (freer.field.displace(places) - field.displace(places))[None]])

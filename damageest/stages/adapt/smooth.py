@@ -25,9 +25,9 @@ FEWEST = 200
 """Points that a field is fitted to at least."""
 FINE = 40.0
 """Edges along the part's diagonal of the triangles that points are matched with."""
-PLACES = 2500
+PLACES = 1200
 """Places in the metal where the strain is asked for."""
-ROUNDS, LAST, HELD = 10, 4, 4
+ROUNDS, LAST, HELD = 8, 3, 4
 """Rounds from the widest robust scale to the narrowest, more at the narrowest, and those of a fit to half of the
 patches."""
 WIDEST = 12.0
@@ -66,52 +66,51 @@ class Smooth(Adapt):
         for too few points, and where the field would fold the part."""
         centre = part.bounds.mean(axis=0)
         noise = max(aligned.noise, 0.02 * tolerance)
-        body, basis = prepare(part, centre, tolerance, noise)
+        body = prepare(part, centre, tolerance, noise)
         points = thin(aligned.points, part, self.points, WIDEST * tolerance) - centre
         if len(points) < FEWEST:
             raise StageError(f"only {len(points)} points lie near the part", "scan more of the part, or adapt: none")
-        trials, chosen = self._climb(points, body, basis, part.diagonal, tolerance)
+        trials, chosen = self._climb(points, body, part.diagonal, tolerance)
         if chosen.freedom == LADDER[0]:
             return None
         return self._finish(part, centre, points, body, trials, chosen, tolerance)
 
-    def _climb(
-        self, points: Floats, body: Body, basis: Basis, diagonal: float, tolerance: float
-    ) -> tuple[list[Trial], Trial]:
-        """The fields that were tried, and the one that held-out patches bear out."""
-        distance = np.abs(match(Field.zero(basis), points, body).distance)
+    def _climb(self, points: Floats, body: Body, diagonal: float, tolerance: float) -> tuple[list[Trial], Trial]:
+        """The fields that were tried on half of the points, and the one that held-out patches bear out."""
+        half, zero = points[::2], Field.zero(body.basis)
+        distance = np.abs(match(zero, half, body).distance)
         last = max(tolerance, 3 * body.noise)
         first = float(np.clip(3 * np.quantile(distance, 0.9), last, WIDEST * tolerance))
         scales = [*np.geomspace(first, last, ROUNDS), *[last] * LAST]
-        half = points[::2]
         patch, held = cut_patches(half, diagonal)
 
-        def attempt(freedom: Freedom, start: Field, scales: list[float]) -> Trial:
-            field = fit(start, points, body, freedom, scales)
+        def attempt(freedom: Freedom, start: Field, scales: list[float], body: Body = body) -> Trial:
+            field = fit(start, half, body, freedom, scales)
             score = cross_validate(field, half, body, freedom, last, HELD, patch, held)
             return Trial(field, freedom, score)
 
-        trials = [attempt(LADDER[0], Field.zero(basis), scales)]
+        trials = [attempt(LADDER[0], zero, scales)]
         chosen = trials[0]
         for freedom in LADDER[1:]:
-            trials.append(attempt(freedom, Field.zero(basis), scales))
+            trials.append(attempt(freedom, zero, scales))
             if freedom.bound == STIFF:  # a scale: nothing is strained, and shrinking leaves no metal outside
                 better = explains_more(trials[-1].score.both, chosen.score.both)[0]
             else:
                 better = is_better(trials[-1].score, chosen.score)
             chosen = trials[-1] if better else chosen
         for cells in self.lattice if chosen.freedom.bound >= LOOSE else ():
-            finer = replace(basis, cells=cells)
-            start = chosen.field.to_basis(finer, np.concatenate([body.inside, body.mesh.vertices]))
-            trials.append(attempt(Freedom(chosen.freedom.bound, cells=cells), start, [last] * ROUNDS))
+            finer = replace(body, basis=replace(body.basis, cells=cells))
+            start = chosen.field.to_basis(finer.basis, np.concatenate([body.inside, body.mesh.vertices]))
+            trials.append(attempt(Freedom(chosen.freedom.bound, cells=cells), start, [last] * ROUNDS, finer))
             chosen = trials[-1] if is_better(trials[-1].score, chosen.score) else chosen
-        return trials, chosen
+        body = replace(body, basis=chosen.field.basis)
+        return trials, replace(chosen, field=fit(chosen.field, points, body, chosen.freedom, [last] * LAST))
 
     def _finish(
         self, part: Part, centre: Floats, points: Floats, body: Body, trials: list[Trial], chosen: Trial,
         tolerance: float,
     ) -> AdaptedPart:  # fmt: skip
-        field = chosen.field
+        field, body = chosen.field, replace(body, basis=chosen.field.basis)
         found = match(field, points, body)
         weights = weigh(found, tolerance, body.noise) * (np.abs(found.distance) < 2 * tolerance)
         seen = found.material
@@ -143,20 +142,21 @@ class Smooth(Adapt):
             growth=field.growth,
             strain=float(np.abs(strain).max()),
             lattice=field.basis.shape_of_cells,
+            functions=field.basis.count,
             gain=gain,
         )
         return replace(adapted, notes=(describe(adapted, tolerance),))
 
 
-def prepare(part: Part, centre: Floats, tolerance: float, noise: float) -> tuple[Body, Basis]:
-    """What a field is fitted to the part by, and the polynomials, about the centre."""
+def prepare(part: Part, centre: Floats, tolerance: float, noise: float) -> Body:
+    """What a polynomial field is fitted to the part by, about the centre."""
     extent = np.ptp(part.bounds, axis=0)
     size = float(extent.max()) / 2
     fine, _ = cut_into_cells(Mesh(part.vertices - centre, part.faces), part.diagonal / FINE)
     box = np.random.default_rng(17).uniform(-extent / 2, extent / 2, (20 * PLACES, 3))
     inside = box[is_inside(box, fine)][:PLACES]
     inside = inside if len(inside) > PLACES // 10 else fine.triangles.mean(axis=1)[:: max(1, len(fine.faces) // PLACES)]
-    return Body(fine, inside, tolerance / 4, noise), Basis(np.zeros(3), size, extent / 2 / size)
+    return Body(fine, inside, tolerance / 4, noise, Basis(np.zeros(3), size, extent / 2 / size))
 
 
 def thin(points: Floats, part: Part, count: int, reach: float) -> Floats:
