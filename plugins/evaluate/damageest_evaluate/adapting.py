@@ -142,12 +142,13 @@ def main() -> None:
     parser.add_argument("--only", default="")
     parser.add_argument("--set", action="append", default=[], dest="settings")
     parser.add_argument("--rows", default="")
+    parser.add_argument("--use", nargs="*", default=["none", "smooth"])
     given = parser.parse_args()
     rows = []
     for case in CASES:
         if given.only not in case.name:
             continue
-        for name in ("none", "smooth"):
+        for name in given.use:
             row = {"use": name, **measure(case, [f"adapt={name}", *given.settings])}
             rows.append(row)
             print(describe_row(row), flush=True)
