@@ -21,8 +21,8 @@ class AdaptedPart(Checked):
     over intact skin it has no rigid part. ``motion`` (4,4): rigid; takes the aligned scan onto the deformed part.
     ``modes`` (K,V,3): how exactly the displacement is known: independent errors, each as one standard deviation.
     ``amount``, ``rms``: largest and root of the mean square of the displacement over the seen skin. ``growth``: the
-    uniform scale in it, less 1; ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells along
-    the axes, (0, 0, 0) for a polynomial; ``functions``: how many smooth functions a coordinate the field is a sum of.
+    uniform scale in it, less 1; ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells
+    along the axes, (0, 0, 0) for a polynomial; ``functions``: how many functions each coordinate is a sum of.
     ``gain``: share by which it explains held-out patches of the scan better than
     a rigid part. ``notes`` are warnings.
     """

@@ -39,8 +39,8 @@ def require_rigid(name: str, poses: Floats) -> None:
 @dataclass(frozen=True, eq=False)
 class Truth(Checked):
     """The truth of a virtual scan: the true ``damage`` in the part's frame (None if there is none), the pose, and the
-    metal ``added`` outside the part, in the part's frame (None if there is none). ``deformed``: the damage where it lies
-    in a part that was deformed before it was scanned; None where it was not."""
+    metal ``added`` outside the part, in the part's frame (None if there is none). ``deformed``: the damage where it
+    lies in a part that was deformed before it was scanned; None where it was not."""
 
     damage: Solid | None
     T_part_scan: Floats

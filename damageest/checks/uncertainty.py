@@ -18,8 +18,8 @@ from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion
 from damageest.checks.inner_surface import measure_inner_surface, pair_faces
 from damageest.checks.pose_error import PoseError
 from damageest.findings import Coverage, Interval
-from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.barycentric import find_barycentric
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby
 from damageest.rules import ScanFacts
 from damageest.rules.inner_surface import GAP
@@ -146,8 +146,8 @@ def measure_site_error(
 def measure_adapt(
     adapted: AdaptedPart | None, damage: Solid, skin: Flags, area: Floats, deepest: _Place
 ) -> tuple[Floats, float]:
-    """What the errors (J,) of an adapted part's field make of a volume, and the standard deviation of the distance of its
-    deepest place to the skin. The skin that is gone lies elsewhere by the field's error, and the volume ends there."""
+    """What the errors (J,) of an adapted part's field make of a volume, and the standard deviation of the distance of
+    its deepest place to the skin. The skin that is gone lies elsewhere by the field's error; the volume ends there."""
     if adapted is None or not len(adapted.modes):
         return np.empty(0), 0.0
     centres = np.concatenate([damage.triangles[skin].mean(axis=1), deepest.at[None]])

@@ -34,7 +34,7 @@ class AdaptContract(PlacementContract):
 
     def make_bent(self) -> Scan:
         """The scan of the bent prism, with its dents."""
-        aligned = _scene.make_scene().aligned
+        aligned: Scan = _scene.make_scene().aligned
         return replace(aligned, points=bend(aligned.points), normals=None)
 
     def test_gives_its_type(self) -> None:

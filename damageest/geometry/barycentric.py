@@ -15,4 +15,4 @@ def find_barycentric(corners: Floats, places: Floats) -> Floats:
     wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
     size = np.maximum(uu * vv - uv**2, 1e-300)
     second, third = (vv * wu - uv * wv) / size, (uu * wv - uv * wu) / size
-    return np.clip(np.stack([1 - second - third, second, third], axis=1), 0, 1)
+    return np.asarray(np.clip(np.stack([1 - second - third, second, third], axis=1), 0, 1))

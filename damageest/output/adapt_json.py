@@ -18,7 +18,9 @@ class AdaptReport(JsonModel):
     lattice: tuple[int, int, int] = Field(description="cells along the axes; 0, 0, 0: a cubic polynomial")
     functions: int = Field(description="how many smooth functions each coordinate of the displacement is a sum of")
     gain: float = Field(description="share by which it explains held-out patches of the scan better than a rigid part")
-    motion: list[list[float]] = Field(description="4x4, the rigid motion beside it, which is in alignment.transform too")
+    motion: list[list[float]] = Field(
+        description="4x4, the rigid motion beside it, which is in alignment.transform too"
+    )
 
 
 def report_adapt(adapted: AdaptedPart | None) -> AdaptReport | None:

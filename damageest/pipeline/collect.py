@@ -105,8 +105,8 @@ def _compare_with_truth(
     damage: Solid | None, scan: Scan, pose: Pose, tolerance: float, is_adapted: bool
 ) -> Floats | None:
     """(volume, IoU) against a virtual scan's known damage. On a symmetric part any of the poses that map it onto itself
-    is right, so where the pose found is another one, the truth is moved by the difference. ``is_adapted``: the damage is
-    that of the deformed part, and its truth too."""
+    is right, so where the pose found is another one, the truth is moved by the difference. ``is_adapted``: the damage
+    is that of the deformed part, and its truth too."""
     if scan.truth is None:
         return None
     deformed = scan.truth.deformed if is_adapted else None

@@ -136,7 +136,7 @@ def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> float
 
     intact = state.aligned.points[state.deviation.label == INTACT]
     places = damage.triangles[~inner].mean(axis=1)
-    return float(cKDTree(intact).query(places)[0].max()) if len(intact) else 0.0
+    return float(np.max(cKDTree(intact).query(places)[0])) if len(intact) else 0.0
 
 
 def _measure_fading(

@@ -11,7 +11,6 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Mesh
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import SurfaceTree
-from damageest.geometry.vectors import normalise
 from damageest.stages.adapt._basis import Basis
 
 INSIDE = 0.6
@@ -33,8 +32,8 @@ class Body:
     """What a field is fitted to the part by.
 
     ``mesh``: the part's skin as designed, of triangles small enough; ``inside`` (P,3): places in its metal where the
-    strain is asked for. ``step``: the deviation that a strain of its bound counts like; ``noise``: standard deviation of
-    the points. ``basis``: the functions of the fields that are fitted.
+    strain is asked for. ``step``: the deviation that a strain of its bound counts like; ``noise``: standard deviation
+    of the points. ``basis``: the functions of the fields that are fitted.
     """
 
     mesh: Mesh
@@ -83,7 +82,7 @@ class Field:
         """The same field by other functions, by least squares over places."""
         values, columns = self.displace(places), basis.evaluate(places)
         square = columns.T @ columns + 1e-9 * len(places) * (basis.roughness + RIDGE * np.eye(basis.count))
-        return replace(self, basis=basis, coefficients=np.linalg.solve(square, columns.T @ values))
+        return replace(self, basis=basis, coefficients=np.asarray(np.linalg.solve(square, columns.T @ values)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +130,10 @@ class Equations:
         """``grows``: whether the uniform scale is free."""
         square, right = self.stiffen(), self.right
         if grows:
-            found = np.linalg.solve(square, right)
+            found: Floats = np.asarray(np.linalg.solve(square, right), np.float64)
             return Field(basis, found[:-1].reshape(-1, 3), float(found[-1]))
-        return Field(basis, np.linalg.solve(square[:-1, :-1], right[:-1]).reshape(-1, 3))
+        still: Floats = np.asarray(np.linalg.solve(square[:-1, :-1], right[:-1]), np.float64)
+        return Field(basis, still.reshape(-1, 3))
 
     def stiffen(self) -> Floats:
         """(K,K) the square with what keeps it from being singular."""
@@ -163,8 +163,7 @@ def weigh_points(field: Field, found: Match, weights: Floats) -> Equations:
 def weigh_strain(field: Field, body: Body, bound: float) -> Equations:
     """The mean square of the strain, less a uniform growth, in units of ``bound``. Co-rotated about the field: a bend
     turns the metal by large angles and hardly strains it."""
-    basis, count = field.basis, field.basis.count
-    slopes = body.slopes
+    count, slopes = field.basis.count, body.slopes
     u, _, v = np.linalg.svd(np.eye(3) + np.einsum("nma,mk->nka", slopes, field.coefficients))
     turn = u @ v
     rows, right = [], []

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import ArtefactError, Floats, Ints, Part
+from damageest.artefacts import ArtefactError, Floats, Part
 from damageest.errors import StageError
 from damageest.geometry.refinement import cut_into_cells
 from damageest.stages.adapt._field import Field
@@ -39,7 +39,9 @@ def refine(part: Part, field: Field, centre: Floats, tolerance: float) -> tuple[
     edge = max(edge, part.diagonal / FINEST)
     mesh, origin = cut_into_cells(part, edge)
     brep = None if part.faces_brep is None else part.faces_brep[origin]
-    return replace(part, vertices=mesh.vertices, faces=mesh.faces, faces_brep=brep), min(edge, part.diagonal) ** 2 * sharp / 8
+    return replace(part, vertices=mesh.vertices, faces=mesh.faces, faces_brep=brep), min(
+        edge, part.diagonal
+    ) ** 2 * sharp / 8
 
 
 def bound_curvature(field: Field, places: Floats) -> float:
@@ -64,7 +66,7 @@ def require_injective(field: Field, turn: Floats, places: Floats) -> None:
 
 
 def deform_part(part: Part, moved: Floats, error: float) -> Part:
-    """The part with its vertices moved; the CAD file is no longer its shape. Raises StageError where it is no solid then."""
+    """The part with its vertices moved; the CAD file is no longer its shape. Raises StageError where it is no solid."""
     try:
         return replace(part, vertices=moved, tessellation_error=part.tessellation_error + error, cad_scale=0.0)
     except ArtefactError as problem:

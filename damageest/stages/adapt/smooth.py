@@ -23,7 +23,7 @@ from damageest.stages.adapt._words import describe
 
 FEWEST = 200
 """Points that a field is fitted to at least."""
-FINE = 40.0
+FINE = 25.0
 """Edges along the part's diagonal of the triangles that points are matched with."""
 PLACES = 1200
 """Places in the metal where the strain is asked for."""
@@ -45,6 +45,8 @@ LADDER = (
 """Freedoms in the order in which they are tried, the first of them a rigid part."""
 LOOSE = 0.008
 """Strain from which a lattice is tried too."""
+LEFT = 1.15
+"""What a polynomial has to leave in half of the patches for it, in mean squares of the noise."""
 
 
 class Smooth(Adapt):
@@ -89,20 +91,22 @@ class Smooth(Adapt):
             score = cross_validate(field, half, body, freedom, last, HELD, patch, held)
             return Trial(field, freedom, score)
 
-        trials = [attempt(LADDER[0], zero, scales)]
-        chosen = trials[0]
-        for freedom in LADDER[1:]:
-            trials.append(attempt(freedom, zero, scales))
-            if freedom.bound == STIFF:  # a scale: nothing is strained, and shrinking leaves no metal outside
-                better = explains_more(trials[-1].score.both, chosen.score.both)[0]
-            else:
-                better = is_better(trials[-1].score, chosen.score)
-            chosen = trials[-1] if better else chosen
-        for cells in self.lattice if chosen.freedom.bound >= LOOSE else ():
+        rigid, scaled, freest = (attempt(freedom, zero, scales) for freedom in (*LADDER[:2], LADDER[-1]))
+        # nothing is strained by a scale, and shrinking leaves no metal outside
+        chosen = scaled if explains_more(scaled.score.both, rigid.score.both)[0] else rigid
+        trials = [rigid, scaled, freest]
+        if is_better(freest.score, chosen.score):
+            trials[2:2] = [attempt(freedom, zero, scales) for freedom in LADDER[2:-1]]
+            for trial in trials[2:]:
+                chosen = trial if is_better(trial.score, chosen.score) else chosen
+        is_rough = chosen.freedom.bound >= LOOSE and np.median(chosen.score.both) > LEFT * body.noise**2
+        for cells in self.lattice if is_rough else ():
             finer = replace(body, basis=replace(body.basis, cells=cells))
             start = chosen.field.to_basis(finer.basis, np.concatenate([body.inside, body.mesh.vertices]))
             trials.append(attempt(Freedom(chosen.freedom.bound, cells=cells), start, [last] * ROUNDS, finer))
             chosen = trials[-1] if is_better(trials[-1].score, chosen.score) else chosen
+        if chosen is rigid:
+            return trials, chosen
         body = replace(body, basis=chosen.field.basis)
         return trials, replace(chosen, field=fit(chosen.field, points, body, chosen.freedom, [last] * LAST))
 

@@ -99,7 +99,7 @@ def _scale(q: Floats, share: float) -> Floats:
 
 
 def _stretch(q: Floats, share: float) -> Floats:
-    return q * np.array([1 + share, 1.0, 1.0])
+    return np.asarray(q * np.array([1 + share, 1.0, 1.0]))
 
 
 def _taper(q: Floats, slope: float) -> Floats:

@@ -1,4 +1,4 @@
-"""Measures the stage `adapt`: deformed parts with known loss, deformed parts without, and worn parts, straight and bent.
+"""Measures the stage `adapt` on deformed parts with known loss and without, and on worn parts, straight and bent.
 
 ``python -m damageest_evaluate.adapting [--only NAME] [--set SETTING]`` prints a table, and the rows as JSON.
 """
