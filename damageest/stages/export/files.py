@@ -142,7 +142,12 @@ class Files(Export):
         if not result.part.cad_scale:
             if self.solids == "auto":
                 return ExportedFiles()
-            note = "solids: exact was asked for, but the part is a mesh without CAD faces; STEP solids have facets"
+            why = (
+                "the part was adapted to the scan, and its CAD faces were not"
+                if result.adapted
+                else ("the part is a mesh without CAD faces")
+            )
+            note = f"solids: exact was asked for, but {why}; STEP solids have facets"
             return ExportedFiles(notes=(note,), warnings=(note,))
         return writer(folder, result, bodies, places, self.limit)
 
