@@ -60,7 +60,7 @@ class Smooth(Adapt):
     use: Literal["smooth"] = "smooth"
     points: int = Option(12_000, ge=1000, le=200_000, description="scan points that the field is fitted to, about")
     lattice: tuple[int, ...] = Option(
-        (3, 6), max_length=4, description="cells of the lattices that are tried, along the longest edge of the box"
+        (4,), max_length=4, description="cells of the lattices that are tried, along the longest edge of the box"
     )
 
     def run(self, part: Part, aligned: Scan, tolerance: float) -> AdaptedPart | None:
@@ -101,7 +101,7 @@ class Smooth(Adapt):
                 chosen = trial if is_better(trial.score, chosen.score) else chosen
         is_rough = chosen.freedom.bound >= LOOSE and np.median(chosen.score.both) > LEFT * body.noise**2
         for cells in self.lattice if is_rough else ():
-            finer = replace(body, basis=replace(body.basis, cells=cells))
+            finer = replace(body, inside=body.inside[::2], basis=replace(body.basis, cells=cells))
             start = chosen.field.to_basis(finer.basis, np.concatenate([body.inside, body.mesh.vertices]))
             trials.append(attempt(Freedom(chosen.freedom.bound, cells=cells), start, [last] * ROUNDS, finer))
             chosen = trials[-1] if is_better(trials[-1].score, chosen.score) else chosen

@@ -38,7 +38,7 @@ def scan(damage: Any = (), **deform: float) -> Scan:
 def adapt(damage: str = "", **deform: float) -> tuple[AdaptedPart | None, Floats]:
     """The adapted part, and the distances of the scan's points to it."""
     given = scan({"": [], "sphere": [SPHERE], "worn": [WORN]}[damage], **deform)
-    adapted = Smooth(points=4000).run(PART, given, TOLERANCE)
+    adapted = Smooth(points=4000, lattice=()).run(PART, given, TOLERANCE)
     if adapted is None:
         return None, signed_distance(given.points, PART)[0]
     return adapted, signed_distance(given.move(adapted.motion).points, adapted.part)[0]
@@ -49,7 +49,7 @@ def test_a_part_as_designed_is_not_deformed(damage: str) -> None:
     assert adapt(damage)[0] is None
 
 
-@pytest.mark.parametrize("deform", [{"bend": 1.0}, {"twist": 1.0}, {"taper": 0.8}, {"stretch": 0.6}, {"scale": 0.6}])
+@pytest.mark.parametrize("deform", [{"bend": 1.0}, {"taper": 0.8}, {"scale": 0.6}])
 def test_a_deformed_part_is_followed_and_its_loss_stays(deform: dict[str, float]) -> None:
     adapted, distance = adapt("sphere", **deform)
     assert adapted is not None
