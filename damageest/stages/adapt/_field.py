@@ -20,6 +20,8 @@ NOISE = 2.0
 NEAREST = 0.3
 """How far the nearest place may lie off the normal of its triangle, as a share of the distance: beyond, it lies on an
 edge, and says nothing about the skin beside it."""
+STIFF = 1e-5
+"""Strain that is as good as none."""
 RIDGE = 1e-9
 """What keeps functions that nothing determines at 0, as a share of the largest sum of squares."""
 ROUGH = 1e-6
@@ -83,6 +85,18 @@ class Field:
         values, columns = self.displace(places), basis.evaluate(places)
         square = columns.T @ columns + 1e-9 * len(places) * (basis.roughness + RIDGE * np.eye(basis.count))
         return replace(self, basis=basis, coefficients=np.asarray(np.linalg.solve(square, columns.T @ values)))
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """How free a field is: ``bound``: the strain of the metal that counts like a deviation of the body's step; whether
+    it ``grows`` all over; whether it ``stretches`` the part as a whole, more in one direction than in another;
+    ``cells`` of its lattice, 0: a polynomial."""
+
+    bound: float
+    grows: bool = True
+    stretches: bool = False
+    cells: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,9 +174,10 @@ def weigh_points(field: Field, found: Match, weights: Floats) -> Equations:
     return Equations(whole, np.append(right.ravel() / total, 0.0))
 
 
-def weigh_strain(field: Field, body: Body, bound: float) -> Equations:
-    """The mean square of the strain, less a uniform growth, in units of ``bound``. Co-rotated about the field: a bend
-    turns the metal by large angles and hardly strains it."""
+def weigh_strain(field: Field, body: Body, freedom: Freedom) -> Equations:
+    """The mean square of the strain, less a uniform growth, in units of its bound. Co-rotated about the field: a bend
+    turns the metal by large angles and hardly strains it. Where the field may not stretch the part, the mean strain is
+    held at 0: that of a bend, a twist or a taper is, and that of a part with a worn face is not."""
     count, slopes = field.basis.count, body.slopes
     u, _, v = np.linalg.svd(np.eye(3) + np.einsum("nma,mk->nka", slopes, field.coefficients))
     turn = u @ v
@@ -177,31 +192,26 @@ def weigh_strain(field: Field, body: Body, bound: float) -> Equations:
         rows.append(factor * flat)
         right.append(factor * (same - still))
     matrix, values = np.concatenate(rows), np.concatenate(right)
-    factor = (body.step / bound) ** 2 / len(body.inside)
-    return Equations(factor * matrix.T @ matrix, factor * matrix.T @ values)
-
-
-@dataclass(frozen=True)
-class Freedom:
-    """How free a field is: ``bound``: the strain of the metal that counts like a deviation of the body's step; whether
-    it ``grows`` all over; ``cells`` of its lattice, 0: a polynomial."""
-
-    bound: float
-    grows: bool = True
-    cells: int = 0
+    factor = (body.step / freedom.bound) ** 2 / len(body.inside)
+    square, aim = factor * matrix.T @ matrix, factor * matrix.T @ values
+    if not freedom.stretches:
+        mean, target = matrix.reshape(6, len(slopes), -1).mean(axis=1), values.reshape(6, -1).mean(axis=1)
+        held = (body.step / STIFF) ** 2
+        square, aim = square + held * mean.T @ mean, aim + held * mean.T @ target
+    return Equations(square, aim)
 
 
 def fit(field: Field, points: Floats, body: Body, freedom: Freedom, scales: Sequence[float]) -> Field:
     """The field after one round of matching and least squares for each of the robust ``scales``."""
     for scale in scales:
         found = match(field, points, body)
-        field = assemble(field, found, body, freedom.bound, scale).solve(field.basis, freedom.grows)
+        field = assemble(field, found, body, freedom, scale).solve(field.basis, freedom.grows)
     return field
 
 
-def assemble(field: Field, found: Match, body: Body, bound: float, scale: float) -> Equations:
+def assemble(field: Field, found: Match, body: Body, freedom: Freedom, scale: float) -> Equations:
     """The equations of points, strain and roughness together."""
-    one, two = weigh_points(field, found, weigh(found, scale, body.noise)), weigh_strain(field, body, bound)
+    one, two = weigh_points(field, found, weigh(found, scale, body.noise)), weigh_strain(field, body, freedom)
     square = one.square + two.square
     if field.basis.cells:
         share = ROUGH * float(np.trace(one.square)) / len(one.square)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,7 +30,8 @@ def find_modes(
     field = chosen.field
     last = max(tolerance, 3 * body.noise)
     found = match(field, points, body)
-    equations = assemble(field, found, body, max(chosen.freedom.bound, PRIOR), last)
+    loose = replace(chosen.freedom, bound=max(chosen.freedom.bound, PRIOR))
+    equations = assemble(field, found, body, loose, last)
     square = equations.stiffen()[:-1, :-1]
     covariance = np.linalg.inv(square) * _measure_error(found.distance, weigh(found, last, body.noise), points, body)
     root = np.linalg.cholesky((covariance + covariance.T) / 2 / len(points))
@@ -40,7 +42,8 @@ def find_modes(
     largest = columns @ main[:, ::-1][:, :MODES]
     modes = np.einsum("vm,mkc->cvk", field.basis.evaluate(places), largest)
     at = [one.freedom for one in trials].index(chosen.freedom) + 1
-    freer = trials[at] if at < len(trials) else None
+    alike = [one for one in trials[at:] if one.freedom.stretches == chosen.freedom.stretches]
+    freer = alike[0] if alike else None
     if freer is None:
         return np.asarray(modes)
     return np.concatenate([modes, (freer.field.displace(places) - field.displace(places))[None]])

@@ -16,7 +16,7 @@ from damageest.geometry.refinement import cut_into_cells
 from damageest.stages.adapt import Adapt
 from damageest.stages.adapt._basis import Basis
 from damageest.stages.adapt._choose import Trial, cross_validate, cut_patches, explains_more, is_better
-from damageest.stages.adapt._field import Body, Field, Freedom, fit, match, weigh
+from damageest.stages.adapt._field import STIFF, Body, Field, Freedom, fit, match, weigh
 from damageest.stages.adapt._mesh import deform_part, find_motion, refine, require_injective
 from damageest.stages.adapt._posterior import find_modes
 from damageest.stages.adapt._words import describe
@@ -32,8 +32,6 @@ ROUNDS, LAST, HELD = 8, 3, 4
 patches."""
 WIDEST = 12.0
 """Widest robust scale, in tolerances."""
-STIFF = 1e-5
-"""Strain that is as good as none: a rigid motion and a uniform scale."""
 LADDER = (
     Freedom(STIFF, grows=False),
     Freedom(STIFF),
@@ -41,6 +39,7 @@ LADDER = (
     Freedom(0.002),
     Freedom(0.008),
     Freedom(0.03),
+    Freedom(0.03, stretches=True),
 )
 """Freedoms in the order in which they are tried, the first of them a rigid part."""
 LOOSE = 0.008
@@ -103,7 +102,7 @@ class Smooth(Adapt):
         for cells in self.lattice if is_rough else ():
             finer = replace(body, inside=body.inside[::2], basis=replace(body.basis, cells=cells))
             start = chosen.field.to_basis(finer.basis, np.concatenate([body.inside, body.mesh.vertices]))
-            trials.append(attempt(Freedom(chosen.freedom.bound, cells=cells), start, [last] * ROUNDS, finer))
+            trials.append(attempt(replace(chosen.freedom, cells=cells), start, [last] * ROUNDS, finer))
             chosen = trials[-1] if is_better(trials[-1].score, chosen.score) else chosen
         if chosen is rigid:
             return trials, chosen
