@@ -132,4 +132,3 @@ def test_a_bent_part_in_a_job(tmp_path: Path) -> None:
     assert site.uncertainty.adapt > 0
     content = json.loads((tmp_path / "out/result.json").read_text())
     assert content["adapt"]["amount"] == pytest.approx(1.0, rel=0.5)
-    assert content["fit"]["words"].startswith("the adapted part")
