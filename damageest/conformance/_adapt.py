@@ -13,7 +13,7 @@ from damageest.conformance import _scene
 from damageest.conformance._base import PlacementContract, check_or_refused
 from damageest.geometry.distance import signed_distance
 
-BEND = 5 * _scene.TOLERANCE
+BEND = 2 * _scene.TOLERANCE
 """How far the ends of the bent prism are off its middle."""
 
 
