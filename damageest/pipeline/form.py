@@ -4,6 +4,7 @@ right."""
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import overload
 
 import numpy as np
 
@@ -104,12 +105,25 @@ def fit_model(engine: Engine, work: Work) -> Work:
         state.corrected_scale,
     )  # fmt: skip
     sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.tolerance, JobState.views)
+    found = _tell_adapted(found, state)
     state = state.derive(JobState.fitted, found, *sources)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
     if found is not None and told:
         warning = Reason("model_fit", found.fit.words, amount=found.fit.amount, unit=state.unit)
         work = replace(work, warnings=(*work.warnings, warning))
     return replace(work, job=state)
+
+
+@overload
+def _tell_adapted(fitted: FittedModel, state: JobState) -> FittedModel: ...
+@overload
+def _tell_adapted(fitted: None, state: JobState) -> None: ...
+def _tell_adapted(fitted: FittedModel | None, state: JobState) -> FittedModel | None:
+    """The fit in words that do not call an adapted part the part as designed."""
+    if fitted is None or state.adapted is None:
+        return fitted
+    words = fitted.fit.words.replace("the part as designed", "the adapted part")
+    return replace(fitted, fit=replace(fitted.fit, words=words))
 
 
 def question_fit(engine: Engine, work: Work) -> Work:
@@ -125,6 +139,7 @@ def question_fit(engine: Engine, work: Work) -> Work:
         return work
     before = state.fitted.fit
     fit = describe_fit(replace(before, model="open"), state.unit, state.tolerance, doubts)
+    fit = _tell_adapted(replace(state.fitted, fit=fit), state).fit
     key = digest("questioned", state.key("fitted"), doubts)
     state = state.with_value(JobState.fitted, replace(state.fitted, fit=fit), key)
     # a corrected scale was reported in a note whose text is no longer true

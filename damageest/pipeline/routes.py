@@ -6,6 +6,7 @@ all of the work and gives it changed; some steps call contracts themselves, and 
 
 from __future__ import annotations
 
+from damageest.pipeline.adapt import adapt_part
 from damageest.pipeline.collect import collect_result
 from damageest.pipeline.coverage import describe_coverage, inspect_skin
 from damageest.pipeline.deposits import make_deposits, separate_deposits
@@ -37,6 +38,7 @@ from damageest.pipeline.sites import (
 from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
+from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
 from damageest.stages.allowance import Allowance
 from damageest.stages.background import Background
@@ -56,8 +58,8 @@ from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
     ReadPart, check_selections, ReadScan, crop_scan, set_far_aside, measure_scan, Sample, Align, place_scan,
-    add_points_near_damage, correct_scan, settle_tolerance, Segment, check_intact, inspect_skin, fit_model, Cluster,
-    find_surplus, gather_intact,
+    add_points_near_damage, correct_scan, adapt_part(Adapt), settle_tolerance, Segment, check_intact, inspect_skin,
+    fit_model, Cluster, find_surplus, gather_intact,
 )  # fmt: skip
 BY_SITE: Route = (
     take_clusters, Reconstruct, Boundary, enclose_grouped(Background, Enclose), Repair, Boolean, gather_sites,

@@ -14,6 +14,7 @@ from typing import Any, Generic, Self, TypeVar, overload
 import numpy as np
 
 from damageest.artefacts import (
+    AdaptedPart,
     DepositPath,
     Deviation,
     Enclosures,
@@ -95,7 +96,8 @@ class State:
 @dataclass(frozen=True, eq=False)
 class JobState(State):
     """The whole job. ``unit`` and ``tolerance`` are the job's; the tolerance is None until it is measured where the job
-    says `auto`. ``aligned``: the scan in the part's frame. ``intact`` (K,3): its points on the nominal surface.
+    says `auto`. ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan, which is
+    ``part`` from then on; None: the part as designed. ``intact`` (K,3): its points on the nominal surface.
     ``content``: that of result.json; ``job_text``: that of job.yaml."""
 
     unit = Value[str]()
@@ -107,6 +109,7 @@ class JobState(State):
     samples = Value[Samples]()
     pose = Value[Pose]()
     aligned = Value[Scan]()
+    adapted = Value[AdaptedPart | None]()
     deviation = Value[Deviation]()
     sites = Value[Sites]()
     intact = Value[Floats]()

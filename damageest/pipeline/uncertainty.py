@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import Flags, Ints
+from damageest.artefacts import INTACT, Flags, Ints, Solid
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
 from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
@@ -91,7 +91,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     # what the model fit gives is the 95 % bound of a deviation
     found = measure_site_error(
         site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts,
-        form=measure_at_site(state, site) / WIDTH, free=state.pose.free,
+        form=measure_at_site(state, site) / WIDTH, free=state.pose.free, adapted=state.adapted,
     )  # fmt: skip
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))
@@ -117,6 +117,8 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         form=error.form,
         outward=error.outward,
         views=error.views,
+        adapt=float(np.linalg.norm(error.adapt)),
+        extrapolated=_measure_extrapolated(state, site.damage, inner),
         free=error.free,
         inside=error.inside,
         beside=error.beside,
@@ -132,6 +134,17 @@ def _may_hide_loss(state: JobState) -> bool:
     if describe_few(scan) or scan.spacing > COARSE * state.part.diagonal:
         return True
     return scan.spacing > tolerance and bool((state.deviation.distance < -2 * tolerance).any())
+
+
+def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> float:
+    """How far skin that a site removes is from intact points, at most; 0 where the part is as designed."""
+    if state.adapted is None or inner.all():
+        return 0.0
+    from scipy.spatial import cKDTree
+
+    intact = state.aligned.points[state.deviation.label == INTACT]
+    places = damage.triangles[~inner].mean(axis=1)
+    return float(np.max(cKDTree(intact).query(places)[0])) if len(intact) else 0.0
 
 
 def _measure_fading(

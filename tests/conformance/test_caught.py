@@ -13,10 +13,11 @@ import pytest
 from damageest_paths.layers import Layers, Nozzle
 
 from damageest import conformance
-from damageest.artefacts import DepositPath, Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
+from damageest.artefacts import AdaptedPart, DepositPath, Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
 from damageest.conformance import _scene
 from damageest.conformance._base import PlacementContract, StageContract
 from damageest.io.meshes import write_stl
+from damageest.stages.adapt.smooth import Smooth
 from damageest.stages.align.none import KnownPose
 from damageest.stages.allowance.none import NoAllowance as NoAllowance
 from damageest.stages.background.bbox import BoundingBox
@@ -44,6 +45,7 @@ GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
     "Scan": (Simulate(points=5000), {}),
     "Sample": (Uniform(), {}),
     "Align": (KnownPose(), {"pose": np.eye(4)}),
+    "Adapt": (Smooth(points=4000), {}),
     "Segment": (MeshDistance(), {}),
     "Cluster": (Dbscan(), {}),
     "Reconstruct": (SignedDistance(), {}),
@@ -63,6 +65,7 @@ MEANING = {
     "Scan": "test_lies_on_what_was_scanned",
     "Sample": "test_lies_on_the_part",
     "Align": "test_finds_the_pose",
+    "Adapt": "test_follows_skin_and_not_damage",
     "Segment": "test_labels_the_dents",
     "Cluster": "test_one_site_for_each_dent",
     "Reconstruct": "test_follows_the_dent",
@@ -80,6 +83,7 @@ MEANING = {
 """By contract: the check of the meaning of a result."""
 BAD_INPUT: dict[str, tuple[str, tuple[Any, ...]]] = {
     "Align": ("test_few_points", (3,)),
+    "Adapt": ("test_few_points", (30,)),
     "Segment": ("test_few_points", (0,)),
     "Cluster": ("test_few_points", (4,)),
     "Reconstruct": ("test_few_points", (0,)),
@@ -103,6 +107,8 @@ def spoil(value: Any, by: float) -> Any:
             name = "vertices" if isinstance(value, Mesh) else "points"
             low = points.min(axis=0)
             return replace(value, **{name: low + (points - low) * (1 + by / np.ptp(points, axis=0).max())})
+        case AdaptedPart():
+            return replace(value, part=spoil(value.part, by))
         case Pose():
             return replace(value, T_part_scan=value.T_part_scan + by * np.eye(4, k=3))
         case Sites():

@@ -1,0 +1,219 @@
+"""A displacement field of the part, and its robust fit to a scan's points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Mesh
+from damageest.geometry.barycentric import find_barycentric
+from damageest.geometry.distance import SurfaceTree
+from damageest.stages.adapt._basis import Basis
+
+INSIDE = 0.6
+"""Weight of points inside the part, against those outside: loss and wear are inside."""
+NOISE = 2.0
+"""Depth, in standard deviations of a point, from which this holds: noise is on both sides."""
+NEAREST = 0.3
+"""How far the nearest place may lie off the normal of its triangle, as a share of the distance: beyond, it lies on an
+edge, and says nothing about the skin beside it."""
+STIFF = 1e-5
+"""Strain that is as good as none."""
+RIDGE = 1e-9
+"""What keeps functions that nothing determines at 0, as a share of the largest sum of squares."""
+ROUGH = 1e-6
+"""Weight of the third differences of a lattice, as a share of the points' mean square: they only fill what neither
+points nor strain determine."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What a field is fitted to the part by.
+
+    ``mesh``: the part's skin as designed, of triangles small enough; ``inside`` (P,3): places in its metal where the
+    strain is asked for. ``step``: the deviation that a strain of its bound counts like; ``noise``: standard deviation
+    of the points. ``basis``: the functions of the fields that are fitted.
+    """
+
+    mesh: Mesh
+    inside: Floats
+    step: float
+    noise: float
+    basis: Basis
+
+    @cached_property
+    def columns(self) -> Floats:
+        """(V,M) the functions at the vertices."""
+        return self.basis.evaluate(self.mesh.vertices)
+
+    @cached_property
+    def slopes(self) -> Floats:
+        """(P,M,3) their derivatives at the places inside."""
+        return self.basis.differentiate(self.inside)
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A displacement of the part's metal: ``coefficients`` (M,3) of a basis, in the job's unit. ``growth``: the uniform
+    scale that the strain is counted from, less 1."""
+
+    basis: Basis
+    coefficients: Floats
+    growth: float = 0.0
+
+    @classmethod
+    def zero(cls, basis: Basis) -> Field:
+        return cls(basis, np.zeros((basis.count, 3)))
+
+    def displace(self, places: Floats) -> Floats:
+        """(N,3) the displacement of places (N,3) on the part as designed."""
+        return np.asarray(self.basis.evaluate(places) @ self.coefficients)
+
+    def move(self, places: Floats) -> Floats:
+        return places + self.displace(places)
+
+    def differentiate(self, places: Floats) -> Floats:
+        """(N,3,3) the deformation gradient: row k holds the derivatives of coordinate k."""
+        slopes = np.einsum("nma,mk->nka", self.basis.differentiate(places), self.coefficients)
+        return np.asarray(np.eye(3) + slopes)
+
+    def to_basis(self, basis: Basis, places: Floats) -> Field:
+        """The same field by other functions, by least squares over places."""
+        values, columns = self.displace(places), basis.evaluate(places)
+        square = columns.T @ columns + 1e-9 * len(places) * (basis.roughness + RIDGE * np.eye(basis.count))
+        return replace(self, basis=basis, coefficients=np.asarray(np.linalg.solve(square, columns.T @ values)))
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """How free a field is: ``bound``: the strain of the metal that counts like a deviation of the body's step; whether
+    it ``grows`` all over; whether it ``stretches`` the part as a whole, more in one direction than in another;
+    ``cells`` of its lattice, 0: a polynomial."""
+
+    bound: float
+    grows: bool = True
+    stretches: bool = False
+    cells: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """Where points (N,3) lie on the deformed part: ``material`` (N,3) places on the part as designed, ``normal`` (N,3)
+    of the deformed skin, ``distance`` (N,) signed, positive outside; ``faces_skin`` (N,): whether the nearest place is
+    no edge's."""
+
+    points: Floats
+    material: Floats
+    normal: Floats
+    distance: Floats
+    faces_skin: Flags
+
+
+def match(field: Field, points: Floats, body: Body) -> Match:
+    """The nearest places on the deformed part."""
+    mesh = body.mesh
+    moved = Mesh(mesh.vertices + body.columns @ field.coefficients, mesh.faces)
+    distance, face, place = SurfaceTree(moved).closest(points)
+    normal = moved.face_normals[face]
+    away = points - place
+    signed = np.einsum("ij,ij->i", away, normal)
+    off = np.linalg.norm(away - signed[:, None] * normal, axis=1)
+    weights = find_barycentric(moved.triangles[face], place)
+    material = np.einsum("nk,nkj->nj", weights, mesh.triangles[face])
+    return Match(points, material, normal, signed, off <= NEAREST * np.maximum(distance, 0.1 * body.step))
+
+
+def weigh(found: Match, scale: float, noise: float) -> Floats:
+    """(N,) robust weights by Geman and McClure, smaller for points inside the part by more than noise."""
+    side = np.where(found.distance < -NOISE * noise, INSIDE, 1.0)
+    return np.asarray(side * found.faces_skin / (1 + (found.distance / scale) ** 2) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The normal equations of a fit about a field: ``square`` (K,K) and ``right`` (K,) of the coefficients, point by
+    point of each function, and the growth last."""
+
+    square: Floats
+    right: Floats
+
+    def solve(self, basis: Basis, grows: bool) -> Field:
+        """``grows``: whether the uniform scale is free."""
+        square, right = self.stiffen(), self.right
+        if grows:
+            found: Floats = np.asarray(np.linalg.solve(square, right), np.float64)
+            return Field(basis, found[:-1].reshape(-1, 3), float(found[-1]))
+        still: Floats = np.asarray(np.linalg.solve(square[:-1, :-1], right[:-1]), np.float64)
+        return Field(basis, still.reshape(-1, 3))
+
+    def stiffen(self) -> Floats:
+        """(K,K) the square with what keeps it from being singular."""
+        scale = float(np.trace(self.square[:-1, :-1])) / max(len(self.square) - 1, 1)
+        return np.asarray(self.square + RIDGE * scale * np.eye(len(self.square)))
+
+
+def weigh_points(field: Field, found: Match, weights: Floats) -> Equations:
+    """Point to plane: each point on the plane through its place, with the mean of the squares."""
+    basis, count = field.basis, field.basis.count
+    used = weights > 1e-4
+    columns, normal, w = basis.evaluate(found.material[used]), found.normal[used], weights[used]
+    target = np.einsum("ij,ij->i", normal, found.points[used] - found.material[used])
+    square = np.zeros((count, 3, count, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            block = columns.T @ (columns * (w * normal[:, i] * normal[:, j])[:, None])
+            square[:, i, :, j] = block
+            square[:, j, :, i] = block.T
+    right = columns.T @ (normal * (w * target)[:, None])
+    size, total = 3 * count, max(len(weights), 1)
+    whole = np.zeros((size + 1, size + 1))
+    whole[:size, :size] = square.reshape(size, size) / total
+    return Equations(whole, np.append(right.ravel() / total, 0.0))
+
+
+def weigh_strain(field: Field, body: Body, freedom: Freedom) -> Equations:
+    """The mean square of the strain, less a uniform growth, in units of its bound. Co-rotated about the field: a bend
+    turns the metal by large angles and hardly strains it. Where the field may not stretch the part, the mean strain is
+    held at 0: that of a bend, a twist or a taper is, and that of a part with a worn face is not."""
+    count, slopes = field.basis.count, body.slopes
+    u, _, v = np.linalg.svd(np.eye(3) + np.einsum("nma,mk->nka", slopes, field.coefficients))
+    turn = u @ v
+    rows, right = [], []
+    for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
+        # strain = sym(R' F) - (1 + growth) I, linear in the coefficients
+        row = (slopes[:, :, None, a] * turn[:, None, :, b] + slopes[:, :, None, b] * turn[:, None, :, a]) / 2
+        same = float(a == b)
+        factor = 1.0 if same else np.sqrt(2.0)
+        still = (turn[:, a, b] + turn[:, b, a]) / 2
+        flat = np.concatenate([row.reshape(len(row), 3 * count), np.full((len(row), 1), -same)], axis=1)
+        rows.append(factor * flat)
+        right.append(factor * (same - still))
+    matrix, values = np.concatenate(rows), np.concatenate(right)
+    factor = (body.step / freedom.bound) ** 2 / len(body.inside)
+    square, aim = factor * matrix.T @ matrix, factor * matrix.T @ values
+    if not freedom.stretches:
+        mean, target = matrix.reshape(6, len(slopes), -1).mean(axis=1), values.reshape(6, -1).mean(axis=1)
+        held = (body.step / STIFF) ** 2
+        square, aim = square + held * mean.T @ mean, aim + held * mean.T @ target
+    return Equations(square, aim)
+
+
+def fit(field: Field, points: Floats, body: Body, freedom: Freedom, scales: Sequence[float]) -> Field:
+    """The field after one round of matching and least squares for each of the robust ``scales``."""
+    for scale in scales:
+        found = match(field, points, body)
+        field = assemble(field, found, body, freedom, scale).solve(field.basis, freedom.grows)
+    return field
+
+
+def assemble(field: Field, found: Match, body: Body, freedom: Freedom, scale: float) -> Equations:
+    """The equations of points, strain and roughness together."""
+    one, two = weigh_points(field, found, weigh(found, scale, body.noise)), weigh_strain(field, body, freedom)
+    square = one.square + two.square
+    if field.basis.cells:
+        share = ROUGH * float(np.trace(one.square)) / len(one.square)
+        square[:-1, :-1] += share * np.kron(field.basis.roughness, np.eye(3))
+    return Equations(square, one.right + two.right)
