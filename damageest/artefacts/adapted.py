@@ -48,7 +48,9 @@ class AdaptedPart(Checked):
         "amount": (0.0, MOST),
         "rms": (0.0, MOST),
         "strain": (0.0, MOST),
-        "growth": (-1.0, MOST),
+        "growth": (-0.5, 1.0),
+        "functions": (0, MOST),
+        "gain": (0.0, 1.0),
     }
 
     def __post_init__(self) -> None:
@@ -56,7 +58,7 @@ class AdaptedPart(Checked):
         count = len(self.part.vertices)
         require_shape("displacement", self.displacement, count, 3)
         require_finite("displacement", self.displacement)
-        require_shape("modes", self.modes, len(self.modes), count, 3)
+        require_shape("modes", self.modes, "K", count, 3)
         require_finite("modes", self.modes)
         require_shape("motion", self.motion, 4, 4)
         require_rigid("motion", self.motion)

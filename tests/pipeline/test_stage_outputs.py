@@ -16,6 +16,7 @@ import pytest
 from pydantic import Field
 
 from damageest.artefacts import (
+    AdaptedPart,
     Deposit,
     DepositPath,
     Enclosure,
@@ -61,6 +62,7 @@ def make_valid(folder: Path) -> dict[str, Any]:
     """A valid value of each contract, by its class's name."""
     given = make_given(folder)
     damage, background = given["damage"], given["background"]
+    count = len(given["part"].vertices)
     up = np.tile([0.0, 0.0, 1.0], (3, 1))
     path = DepositPath(
         np.arange(9.0).reshape(3, 3), up, up, np.full(3, 60.0), np.array([False, True, True]), np.ones(3, int),
@@ -75,6 +77,9 @@ def make_valid(folder: Path) -> dict[str, Any]:
         "ReadScan": viewed,
         "Sample": given["samples"],
         "Align": Pose(np.eye(4), 0.1, 0.9, np.eye(4)[None]),
+        "Adapt": AdaptedPart(
+            given["part"], np.zeros((count, 3)), np.eye(4), np.zeros((2, count, 3)), 0.3, 0.1, 0.01, 0.01, (4, 3, 2)
+        ),
         "Segment": given["deviation"],
         "Cluster": given["sites"],
         "Reconstruct": given["surface"],
@@ -163,6 +168,7 @@ LEGAL = {
     ("Path", "clearance"): ("-1",),
     ("Path", "travel_clearance"): ("-1",),
     ("Align", "alternatives"): ("None", "twice as long", "one row less"),
+    ("Adapt", "modes"): ("-1e+300", "-7.5", "1e+09", "twice as long", "one row less"),
     ("ReadPart", "faces_brep"): ("None", "1e+09", "-7.5"),
     # a mesh with other vertices or fewer triangles is a mesh
     ("Reconstruct", "vertices"): ("-1e+300", "-7.5", "1e+09", "twice as long"),
@@ -225,6 +231,13 @@ def test_a_value_of_another_type_is_an_error(name: str, bad: Any, registry: Regi
 
 
 SPOILED: dict[str, tuple[str, Callable[[dict[str, Any]], Any], str]] = {
+    "a deformation of another part": (
+        "Adapt",
+        lambda g: AdaptedPart(
+            g["part"], np.ones((len(g["part"].vertices), 3)), np.eye(4), np.zeros((0, len(g["part"].vertices), 3)), 1, 1
+        ),
+        "off the part as designed",
+    ),
     "faces of another part": (
         "Segment",
         lambda g: dataclasses.replace(g["deviation"], face=g["deviation"].face + len(g["part"].faces)),

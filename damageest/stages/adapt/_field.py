@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import permutations
 
 import numpy as np
 
@@ -22,6 +23,10 @@ NEAREST = 0.3
 edge, and says nothing about the skin beside it."""
 STIFF = 1e-5
 """Strain that is as good as none."""
+SLENDER = 0.8
+"""Variance of the metal along a main axis, as a share of that along another, from which it bends toward the other."""
+STILL = 0.04
+"""Largest movement of the skin in a round, in the body's step, by which a fit has come to rest."""
 RIDGE = 1e-9
 """What keeps functions that nothing determines at 0, as a share of the largest sum of squares."""
 ROUGH = 1e-6
@@ -53,6 +58,11 @@ class Body:
     def slopes(self) -> Floats:
         """(P,M,3) their derivatives at the places inside."""
         return self.basis.differentiate(self.inside)
+
+    @cached_property
+    def free_strain(self) -> Floats:
+        """(P,3,3,S) the strains that cost nothing, see `make_free_strain`."""
+        return make_free_strain(self.inside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +100,13 @@ class Field:
 @dataclass(frozen=True)
 class Freedom:
     """How free a field is: ``bound``: the strain of the metal that counts like a deviation of the body's step; whether
-    it ``grows`` all over; whether it ``stretches`` the part as a whole, more in one direction than in another;
-    ``cells`` of its lattice, 0: a polynomial."""
+    it ``grows`` all over; whether it ``bends`` and twists the part, of which the strain does not count; whether it
+    ``stretches`` the part as a whole, more in one direction than in another; ``cells`` of its lattice, 0: a
+    polynomial."""
 
     bound: float
     grows: bool = True
+    bends: bool = True
     stretches: bool = False
     cells: int = 0
 
@@ -174,38 +186,92 @@ def weigh_points(field: Field, found: Match, weights: Floats) -> Equations:
     return Equations(whole, np.append(right.ravel() / total, 0.0))
 
 
+def make_free_strain(places: Floats) -> Floats:
+    """(P,3,3,S) strains at places (P,3) in a part that is bent or twisted, as an orthonormal basis over the places.
+
+    Where an axis is bent to a curve, the metal on its outer side is longer and that on its inner side shorter, by its
+    distance from the axis; where cross-sections turn, the metal is sheared. Neither changes how thick the part is, as
+    wear does: of the main axes, one is bent toward those alone along which the part is no longer. Curvature and rate of
+    turning may change in proportion to the place along the axis.
+    """
+    q = places - places.mean(axis=0)
+    spread, frame = np.linalg.eigh(q.T @ q / len(q))
+    q = q @ frame
+    found = []
+    for axis, toward in permutations(range(3), 2):
+        for along in (np.ones(len(q)), q[:, axis]) if spread[axis] > SLENDER * spread[toward] else ():
+            bent = np.zeros((len(q), 3, 3))
+            bent[:, axis, axis] = along * q[:, toward]
+            found.append(bent)
+    for axis in range(3):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        for along in (np.ones(len(q)), q[:, axis]):
+            turned = np.zeros((len(q), 3, 3))
+            turned[:, axis, one] = turned[:, one, axis] = -along * q[:, other]
+            turned[:, axis, other] = turned[:, other, axis] = along * q[:, one]
+            found.append(turned)
+    flat = np.stack([(frame @ one @ frame.T).reshape(-1) for one in found], axis=1)
+    u, size, _ = np.linalg.svd(flat / np.linalg.norm(flat, axis=0), full_matrices=False)
+    kept = u[:, size > 1e-6 * size[0]] * np.sqrt(len(q))
+    return np.asarray(kept.reshape(len(q), 3, 3, -1))
+
+
 def weigh_strain(field: Field, body: Body, freedom: Freedom) -> Equations:
-    """The mean square of the strain, less a uniform growth, in units of its bound. Co-rotated about the field: a bend
-    turns the metal by large angles and hardly strains it. Where the field may not stretch the part, the mean strain is
-    held at 0: that of a bend, a twist or a taper is, and that of a part with a worn face is not."""
+    """The mean square of the strain, less that of a bend, a twist and a uniform growth, in units of its bound.
+    Co-rotated about the field: a bend turns the metal by large angles. Where the field may not stretch the part, the
+    mean strain is held at 0: that of a bend, a twist or a taper is, and that of a part with a worn face is not."""
     count, slopes = field.basis.count, body.slopes
+    places, free = len(slopes), body.free_strain.shape[3] if freedom.bends else 0
     u, _, v = np.linalg.svd(np.eye(3) + np.einsum("nma,mk->nka", slopes, field.coefficients))
     turn = u @ v
     rows, right = [], []
     for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
-        # strain = sym(R' F) - (1 + growth) I, linear in the coefficients
+        # strain = sym(R' F) - (1 + growth) I - free strains, linear in the coefficients
         row = (slopes[:, :, None, a] * turn[:, None, :, b] + slopes[:, :, None, b] * turn[:, None, :, a]) / 2
         same = float(a == b)
         factor = 1.0 if same else np.sqrt(2.0)
         still = (turn[:, a, b] + turn[:, b, a]) / 2
-        flat = np.concatenate([row.reshape(len(row), 3 * count), np.full((len(row), 1), -same)], axis=1)
-        rows.append(factor * flat)
+        given = -body.free_strain[:, a, b, :free]
+        columns = (row.reshape(places, 3 * count), np.full((places, 1), -same), given)
+        rows.append(factor * np.concatenate(columns, axis=1))
         right.append(factor * (same - still))
     matrix, values = np.concatenate(rows), np.concatenate(right)
-    factor = (body.step / freedom.bound) ** 2 / len(body.inside)
+    factor = (body.step / freedom.bound) ** 2 / places
     square, aim = factor * matrix.T @ matrix, factor * matrix.T @ values
     if not freedom.stretches:
-        mean, target = matrix.reshape(6, len(slopes), -1).mean(axis=1), values.reshape(6, -1).mean(axis=1)
+        whole = matrix[:, : 3 * count + 1]
+        mean, target = whole.reshape(6, places, -1).mean(axis=1), values.reshape(6, -1).mean(axis=1)
         held = (body.step / STIFF) ** 2
-        square, aim = square + held * mean.T @ mean, aim + held * mean.T @ target
-    return Equations(square, aim)
+        size = 3 * count + 1
+        square[:size, :size] += held * mean.T @ mean
+        aim[:size] += held * mean.T @ target
+    return _eliminate(square, aim, 3 * count + 1)
+
+
+def _eliminate(square: Floats, right: Floats, kept: int) -> Equations:
+    """The equations of the first ``kept`` unknowns, with the others as they are best."""
+    if len(square) == kept:
+        return Equations(square, right)
+    rest = square[kept:, kept:]
+    solved = np.linalg.solve(rest, np.column_stack([square[kept:, :kept], right[kept:]]))
+    return Equations(
+        square[:kept, :kept] - square[:kept, kept:] @ solved[:, :-1],
+        right[:kept] - square[:kept, kept:] @ solved[:, -1],
+    )
 
 
 def fit(field: Field, points: Floats, body: Body, freedom: Freedom, scales: Sequence[float]) -> Field:
-    """The field after one round of matching and least squares for each of the robust ``scales``."""
+    """The field after one round of matching and least squares for each of the robust ``scales``; of rounds at the same
+    scale no more than it takes until the skin stays where it is."""
+    before = 0.0
     for scale in scales:
         found = match(field, points, body)
-        field = assemble(field, found, body, freedom, scale).solve(field.basis, freedom.grows)
+        after = assemble(field, found, body, freedom, scale).solve(field.basis, freedom.grows)
+        moved = float(np.abs(body.columns @ (after.coefficients - field.coefficients)).max())
+        field = after
+        if scale == before and moved < STILL * body.step:
+            break
+        before = scale
     return field
 
 

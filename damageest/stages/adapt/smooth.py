@@ -25,24 +25,25 @@ FEWEST = 200
 """Points that a field is fitted to at least."""
 FINE = 25.0
 """Edges along the part's diagonal of the triangles that points are matched with."""
-PLACES = 1200
+PLACES = 500
 """Places in the metal where the strain is asked for."""
-ROUNDS, LAST, HELD = 8, 3, 4
-"""Rounds from the widest robust scale to the narrowest, more at the narrowest, and those of a fit to half of the
-patches."""
+ROUNDS, LAST, HELD = 8, 10, 6
+"""Rounds from the widest robust scale to the narrowest, more at the narrowest at most, and those of a fit to half of
+the patches."""
 WIDEST = 12.0
 """Widest robust scale, in tolerances."""
+BENT = 0.001
+"""Strain beyond that of a bend or a twist, of a field that does nothing else."""
 LADDER = (
-    Freedom(STIFF, grows=False),
-    Freedom(STIFF),
-    Freedom(0.0005),
-    Freedom(0.002),
-    Freedom(0.008),
+    Freedom(STIFF, grows=False, bends=False),
+    Freedom(STIFF, bends=False),
+    Freedom(BENT),
+    Freedom(0.006),
     Freedom(0.03),
     Freedom(0.03, stretches=True),
 )
 """Freedoms in the order in which they are tried, the first of them a rigid part."""
-LOOSE = 0.008
+LOOSE = 0.006
 """Strain from which a lattice is tried too."""
 LEFT = 1.15
 """What a polynomial has to leave in half of the patches for it, in mean squares of the noise."""

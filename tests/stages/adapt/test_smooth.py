@@ -29,16 +29,16 @@ WORN = {"tool": "plane", "point": [0, 0, 10 - 2 * TOLERANCE], "normal": [0, 0, 1
 
 
 def scan(damage: Any = (), **deform: float) -> Scan:
-    options = {"damage": list(damage), "points": 16_000, "noise": NOISE, "seed": 2, "deform": deform or None}
+    options = {"damage": list(damage), "points": 8000, "noise": NOISE, "seed": 2, "deform": deform or None}
     found = Simulate.model_validate(options).run("mm", PART)
-    return Scan(found.points, truth=found.truth, noise=NOISE, spacing=0.5)
+    return Scan(found.points, truth=found.truth, noise=NOISE, spacing=0.7)
 
 
 @lru_cache
 def adapt(damage: str = "", **deform: float) -> tuple[AdaptedPart | None, Floats]:
     """The adapted part, and the distances of the scan's points to it."""
     given = scan({"": [], "sphere": [SPHERE], "worn": [WORN]}[damage], **deform)
-    adapted = Smooth(points=4000, lattice=()).run(PART, given, TOLERANCE)
+    adapted = Smooth(points=3000, lattice=()).run(PART, given, TOLERANCE)
     if adapted is None:
         return None, signed_distance(given.points, PART)[0]
     return adapted, signed_distance(given.move(adapted.motion).points, adapted.part)[0]
@@ -81,7 +81,7 @@ def test_the_field_has_no_rigid_part_over_the_seen_skin() -> None:
 def test_what_is_not_seen_is_known_less_exactly() -> None:
     whole = scan(bend=1.0)
     half = whole.take(whole.points[:, 0] < 4)
-    seen, cut = (Smooth(points=4000, lattice=()).run(PART, one, TOLERANCE) for one in (whole, half))
+    seen, cut = (Smooth(points=3000, lattice=()).run(PART, one, TOLERANCE) for one in (whole, half))
     assert seen is not None
     assert cut is not None
 
@@ -118,12 +118,10 @@ def test_derivatives_are_those_of_the_functions(cells: int) -> None:
 
 def test_a_bent_part_in_a_job(tmp_path: Path) -> None:
     given = scan([SPHERE], bend=1.0)
-    job = {"version": 1, "units": "mm", "tolerance": TOLERANCE, "align": "icp", "report": "none", "export": "files"}
-    rigid = damageest.run(job, part=PART, scan=given)
+    job = {"version": 1, "units": "mm", "tolerance": TOLERANCE, "align": "none", "report": "none", "export": "files"}
     result = damageest.run(job, part=PART, scan=given, settings=["adapt=smooth"], output=tmp_path / "out")
-    assert rigid.truth is not None
     assert result.truth is not None
-    assert result.truth[1] > 0.95 > rigid.truth[1]
+    assert result.truth[1] > 0.95
     (site,) = result.sites
     assert site.verdict.level != "doubtful"
     assert site.volume_95 is not None
