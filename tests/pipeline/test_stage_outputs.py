@@ -168,6 +168,7 @@ LEGAL = {
     ("Path", "clearance"): ("-1",),
     ("Path", "travel_clearance"): ("-1",),
     ("Align", "alternatives"): ("None", "twice as long", "one row less"),
+    ("Adapt", "displacement"): ("-7.5",),  # leads back to the skin by chance
     ("Adapt", "modes"): ("-1e+300", "-7.5", "1e+09", "twice as long", "one row less"),
     ("ReadPart", "faces_brep"): ("None", "1e+09", "-7.5"),
     # a mesh with other vertices or fewer triangles is a mesh

@@ -23,6 +23,9 @@ NEAREST = 0.3
 edge, and says nothing about the skin beside it."""
 STIFF = 1e-5
 """Strain that is as good as none."""
+MEAN = 0.002
+"""Strain, on average over the metal, of a field that does not stretch the part: a bend about an axis that is not its
+middle has some."""
 SLENDER = 0.8
 """Variance of the metal along a main axis, as a share of that along another, from which it bends toward the other."""
 STILL = 0.04
@@ -219,7 +222,7 @@ def make_free_strain(places: Floats) -> Floats:
 def weigh_strain(field: Field, body: Body, freedom: Freedom) -> Equations:
     """The mean square of the strain, less that of a bend, a twist and a uniform growth, in units of its bound.
     Co-rotated about the field: a bend turns the metal by large angles. Where the field may not stretch the part, the
-    mean strain is held at 0: that of a bend, a twist or a taper is, and that of a part with a worn face is not."""
+    mean strain is held near 0: that of a bend, a twist or a taper is, and that of a part with a worn face is not."""
     count, slopes = field.basis.count, body.slopes
     places, free = len(slopes), body.free_strain.shape[3] if freedom.bends else 0
     u, _, v = np.linalg.svd(np.eye(3) + np.einsum("nma,mk->nka", slopes, field.coefficients))
@@ -241,7 +244,7 @@ def weigh_strain(field: Field, body: Body, freedom: Freedom) -> Equations:
     if not freedom.stretches:
         whole = matrix[:, : 3 * count + 1]
         mean, target = whole.reshape(6, places, -1).mean(axis=1), values.reshape(6, -1).mean(axis=1)
-        held = (body.step / STIFF) ** 2
+        held = (body.step / min(MEAN, freedom.bound)) ** 2
         size = 3 * count + 1
         square[:size, :size] += held * mean.T @ mean
         aim[:size] += held * mean.T @ target

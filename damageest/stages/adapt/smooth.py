@@ -34,15 +34,9 @@ WIDEST = 12.0
 """Widest robust scale, in tolerances."""
 BENT = 0.001
 """Strain beyond that of a bend or a twist, of a field that does nothing else."""
-LADDER = (
-    Freedom(STIFF, grows=False, bends=False),
-    Freedom(STIFF, bends=False),
-    Freedom(BENT),
-    Freedom(0.006),
-    Freedom(0.03),
-    Freedom(0.03, stretches=True),
-)
-"""Freedoms in the order in which they are tried, the first of them a rigid part."""
+RIGID, SCALED = Freedom(STIFF, grows=False, bends=False), Freedom(STIFF, bends=False)
+STRAINED = (0.006, 0.03)
+"""Strains beyond that of a bend or a twist that freer fields may have, in the order in which they are tried."""
 LOOSE = 0.006
 """Strain from which a lattice is tried too."""
 LEFT = 1.15
@@ -73,7 +67,7 @@ class Smooth(Adapt):
         if len(points) < FEWEST:
             raise StageError(f"only {len(points)} points lie near the part", "scan more of the part, or adapt: none")
         trials, chosen = self._climb(points, body, part.diagonal, tolerance)
-        if chosen.freedom == LADDER[0]:
+        if chosen is trials[0]:
             return None
         return self._finish(part, centre, points, body, trials, chosen, tolerance)
 
@@ -91,14 +85,26 @@ class Smooth(Adapt):
             score = cross_validate(field, half, body, freedom, last, HELD, patch, held)
             return Trial(field, freedom, score)
 
-        rigid, scaled, freest = (attempt(freedom, zero, scales) for freedom in (*LADDER[:2], LADDER[-1]))
+        def take(freedom: Freedom) -> None:
+            """Tries a freer field, and takes it where held-out patches bear it out."""
+            nonlocal chosen
+            trials.append(attempt(freedom, zero, scales))
+            chosen = trials[-1] if is_better(trials[-1].score, chosen.score) else chosen
+
+        rigid, scaled = attempt(RIGID, zero, scales), attempt(SCALED, zero, scales)
         # nothing is strained by a scale, and shrinking leaves no metal outside
         chosen = scaled if explains_more(scaled.score.both, rigid.score.both)[0] else rigid
-        trials = [rigid, scaled, freest]
+        trials, grows = [rigid, scaled], chosen is scaled
+        take(Freedom(BENT, grows=grows))
+        if chosen is trials[-1] and not grows:
+            take(Freedom(BENT))
+            grows = chosen is trials[-1]
+        freest = attempt(Freedom(STRAINED[-1], grows, stretches=True), zero, scales)
         if is_better(freest.score, chosen.score):
-            trials[2:2] = [attempt(freedom, zero, scales) for freedom in LADDER[2:-1]]
-            for trial in trials[2:]:
-                chosen = trial if is_better(trial.score, chosen.score) else chosen
+            for bound in STRAINED:
+                take(Freedom(bound, grows))
+            chosen = freest if is_better(freest.score, chosen.score) else chosen
+        trials.append(freest)
         is_rough = chosen.freedom.bound >= LOOSE and np.median(chosen.score.both) > LEFT * body.noise**2
         for cells in self.lattice if is_rough else ():
             finer = replace(body, inside=body.inside[::2], basis=replace(body.basis, cells=cells))
@@ -157,10 +163,18 @@ def prepare(part: Part, centre: Floats, tolerance: float, noise: float) -> Body:
     extent = np.ptp(part.bounds, axis=0)
     size = float(extent.max()) / 2
     fine, _ = cut_into_cells(Mesh(part.vertices - centre, part.faces), part.diagonal / FINE)
-    box = np.random.default_rng(17).uniform(-extent / 2, extent / 2, (20 * PLACES, 3))
-    inside = box[is_inside(box, fine)][:PLACES]
+    box = (spread_evenly(40 * PLACES) - 0.5) * extent
+    inside = box[is_inside(box, fine)]
+    inside = inside[:: max(1, len(inside) // PLACES)]
     inside = inside if len(inside) > PLACES // 10 else fine.triangles.mean(axis=1)[:: max(1, len(fine.faces) // PLACES)]
     return Body(fine, inside, tolerance / 4, noise, Basis(np.zeros(3), size, extent / 2 / size))
+
+
+def spread_evenly(count: int) -> Floats:
+    """(N,3) places in the unit cube whose means, over any box in it, are those of the box: an additive recurrence by
+    the root of x^4 = x + 1."""
+    root = 1.2207440846057596
+    return np.asarray((0.5 + np.arange(1, count + 1)[:, None] * root ** -np.arange(1.0, 4.0)) % 1)
 
 
 def thin(points: Floats, part: Part, count: int, reach: float) -> Floats:

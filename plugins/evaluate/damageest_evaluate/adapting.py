@@ -25,7 +25,7 @@ from damageest_evaluate.sized import make_sized_damage
 
 TOLERANCE = 0.2
 """In mm; the noise is a quarter of it."""
-POINTS = 80_000
+POINTS = 25_000
 
 
 @dataclass(frozen=True)
