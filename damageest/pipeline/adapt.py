@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats, Part, Pose
+from damageest.checks.model_fit import measure_fit
 from damageest.geometry.distance import signed_distance
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, Step
@@ -23,6 +24,10 @@ NEAR = 0.05
 """Distance outside the part, in diagonals, from which a point shows something beside it."""
 ASKED = 15_000
 """Points that the share is estimated from."""
+MEASURED = 40_000
+"""Points, about, that the form of the part is measured with before it is adapted."""
+ASKING = ("deformed", "scaled", "wavy")
+"""What the fit of the model calls a part that a field may explain."""
 BY_FORM = "another_part"
 """Code of the doubt in a pose that a part of another form explains."""
 
@@ -33,10 +38,28 @@ def adapt_part(adapt: Contract) -> Step:
     def run(engine: Engine, work: Work) -> Work:
         stage = engine.job.stages[adapt]
         if adapt not in engine.job.given and isinstance(stage, Adapt) and not stage.deforms:
-            return replace(work, job=work.job.with_value(JobState.adapted, None, digest("as designed")))
+            return keep_designed(work)
+        if isinstance(stage, Adapt) and stage.asks_first and not is_asked_for(work.job):
+            return keep_designed(work)
         return take_adapted(engine, replace(work, job=engine.call(adapt, work.job)))
 
     return run
+
+
+def keep_designed(work: Work) -> Work:
+    """The work with the part as designed."""
+    return replace(work, job=work.job.with_value(JobState.adapted, None, digest("as designed")))
+
+
+def is_asked_for(state: JobState) -> bool:
+    """Whether the intact skin shows a part that is not as designed: a form that the fit of the model names, or a scan
+    of which too little lies on the part in the best pose."""
+    if any(doubt.code == BY_FORM for doubt in state.pose.doubts):
+        return True
+    points = state.aligned.points[:: max(1, len(state.aligned.points) // MEASURED)]
+    distance, _ = signed_distance(points, state.part)
+    found = measure_fit(state.part, points, distance, state.aligned.noise, state.tolerance, state.unit, state.views)
+    return found is not None and found.fit.model in ASKING
 
 
 def take_adapted(engine: Engine, work: Work) -> Work:

@@ -12,7 +12,8 @@ from damageest.stages import Stage, asked_by_name
 class Adapt(Stage, ABC):
     """Deforms the part as designed until it follows the intact skin of the scan. All later stages work on the result.
 
-    An implementation that never deforms sets ``deforms`` to False; it is not called.
+    An implementation that never deforms sets ``deforms`` to False; it is not called. One with ``asks_first`` is called
+    only where the intact skin shows that the part as designed does not explain the scan.
 
     Args of ``run``, lengths in the job's unit:
         part: the part as designed.
@@ -57,6 +58,7 @@ class Adapt(Stage, ABC):
     stage: ClassVar[str] = "adapt"
     gives: ClassVar[str] = "adapted"
     deforms: ClassVar[bool] = True
+    asks_first: ClassVar[bool] = False
 
     @asked_by_name
     @abstractmethod
