@@ -33,15 +33,14 @@ class Basis:
         return int(counts[0]), int(counts[1]), int(counts[2])
 
     @cached_property
-    def _chosen(self) -> Ints:
-        """Which of the products of one function an axis are used: of a polynomial those up to the degree."""
+    def _powers(self) -> Ints:
+        """(3,M) which function of each axis is multiplied: of a polynomial those up to the degree in all."""
         powers = np.array(list(product(*(range(n) for n in self.shape))))
-        kept = np.ones(len(powers), bool) if self.cells else powers.sum(axis=1) <= DEGREE
-        return np.asarray(np.flatnonzero(kept))
+        return np.asarray((powers if self.cells else powers[powers.sum(axis=1) <= DEGREE]).T)
 
     @property
     def count(self) -> int:
-        return len(self._chosen)
+        return self._powers.shape[1]
 
     @property
     def shape_of_cells(self) -> tuple[int, int, int]:
@@ -104,6 +103,5 @@ class Basis:
 
     def _multiply(self, factors: list[Floats]) -> Floats:
         """(N,M) the products of one function an axis that are used."""
-        x, y, z = factors
-        whole = (x[:, :, None, None] * y[:, None, :, None] * z[:, None, None, :]).reshape(len(x), -1)
-        return np.asarray(whole[:, self._chosen])
+        i, j, k = self._powers
+        return np.asarray(factors[0][:, i] * factors[1][:, j] * factors[2][:, k])

@@ -10,7 +10,6 @@ from itertools import permutations
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh
-from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import SurfaceTree
 from damageest.stages.adapt._basis import Basis
 
@@ -26,6 +25,8 @@ STIFF = 1e-5
 MEAN = 0.002
 """Strain, on average over the metal, of a field that does not stretch the part: a bend about an axis that is not its
 middle has some."""
+UNDO = 4
+"""Rounds in which the place is found that a field moves to a point: its slope is below a tenth."""
 SLENDER = 0.8
 """Variance of the metal along a main axis, as a share of that along another, from which it bends toward the other."""
 STILL = 0.04
@@ -51,6 +52,15 @@ class Body:
     step: float
     noise: float
     basis: Basis
+
+    @cached_property
+    def tree(self) -> SurfaceTree:
+        return SurfaceTree(self.mesh)
+
+    @cached_property
+    def normals(self) -> Floats:
+        """(F,3) of the mesh's triangles."""
+        return self.mesh.face_normals
 
     @cached_property
     def columns(self) -> Floats:
@@ -87,6 +97,13 @@ class Field:
 
     def move(self, places: Floats) -> Floats:
         return places + self.displace(places)
+
+    def undo(self, points: Floats) -> Floats:
+        """(N,3) the places that are moved to the points (N,3), within a part in 10,000 of the displacement."""
+        places = points
+        for _ in range(UNDO):
+            places = points - self.displace(places)
+        return places
 
     def differentiate(self, places: Floats) -> Floats:
         """(N,3,3) the deformation gradient: row k holds the derivatives of coordinate k."""
@@ -128,17 +145,15 @@ class Match:
 
 
 def match(field: Field, points: Floats, body: Body) -> Match:
-    """The nearest places on the deformed part."""
-    mesh = body.mesh
-    moved = Mesh(mesh.vertices + body.columns @ field.coefficients, mesh.faces)
-    distance, face, place = SurfaceTree(moved).closest(points)
-    normal = moved.face_normals[face]
-    away = points - place
+    """The nearest places on the deformed part. They are looked for on the part as designed, where the points are taken
+    back to: the field hardly strains the metal, and the tree of the part's triangles is built once."""
+    _, face, material = body.tree.closest(field.undo(points))
+    normal = np.linalg.solve(field.differentiate(material).transpose(0, 2, 1), body.normals[face][:, :, None])[:, :, 0]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    away = points - field.move(material)
     signed = np.einsum("ij,ij->i", away, normal)
     off = np.linalg.norm(away - signed[:, None] * normal, axis=1)
-    weights = find_barycentric(moved.triangles[face], place)
-    material = np.einsum("nk,nkj->nj", weights, mesh.triangles[face])
-    return Match(points, material, normal, signed, off <= NEAREST * np.maximum(distance, 0.1 * body.step))
+    return Match(points, material, normal, signed, off <= NEAREST * np.maximum(np.abs(signed), 0.1 * body.step))
 
 
 def weigh(found: Match, scale: float, noise: float) -> Floats:
