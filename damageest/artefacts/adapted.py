@@ -20,6 +20,7 @@ class AdaptedPart(Checked):
     ``part``: the deformed part, of V vertices. ``displacement`` (V,3): that of each vertex from the part as designed;
     over intact skin it has no rigid part. ``motion`` (4,4): rigid; takes the aligned scan onto the deformed part.
     ``modes`` (K,V,3): how exactly the displacement is known: independent errors, each as one standard deviation.
+    ``other`` (V,3): what else explains the scan as well, as a change of the displacement; None where nothing does.
     ``amount``, ``rms``: largest and root of the mean square of the displacement over the seen skin. ``growth``: the
     uniform scale in it, less 1; ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells
     along the axes, (0, 0, 0) for a polynomial; ``functions``: how many functions each coordinate is a sum of.
@@ -39,10 +40,12 @@ class AdaptedPart(Checked):
     functions: int = 0
     gain: float = 0.0
     notes: tuple[str, ...] = ()
+    other: Floats | None = None
     _dtypes: ClassVar[dict[str, Any]] = {
         "displacement": np.float64,
         "motion": np.float64,
         "modes": np.float64,
+        "other": np.float64,
     }
     _ranges: ClassVar[dict[str, Range]] = {
         "amount": (0.0, MOST),
@@ -60,5 +63,8 @@ class AdaptedPart(Checked):
         require_finite("displacement", self.displacement)
         require_shape("modes", self.modes, "K", count, 3)
         require_finite("modes", self.modes)
+        if self.other is not None:
+            require_shape("other", self.other, count, 3)
+            require_finite("other", self.other)
         require_shape("motion", self.motion, 4, 4)
         require_rigid("motion", self.motion)

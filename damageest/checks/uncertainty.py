@@ -55,7 +55,8 @@ class SiteError:
 
     ``pose`` (K,): signed, by the columns of `PoseError.spread`; ``excess``: by how much the volume is too large on
     average; ``adapt`` (J,): signed, by the modes of an adapted part, and ``depth_adapt``: what they make of the depth;
-    ``rates`` (M,): change of the volume for each unit of each free motion, and ``motions`` (M,2): their ends;
+    ``rates`` (M,): change of the volume for each unit of each free motion, and by the other field of an adapted part,
+    and ``motions`` (M,2): their ends;
     ``inside``, ``beside``, ``fading``: by how much the loss may be larger; ``less``: by how much it may be smaller,
     since the inner surface was closed across what was not seen. ``depth``: of the damage volume, corrected for its mean
     error; ``depth_error``: one standard deviation; ``depth_free``: change by the free motions.
@@ -122,6 +123,7 @@ def measure_site_error(
     deepest = _find_deepest(damage, inner, part, members, 3 * max(surface.gap, tolerance))
     by_pose = pose.of_distance(deepest.at, deepest.normal)
     bent, bent_depth = measure_adapt(adapted, damage, skin, area, deepest)
+    has_other = adapted is not None and adapted.other is not None
     beside = by_pose**2 + bent_depth**2 + max(form, systematic) ** 2 + part.tessellation_error**2 / 3
     by_point = float(np.sqrt(aligned.noise**2 + beside))
     return SiteError(
@@ -136,7 +138,9 @@ def measure_site_error(
         form=float(max(form * exposed, systematic * exposed / np.sqrt(patches))),
         outward=outward * exposed / WIDTH,
         views=scan.between_views * exposed / WIDTH,
-        adapt=bent,
+        adapt=bent[:-1] if has_other else bent,
+        rates=bent[-1:] if has_other else np.empty(0),
+        motions=np.array([[0.0, 1.0]]) if has_other else np.empty((0, 2)),
         inside=HOLE * hole**1.5,
         less=damage.volume * evidence.ids_unseen if hole else 0.0,
         depth=deepest.depth - surface.depth_excess,
@@ -152,15 +156,17 @@ def measure_adapt(
     adapted: AdaptedPart | None, damage: Solid, skin: Flags, area: Floats, deepest: _Place
 ) -> tuple[Floats, float]:
     """What the errors (J,) of an adapted part's field make of a volume, and the standard deviation of the distance of
-    its deepest place to the skin. The skin that is gone lies elsewhere by the field's error; the volume ends there."""
-    if adapted is None or not len(adapted.modes):
+    its deepest place to the skin. Last, where there is one, what another field that explains the scan makes of the
+    volume. The skin that is gone lies elsewhere by them; the volume ends there."""
+    if adapted is None:
         return np.empty(0), 0.0
+    fields = adapted.modes if adapted.other is None else np.concatenate([adapted.modes, adapted.other[None]])
     centres = np.concatenate([damage.triangles[skin].mean(axis=1), deepest.at[None]])
     normals = np.concatenate([damage.face_normals[skin], deepest.normal[None]])
     _, face, place = closest_on_mesh(centres, adapted.part)
     weights = find_barycentric(adapted.part.triangles[face], place)
-    moved = np.einsum("nc,jnck,nk->jn", weights, adapted.modes[:, adapted.part.faces[face]], normals)
-    return np.asarray(moved[:, :-1] @ area[skin]), float(np.linalg.norm(moved[:, -1]))
+    moved = np.einsum("nc,jnck,nk->jn", weights, fields[:, adapted.part.faces[face]], normals)
+    return np.asarray(moved[:, :-1] @ area[skin]), float(np.linalg.norm(moved[: len(adapted.modes), -1]))
 
 
 def combine_site(error: SiteError) -> tuple[Interval, Interval]:
@@ -184,7 +190,8 @@ def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 
     bent = np.sum([one.adapt for one in errors], axis=0)
     deviation = float(np.sqrt((alone**2).sum() + (shared**2).sum() + (moved**2).sum() + (bent**2).sum()))
     more = sum(one.inside + one.beside + one.fading for one in errors)
-    free = _sweep(np.sum([one.rates for one in errors], axis=0), errors[0].motions)
+    moving = [one for one in errors if len(one.rates)]  # a whole body that is lost has none
+    free = _sweep(np.sum([one.rates for one in moving], axis=0), moving[0].motions) if moving else (0.0, 0.0)
     middle = volume - sum(one.excess for one in errors)
     low = min(middle - WIDTH * deviation, volume) + free[0] - sum(one.less for one in errors)
     high = max(middle + WIDTH * deviation, volume) + free[1] + more

@@ -102,8 +102,8 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         found,
         beside=limit_beside(state.coverage, site.damage, reach, found.depth),
         fading=fading.beyond if fading else 0.0,
-        rates=np.array([one.rate for one in dependences]),
-        motions=np.array([[one.motion.low, one.motion.high] for one in dependences]).reshape(-1, 2),
+        rates=np.append(found.rates, [one.rate for one in dependences]),
+        motions=np.concatenate([found.motions, *([[one.motion.low, one.motion.high]] for one in dependences)]),
     )
     volume, depth = combine_site(error)
     uncertainty = Uncertainty(

@@ -56,9 +56,9 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.segment.mesh_distance import MeshDistance
 
     return [
-        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, Points, NoAdapt, Smooth, AutoAdapt,
-        MeshDistance, Dbscan, PyVista, LargestLoop, AllLoops, Offset, BoundingBox, Capsule, CylinderBackground, Minkowski,
-        BuildVolume, ShortestPath, Adaptive, Implicit,
+        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, Points, NoAdapt, Smooth,
+        AutoAdapt, MeshDistance, Dbscan, PyVista, LargestLoop, AllLoops, Offset, BoundingBox, Capsule,
+        CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
         NoRepair, Manifold, NoAllowance, Milling, NoPath, Files, Uniform, CloudDistance, SignedDistance,
         PartFromScan, Html, NoReport,
     ]  # fmt: skip

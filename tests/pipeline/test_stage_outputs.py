@@ -78,7 +78,16 @@ def make_valid(folder: Path) -> dict[str, Any]:
         "Sample": given["samples"],
         "Align": Pose(np.eye(4), 0.1, 0.9, np.eye(4)[None]),
         "Adapt": AdaptedPart(
-            given["part"], np.zeros((count, 3)), np.eye(4), np.zeros((2, count, 3)), 0.3, 0.1, 0.01, 0.01, (4, 3, 2)
+            given["part"],
+            np.zeros((count, 3)),
+            np.eye(4),
+            np.zeros((2, count, 3)),
+            0.3,
+            0.1,
+            0.01,
+            0.01,
+            (4, 3, 2),
+            other=np.zeros((count, 3)),
         ),
         "Segment": given["deviation"],
         "Cluster": given["sites"],
@@ -169,6 +178,7 @@ LEGAL = {
     ("Path", "travel_clearance"): ("-1",),
     ("Align", "alternatives"): ("None", "twice as long", "one row less"),
     ("Adapt", "displacement"): ("-7.5",),  # leads back to the skin by chance
+    ("Adapt", "other"): ("-1e+300", "-7.5", "1e+09", "None"),
     ("Adapt", "modes"): ("-1e+300", "-7.5", "1e+09", "twice as long", "one row less"),
     ("ReadPart", "faces_brep"): ("None", "1e+09", "-7.5"),
     # a mesh with other vertices or fewer triangles is a mesh

@@ -40,7 +40,7 @@ class Basis:
 
     @property
     def count(self) -> int:
-        return self._powers.shape[1]
+        return int(self._powers.shape[1])
 
     @property
     def shape_of_cells(self) -> tuple[int, int, int]:

@@ -151,9 +151,15 @@ def match(field: Field, points: Floats, body: Body) -> Match:
     normal = np.linalg.solve(field.differentiate(material).transpose(0, 2, 1), body.normals[face][:, :, None])[:, :, 0]
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     away = points - field.move(material)
-    signed = np.einsum("ij,ij->i", away, normal)
+    signed: Floats = np.einsum("ij,ij->i", away, normal)
     off = np.linalg.norm(away - signed[:, None] * normal, axis=1)
-    return Match(points, material, normal, signed, off <= NEAREST * np.maximum(np.abs(signed), 0.1 * body.step))
+    return Match(
+        points,
+        material,
+        np.asarray(normal, np.float64),
+        signed,
+        off <= NEAREST * np.maximum(np.abs(signed), 0.1 * body.step),
+    )
 
 
 def weigh(found: Match, scale: float, noise: float) -> Floats:
@@ -296,8 +302,13 @@ def fit(field: Field, points: Floats, body: Body, freedom: Freedom, scales: Sequ
 def assemble(field: Field, found: Match, body: Body, freedom: Freedom, scale: float) -> Equations:
     """The equations of points, strain and roughness together."""
     one, two = weigh_points(field, found, weigh(found, scale, body.noise)), weigh_strain(field, body, freedom)
-    square = one.square + two.square
+    return Equations(one.square + two.square + weigh_roughness(field, one), one.right + two.right)
+
+
+def weigh_roughness(field: Field, points: Equations) -> Floats:
+    """(K,K) the third differences of a lattice, against the equations of the points."""
+    square = np.zeros_like(points.square)
     if field.basis.cells:
-        share = ROUGH * float(np.trace(one.square)) / len(one.square)
-        square[:-1, :-1] += share * np.kron(field.basis.roughness, np.eye(3))
-    return Equations(square, one.right + two.right)
+        share = ROUGH * float(np.trace(points.square)) / len(points.square)
+        square[:-1, :-1] = share * np.kron(field.basis.roughness, np.eye(3))
+    return square

@@ -7,46 +7,71 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Mesh
 from damageest.stages.adapt._choose import Trial, cut_patches
-from damageest.stages.adapt._field import Body, assemble, match, weigh
+from damageest.stages.adapt._field import Body, Equations, match, weigh, weigh_points, weigh_roughness, weigh_strain
 
 MODES = 24
 """Independent errors that are kept."""
-PRIOR = 0.03
-"""Strain that is allowed for where no point shows the field, at least."""
+PRIOR = 0.002
+"""Strain that is allowed for where no point shows the field, at least, as one standard deviation."""
+BEYOND = 0.004
+"""Strain of the metal beyond the skin that is seen, as one standard deviation: that of a bend about an axis which is
+some way from the middle of the section."""
 ASKED = 1500
 """Places on the skin by which the largest errors are chosen."""
 
 
 def find_modes(
-    chosen: Trial, trials: Sequence[Trial], points: Floats, body: Body, places: Floats, tolerance: float
+    chosen: Trial, trials: Sequence[Trial], points: Floats, body: Body, skin: Mesh, tolerance: float
 ) -> Floats:
-    """(K,V,3) independent errors of the displacement at places (V,3), each as one standard deviation.
+    """(K,V,3) independent errors of the displacement at the vertices of the skin as designed, each as one standard
+    deviation.
 
     The posterior of a Gaussian prior on the strain, with the points' error as large as the means of patches show it;
-    and the difference to the next freer field that was tried, since the truth may be as free as that.
+    what the metal may be strained by beyond the skin that is seen, which grows with the distance from it; and the
+    difference to the next freer field that was tried, since the truth may be as free as that.
     """
-    field = chosen.field
+    field, places = chosen.field, skin.vertices
     last = max(tolerance, 3 * body.noise)
     found = match(field, points, body)
     loose = replace(chosen.freedom, bound=max(chosen.freedom.bound, PRIOR))
-    equations = assemble(field, found, body, loose, last)
-    square = equations.stiffen()[:-1, :-1]
-    covariance = np.linalg.inv(square) * _measure_error(found.distance, weigh(found, last, body.noise), points, body)
-    root = np.linalg.cholesky((covariance + covariance.T) / 2 / len(points))
+    weights = weigh(found, last, body.noise)
+    shown = weigh_points(field, found, weights)
+    # the mean square of all points, as their number and their error make it, against a strain that is drawn once
+    shown = Equations(shown.square + weigh_roughness(field, shown), shown.right)
+    precision = len(points) / _measure_error(found.distance, weights, points, body)
+    square = precision * shown.stiffen() + weigh_strain(field, body, loose).square / body.step**2
+    covariance = np.linalg.inv(square)[:-1, :-1]
+    root = np.linalg.cholesky((covariance + covariance.T) / 2)
     asked = field.basis.evaluate(places[:: max(1, len(places) // ASKED)])
     columns = root.reshape(field.basis.count, 3, -1)
     spread = np.einsum("vm,mkc->vkc", asked, columns).reshape(3 * len(asked), -1)
     _, main = np.linalg.eigh(spread.T @ spread)
     largest = columns @ main[:, ::-1][:, :MODES]
     modes = np.einsum("vm,mkc->cvk", field.basis.evaluate(places), largest)
+    near = find_distance(places, found.material[np.abs(found.distance) < tolerance])
+    beyond = BEYOND * np.maximum(near - find_spacing(body, points), 0.0)[:, None] * skin.vertex_normals
+    modes = np.concatenate([modes, beyond[None]])
     at = [one.freedom for one in trials].index(chosen.freedom) + 1
     alike = [one for one in trials[at:] if one.freedom.stretches == chosen.freedom.stretches]
     freer = alike[0] if alike else None
     if freer is None:
         return np.asarray(modes)
     return np.concatenate([modes, (freer.field.displace(places) - field.displace(places))[None]])
+
+
+def find_distance(places: Floats, seen: Floats) -> Floats:
+    """(V,) how far places (V,3) are from the nearest of the seen places (N,3)."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(seen).query(places)[0])
+
+
+def find_spacing(body: Body, points: Floats) -> float:
+    """How far skin may be from a point between points, where all of it is seen."""
+    area = float(np.linalg.norm(body.mesh.cross, axis=1).sum()) / 2
+    return 2 * float(np.sqrt(area / max(len(points), 1)))
 
 
 def _measure_error(distance: Floats, weights: Floats, points: Floats, body: Body) -> float:

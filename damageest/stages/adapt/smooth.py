@@ -18,6 +18,14 @@ from damageest.stages.adapt._basis import Basis
 from damageest.stages.adapt._choose import Trial, cross_validate, cut_patches, explains_more, is_better
 from damageest.stages.adapt._field import STIFF, Body, Field, Freedom, fit, match, weigh
 from damageest.stages.adapt._mesh import deform_part, find_motion, refine, require_injective
+from damageest.stages.adapt._other import (
+    describe_hidden,
+    describe_other,
+    describe_unknown,
+    find_other,
+    find_thinned,
+    measure_unknown,
+)
 from damageest.stages.adapt._posterior import find_modes
 from damageest.stages.adapt._words import describe
 
@@ -85,16 +93,17 @@ class Smooth(Adapt):
             score = cross_validate(field, half, body, freedom, last, HELD, patch, held)
             return Trial(field, freedom, score)
 
+        rigid, scaled = attempt(RIGID, zero, scales), attempt(SCALED, zero, scales)
+        # nothing is strained by a scale, and shrinking leaves no metal outside
+        chosen = scaled if explains_more(scaled.score.both, rigid.score.both)[0] else rigid
+        trials, grows = [rigid, scaled], chosen is scaled
+
         def take(freedom: Freedom) -> None:
             """Tries a freer field, and takes it where held-out patches bear it out."""
             nonlocal chosen
             trials.append(attempt(freedom, zero, scales))
             chosen = trials[-1] if is_better(trials[-1].score, chosen.score) else chosen
 
-        rigid, scaled = attempt(RIGID, zero, scales), attempt(SCALED, zero, scales)
-        # nothing is strained by a scale, and shrinking leaves no metal outside
-        chosen = scaled if explains_more(scaled.score.both, rigid.score.both)[0] else rigid
-        trials, grows = [rigid, scaled], chosen is scaled
         take(Freedom(BENT, grows=grows))
         if chosen is trials[-1] and not grows:
             take(Freedom(BENT))
@@ -134,7 +143,7 @@ class Smooth(Adapt):
             return (at - motion[:3, 3]) @ turn.T
 
         moved = undo(field.move(places))
-        modes = find_modes(chosen, trials, points, body, places, tolerance) @ turn.T
+        modes = find_modes(chosen, trials, points, body, Mesh(places, fine.faces), tolerance) @ turn.T
         back = np.eye(4)
         back[:3, :3] = turn
         back[:3, 3] = centre - turn @ (centre + motion[:3, 3])
@@ -155,7 +164,25 @@ class Smooth(Adapt):
             functions=field.basis.count,
             gain=gain,
         )
-        return replace(adapted, notes=(describe(adapted, tolerance),))
+        rival, is_open = find_other(trials, chosen)
+        other = (rival.field.displace(places) - field.displace(places)) @ turn.T if rival and is_open else None
+        notes = (describe(adapted, tolerance), *_compare(body, trials, chosen, tolerance, part.unit))
+        if (unknown := measure_unknown(modes, adapted.part.vertex_normals)) > tolerance / 2:
+            notes = (*notes, describe_unknown(unknown, tolerance, part.unit))
+        return replace(adapted, notes=notes, other=other)
+
+
+def _compare(body: Body, trials: list[Trial], chosen: Trial, tolerance: float, unit: str) -> list[str]:
+    """What is said of skin that another field has elsewhere: loss that may be form, and form that may be loss."""
+    notes = []
+    rival, is_open = find_other(trials, chosen)
+    if rival and (thinned := find_thinned(body.mesh, chosen.field, rival.field, tolerance)).area:
+        notes.append(describe_other(thinned, is_open, unit))
+    if chosen.freedom.bound > BENT:
+        stiff = min((one for one in trials if one.freedom.bound <= BENT), key=lambda one: float(one.score.both.mean()))
+        if (thinned := find_thinned(body.mesh, stiff.field, chosen.field, tolerance)).area:
+            notes.append(describe_hidden(thinned, unit))
+    return notes
 
 
 def prepare(part: Part, centre: Floats, tolerance: float, noise: float) -> Body:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import sys
@@ -33,8 +34,9 @@ KINDS = ("chip", "pit", "cut")
 
 @dataclass(frozen=True)
 class DeformedCase:
-    """``deform``: options of the virtual scanner's `deform`; ``losses``: depth in mm of each random loss; ``wear``:
-    tools; ``seen``: share of the skin that is scanned, from one side; ``use``: the stage `adapt`, or `plain`."""
+    """``deform``: options of the virtual scanner's `deform`; ``losses``: depth in mm of each random loss, less where
+    a part is thin; ``wear``: tools; ``seen``: share of the skin that is scanned, from one side; ``use``: the stage
+    `adapt`, or `plain`."""
 
     module: ClassVar[str] = "damageest_evaluate.adapting.case"
     group: str
@@ -78,7 +80,7 @@ class DeformedCase:
         tools: list[Any] = list(self.wear)
         for number, depth in enumerate(self.losses):
             kind = KINDS[(self.seed + number) % len(KINDS)]
-            tools += make_sized_damage(part, 100 * self.seed + number, depth, kind).tools
+            tools += _make_loss(part, 100 * self.seed + number, depth, kind)
         options = {"points": self.points, "noise": TOLERANCE / 4, "pose": "random", "seed": self.seed}
         scanner = Simulate.model_validate({**options, "damage": tools, "deform": self.deform or None})
         scan = scanner.run(part.unit, part)
@@ -87,6 +89,14 @@ class DeformedCase:
             toward = move_points(scan.points, scan.truth.T_part_scan) @ np.array([0.48, 0.36, 0.8])
             scan = scan.take(toward > np.quantile(toward, 1 - self.seen))
         return part, scan
+
+
+def _make_loss(part: Part, seed: int, depth: float, kind: str) -> Sequence[Any]:
+    """A random loss of this depth, or of half or a quarter of it where the part is too thin."""
+    for share in (1.0, 0.5):
+        with contextlib.suppress(LookupError):
+            return make_sized_damage(part, seed, share * depth, kind).tools
+    return make_sized_damage(part, seed, depth / 4, kind).tools
 
 
 def measure(case: DeformedCase) -> dict[str, Any]:
