@@ -9,12 +9,14 @@ import numpy as np
 from damageest.artefacts import Floats, Part, Pose
 from damageest.checks.model_fit import measure_fit
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, Step
 from damageest.pipeline.state import JobState, Work
 from damageest.registry.contracts import Contract
 from damageest.rules.notes import make_notes
 from damageest.stages.adapt import Adapt
+from damageest.stages.align import Align
 from damageest.stages.sample import Sample
 
 AGREES = 0.72
@@ -70,13 +72,27 @@ def take_adapted(engine: Engine, work: Work) -> Work:
         return work
     aligned = state.aligned.move(adapted.motion)
     pose = fit_pose(state.pose, adapted.motion, aligned.points, adapted.part, state.tolerance)
-    settled = {f"{doubt}" for doubt in state.pose.doubts} - {f"{doubt}" for doubt in pose.doubts}
-    warnings = tuple(note for note in work.warnings if note.code != "align" or note.text not in settled)
+    before, sources = state, (JobState.pose, JobState.adapted, JobState.tolerance)
     state = state.derive(JobState.aligned, aligned, JobState.aligned, JobState.adapted)
-    state = state.derive(JobState.pose, pose, JobState.pose, JobState.adapted, JobState.tolerance)
     state = state.derive(JobState.part, adapted.part, JobState.part, JobState.adapted)
+    if pose.doubts or pose.free:
+        pose = doubt_anew(pose, engine.make_silent().call(Align, state).pose, aligned.points, state.tolerance)
+    state = state.derive(JobState.pose, pose, *sources)
+    settled = {f"{doubt}" for doubt in before.pose.doubts} - {f"{doubt}" for doubt in pose.doubts}
+    warnings = tuple(note for note in work.warnings if note.code != "align" or note.text not in settled)
     state = engine.make_silent().call(Sample, state)
     return replace(work, job=state, warnings=(*warnings, *make_notes("adapt", adapted.notes)))
+
+
+def doubt_anew(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pose:
+    """The pose of the aligned ``points`` (N,3) with the doubts and free motions that an alignment to the adapted part
+    has, where that agrees. Those of the part as designed may come from its form: it fits nowhere, so it fits as well
+    moved a little."""
+    moved = move_points(points[:: max(1, len(points) // ASKED)], again.T_part_scan @ np.linalg.inv(pose.T_part_scan))
+    off = float(np.linalg.norm(moved - points[:: max(1, len(points) // ASKED)], axis=1).max(initial=0.0))
+    if off > tolerance:
+        return pose
+    return replace(pose, doubts=again.doubts, free=again.free, notes=again.notes, is_held=again.is_held)
 
 
 def fit_pose(pose: Pose, motion: Floats, points: Floats, part: Part, tolerance: float) -> Pose:
