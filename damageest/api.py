@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Part, Reason, Scan
-from damageest.errors import InputError, StageError
+from damageest.artefacts import Part, Scan
+from damageest.errors import InputError
 from damageest.io.files import resolve_path, working_folder
 from damageest.isolation import Limits, keep_one_thread
 from damageest.job import Job, load
-from damageest.output.files import describe_job, describe_result, write_report
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
-from damageest.pipeline.routes import SHOW, WRITE, route_of
-from damageest.pipeline.state import JobState, Work
+from damageest.pipeline.routes import WRITE, route_of
+from damageest.pipeline.state import JobState
 from damageest.pipeline.workspace import open_workspace
 from damageest.registry import Registry
 from damageest.registry.contracts import Contract
 from damageest.result import Result
-from damageest.rules.notes import make_notes, rank_notes
-from damageest.stages.export import ExportedFiles
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 
@@ -57,41 +53,16 @@ def run(
         source, given = _split(job, part, scan)
         job = load(source, registry, settings, given)
     if output is False:
-        return follow(route_of(job.method), Engine(job, registry, limits=limits), start(job)).job.result
+        engine = Engine(job, registry, limits=limits)
+        return follow(route_of(job.method), engine, start(engine)).result
     target = job.output if output is True else resolve_path(Path(output), working_folder())
     with open_workspace(target, cache) as place:
         engine = Engine(job, registry, place.cache, limits=limits)
-        work = follow(route_of(job.method), engine, start(job))
-        state = work.job.with_value(JobState.folder, place.folder, digest(str(target)))
-        state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
-        state = state.with_value(JobState.path_writers, registry.path_writers, digest(sorted(registry.path_writers)))
-        written = follow(WRITE, engine, replace(work, job=state)).job.written
-        if written.warnings:
-            notes = rank_notes((*state.result.warnings, *make_notes("export", written.warnings)))
-            told = replace(state.result, warnings=notes)
-            state = state.with_value(JobState.result, told, state.key("result"))
-        result, written = _show_result(engine, replace(work, job=state), target, written)
-        write_report(result, job, place.folder, target, written)
+        state = start(engine).with_value(JobState.folder, place.folder, digest(str(target)))
+        state = state.with_value(JobState.target, target, digest(str(target)))
+        result = follow((*route_of(job.method), *WRITE), engine, state).result
         place.finish(engine.stems)
     return result
-
-
-def _show_result(engine: Engine, work: Work, target: Path, written: ExportedFiles) -> tuple[Result, ExportedFiles]:
-    """Calls stage `report`. Gives the result with all stages, and the files with those of the report.
-
-    A report that fails is a warning: the result is more than its pictures.
-    """
-    result = replace(work.job.result, stages=tuple(engine.records))
-    content, job_text = describe_result(result, target, written), describe_job(engine.job, target)
-    state = work.job.with_value(JobState.content, content, "follows from the result")
-    state = state.with_value(JobState.job_text, job_text, "follows from the job")
-    try:
-        done = follow(SHOW, engine, replace(work, job=state)).job.reported
-    except StageError as error:
-        warning = Reason("report", f"{error.args[0]} (the run went on without a report)")
-        return replace(result, warnings=(*result.warnings, warning)), written
-    result = replace(result, stages=tuple(engine.records))
-    return result, replace(written, files=(*written.files, *done.files), notes=(*written.notes, *done.notes))
 
 
 def _split(

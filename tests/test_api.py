@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,9 @@ import trimesh
 
 import damageest
 from damageest.errors import InputError, JobError
+from damageest.result import Result
+from damageest.stages.export import ExportedFiles
+from damageest.stages.export.files import Files
 from tests import damaged_box
 
 LEAST = {"version": 1, "tolerance": 0.2, "align": "none"}
@@ -81,3 +86,19 @@ def test_no_damage_is_a_result(tmp_path: Path) -> None:
 def test_bad_arrays_are_refused(part: object, scan: np.ndarray, error: type[Exception]) -> None:
     with pytest.raises(error):
         damageest.run(LEAST, part=part, scan=scan)
+
+
+def test_what_export_warns_of_is_in_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the one that is given, and in the one that is written, both with all stages."""
+    write = Files.run
+
+    def run(self: Files, result: Result, folder: Path, writers: Any) -> ExportedFiles:
+        return replace(write(self, result, folder, writers), warnings=("a file is coarse",))
+
+    monkeypatch.setattr(Files, "run", run)
+    result = damageest.run(damaged_box.write(tmp_path), output=tmp_path / "out")
+    content = json.loads((tmp_path / "out/result.json").read_text())
+    assert [note.text for note in result.warnings if note.code == "export"] == ["a file is coarse"]
+    assert [note["text"] for note in content["warnings"] if note["code"] == "export"] == ["a file is coarse"]
+    assert [one.stage for one in result.stages][-2:] == ["export", "report"]
+    assert [one["stage"] for one in content["stages"]] == [one.stage for one in result.stages]

@@ -7,22 +7,19 @@ import functools
 import io
 import json
 import os
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from damageest.batches.rows import LEVELS, OUTCOMES, Row
+from damageest.io.files import embed_png
 
 COLUMNS = (
     "name", "outcome", "sites", *LEVELS, "damage_volume", "volume_low", "volume_high", "part_volume", "units",
     "tolerance", "warnings", "reasons", "remedies", "seconds", "megabytes", "tries", "host", "job", "output", "error",
 )  # fmt: skip
 """Columns of batch.csv."""
-_PICTURE = re.compile(rb'<img[^>]*src="(data:image/png;base64,[A-Za-z0-9+/=]{1,400000})"')
-_HEAD_BYTES = 1 << 20
-"""The picture of the part is in the first megabyte of a report."""
 
 
 def write_tables(rows: Sequence[Row], folder: Path) -> None:
@@ -42,7 +39,7 @@ def write_page(rows: Sequence[Row], folder: Path) -> None:
     items = [
         {
             "row": row,
-            "picture": _read_picture(Path(row.output) / "report.html") if row.has_result else "",
+            "picture": _read_picture(Path(row.output)) if row.has_result else "",
             "link": _link(row, folder),
             "said": OUTCOMES.get(row.outcome, ""),
         }
@@ -79,14 +76,26 @@ def _link(row: Row, folder: Path) -> str:
     return ""
 
 
-def _read_picture(report: Path) -> str:
-    """The first picture of a report, as a data URI; empty where there is none."""
+def keep_picture(output: Path, picture: bytes) -> None:
+    """Keeps the PNG that a report gives, beside the job's output folder ``output``; removes it where there is none."""
+    path = _place_picture(output)
+    if picture:
+        path.write_bytes(picture)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _read_picture(output: Path) -> str:
+    """The picture of a job for the page; empty where there is none."""
     try:
-        with report.open("rb") as stream:
-            found = _PICTURE.search(stream.read(_HEAD_BYTES))
+        return embed_png(_place_picture(output).read_bytes())
     except OSError:
         return ""
-    return found[1].decode() if found else ""
+
+
+def _place_picture(output: Path) -> Path:
+    """No job has a name that begins with a dot."""
+    return output.with_name(f".{output.name}.png")
 
 
 def _replace(path: Path, text: str) -> None:

@@ -75,8 +75,7 @@ def batch(
         if waiting and client is None:
             count = min(workers or count_cores(), len(waiting))
             if options.memory is None and not scheduler:
-                free = measure_free_memory()
-                options = replace(options, memory=None if free is None else free // count)
+                options = replace(options, memory=measure_free_memory() // count)
             client = stack.enter_context(open_client(scheduler, count))
         if waiting:
             _run(client, waiting, folder, options, rows, lambda active: _report(found, rows, active, folder, tell))

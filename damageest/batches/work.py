@@ -5,26 +5,24 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
-import re
 import socket
-import sys
 import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from damageest.batches.files import keep_picture
 from damageest.batches.jobs import MATRIX
 from damageest.batches.rows import describe_result
 from damageest.errors import DamageestError, StageError, clean_message
-from damageest.isolation import Limits, ProcessError, call_isolated, end_workers
+from damageest.isolation import Limits, ProcessError, Usage, call_isolated, end_workers, find_place
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
 from damageest.registry import Registry
 from damageest.registry.hookspecs import hookimpl
+from damageest.stages.report import ReportFiles
 
-_STAGE = "@stage "
-"""Begins the line that names the stage which a process is in."""
 _OUTCOMES = {"time": "timeout", "memory": "memory", "crash": "crashed", "exit": "crashed"}
 CHECKED = 1.0
 """Seconds between two looks whether the batch still wants a job."""
@@ -37,13 +35,20 @@ def work(task: dict[str, Any]) -> dict[str, Any]:
     os.environ.pop("MALLOC_TRIM_THRESHOLD_", None)
     row = {name: task[name] for name in ("name", "job", "settings", "output")} | {"host": socket.gethostname()}
     start = time.perf_counter()
-    limits = Limits(task["memory"], task["timeout"])
+    limits = Limits(task["memory"], task["timeout"], of="job", option="--timeout")
     process = f"{task['batch']} {threading.get_ident()}"
+
+    def tell(usage: Usage) -> None:
+        row["megabytes"] = usage.megabytes
+
     try:
         with _end_if_unwanted(process):
-            done = call_isolated(run_job, {"task": task}, worker=process, limits=limits, show=False)
+            done = call_isolated(
+                run_job, {"task": task}, worker=process, limits=limits, show=False, nested=True, tell=tell
+            )
     except ProcessError as error:
-        done = {"outcome": _OUTCOMES[error.why], "error": _describe_end(error, limits)}
+        what = find_place(error)
+        done = {"outcome": _OUTCOMES[error.why], "error": f"{what}: {error.message}" if what else error.message}
     except BaseException as error:  # also an interrupt: Ctrl-C reaches the batch, not this thread of a worker
         done = {"outcome": "failed", "error": f"{type(error).__name__}: {' '.join(clean_message(error, 400).split())}"}
     return row | done | {"seconds": round(time.perf_counter() - start, 3)}
@@ -57,17 +62,16 @@ def release(batch: str) -> None:
 def run_job(task: dict[str, Any]) -> dict[str, Any]:
     """Runs in the job's process: gives the fields of the row that the job decides."""
     from damageest.api import run
-    from damageest.isolation import serve
 
-    serve.is_worker = False  # a stage that calls a native library has a process of its own also here
-    _reset_peak()
     key = ""
     try:
-        registry = _discover()
+        registry, pictures = _discover()
+        pictures.last = b""
         job = load_job(task["job"], task["settings"], registry)
         key = compute_key(job, registry)
         limits = Limits(task["memory"], task["stage_timeout"])
         result = run(job, output=task["output"], cache=task["cache"], registry=registry, limits=limits)
+        keep_picture(Path(task["output"]), pictures.last)
         done = describe_result(result)
     except MemoryError:
         raise
@@ -75,7 +79,7 @@ def run_job(task: dict[str, Any]) -> dict[str, Any]:
         outcome = "failed" if isinstance(error, StageError) else "refused"
         outcome = _OUTCOMES.get(getattr(error, "why", ""), outcome) if outcome == "failed" else outcome
         done = {"outcome": outcome, "error": " ".join(str(error).split())}
-    return done | {"key": key, "megabytes": _read_peak()}
+    return done | {"key": key}
 
 
 def load_job(path: str, settings: list[str] | tuple[str, ...], registry: Registry) -> Job:
@@ -90,27 +94,23 @@ def compute_key(job: Job, registry: Registry) -> str:
     return digest(stages, fixed, sorted(provider.fingerprint for provider in registry.providers))
 
 
-class _NameStage:
-    """Prints each stage as it begins, so that a crash can be told where it was."""
+class _Pictures:
+    """Takes the picture of a run from its report."""
+
+    def __init__(self) -> None:
+        self.last = b""
 
     @hookimpl
-    def damageest_before_stage(self, stage: str, use: str, site: int) -> None:
-        sys.stderr.write(f"{_STAGE}{stage}: {use}{f' (site {site})' if site else ''}\n")
-        sys.stderr.flush()
+    def damageest_after_stage(self, stage: str, output: object) -> None:
+        if stage == "report" and isinstance(output, ReportFiles):
+            self.last = output.picture
 
 
 @functools.cache
-def _discover() -> Registry:
-    """All that is installed; once for each process, which runs many jobs."""
-    return Registry.discover([_NameStage()])
-
-
-def _describe_end(error: ProcessError, limits: Limits) -> str:
-    """What ended a job's process, with the stage that it was in."""
-    late = f"not finished after {limits.seconds:g} s (--timeout)"
-    text = late if error.why == "time" else error.message
-    stages = re.findall(rf"^{_STAGE}(.*)$", str(error.__cause__ or ""), re.MULTILINE)
-    return f"{stages[-1]}: {text}" if stages else text
+def _discover() -> tuple[Registry, _Pictures]:
+    """All that is installed, and what observes it; once for each process, which runs many jobs."""
+    pictures = _Pictures()
+    return Registry.discover([pictures]), pictures
 
 
 @contextlib.contextmanager
@@ -139,18 +139,3 @@ def _end_if_unwanted(process: str) -> Iterator[None]:
     finally:
         over.set()
         thread.join()
-
-
-def _reset_peak() -> None:
-    """Begins a new peak of memory: the process has run other jobs."""
-    with contextlib.suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")
-
-
-def _read_peak() -> float | None:
-    """The peak of this process in MB; None where the system does not tell."""
-    try:
-        found = re.search(r"^VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE)
-    except OSError:
-        return None
-    return round(int(found[1]) / 1024) if found else None

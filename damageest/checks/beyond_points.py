@@ -1,8 +1,9 @@
-"""Whether a volume, lost or added, holds more than the scan points on its surface show.
+"""Whether a volume, lost or added, holds more or less than the scan points on its surface show.
 
 Two things bound it. It is not larger than the skin under it times the distance of its points from that skin. And
 between its points its surface does not leave them: a bulge lies behind all points near it. An undercut is larger than
-the first says, and its points show it, so that the first counts only where part of the surface has no points.
+the first says, and its points show it, so that the first counts only where part of the surface has no points. Where a
+surface lies before most points near it, the volume is too small: a wall thinner than the tolerance comes out thick.
 """
 
 from __future__ import annotations
@@ -36,12 +37,15 @@ surface, as that of an undercut."""
 @dataclass(frozen=True)
 class BeyondPoints:
     """``amount``: volume that no scan point shows; ``share`` of the whole. ``reason`` in words, empty for a share that
-    does not matter. ``depth``: of the farthest point from the skin."""
+    does not matter. ``depth``: of the farthest point from the skin. ``short``: volume that the points show, and that it
+    does not hold.
+    """
 
-    amount: float
-    share: float
-    depth: float
-    reason: str
+    amount: float = 0.0
+    share: float = 0.0
+    depth: float = 0.0
+    reason: str = ""
+    short: float = 0.0
 
     @property
     def is_contradicted(self) -> bool:
@@ -61,14 +65,19 @@ def ask_beyond_points(
     """
     inner = find_inner_faces(solid, part)
     if not len(own) or inner.all() or not inner.any():
-        return BeyondPoints(0.0, 0.0, 0.0, "")
+        return BeyondPoints()
     volume = solid.volume
     area = np.linalg.norm(solid.cross, axis=1) / 2
     skin = Mesh(solid.vertices, solid.faces[~inner])
     depth = float(distance_to_mesh(own[:: max(1, len(own) // MOST)], skin).max())
-    behind, bare = _measure_behind(solid, inner, points, 2 * max(gap, tolerance), BARE * max(gap, tolerance))
-    bulge = float(area[inner].sum() / len(behind) * np.maximum(behind - NOISES * noise - GAPS * gap, 0).sum())
-    deepest = depth + NOISES * noise + GAPS * gap
+    behind, before, bare = _compare_with_points(
+        solid, inner, points, 2 * max(gap, tolerance), BARE * max(gap, tolerance)
+    )
+    slack = NOISES * noise + GAPS * gap
+    each = float(area[inner].sum()) / len(behind)
+    bulge = each * float(np.maximum(behind - slack, 0).sum())
+    short = each * float(before[before > slack].sum())
+    deepest = depth + slack
     most = float(area[~inner].sum()) * deepest + _measure_hollow(solid, ~inner) * deepest**2 / 2
     is_shown = bare <= SEEN and bulge <= STRAY * volume
     over = 0.0 if is_shown else volume - most
@@ -85,22 +94,25 @@ def ask_beyond_points(
             f"{amount:.3g} {unit}³ of it ({share:.1%}) lie behind the scan points near them, up to "
             f"{behind.max():.3g} {unit}: its surface bulges between the points, which are {gap:.3g} {unit} apart"
         )
-    return BeyondPoints(amount, share, depth, reason)
+    return BeyondPoints(amount, share, depth, reason, short)
 
 
-def _measure_behind(solid: Solid, inner: Flags, points: Floats, wide: float, far: float) -> tuple[Floats, float]:
-    """How far places (P,) all over the inner faces lie behind all scan points near them, seen from the volume; and the
-    share of the places that have no point within ``far``. Farther than ``wide``, none is near."""
+def _compare_with_points(
+    solid: Solid, inner: Flags, points: Floats, wide: float, far: float
+) -> tuple[Floats, Floats, float]:
+    """How far places (P,) all over the inner faces lie behind all scan points near them, seen from the volume, and how
+    far before most of them; and the share of the places that have no point within ``far``. Farther than ``wide``, none
+    is near."""
     places, face = sample_by_area(solid, PLACES, np.random.default_rng(0), np.flatnonzero(inner))
     points = points[find_in_box(points, places.min(axis=0) - wide, places.max(axis=0) + wide)]
     if not len(points):
-        return np.zeros(len(places)), 1.0
+        return np.zeros(len(places)), np.zeros(len(places)), 1.0
     distance, index = find_neighbours(places, NEAR, points)
-    outward = solid.face_normals[face]
-    height = np.einsum("ikj,ij->ik", places[:, None] - points[index], outward)
-    height[distance > wide] = np.inf
-    behind = np.where(np.isfinite(height[:, 0]), height.min(axis=1), 0.0)
-    return behind, float((distance[:, 0] > far).mean())
+    height = np.einsum("ikj,ij->ik", places[:, None] - points[index], solid.face_normals[face])
+    is_near = distance <= wide
+    lowest = np.where(is_near, height, np.inf).min(axis=1)
+    before = np.where(is_near.all(axis=1), -np.median(height, axis=1), 0.0)
+    return np.where(is_near[:, 0], lowest, 0.0), before, float((distance[:, 0] > far).mean())
 
 
 def _measure_hollow(solid: Solid, skin: Flags) -> float:

@@ -22,6 +22,12 @@ MOST_POINTS = 200_000
 """Intact points that are used; more do not change the second digit."""
 ROUNDS = 10
 """Rounds of the robust fit."""
+LAGS = 10
+"""Distance, in edges of a patch, up to which patches are compared for how far they deviate alike."""
+ALIKE = 0.1
+"""Correlation from which on patches count as independent."""
+MOST_PATCHES = 1500
+"""Patches that are compared in pairs."""
 SIGNIFICANT = 22.5
 """Square of a deviation of the pose, in its standard deviations, from which it is real: one in a thousand by chance, of
 six degrees of freedom."""
@@ -33,7 +39,8 @@ class PoseError:
 
     ``spread`` (6,K): columns of independent errors, one standard deviation each, of a small motion of the scan in the
     part's frame: rotation about ``centre`` (3,) in radians, then shift. ``systematic``: standard deviation of the mean
-    distances of patches of intact skin that noise does not explain; ``patch_area``: area over which it is common.
+    distances of patches of intact skin that noise does not explain; ``patch_area``: area over which it is common, from
+    the correlation of patches with their distance (as of a semivariogram).
     """
 
     centre: Floats
@@ -76,7 +83,7 @@ def measure_pose_error(
     edge = PATCH * part.diagonal
     radius = max(part.diagonal / 4, 1e-12)
     scale = np.diag([1 / radius] * 3 + [1.0] * 3)
-    mean, rows, count = _average_patches(part, aligned, deviation, centre, edge)
+    mean, places, rows, count = _average_patches(part, aligned, deviation, centre, edge)
     if len(mean) < FEWEST_PATCHES:
         spread = tolerance * scale
         return PoseError(centre, spread, max(form, 0.0), edge**2)
@@ -84,7 +91,7 @@ def measure_pose_error(
     prior = np.eye(6) / tolerance**2
     variance = np.maximum(aligned.noise**2 / count, (1e-6 * part.diagonal) ** 2)
     motion: Floats = np.zeros(6)
-    systematic, weights = 0.0, np.ones(len(mean))
+    systematic, left, weights = 0.0, mean, np.ones(len(mean))
     for _ in range(ROUNDS):
         trust = weights / (variance + systematic**2)
         weighted = (rows * trust[:, None]).T
@@ -93,6 +100,7 @@ def measure_pose_error(
         systematic = _measure_excess(left, variance)
         limit = 3 * np.sqrt(variance + systematic**2)
         weights = np.minimum(1, limit / np.maximum(np.abs(left), 1e-300))
+    area = _measure_area_alike(left, places, systematic, edge)
     systematic = max(systematic, form)
     information = (rows / (variance + systematic**2)[:, None]).T @ rows + prior
     covariance = np.linalg.inv(information)
@@ -100,7 +108,7 @@ def measure_pose_error(
     spread = vectors * np.sqrt(np.maximum(values, 0))
     if motion @ information @ motion > SIGNIFICANT:
         spread = np.column_stack([spread, motion])
-    return PoseError(centre, scale @ spread, systematic, edge**2)
+    return PoseError(centre, scale @ spread, systematic, area)
 
 
 def _make_rows(places: Floats, normals: Floats) -> Floats:
@@ -110,22 +118,26 @@ def _make_rows(places: Floats, normals: Floats) -> Floats:
 
 def _average_patches(
     part: Part, aligned: Scan, deviation: Deviation, centre: Floats, edge: float
-) -> tuple[Floats, Floats, Floats]:
-    """Mean distance (P,) of patches of intact skin, mean rows (P,6) of `_make_rows`, and number of points (P,)."""
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Mean distance (P,) of patches of intact skin, their places (P,3), mean rows (P,6) of `_make_rows`, and number of
+    points (P,)."""
     index = np.flatnonzero(deviation.label == INTACT)
     step = max(1, -(-len(index) // MOST_POINTS))
     index = index[::step]
     if not len(index):
-        return np.empty(0), np.empty((0, 6)), np.empty(0)
+        return np.empty(0), np.empty((0, 3)), np.empty((0, 6)), np.empty(0)
     normals = part.face_normals[deviation.face[index]]
     places = aligned.points[index] - centre
     _, number = number_faced_cubes(places, normals, edge)
     _, group, count = group_integers(number)
     rows = _make_rows(places, normals)
     mean = np.bincount(group, weights=deviation.distance[index]) / count
-    mean_rows = np.stack([np.bincount(group, weights=row) for row in rows.T], axis=1) / count[:, None]
+    mean_places, mean_rows = (
+        np.stack([np.bincount(group, weights=column) for column in values.T], axis=1) / count[:, None]
+        for values in (places, rows)
+    )
     enough: Flags = count >= FEWEST_POINTS
-    return mean[enough], mean_rows[enough], step * count[enough].astype(np.float64)
+    return mean[enough], mean_places[enough], mean_rows[enough], step * count[enough].astype(np.float64)
 
 
 def _measure_excess(left: Floats, variance: Floats) -> float:
@@ -135,3 +147,23 @@ def _measure_excess(left: Floats, variance: Floats) -> float:
     ratio = float(np.median(size))
     chance = 1 + 2.5 * 1.6 / np.sqrt(len(left))
     return float(np.sqrt(max(ratio - chance, 0.0) * np.median(variance)))
+
+
+def _measure_area_alike(left: Floats, places: Floats, systematic: float, edge: float) -> float:
+    """The area over which patches at ``places`` (P,3) deviate alike: the integral over the plane of the correlation of
+    what is ``left`` (P,), at least one patch."""
+    if not systematic:
+        return edge**2
+    from scipy.spatial.distance import pdist
+
+    some = np.random.default_rng(0).permutation(len(left))[:MOST_PATCHES]
+    value = np.clip(left[some], -3 * systematic, 3 * systematic)
+    lag = np.rint(pdist(places[some]) / edge).astype(np.int64)
+    first, second = np.triu_indices(len(some), 1)
+    near = (lag >= 1) & (lag <= LAGS)
+    count = np.bincount(lag[near], minlength=LAGS + 1)
+    product = np.bincount(lag[near], weights=(value[first] * value[second])[near], minlength=LAGS + 1)
+    alike = product[1:] / np.maximum(count[1:], 1) / systematic**2
+    independent = np.flatnonzero(alike < ALIKE)
+    alike = np.clip(alike[: independent[0]] if len(independent) else alike, 0, 1)
+    return edge**2 * (1 + float(2 * np.pi * np.arange(1, len(alike) + 1) @ alike))

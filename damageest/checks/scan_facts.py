@@ -6,9 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from damageest.artefacts import ADDED, Deviation, Pose, Scan
+from damageest.artefacts import ADDED, Deviation, Part, Pose, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.skin_cells import AVERAGED
+from damageest.checks.two_sheets import measure_sheets
 from damageest.findings import ModelFit, Surplus
 from damageest.geometry.voxels import measure_area, number_cubes
 from damageest.rules import ScanFacts
@@ -26,8 +27,8 @@ LAYER = 5.0
 
 
 def gather_scan_facts(
-    skin: SkinView, aligned: Scan, deviation: Deviation, surplus: Iterable[Surplus], pose: Pose, fit: ModelFit | None,
-    tolerance: float, unit: str, is_fitted: bool,
+    skin: SkinView, part: Part, aligned: Scan, deviation: Deviation, surplus: Iterable[Surplus], pose: Pose,
+    fit: ModelFit | None, tolerance: float, unit: str, is_fitted: bool,
 ) -> ScanFacts:  # fmt: skip
     """Measures how far skin deviates that is not damaged. ``surplus``: higher one is left out, since it is metal."""
     layer = (deviation.label == ADDED) & (deviation.distance < LAYER * tolerance)
@@ -38,6 +39,7 @@ def gather_scan_facts(
     if layer.any():
         area = measure_area(aligned.points[layer], skin.cells.edge, FEWEST_OUTSIDE)
         height = float(np.quantile(deviation.distance[layer], 0.9))
+    sheets = measure_sheets(aligned, deviation, part, tolerance)
     return ScanFacts(
         tolerance=tolerance,
         spacing=aligned.spacing,
@@ -49,6 +51,8 @@ def gather_scan_facts(
         outward_area=area,
         outward_height=height,
         between_views=_compare_views(aligned, deviation, skin.cells.edge, tolerance),
+        sheets_share=sheets.share,
+        sheets_apart=sheets.apart,
         pose=pose.doubts,
         fit=fit,
     )

@@ -1,68 +1,115 @@
-"""Whether a scan shows two surfaces over the same skin: one on the skin, and one below it."""
+"""Whether a scan shows two surfaces over the same skin, as of two views that do not fit together."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
 
-ON_SKIN, BELOW = 0.4, 0.9
-"""Largest distance from the skin of points on it, and least depth of those below it, in tolerances."""
 NEIGHBOURS = 12
-"""Points looked at about each point of the site."""
-LEAST, MOST = 0.25, 0.75
-"""Share of them on the skin between which both kinds are there."""
-BETWEEN = 0.25
-"""Share of them between both, from which they are one surface with noise: wear of less than a tolerance."""
+"""Points looked at about each point."""
+FEWEST = 3
+"""Points of each of the two surfaces among them."""
+LEAST_NOISE = 1 / 6
+"""Noise that is reckoned with at least, in tolerances: a surface that curves is no second one."""
+SEPARATE, INSIDE, EMPTY = 3.0, 1.3, 1.0
+"""Distance of the middles of both, spread of each, and gap between them, in noises: at least the first and the last, at
+most the second. Twelve points of one surface are split by 1.6 with a spread of 0.6."""
 APART = 0.85
-"""Distance of the middles of both kinds, in radii of the neighbours, from which they lie side by side, as at the rim of
-a loss. Half discs lie 1.2 apart, twice six points drawn at random 0.58."""
+"""Distance of the middles of both along the skin, in radii of the neighbours, from which they lie side by side, as at
+the rim of a loss. Half discs lie 1.2 apart, twice six points drawn at random 0.58."""
+ON_SKIN = 0.5
+"""Largest depth, in tolerances, of the upper surface over a site."""
 FACING = 3.0
 """Weight of a difference of normals, in spacings: a thin wall has two sides."""
-EVEN = 0.35
-"""Spread of the depths of those below, as a share of their mean, up to which they are a surface. The points on a steep
-wall lie at all depths below the same skin."""
-MOST_ASKED = 2000
-"""Points of the site that are asked; a share is right to two percent then."""
+STRAIGHT = 0.15
+"""Difference of a point's distances to the skin and to the plane of the nearest triangle, in tolerances, up to which it
+lies straight over that triangle. What is nearest to an edge, as the root of a wall that is gone, lies beside it."""
+LAYER = 5.0
+"""Distance from the skin, in tolerances, up to which the whole scan is asked."""
+FEWEST_POINTS = 25
+"""Points of a site among two surfaces below which nothing is said: at the roots of walls that are gone are some."""
+MOST_ASKED, ALL_ASKED = 2000, 4000
+"""Points of a site, and of the whole scan, that are asked; a share is right to two percent, and to 0.2 percent."""
+
+
+class Sheets(NamedTuple):
+    """``share`` of a scan's points that lie where it shows two surfaces, and how far these are ``apart``."""
+
+    share: float = 0.0
+    apart: float = 0.0
 
 
 def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members: Ints, tolerance: float) -> float:
-    """Share of a site's points ``members`` (M,) among whose neighbours along the skin are points on it.
+    """Share of a site's points ``members`` (M,) where the scan shows another surface above them, on the skin.
 
     At the rim of a loss points of both kinds lie side by side. Where two views do not fit together, or one surface was
     scanned twice with an error between, they lie in the same place.
     """
-    below = members[deviation.distance[members] < -BELOW * tolerance]
-    if len(below) < NEIGHBOURS:
+    if len(members) < NEIGHBOURS:
         return 0.0
-    spacing = max(aligned.spacing, 1e-300)
-    low, high = aligned.points[below].min(axis=0), aligned.points[below].max(axis=0)
-    near = find_in_box(aligned.points, low - 3 * tolerance - 3 * spacing, high + 3 * tolerance + 3 * spacing)
-    # whatever their label: among damaged points, means of neighbours make damage of points on the skin
-    # whatever their label: among damaged points, means of neighbours make damage of points on the skin
-    distance = deviation.distance[near]
-    near, distance = near[distance < ON_SKIN * tolerance], distance[distance < ON_SKIN * tolerance]
-    is_on = np.concatenate([np.zeros(len(below), bool), distance > -ON_SKIN * tolerance])
-    is_between = np.concatenate([np.zeros(len(below), bool), (distance <= -ON_SKIN * tolerance)])
-    is_between[len(below) :] &= distance > -BELOW * tolerance
-    used = np.concatenate([np.ones(len(below), bool), is_on[len(below) :] | is_between[len(below) :]])
-    feet = np.concatenate([_find_feet(aligned, deviation, part, index, FACING * spacing) for index in (below, near)])
-    feet, is_on, is_between = feet[used], is_on[used], is_between[used]
-    if is_on.sum() < NEIGHBOURS:
-        return 0.0
-    asked = np.arange(len(below))[:: max(1, len(below) // MOST_ASKED)]
-    index = find_neighbours(feet[asked], NEIGHBOURS, feet)[1]
-    offset, on, between = feet[index] - feet[asked][:, None], is_on[index], is_between[index]
-    share = on.mean(axis=1)
-    middle_on, middle_below = (_find_middle(offset, kind) for kind in (on, ~on & ~between))
+    margin = 3 * tolerance + 3 * aligned.spacing
+    low, high = aligned.points[members].min(axis=0) - margin, aligned.points[members].max(axis=0) + margin
+    near = find_in_box(aligned.points, low, high)
+    step = max(1, len(members) // MOST_ASKED)
+    asked = members[::step]
+    is_double, upper, _ = _find_double(aligned, deviation, part, asked, near, tolerance)
+    is_double &= upper < ON_SKIN * tolerance
+    return float(is_double.mean()) if step * is_double.sum() >= FEWEST_POINTS else 0.0
+
+
+def measure_sheets(aligned: Scan, deviation: Deviation, part: Part, tolerance: float) -> Sheets:
+    """How much of the whole scan shows two surfaces, wherever they lie."""
+    near = np.flatnonzero(np.abs(deviation.distance) < LAYER * tolerance)
+    if len(near) < NEIGHBOURS:
+        return Sheets()
+    asked = np.random.default_rng(0).permutation(near)[:ALL_ASKED]
+    is_double, _, apart = _find_double(aligned, deviation, part, asked, near, tolerance)
+    if not is_double.any():
+        return Sheets()
+    return Sheets(float(is_double.mean()), float(np.quantile(apart[is_double], 0.9)))
+
+
+def _find_double(
+    aligned: Scan, deviation: Deviation, part: Part, asked: Ints, near: Ints, tolerance: float
+) -> tuple[Flags, Floats, Floats]:
+    """Which of the points ``asked`` (A,) lie among two surfaces of points of ``near`` (N,), the depth (A,) of the upper
+    one and how far below it the lower one lies (A,)."""
+    noise = max(aligned.noise, LEAST_NOISE * tolerance)
+    weight = FACING * max(aligned.spacing, 1e-300)
+    is_asked_straight, is_near_straight = (
+        _is_straight(aligned, deviation, part, index, STRAIGHT * tolerance) for index in (asked, near)
+    )
+    near = near[is_near_straight]
+    if len(near) < NEIGHBOURS:
+        nothing = np.zeros(len(asked))
+        return nothing > 0, nothing, nothing
+    feet, own = (_find_feet(aligned, deviation, part, index, weight) for index in (near, asked))
+    index = find_neighbours(own, NEIGHBOURS, feet)[1]
+    depth, offset = -deviation.distance[near][index], feet[index] - own[:, None]
+    # two surfaces are split at the widest gap between the depths
+    ordered = np.sort(depth, axis=1)
+    gaps = np.diff(ordered, axis=1)[:, FEWEST - 1 : NEIGHBOURS - FEWEST]
+    at = gaps.argmax(axis=1) + FEWEST
+    rows = np.arange(len(asked))
+    is_lower = depth > ((ordered[rows, at - 1] + ordered[rows, at]) / 2)[:, None]
+    lower, lower_spread = _measure_spread(depth, is_lower)
+    upper, upper_spread = _measure_spread(depth, ~is_lower)
+    side = np.linalg.norm(_find_middle(offset, is_lower) - _find_middle(offset, ~is_lower), axis=1)
     radius = np.sqrt(((offset - offset.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1))
-    apart = np.linalg.norm(middle_on - middle_below, axis=1) / np.maximum(radius, 1e-300)
-    depth = -np.concatenate([deviation.distance[below], distance])[used][index]
-    mean, spread = _measure_spread(depth, ~on & ~between)
-    is_mixed = (share > LEAST) & (share < MOST) & (between.mean(axis=1) < BETWEEN) & (apart < APART)
-    is_mixed &= spread < EVEN * mean
-    return float(is_mixed.mean())
+    is_double = (lower - upper > SEPARATE * noise) & (gaps.max(axis=1) > EMPTY * noise) & (side < APART * radius)
+    is_double &= is_asked_straight & (np.maximum(lower_spread, upper_spread) < INSIDE * noise)
+    return is_double, upper, lower - upper
+
+
+def _is_straight(aligned: Scan, deviation: Deviation, part: Part, index: Ints, most: float) -> Flags:
+    """Which points lie straight over or under their nearest triangle, and not beside an edge of it."""
+    face = deviation.face[index]
+    height = np.einsum("ij,ij->i", aligned.points[index] - part.triangles[face, 0], part.face_normals[face])
+    return np.asarray(np.abs(height - deviation.distance[index]) < most)
 
 
 def _measure_spread(values: Floats, chosen: Flags) -> tuple[Floats, Floats]:

@@ -15,6 +15,8 @@ from damageest.conformance._files import make_result
 
 DATES = re.compile(rb"<!-- dates and times: begin -->.*?<!-- dates and times: end -->", re.DOTALL)
 
+PNG = b"\x89PNG\r\n\x1a\n"
+
 
 class ReportContract(StageContract):
     """Checks for `report`, on a result with two sites, one of them with a deposit.
@@ -44,7 +46,9 @@ class ReportContract(StageContract):
     def write_files(self, result: Any = None) -> dict[str, bytes]:
         """Runs the report and gives the bytes of the files that it names, by path, without dates."""
         changes = {} if result is None else {"result": result, "content": describe(result)}
-        files = self.run(**changes).files
+        done = self.run(**changes)
+        files = done.files
+        assert not done.picture or done.picture.startswith(PNG), "the picture is no PNG"
         assert len(set(files)) == len(files), "a file is named twice"
         held = {p.relative_to(self.folder).as_posix() for p in self.folder.rglob("*") if p.is_file()}
         assert held == set(files), "the named files differ from the files in the folder"

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import list_used
+from damageest.geometry.vectors import normalise
 from damageest.geometry.voxels import order_by_place
 from damageest.isolation.memory import FEWER_POINTS, require_memory
 
@@ -213,7 +214,7 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
 
     away = query - foot
     cross = mesh.cross[used]
-    normal = (cross / np.linalg.norm(cross, axis=1, keepdims=True))[nearest]
+    normal = normalise(cross)[nearest]
     beside = np.linalg.norm(np.cross(away, normal), axis=1) > 1e-7 * np.abs(signed)
     # Where the nearest place lies on the short edge of a slender triangle, libigl sometimes gives the normal of that
     # face and not the pseudonormal of the edge: 4 of 70,000 points around a tube with a hole, millimetres from the

@@ -13,6 +13,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import order_integers
+from damageest.geometry.vectors import normalise
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid
 from damageest.isolation.memory import FEWER_POINTS, require_memory
 
@@ -126,7 +127,7 @@ def _build_frames(part: Mesh) -> Floats:
     corners = part.triangles - part.bounds.mean(axis=0)
     normal = part.face_normals
     inward = np.cross(normal[:, None], np.roll(corners, -1, axis=1) - corners)
-    inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-300)
+    inward = normalise(inward)
     result = np.empty((len(corners), 4, 4))
     result[:, 0, :3], result[:, 0, 3] = normal, -np.einsum("fi,fi->f", normal, corners[:, 0])
     result[:, 1:, :3], result[:, 1:, 3] = inward, -np.einsum("fki,fki->fk", inward, corners)

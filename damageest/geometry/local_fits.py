@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.neighbourhoods import find_neighbours, make_tree, query_neighbours
 from damageest.geometry.threads import cut_evenly, map_in_threads
+from damageest.geometry.vectors import normalise
 from damageest.isolation.memory import require_memory
 
 Floats32 = NDArray[np.float32]
@@ -152,7 +153,7 @@ def _fit_quadric(normals: Floats, off: Floats32, weights: Floats32, reach: Float
     reach = np.maximum(reach, 1e-12)
     helper = np.eye(3)[np.abs(normals).argmin(axis=1)]
     u = np.cross(normals, helper)
-    u /= np.linalg.norm(u, axis=1)[:, None]
+    u = normalise(u)
     v = np.cross(normals, u)
     axes = np.stack([u, v, normals], axis=2) / reach[:, None, None]
     a, b, h = np.moveaxis(np.matmul(off, axes.astype(np.float32)), 2, 0)
@@ -165,5 +166,5 @@ def _fit_quadric(normals: Floats, off: Floats32, weights: Floats32, reach: Float
     of_moments = np.linalg.solve(left, np.broadcast_to(np.eye(6, 3), (len(off), 6, 3)))
     fit = np.matmul(np.matmul(heavy, h[:, :, None])[:, None, :, 0], of_moments)[:, 0]
     tilted = normals - fit[:, 1, None] * u - fit[:, 2, None] * v
-    tilted /= np.linalg.norm(tilted, axis=1)[:, None]
+    tilted = normalise(tilted)
     return fit[:, 0] * reach, tilted, np.matmul(of_moments[:, None, :, 0].astype(np.float32), heavy)[:, 0]

@@ -16,8 +16,10 @@ def number_pieces(points: Floats, gap: float) -> Ints:
 
     Two points are connected where their distance is at most ``gap``, directly or over other points. The points are
     sorted into cubes whose diagonal is the gap, so that all points of a cube are connected. Cubes near each other are
-    connected by one pair of their points, or else compared in full.
+    connected by one pair of their points, or else compared in full. Pieces are numbered in the order of their first
+    cubes.
     """
+    from scipy.cluster.hierarchy import DisjointSet
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial.distance import cdist
@@ -51,24 +53,18 @@ def number_pieces(points: Floats, gap: float) -> Ints:
 
     joined = pair[near]
     label = connect(joined)
-    parent = list(range(int(label.max()) + 1))
-
-    def find_root(item: int) -> int:
-        while parent[item] != item:
-            parent[item] = parent[parent[item]]
-            item = parent[item]
-        return item
-
+    sets = DisjointSet(range(int(label.max()) + 1))
+    more = [np.empty((0, 2), np.int64)]
     for a, b in pair[label[pair[:, 0]] != label[pair[:, 1]]]:
-        one, other = find_root(int(label[a])), find_root(int(label[b]))
-        if one == other:
+        one, other = int(label[a]), int(label[b])
+        if sets.connected(one, other):
             continue
         own, beside = points[order[first[a] : ends[a]]], points[order[first[b] : ends[b]]]
         # in chunks, as a coarse gap may put many points into one cube
         if any(cdist(own[k : k + 500], beside).min() <= gap for k in range(0, len(own), 500)):
-            parent[one] = other
-    roots = np.array([find_root(item) for item in range(len(parent))])
-    _, piece = np.unique(roots[label], return_inverse=True)
+            sets.merge(one, other)
+            more.append(np.array([[a, b]]))
+    piece = connect(np.concatenate([joined, *more]))
     result = np.empty(len(points), np.int64)
     result[order] = piece[cube]
     return result

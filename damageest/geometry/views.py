@@ -12,11 +12,12 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.rays import RayCaster
+from damageest.geometry.vectors import normalise
 
 DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
-DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
+DIRECTIONS = normalise(DIRECTIONS)
 OVERVIEWS = np.array([(x, y, 0.8) for x, y in ((-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0))])
-OVERVIEWS /= np.linalg.norm(OVERVIEWS, axis=1)[:, None]
+OVERVIEWS = normalise(OVERVIEWS)
 """Directions that all of a part is looked at from: askew and from above."""
 PROBES = 150
 """Points of a damage surface for which it is tested from where they are seen."""

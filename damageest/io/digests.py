@@ -26,6 +26,8 @@ def _feed(total: hashlib._Hash, part: object) -> None:
     if isinstance(part, np.ndarray):
         total.update(f"{part.dtype}{part.shape}".encode())
         total.update(np.ascontiguousarray(part).reshape(-1).view(np.uint8).data)
+    elif isinstance(part, np.generic):  # which the cache gives back as a number of Python
+        _feed(total, part.item())
     elif isinstance(part, Path):
         total.update(file_sha256(part).encode() if part.is_file() else str(part).encode())
     elif isinstance(part, (Mapping, list, tuple)):

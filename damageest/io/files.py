@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import os
@@ -55,6 +56,11 @@ def file_sha256(path: Path) -> str:
     """The file's SHA-256, in hexadecimal."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def embed_png(data: bytes) -> str:
+    """A PNG as a page holds it, which then needs no other file."""
+    return f"data:image/png;base64,{base64.b64encode(data).decode()}"
 
 
 def shorten_error(error: BaseException) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.errors import InputError
+from damageest.geometry.vectors import normalise
 from damageest.io.file_memory import require_memory_for
 from damageest.io.files import check_file, raise_environment_fault, shorten_error
 from damageest.isolation.memory import FEWER_POINTS, require_memory
@@ -159,6 +160,6 @@ def write_stl(path: Path, mesh: Mesh) -> None:
     a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
     normal = np.cross(b - a, c - a)
     table = np.zeros(len(corners), STL_TRIANGLE)
-    table["normal"] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    table["normal"] = normalise(normal)
     table["corners"] = corners
     _write(path, b"damageest".ljust(80, b"\0") + len(table).to_bytes(4, "little"), table)

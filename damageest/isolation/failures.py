@@ -35,13 +35,13 @@ class RemoteTraceback(Exception):  # noqa: N818  (no error of its own: the cause
         return "\n" + str(self.args[0])
 
 
-def describe_end(status: int | None, output: str, memory: int | None, limits: Limits, owner: str) -> ProcessError:
+def describe_end(status: int | None, output: str, memory: int, limits: Limits, owner: str) -> ProcessError:
     """The error for a process that gave no answer. ``status``: as of subprocess, None where it took too long."""
     if status is None:
         error = ProcessError(
             "time",
-            f"was ended: not finished after {limits.seconds:g} s, the time limit of a stage",
-            f"a longer --stage-timeout, or {blame_authors(owner)}",
+            f"was ended: not finished after {limits.seconds:g} s, the time limit of a {limits.of}",
+            ", or ".join(part for part in (f"a longer {limits.option}", blame_authors(owner)) if part),
         )
     elif "bad_alloc" in output or "MemoryError" in output:
         error = describe_memory(memory, limits)
@@ -64,10 +64,10 @@ def describe_signal(number: int) -> tuple[str, str]:
     return f"its process ended by {_SIGNALS.get(number, 'a signal')} ({signal.Signals(number).name})", ""
 
 
-def describe_memory(memory: int | None, limits: Limits) -> ProcessError:
-    most = "" if memory is None else f" than the {format_bytes(memory)} "
-    if memory is not None:
-        most += "that --memory leaves it" if limits.memory is not None else "that were free"
+def describe_memory(memory: int, limits: Limits) -> ProcessError:
+    """The error for a process that ran out of the ``memory`` that it could allocate, in bytes."""
+    most = f" than the {format_bytes(memory)} "
+    most += "that --memory leaves it" if limits.memory is not None else "that were free"
     larger = "a larger --memory" if limits.memory is not None else "a machine with more memory"
     return ProcessError("memory", f"needed more memory{most}", f"a larger tolerance, fewer scan points, or {larger}")
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+
+import psutil
 
 from damageest.errors import InputError
 
@@ -23,10 +24,13 @@ _CGROUP = Path("/sys/fs/cgroup")
 @dataclass(frozen=True)
 class Limits:
     """``memory``: bytes that a process may allocate, None for what is free on the machine. ``seconds``: time limit of
-    one isolated call, 0 for none."""
+    one isolated call, 0 for none. ``of``: what has that time limit, and ``option``: of the command line, which sets it,
+    for messages."""
 
     memory: int | None = None
     seconds: float = STAGE_SECONDS
+    of: str = "stage"
+    option: str = "--stage-timeout"
 
 
 def parse_memory(text: str, option: str = "--memory") -> int:
@@ -44,19 +48,21 @@ def format_bytes(size: float) -> str:
     return f"{size / (1e9 if unit == 'GB' else 1e6):.3g} {unit}"
 
 
-def measure_free_memory() -> int | None:
+def measure_free_memory() -> int:
     """Bytes that can still be allocated: the least of what the machine, its control group (version 1 or 2) and the
-    process' own limit of address space (``ulimit -v``) leave. None where the system gives none of them."""
-    known = [value for value in (_machine_free(), _group_free(), _address_space_free()) if value is not None]
-    return max(0, min(known)) if known else None
+    process' own limits of address space (``ulimit -v``) and data (--memory) leave."""
+    held = psutil.Process().memory_info()
+    known = [int(psutil.virtual_memory().available), *_group_free()]
+    for limit, used in ((resource.RLIMIT_AS, held.vms), (resource.RLIMIT_DATA, getattr(held, "data", held.rss))):
+        most = resource.getrlimit(limit)[0]
+        if most != resource.RLIM_INFINITY:
+            known.append(most - int(used))
+    return max(0, min(known))
 
 
 def own_memory() -> int:
-    """Bytes that this process holds in memory; 0 where the system does not tell."""
-    try:
-        return int((_PROC / "self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except (OSError, ValueError, IndexError):
-        return 0
+    """Bytes that this process holds in memory."""
+    return int(psutil.Process().memory_info().rss)
 
 
 def limit_this_process(memory: int | None) -> None:
@@ -80,20 +86,12 @@ def limited(memory: int | None) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
-def _machine_free() -> int | None:
-    try:
-        found = re.search(r"^MemAvailable:\s+(\d+) kB", (_PROC / "meminfo").read_text(), re.MULTILINE)
-    except OSError:
-        return None
-    return int(found[1]) * 1024 if found else None
-
-
-def _group_free() -> int | None:
-    """Of the control group of this process and all groups round it, the least free."""
+def _group_free() -> list[int]:
+    """What the control group of this process and all groups round it leave. psutil does not know them."""
     try:
         lines = (_PROC / "self/cgroup").read_text().splitlines()
     except OSError:
-        return None
+        return []
     left = []
     for line in lines:
         _, controllers, path = line.split(":", 2)
@@ -105,7 +103,7 @@ def _group_free() -> int | None:
         own = base / path.lstrip("/")
         for folder in {base, *(place for place in (own, *own.parents) if place.is_relative_to(base))}:
             left += _read_group(folder, *names)
-    return min(left, default=None)
+    return left
 
 
 _OLD_NAMES = ("memory.limit_in_bytes", "memory.usage_in_bytes")
@@ -119,13 +117,3 @@ def _read_group(folder: Path, limit: str, usage: str) -> list[int]:
     except (OSError, ValueError):  # no such group, or the word max
         return []
     return [most - used + (int(found[1]) if found else 0)] if most < 2**60 else []
-
-
-def _address_space_free() -> int | None:
-    most = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if most == resource.RLIM_INFINITY:
-        return None
-    try:
-        return most - int((_PROC / "self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
-    except (OSError, ValueError, IndexError):
-        return most

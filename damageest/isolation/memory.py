@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import resource
-from pathlib import Path
-
 from damageest.errors import StageError
 from damageest.isolation.limits import format_bytes, measure_free_memory
 
@@ -23,22 +20,8 @@ def require_memory(needed: float, what: str, remedy: str) -> None:
     """
     if needed < WORTH_ASKING:
         return
-    known = [free for free in (measure_free_memory(), _measure_free_data()) if free is not None]
-    if known and needed > min(known):
+    free = measure_free_memory()
+    if needed > free:
         raise StageError(
-            f"would need about {format_bytes(needed)} of memory for {what}, but {format_bytes(max(min(known), 0))} are "
-            "free",
-            remedy,
+            f"would need about {format_bytes(needed)} of memory for {what}, but {format_bytes(free)} are free", remedy
         )
-
-
-def _measure_free_data() -> int | None:
-    """Bytes that the limit of the process' data leaves, which --memory sets; None where there is no limit."""
-    most = resource.getrlimit(resource.RLIMIT_DATA)[0]
-    if most == resource.RLIM_INFINITY:
-        return None
-    try:
-        lines = Path("/proc/self/status").read_text().splitlines()
-        return most - next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData"))
-    except (OSError, StopIteration, ValueError):
-        return most

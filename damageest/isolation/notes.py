@@ -1,18 +1,22 @@
-"""What a process is doing, where its parent can read it after a crash: a page of memory that both share."""
+"""What a process is doing, where the one that started it can read it at any time: a page of memory that both share."""
 
 from __future__ import annotations
 
 import mmap
+import os
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Any
+
+from damageest.isolation.transfer import make_shared_file
 
 _HEAD = struct.Struct("<IIdi?HH")
 """Change, job, seconds, status, open, and the length of ``what`` and ``owner``, which follow."""
 _SIZE = 4096
-_page: mmap.mmap | None = None
+_PLACE = "damageest_place"
+"""The attribute of an error that says what was at work."""
 
 
 @dataclass(frozen=True)
@@ -32,36 +36,78 @@ class Entry:
     owner: str = ""
 
 
-def share_page() -> None:
-    """Makes the page. A process that is forked afterwards shares it; without it, nothing is noted."""
-    global _page
-    _page = mmap.mmap(-1, _SIZE)
-    _write(Entry())
+class Page:
+    """A page with one entry. ``file``: the number of the open file that another process has opened it with; without
+    one, a new page."""
+
+    def __init__(self, file: int | None = None) -> None:
+        self.file = make_shared_file() if file is None else file
+        if file is None:
+            os.ftruncate(self.file, _SIZE)
+        self._data = mmap.mmap(self.file, _SIZE)
+        if file is None:
+            self.write(Entry())
+
+    def read(self) -> Entry:
+        """The last entry."""
+        *head, length, other = _HEAD.unpack_from(self._data, 0)
+        start, end = _HEAD.size, _HEAD.size + length
+        what, owner = (part.decode(errors="replace") for part in (self._data[start:end], self._data[end : end + other]))
+        count, job, seconds, status, is_open = head
+        return Entry(count, job - 1, seconds, status, is_open, what, owner)
+
+    def write(self, entry: Entry) -> None:
+        """Replaces the entry."""
+        what, owner = (text.encode()[: _SIZE // 3] for text in (entry.what, entry.owner))
+        fixed = (entry.count % 2**32, entry.job + 1, entry.seconds, entry.status, entry.open)
+        data = _HEAD.pack(*fixed, len(what), len(owner)) + what + owner
+        self._data[: len(data)] = data
+
+    def close(self) -> None:
+        self._data.close()
+        os.close(self.file)
 
 
-def read_entry() -> Entry:
-    """The last entry."""
-    if _page is None:
-        return Entry()
-    *head, length, other = _HEAD.unpack_from(_page, 0)
-    start, end = _HEAD.size, _HEAD.size + length
-    what, owner = (part.decode(errors="replace") for part in (_page[start:end], _page[end : end + other]))
-    count, job, seconds, status, is_open = head
-    return Entry(count, job - 1, seconds, status, is_open, what, owner)
+_own: Page | None = None
+"""The page of this process, which another one reads; without it, nothing is noted."""
+
+
+def note_on(page: Page) -> None:
+    """Lets this process, and forks of it, note on this page what they do."""
+    global _own
+    _own = page
 
 
 @contextmanager
 def at_work(what: str, seconds: float = 0.0, owner: str = "") -> Iterator[None]:
-    """Notes what is done while the ``with`` block runs, then again what was done before, its time beginning anew."""
-    if _page is None:
+    """Notes what is done while the ``with`` block runs, then again what was done before, its time beginning anew.
+
+    The process that reads it ends this one where the block takes longer than ``seconds``; 0 for no limit.
+    """
+    if _own is None:
         yield
         return
-    before = read_entry()
+    before = _own.read()
     _change(what=what, seconds=seconds, owner=owner)
     try:
         yield
+    except BaseException as error:
+        set_place(error, what)
+        raise
     finally:
         _change(what=before.what, seconds=before.seconds, owner=before.owner)
+
+
+def set_place(error: BaseException, what: str) -> None:
+    """Keeps what was at work where an error was raised, unless it is known already."""
+    if what and not find_place(error):
+        with suppress(AttributeError, TypeError):  # an exception of a library that takes no attribute
+            setattr(error, _PLACE, what)
+
+
+def find_place(error: BaseException) -> str:
+    """What was at work, as noted, where an error was raised; empty where nothing was. It passes between processes."""
+    return str(getattr(error, _PLACE, ""))
 
 
 def note_job(number: int) -> None:
@@ -75,14 +121,6 @@ def close_entry(status: int, seconds: float = 0.0) -> None:
 
 
 def _change(**values: Any) -> None:
-    if _page is not None:
-        now = read_entry()
-        _write(replace(now, count=now.count + 1, **values))
-
-
-def _write(entry: Entry) -> None:
-    assert _page is not None
-    what, owner = (text.encode()[: _SIZE // 3] for text in (entry.what, entry.owner))
-    fixed = (entry.count % 2**32, entry.job + 1, entry.seconds, entry.status, entry.open)
-    data = _HEAD.pack(*fixed, len(what), len(owner)) + what + owner
-    _page[: len(data)] = data
+    if _own is not None:
+        now = _own.read()
+        _own.write(replace(now, count=now.count + 1, **values))

@@ -1,32 +1,45 @@
 """The worker's side: answers calls until the process that started it ends.
 
-``worker.py`` starts it as ``python -c CODE CHANNEL LEASH``; both are numbers of open files.
+``worker.py`` starts it as ``python -c CODE CHANNEL LEASH PAGE``; all are numbers of open files.
 """
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import os
 import pickle
+import re
 import socket
 import sys
 import time
 import traceback
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from damageest.isolation.limits import limited
+from damageest.isolation.notes import Page, find_place, note_on
 from damageest.isolation.parent import end_with_parent
 from damageest.isolation.transfer import load, receive, receive_parts, send
 
-is_worker = False
-"""Whether this process is a worker. An isolated call within one is an ordinary call."""
+is_plain = False
+"""Whether this process is a worker in which an isolated call is an ordinary call."""
 
 
-def main(channel_file: int, leash: int) -> None:
+@dataclass(frozen=True)
+class Usage:
+    """What a call took: processor ``seconds``, and ``megabytes``, the peak of its process; None where the system does
+    not tell."""
+
+    seconds: float
+    megabytes: float | None
+
+
+def main(channel_file: int, leash: int, page: int) -> None:
     """Serves until the channel closes. What stages print goes to the error stream, as what libraries print does."""
-    global is_worker
-    is_worker = True
     end_with_parent(leash)
+    note_on(Page(page))
     os.dup2(2, 1)
     faulthandler.enable()
     channel = socket.socket(fileno=channel_file)
@@ -39,28 +52,47 @@ def main(channel_file: int, leash: int) -> None:
 
 
 def _answer(channel: socket.socket) -> None:
-    """Receives one call and sends (kind, value, processor seconds)."""
-    path, memory = receive(channel, copy=True)
+    """Receives one call and sends (kind, value, what was at work, usage)."""
+    global is_plain
+    path, memory, nested = receive(channel, copy=True)
     parts = receive_parts(channel, copy=False)
     sys.path[:] = path
-    before = time.process_time()
+    is_plain = not nested
+    place, before = "", time.process_time()
+    _reset_peak()
     try:
         with limited(memory):
             function, arguments = load(parts)
             del parts
             answer: tuple[str, Any] = ("value", function(**arguments))
     except SystemExit as error:
-        answer = ("exit", str(error.code))
+        place, answer = find_place(error), ("exit", str(error.code))
     except MemoryError as error:
-        answer = ("memory", str(error))
+        place, answer = find_place(error), ("memory", str(error))
     except BaseException as error:
-        answer = ("error", _pack_error(error))
+        place, answer = find_place(error), ("error", _pack_error(error))
     sys.stdout.flush()
     sys.stderr.flush()
+    usage = Usage(time.process_time() - before, _read_peak())
     try:
-        send(channel, (*answer, time.process_time() - before))
+        send(channel, (*answer, place, usage))
     except (pickle.PicklingError, TypeError, AttributeError) as error:
-        send(channel, ("error", _pack_error(error), time.process_time() - before))
+        send(channel, ("error", _pack_error(error), place, usage))
+
+
+def _reset_peak() -> None:
+    """Begins a new peak of memory: the process may have answered other calls."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
+
+
+def _read_peak() -> float | None:
+    """The peak since then in MB; psutil has none, and that of getrusage cannot be reset."""
+    try:
+        found = re.search(r"^VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE)
+    except OSError:
+        return None
+    return round(int(found[1]) / 1024) if found else None
 
 
 def _pack_error(error: BaseException) -> tuple[bytes, str, str, str]:

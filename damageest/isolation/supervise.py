@@ -9,20 +9,19 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
 from damageest.errors import StageError
-from damageest.isolation.failures import describe_signal
-from damageest.isolation.notes import Entry, close_entry, read_entry, share_page
+from damageest.isolation.clock import TICK, Clock
+from damageest.isolation.failures import describe_end
+from damageest.isolation.limits import Limits
+from damageest.isolation.notes import Entry, Page, close_entry, note_on
 from damageest.isolation.parent import end_with_parent
 
 PASSED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 """Signals that are passed on to the fork."""
-TICK = 0.5
-"""Seconds between two looks at the clock. A process that is stopped for longer, as by Ctrl-Z, loses no time by it."""
 IS_POSSIBLE = hasattr(os, "fork") and hasattr(signal, "sigtimedwait")
 END_SECONDS = 10.0
 """Seconds from the end of the work, when all is written, to that of its process. Until then threads that a plugin has
@@ -51,7 +50,7 @@ def supervise(work: Callable[[], int]) -> End:
     what it notes (`at_work`) for longer than the time limit noted with it, and where this process ends.
     """
     global is_watched
-    share_page()
+    page = Page()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     leash, held = os.pipe()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {*PASSED, signal.SIGCHLD})
@@ -61,6 +60,7 @@ def supervise(work: Callable[[], int]) -> End:
     if child == 0:
         is_watched = True
         os.close(held)
+        note_on(page)
         end_with_parent(leash)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         status = 1
@@ -71,9 +71,10 @@ def supervise(work: Callable[[], int]) -> End:
         sys.exit(status)
     os.close(leash)
     try:
-        return _describe(*_wait(child), read_entry())
+        return _describe(*_wait(child, page), page.read())
     finally:
         os.close(held)
+        page.close()
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
@@ -89,9 +90,9 @@ def end_like_fork(status: int) -> NoReturn:
     os._exit(status if status >= 0 else 128 - status)
 
 
-def _wait(child: int) -> tuple[int, bool]:
+def _wait(child: int, page: Page) -> tuple[int, bool]:
     """The exit status of the fork, as of subprocess, and whether it was killed since it was late."""
-    count, spent, before, late = -1, 0.0, time.monotonic(), False
+    clock, late = Clock(page), False
     while True:
         ended, status = os.waitpid(child, os.WNOHANG)
         if ended:
@@ -99,10 +100,7 @@ def _wait(child: int) -> tuple[int, bool]:
         found = signal.sigtimedwait({*PASSED, signal.SIGCHLD}, TICK)
         if found and found.si_signo in PASSED and found.si_code <= _USER:
             os.kill(child, found.si_signo)
-        entry, now = read_entry(), time.monotonic()
-        spent = 0.0 if entry.count != count else spent + min(now - before, 2 * TICK)
-        count, before = entry.count, now
-        if entry.seconds and spent > entry.seconds and not late:
+        if clock.find_late() and not late:
             late = True
             os.kill(child, signal.SIGKILL)
 
@@ -113,16 +111,9 @@ def _describe(status: int, late: bool, entry: Entry) -> End:
         return End(status)
     if not entry.open:
         return End(status if status >= 0 else entry.status, late=late)
-    remedy = f"another implementation; report it to the authors of {entry.owner}, with job and inputs"
-    if late:
-        message = f"was ended: not finished after {entry.seconds:g} s, the time limit of a stage"
-        remedy = f"a longer --stage-timeout{f', or {remedy}' if entry.owner else ''}"
-    elif status < 0:
-        message, killed = describe_signal(-status)
-        remedy = killed or remedy
-    else:
-        message = f"ended its process with exit status {status}"
-    error = StageError(message if entry.what else f"the run {message}", remedy if entry.owner or late else "")
+    error = describe_end(None if late else status, "", 0, Limits(seconds=entry.seconds), entry.owner)
+    if not entry.what:
+        error.message = f"the run {error.message}"
     return End(1, _name(error, entry.what), entry.job)
 
 

@@ -30,7 +30,7 @@ def send(channel: socket.socket, value: Any) -> None:
     _Pickler(stream, protocol=5, buffer_callback=buffers.append).dump(value)
     parts = [stream.getbuffer(), *(buffer.raw() for buffer in buffers)]
     starts = _place([part.nbytes for part in parts])
-    file = _make_file()
+    file = make_shared_file()
     try:
         os.ftruncate(file, starts[-1])
         sizes = struct.pack(f"<{len(parts) + 1}Q", len(parts), *(part.nbytes for part in parts))
@@ -104,7 +104,8 @@ def _place(sizes: Sequence[int]) -> list[int]:
     return [*starts, end]
 
 
-def _make_file() -> int:
+def make_shared_file() -> int:
+    """The number of a new open file in memory, which this process closes."""
     if hasattr(os, "memfd_create"):
         return os.memfd_create("damageest")
     with tempfile.TemporaryFile() as file:

@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
-import json
+import itertools
 import os
 import pickle
-import selectors
-import signal
-import socket
-import subprocess
 import sys
 import threading
 import time
@@ -21,20 +16,14 @@ from damageest.errors import StageError
 from damageest.isolation import serve
 from damageest.isolation.failures import ProcessError, RemoteTraceback, blame_authors, describe_end, describe_memory
 from damageest.isolation.limits import Limits, format_bytes, measure_free_memory, own_memory
-from damageest.isolation.one_thread import ONE_THREAD
-from damageest.isolation.transfer import receive, send
+from damageest.isolation.notes import set_place
+from damageest.isolation.process import Answer, Call, Ended, WorkerProcess
+from damageest.isolation.serve import Usage
 
 T = TypeVar("T")
-START_SECONDS = 120.0
-"""Longest time from the start of a worker until it answers."""
-_CODE = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[3])\n"
-    "from damageest.isolation.serve import main; main(int(sys.argv[1]), int(sys.argv[2]))"
-)
-_MOST_OUTPUT = 1 << 16
-"""Bytes of a worker's output that are kept until the call ends."""
 _workers: dict[tuple[int, str], _Worker] = {}
 _workers_lock = threading.Lock()
+_numbers = itertools.count()
 _cpu_seconds = 0.0
 
 
@@ -46,26 +35,48 @@ def call_isolated(
     owner: str = "",
     limits: Limits | None = None,
     show: bool = True,
+    stays: bool = True,
+    nested: bool = False,
+    processor_time: bool = False,
+    tell: Callable[[Usage], None] | None = None,
 ) -> T:
     """``function(**arguments)`` in a worker process, which stays for the next call with the same name ``worker``.
 
     Function, arguments and result have to be picklable, the function by its name in a module that can be imported.
     Arrays go through shared memory; those that the function gets stay read-only where they were. An exception of the
-    function is raised here as well, with its traceback as cause. ``owner``: whose code it is, as "damageest-open3d
-    0.1", for messages. ``show``: what the function prints goes to the error stream of this process when the call ends.
+    function is raised here as well, with its traceback as cause. What the function notes with `at_work` has the time
+    limit noted with it, and is what the error names.
+
+    ``owner``: whose code it is, as "damageest-open3d 0.1", for messages. ``show``: what the function prints goes to the
+    error stream of this process when the call ends. ``stays``: without it the process serves this call alone.
+    ``nested``: isolated calls of the function have processes of their own; without it they are ordinary calls.
+    ``processor_time``: the time limits of what is noted are ones of processor time, since a busy machine is no reason
+    to end it. ``tell`` gets what the call used, where it gave a value or raised.
 
     Raises StageError, most often ProcessError, where the process crashes or exits, or passes a limit.
     """
-    limits = limits or Limits()
-    if serve.is_worker:
+    if serve.is_plain:
         return function(**arguments)
-    key = (os.getpid(), worker)  # a forked process has workers of its own
+    # a forked process has workers of its own
+    key = (os.getpid(), worker if stays else f"{worker} {next(_numbers)}")
     with _workers_lock:
         found = _workers.get(key)
         if found is None:
             found = _workers[key] = _Worker()
-    result: T = found.call(function, arguments, limits, owner, show)
-    return result
+    call = Call(function, arguments, limits or Limits(), owner, show, nested, processor_time)
+    try:
+        answer = found.answer(call, tell)
+    finally:
+        if not stays:
+            found.end()
+            with _workers_lock:
+                _workers.pop(key, None)
+    if answer.kind == "value":
+        result: T = answer.value
+        return result
+    error, cause = _unpack(answer, call)
+    set_place(error, answer.what)
+    raise error from cause
 
 
 def cpu_seconds() -> float:
@@ -86,150 +97,65 @@ atexit.register(end_workers)
 
 
 class _Worker:
-    """One process, started with its first call and after each crash. Calls from several threads wait for each other."""
+    """A process, started with its first call and after each crash. Calls from several threads wait for each other."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
-        self._output = bytearray()
+        self._process: WorkerProcess | None = None
 
-    def call(
-        self, function: Callable[..., Any], arguments: Mapping[str, Any], limits: Limits, owner: str, show: bool
-    ) -> Any:
-        with self._lock:
-            memory = _share_memory(limits, owner)
-            if self._process is None or self._process.poll() is not None:
-                self._start()
-            try:
-                kind, value = self._exchange(function, dict(arguments), memory, limits.seconds)
-            except _Ended as end:
-                status = None if end.late else self._wait_for_end()
-                self.kill()
-                raise describe_end(status, self._take_output(), memory, limits, owner)  # noqa: B904  (it has a cause)
-            except BaseException:  # as Ctrl-C: the worker may be anywhere in the call
-                self.kill()
-                raise
-            if kind in ("exit", "memory"):
-                self.kill()  # what it had allocated may still be there
-            output = self._take_output()
-            if show and output:
-                sys.stderr.write(output)
-        return _unpack(kind, value, memory, limits, owner)
-
-    def _start(self) -> None:
-        self._close()
-        self._channel, other = socket.socketpair()
-        leash, self._leash = os.pipe()
-        self._output = bytearray()
-        with other:
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _CODE, str(other.fileno()), str(leash), json.dumps(sys.path)],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                pass_fds=(other.fileno(), leash),
-                env={**os.environ, **ONE_THREAD},
-                start_new_session=True,  # Ctrl-C reaches the caller alone, which then ends the worker
-            )
-        os.close(leash)
-        self._reader = threading.Thread(target=self._collect, args=(self._process, self._output), daemon=True)
-        self._reader.start()
-        try:
-            self._wait(START_SECONDS)
-            receive(self._channel, copy=True)
-        except (_Ended, EOFError):
-            self.kill()
-            last = _last_line(self._take_output())
-            raise StageError(f"its worker process did not start: {last or 'no message'}", "install it again") from None
-
-    def _exchange(
-        self, function: Callable[..., Any], arguments: dict[str, Any], memory: int | None, seconds: float
-    ) -> tuple[str, Any]:
+    def answer(self, call: Call, tell: Callable[[Usage], None] | None) -> Answer:
+        """What the process answers. Raises ProcessError where it ends before."""
         global _cpu_seconds
-        try:
-            send(self._channel, (sys.path, memory))
-            send(self._channel, (function, arguments))
-            self._wait(seconds)
-            kind, value, seconds_used = receive(self._channel, copy=True)
-        except (EOFError, ConnectionError):
-            raise _Ended from None
-        _cpu_seconds += seconds_used
-        return kind, value
+        with self._lock:
+            memory = _share_memory(call.limits, call.owner)
+            process = self._find_process()
+            try:
+                answer = process.ask(call, memory)
+            except Ended as end:
+                status = None if end.seconds else process.wait_for_end()
+                what = process.page.read().what
+                process.kill()
+                limits = Limits(call.limits.memory, end.seconds) if end.is_step else call.limits
+                error = describe_end(status, process.take_output(), memory, limits, call.owner)
+                set_place(error, what)
+                raise error  # noqa: B904  (it has a cause)
+            except BaseException:  # as Ctrl-C: the worker may be anywhere in the call
+                process.kill()
+                raise
+            if answer.kind in ("exit", "memory"):
+                process.kill()  # what it had allocated may still be there
+            output = process.take_output()
+            if call.show and output:
+                sys.stderr.write(output)
+        _cpu_seconds += answer.usage.seconds
+        if tell:
+            tell(answer.usage)
+        return answer
 
-    def _wait(self, seconds: float) -> None:
-        """Waits for an answer. Raises _Ended where there is none in time, or the process has ended."""
-        end = time.monotonic() + seconds if seconds else float("inf")
-        with selectors.PollSelector() as selector:  # not select(): it takes no file numbers above 1023
-            selector.register(self._channel, selectors.EVENT_READ)
-            while True:
-                left = end - time.monotonic()
-                if selector.select(max(0.0, min(left, 0.5))):
-                    return
-                # a process that the worker started may hold the channel open
-                if self._process is None or self._process.poll() is not None:
-                    raise _Ended
-                if left <= 0:
-                    raise _Ended(late=True)
+    def _find_process(self) -> WorkerProcess:
+        """The process, a new one where there is none that runs."""
+        if self._process is None or not self._process.is_running:
+            if self._process is not None:
+                self._process.kill()
+            self._process = WorkerProcess()
+            self._process.wait_for_start()
+        return self._process
 
     def end(self) -> bool:
         """Ends the process, from any thread. Gives whether no call was in progress; one that was raises then."""
         if self._lock.acquire(blocking=False):
             try:
-                self.kill()
+                if self._process is not None:
+                    self._process.kill()
             finally:
                 self._lock.release()
             return True
-        if self._process is not None and self._process.poll() is None:
-            with contextlib.suppress(OSError):
-                os.killpg(self._process.pid, signal.SIGKILL)
+        if self._process is not None:
+            self._process.interrupt()
         return False
 
-    def kill(self) -> None:
-        """Ends the process and what it started."""
-        if self._process is not None:
-            with contextlib.suppress(OSError):
-                os.killpg(self._process.pid, signal.SIGKILL)
-            self._process.wait()
-            self._reader.join(timeout=1)
-        self._close()
 
-    def _wait_for_end(self) -> int | None:
-        """The exit status of a process that ends by itself; None where it does not."""
-        assert self._process is not None
-        try:
-            return self._process.wait(timeout=5)
-        except subprocess.TimeoutExpired:
-            return None
-
-    def _close(self) -> None:
-        if hasattr(self, "_channel"):
-            self._channel.close()
-            os.close(self._leash)
-            del self._channel, self._leash
-
-    @staticmethod
-    def _collect(process: subprocess.Popen[bytes], output: bytearray) -> None:
-        """Reads what the worker prints, so that it never waits for a reader. The end of it is kept."""
-        assert process.stdout is not None
-        with process.stdout as stream:
-            while text := os.read(stream.fileno(), 1 << 16):
-                output += text
-                del output[:-_MOST_OUTPUT]
-
-    def _take_output(self) -> str:
-        text = bytes(self._output).decode(errors="replace")
-        self._output.clear()
-        return text
-
-
-class _Ended(Exception):  # noqa: N818
-    """The worker gives no answer: it has ended, or it is ``late``."""
-
-    def __init__(self, late: bool = False) -> None:
-        self.late = late
-
-
-def _share_memory(limits: Limits, owner: str) -> int | None:
+def _share_memory(limits: Limits, owner: str) -> int:
     """Bytes for the worker: what this process leaves of the limit. Raises StageError where it leaves nothing."""
     if limits.memory is None:
         return measure_free_memory()
@@ -247,21 +173,15 @@ _LEAST_MEMORY = 100 * 10**6
 """A worker needs about this much to start."""
 
 
-def _unpack(kind: str, value: Any, memory: int | None, limits: Limits, owner: str) -> Any:
-    """The value of an answer. Raises what the function raised."""
-    if kind == "value":
-        return value
-    if kind == "exit":
-        raise ProcessError("exit", f"called sys.exit({value}), which would end the run", blame_authors(owner))
-    if kind == "memory":
-        raise describe_memory(memory, limits)
-    packed, name, text, trace = value
+def _unpack(answer: Answer, call: Call) -> tuple[BaseException, BaseException | None]:
+    """What the function raised, and its cause."""
+    if answer.kind == "exit":
+        text = f"called sys.exit({answer.value}), which would end the run"
+        return ProcessError("exit", text, blame_authors(call.owner)), None
+    if answer.kind == "memory":
+        return describe_memory(answer.memory, call.limits), None
+    packed, name, text, trace = answer.value
     error = pickle.loads(packed) if packed else type(name, (Exception,), {})(text)
     if not isinstance(error, (Exception, KeyboardInterrupt)):  # as GeneratorExit: it would end more than the call
-        error = ProcessError("exit", f"raised {name}{f' ({text})' if text else ''}", blame_authors(owner))
-    raise error from RemoteTraceback(trace)
-
-
-def _last_line(output: str) -> str:
-    lines = output.strip().splitlines()
-    return lines[-1][:400] if lines else ""
+        error = ProcessError("exit", f"raised {name}{f' ({text})' if text else ''}", blame_authors(call.owner))
+    return error, RemoteTraceback(trace)

@@ -2,8 +2,29 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+import math
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, field_validator
 
 
 class JsonModel(BaseModel):
-    model_config = ConfigDict(extra="forbid", populate_by_name=True, defer_build=True)
+    """A part of result.json, and of its schema. It is filled from the attributes of a value with the same names; an
+    array becomes a list."""
+
+    model_config = ConfigDict(extra="forbid", populate_by_name=True, defer_build=True, from_attributes=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _list_array(cls, value: Any) -> Any:
+        return value.tolist() if isinstance(value, np.ndarray) else value
+
+    @classmethod
+    def read(cls, source: Any, **others: Any) -> Self:
+        """The model of ``source``, whose attributes are its fields, but for the ``others``."""
+        return cls(**{name: getattr(source, name) for name in cls.model_fields if name not in others}, **others)
+
+
+Bound = Annotated[float | None, BeforeValidator(lambda value: value if math.isfinite(value) else None)]
+"""A number that is null where it is infinite: nothing limits it."""

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from damageest.artefacts import Vector
 from damageest.findings import ModelFit
+from damageest.output.base import JsonModel
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", defer_build=True)
-
-
-class PatchReport(_Model):
+class PatchReport(JsonModel):
     size: float = Field(description="width of the patches of skin")
     deviation: float = Field(description="standard deviation of their mean distances from the part in the pose")
     noise: float = Field(description="what the noise of their points explains of it")
     left: float = Field(description="the same after the form that `model` names is undone")
 
 
-class ScaleReport(_Model):
+class ScaleReport(JsonModel):
     value: float = Field(description="length in the scan over length in the CAD, the one that fits best")
     error: float = Field(description="its standard error")
     axes: tuple[Vector, Vector, Vector] = Field(description="directions of by_axis, in the part's frame")
@@ -30,12 +27,12 @@ class ScaleReport(_Model):
     corrected: float = Field(description="the scale that was taken out of the scan before; 1: none")
 
 
-class DeformationReport(_Model):
+class DeformationReport(JsonModel):
     kind: Literal["bend", "twist", "shear", "stretch", "scale"]
     amount: float = Field(description="largest displacement of the seen skin by it beyond the nearest rigid motion")
 
 
-class ViewReport(_Model):
+class ViewReport(JsonModel):
     number: int = Field(description="from 1 up, in the order of the scan's views")
     shift: Vector = Field(description="of the part's centre, by which the view is corrected, in the part's frame")
     turn: float = Field(description="in degrees, by which the view is corrected")
@@ -45,7 +42,7 @@ class ViewReport(_Model):
     is_corrected: bool = Field(description="whether it was moved to its place")
 
 
-class FitReport(_Model):
+class FitReport(JsonModel):
     """How well the part as designed, in one rigid pose, explains the intact skin."""
 
     model: Literal["ok", "scaled", "deformed", "views disagree", "wavy", "open"]
@@ -63,32 +60,14 @@ def report_fit(fit: ModelFit | None) -> FitReport | None:
     """The fit as values for JSON; None where too few points lie near the skin."""
     if fit is None:
         return None
-    return FitReport(
-        model=fit.model,
-        words=fit.words,
-        deviations=[PatchReport(**vars(one)) for one in fit.deviations],
-        scale=ScaleReport(
-            value=fit.scale,
-            error=fit.scale_error,
-            axes=tuple(tuple(row) for row in fit.axes.tolist()),
-            by_axis=tuple(fit.scale_by_axis.tolist()),
-            by_axis_error=tuple(fit.scale_by_axis_error.tolist()),
-            corrected=fit.corrected_scale,
-        ),
-        deformation=[DeformationReport(kind=kind, amount=amount) for kind, amount in fit.deformation],
-        amount=fit.amount,
-        amount_error=fit.amount_error,
-        views=[
-            ViewReport(
-                number=view.number + 1,
-                shift=tuple(view.shift.tolist()),
-                turn=view.turn,
-                apart=view.apart,
-                left=view.left,
-                is_determined=view.is_determined,
-                is_corrected=view.is_corrected,
-            )
-            for view in fit.views
-        ],
-        waviness=fit.waviness,
+    scale = ScaleReport.read(
+        fit,
+        value=fit.scale,
+        error=fit.scale_error,
+        by_axis=fit.scale_by_axis,
+        by_axis_error=fit.scale_by_axis_error,
+        corrected=fit.corrected_scale,
     )
+    deformation = [DeformationReport(kind=kind, amount=amount) for kind, amount in fit.deformation]
+    views = [ViewReport.read(view, number=view.number + 1) for view in fit.views]
+    return FitReport.read(fit, scale=scale, deformation=deformation, views=views)

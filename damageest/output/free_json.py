@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from damageest.artefacts import FreeMotion, Vector
+from damageest.artefacts import Vector
+from damageest.output.base import JsonModel
 
 
-class FreeMotionReport(BaseModel):
+class FreeMotionReport(JsonModel):
     """One motion of the scan after which it fits as well."""
-
-    model_config = ConfigDict(extra="forbid", defer_build=True)
 
     direction: Vector = Field(description="of a shift, or of the axis of a turn; unit vector in the part's frame")
     point: Vector | None = Field(description="on the axis of a turn; null for a shift")
@@ -20,8 +19,3 @@ class FreeMotionReport(BaseModel):
     high: float = Field(description="how far forth")
     turn: float = Field(description="angle in radians for each unit of movement; 0 for a shift")
     text: str
-
-
-def report_free_motion(motion: FreeMotion) -> FreeMotionReport:
-    """The entry of a motion."""
-    return FreeMotionReport(**vars(motion))

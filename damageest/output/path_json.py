@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from pydantic import Field
 
-from damageest.artefacts import DepositPath, Vector
-from damageest.output.base import JsonModel
+from damageest.artefacts import Vector
+from damageest.output.base import Bound, JsonModel
 from damageest.result import Site
 from damageest.stages.export import ExportedFiles
 
@@ -44,11 +42,11 @@ class PathReport(JsonModel):
     deposit_volume: float
     unreachable_volume: float = Field(description="of the deposit that no pass fills")
     unreached: list[UnreachedReport] = Field(description="the same by reason")
-    clearance: float | None = Field(
+    clearance: Bound = Field(
         description="least distance of the nozzle from metal, earlier deposits, fixture and layers below during "
         "deposition; null: none is near"
     )
-    travel_clearance: float | None = Field(description="the same between passes")
+    travel_clearance: Bound = Field(description="the same between passes")
     fill: BeadFillReport | None = Field(description="null where it was not simulated")
     files: list[str]
     notes: list[str]
@@ -58,30 +56,5 @@ def report_path(site: Site, written: ExportedFiles) -> PathReport | None:
     path = site.path
     if path is None:
         return None
-    stem = f"path/site-{site.id}."
-    return PathReport(
-        passes=path.passes,
-        layers=path.layers,
-        directions=[(x, y, z) for x, y, z in path.directions.tolist()],
-        layer_heights=path.heights.tolist(),
-        length=path.length,
-        travel=path.travel,
-        minutes=path.minutes,
-        bead_volume=path.bead_volume,
-        deposit_volume=path.deposit_volume,
-        unreachable_volume=path.unreached_volume,
-        unreached=[UnreachedReport(volume=item.volume, why=item.why) for item in path.unreached],
-        clearance=_bound(path.clearance),
-        travel_clearance=_bound(path.travel_clearance),
-        fill=_report_fill(path),
-        files=[name for name in written.files if name.removeprefix("scan_frame/").startswith(stem)],
-        notes=list(path.notes),
-    )
-
-
-def _bound(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _report_fill(path: DepositPath) -> BeadFillReport | None:
-    return None if path.fill is None else BeadFillReport(**vars(path.fill))
+    files = [name for name in written.files if name.removeprefix("scan_frame/").startswith(f"path/site-{site.id}.")]
+    return PathReport.read(path, layer_heights=path.heights, unreachable_volume=path.unreached_volume, files=files)

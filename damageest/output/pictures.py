@@ -15,6 +15,7 @@ from damageest.geometry.rays import RayCaster
 from damageest.geometry.solids import concatenate_meshes
 from damageest.geometry.views import DIRECTIONS, OVERVIEWS, choose_view
 from damageest.io import colours
+from damageest.isolation import Limits, call_isolated
 from damageest.output.folder import OutputFolder
 
 Look = Literal["damage", "points", "deviation", "deposit", "stock"]
@@ -50,17 +51,16 @@ def draw_picture(picture: Picture, path: Path) -> None:
 
     Raises StageError where that happens, InputError where a folder cannot be read.
     """
-    from multiprocessing import get_context
-
     for folder in picture.folders:
         _ = folder.scan  # what is wrong with the files is said here, and not by the other process
     path.parent.mkdir(parents=True, exist_ok=True)
     path.unlink(missing_ok=True)
-    process = get_context("spawn").Process(target=_draw_quietly, args=(picture, str(path)))
-    process.start()
-    process.join()
-    if process.exitcode or not path.is_file():
-        raise StageError(*NO_GRAPHICS)
+    arguments = {"picture": picture, "path": str(path)}
+    try:
+        # VTK's messages say the same in many lines; they are the cause of the error, for --debug
+        call_isolated(draw_here, arguments, worker="picture", limits=Limits(seconds=0), show=False, stays=False)
+    except Exception as error:  # VTK and PyVista share none: where there is no library, ImportError
+        raise StageError(*NO_GRAPHICS) from error
 
 
 def open_window(folder: OutputFolder, site: int) -> None:
@@ -85,16 +85,8 @@ def open_window(folder: OutputFolder, site: int) -> None:
     plotter.show()
 
 
-def _draw_quietly(picture: Picture, path: str) -> None:
-    """In the other process: draws, without the messages of VTK, which say the same in many lines."""
-    import os
-
-    if not os.environ.get("DAMAGEEST_DEBUG"):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-    _draw(picture, path)
-
-
-def _draw(picture: Picture, path: str) -> None:
+def draw_here(picture: Picture, path: str) -> None:
+    """As `draw_picture`, in this process."""
     import pyvista as pv
     from PIL import Image
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from pydantic import Field
 
-from damageest.artefacts import Effect, Reason, Vector
+from damageest.artefacts import Effect, Vector
 from damageest.output.base import JsonModel
 
 
@@ -21,7 +19,3 @@ class ReasonReport(JsonModel):
     place: Vector | None = Field(description="where, in the part's frame; null where it has no place")
     text: str = Field(description="what was found; its words may change from version to version")
     remedy: str = Field(description="what to do about it; empty where nothing helps")
-
-
-def report_reasons(reasons: Iterable[Reason]) -> list[ReasonReport]:
-    return [ReasonReport(**vars(reason)) for reason in reasons]

@@ -11,12 +11,12 @@ from damageest.output.adapt_json import AdaptReport, report_adapt
 from damageest.output.base import JsonModel
 from damageest.output.deviation_json import DeviationReport, report_deviation
 from damageest.output.fit_json import FitReport, report_fit
-from damageest.output.free_json import FreeMotionReport, report_free_motion
+from damageest.output.free_json import FreeMotionReport
 from damageest.output.provenance import ProvenanceReport
-from damageest.output.reason_json import ReasonReport, report_reasons
+from damageest.output.reason_json import ReasonReport
 from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
-from damageest.output.skin_json import CoverageReport, SurplusReport, report_coverage, report_surplus
-from damageest.output.uncertainty_json import report_interval
+from damageest.output.skin_json import CoverageReport, SurplusReport, report_surplus
+from damageest.output.uncertainty_json import ReportedInterval
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
@@ -98,7 +98,7 @@ class Report(JsonModel):
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
     export: ExportReport
     damage_volume: float
-    volume_95: tuple[float, float | None] | None = Field(
+    volume_95: ReportedInterval | None = Field(
         description="95 % interval of `damage_volume`, its high end null where nothing limits it; null: there is none"
     )
     undamaged_volume: float
@@ -124,55 +124,34 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
     part, scan, pose = result.part, result.scan, result.pose
     files = index_files(written.files)
     sites = [report_site(site, written, files) for site in result.sites]
-    filled = Report(
-        status=result.status,
-        name=result.name,
-        units=result.units,
-        tolerance=result.tolerance,
-        part=PartReport(
-            path=relative(part.path) if part.path else "",
-            sha256=part.sha256,
-            volume=part.volume,
-            watertight=True,
-            tessellation_error=part.tessellation_error,
-            notes=list(part.notes),
-        ),
-        scan=ScanReport(
+    filled = Report.read(
+        result,
+        version=1,
+        part=PartReport.read(part, path=relative(part.path) if part.path else "", watertight=True),
+        scan=ScanReport.read(
+            scan,
             paths=[relative(path) for path in scan.paths],
             points=len(scan.points),
             total=scan.total or len(scan.points),
-            noise=scan.noise,
-            spacing=scan.spacing,
-            notes=list(scan.notes),
         ),
-        alignment=AlignmentReport(
-            transform=pose.T_part_scan.tolist(),
+        alignment=AlignmentReport.read(
+            pose,
+            transform=pose.T_part_scan,
             quaternion=_to_quaternion(pose.T_part_scan),
-            translation=tuple(pose.T_part_scan[:3, 3].tolist()),
-            rms=pose.rms,
-            inliers=pose.inliers,
-            alternatives=[] if pose.alternatives is None else pose.alternatives.tolist(),
-            notes=list(pose.notes),
-            doubts=report_reasons(pose.doubts),
-            free=[report_free_motion(motion) for motion in pose.free],
+            translation=pose.T_part_scan[:3, 3],
+            alternatives=[] if pose.alternatives is None else pose.alternatives,
             held=pose.is_held,
         ),
         deviation=report_deviation(result.deviation),
-        coverage=report_coverage(result.coverage),
         adapt=report_adapt(result.adapted),
         fit=report_fit(result.fit),
         sites=sites,
         surplus=[report_surplus(item, result, written) for item in result.surplus],
-        export=ExportReport(files=list(written.files), notes=list(written.notes)),
-        damage_volume=result.damage_volume,
-        volume_95=report_interval(result.volume_95),
-        undamaged_volume=result.undamaged_volume,
+        export=ExportReport.read(written),
         material=sum_material([site.deposit for site in sites if site.deposit]),
         truth=_report_truth(result),
-        stages=[StageReport(**vars(record)) for record in result.stages],
-        failures=list(result.failures),
-        warnings=report_reasons(result.warnings),
         versions={"damageest": version("damageest"), "python": platform.python_version()},
+        provenance=None,
     )
     return filled.model_dump(mode="json", by_alias=True)
 
@@ -189,4 +168,4 @@ def _report_truth(result: Result) -> TruthReport | None:
     if truth is None or result.truth is None:
         return None
     volume, iou = result.truth.tolist()
-    return TruthReport(volume=volume, iou=iou, transform=truth.T_part_scan.tolist())
+    return TruthReport(volume=volume, iou=iou, transform=truth.T_part_scan)

@@ -10,10 +10,10 @@ from pydantic import Field
 from damageest.artefacts import Deposit, Vector
 from damageest.output.base import JsonModel
 from damageest.output.path_json import PathReport, report_path
-from damageest.output.reason_json import ReasonReport, report_reasons
-from damageest.output.uncertainty_json import UncertaintyReport, report_interval, report_uncertainty
+from damageest.output.reason_json import ReasonReport
+from damageest.output.uncertainty_json import ReportedInterval, UncertaintyReport
 from damageest.result import Site
-from damageest.stages.export import ExactForm, ExportedFiles
+from damageest.stages.export import ExportedFiles
 
 
 class EvidenceReport(JsonModel):
@@ -109,12 +109,10 @@ class SiteReport(JsonModel):
     id: int
     points: int
     volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
-    volume_95: tuple[float, float | None] | None = Field(
+    volume_95: ReportedInterval | None = Field(
         description="95 % interval of `volume`, its high end null where nothing limits it; null where there is none"
     )
-    depth_95: tuple[float, float | None] | None = Field(
-        description="95 % interval of the largest depth, before a cut-back"
-    )
+    depth_95: ReportedInterval | None = Field(description="95 % interval of the largest depth, before a cut-back")
     uncertainty: UncertaintyReport | None
     surface_area: float = Field(description="of the inner damage surface")
     max_depth: float = Field(description="of the scan below the nominal surface")
@@ -148,39 +146,20 @@ def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str
     kinds = ("damage", "surface", "deposit")
     folders = dict(zip(kinds, kinds if site.accepted else ("doubtful", "doubtful/surface", "deposit"), strict=True))
     own = {kind: files.get(f"{folder}/site-{site.id}", []) for kind, folder in folders.items()}
-    spline, exact = written.splines.get(site.id), written.exact.get(site.id)
-
-    low, high = site.damage.bounds.tolist()
-    return SiteReport(
-        id=site.id,
+    return SiteReport.read(
+        site,
         points=len(site.points),
         volume=site.damage.volume,
-        volume_95=report_interval(site.volume_95),
-        depth_95=report_interval(site.depth_95),
-        uncertainty=report_uncertainty(site),
         surface_area=site.surface.area,
-        max_depth=site.max_depth,
-        volume_rates=list(site.volume_rates),
-        centroid=tuple(site.centroid.tolist()),
-        bounds=(tuple(low), tuple(high)),
-        method=site.method,
+        bounds=site.damage.bounds,
         deposit=_report_deposit(site),
         path=report_path(site, written),
-        evidence=EvidenceReport(**{**vars(site.evidence), "causes": list(site.evidence.causes)}),
-        verdict=VerdictReport(level=site.verdict.level, reasons=report_reasons(site.verdict.reasons)),
-        accepted=site.accepted,
         files=FilesReport(
             **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
         ),
-        spline=SplineReport(**vars(spline)) if spline else None,
-        exact=_report_exact(exact) if exact else None,
-        warnings=report_reasons(site.warnings),
+        spline=written.splines.get(site.id),
+        exact=written.exact.get(site.id),
     )
-
-
-def _report_exact(exact: ExactForm) -> ExactReport:
-    deposit = ExactDepositReport(**vars(exact.deposit)) if exact.deposit else None
-    return ExactReport(**{**vars(exact), "tried": list(exact.tried), "deposit": deposit})
 
 
 def _report_deposit(site: Site) -> DepositReport | None:
@@ -190,14 +169,8 @@ def _report_deposit(site: Site) -> DepositReport | None:
     if not isinstance(deposit, Deposit):
         stock = deposit.volume - site.damage.volume
         return DepositReport(volume=deposit.volume, stock_volume=stock, cut_back_volume=0, thickness=None, faces=[])
-    low, mean, high = deposit.thickness or (0.0, 0.0, 0.0)
-    return DepositReport(
-        volume=deposit.volume,
-        stock_volume=deposit.stock_volume,
-        cut_back_volume=deposit.cut_back_volume,
-        thickness=ThicknessReport(min=low, mean=mean, max=high) if deposit.thickness else None,
-        faces=list(deposit.touched),
-    )
+    thickness = dict(zip(("min", "mean", "max"), deposit.thickness, strict=True)) if deposit.thickness else None
+    return DepositReport.read(deposit, thickness=thickness, faces=deposit.touched)
 
 
 def sum_material(deposits: list[DepositReport]) -> MaterialReport:

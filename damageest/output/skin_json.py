@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Vector
-from damageest.findings import Coverage, Surplus
+from damageest.findings import Surplus
 from damageest.output.base import JsonModel
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
@@ -51,41 +51,15 @@ class SurplusReport(JsonModel):
     notes: list[str]
 
 
-def report_coverage(coverage: Coverage | None) -> CoverageReport | None:
-    if coverage is None:
-        return None
-    regions = []
-    for region in coverage.unseen:
-        low, high = region.bounds.tolist()
-        regions.append(
-            UnseenReport(
-                area=region.area,
-                centre=tuple(region.centre.tolist()),
-                bounds=(tuple(low), tuple(high)),
-                faces=list(region.faces),
-                volume=region.volume,
-                why=region.why,
-            )
-        )
-    return CoverageReport(seen=coverage.seen, unseen=regions)
-
-
 def report_surplus(item: Surplus, result: Result, written: ExportedFiles) -> SurplusReport:
     points = result.aligned.points[item.points]
     bounds = np.array([points.min(axis=0), points.max(axis=0)]) if item.solid is None else item.solid.bounds
-    low, high = bounds.tolist()
     own = [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"surplus/site-{item.id}.")]
-    return SurplusReport(
-        id=item.id,
-        kind=item.kind,
+    return SurplusReport.read(
+        item,
         points=len(item.points),
-        share=item.share,
-        volume=item.volume,
-        height=item.height,
-        area=item.area,
-        centre=tuple(bounds.mean(axis=0).tolist()),
-        bounds=(tuple(low), tuple(high)),
+        centre=bounds.mean(axis=0),
+        bounds=bounds,
         file=next(iter(own), None),
         beside=[site.id for site in result.sites if set(site.clusters) & set(item.clusters)],
-        notes=list(item.notes),
     )

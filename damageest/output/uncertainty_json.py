@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 from pydantic import Field
 
-from damageest.findings import Interval
-from damageest.output.base import JsonModel
-from damageest.result import Site
+from damageest.output.base import Bound, JsonModel
+
+ReportedInterval = tuple[float, Bound]
 
 
 class FadingReport(JsonModel):
@@ -38,21 +36,3 @@ class UncertaintyReport(JsonModel):
     inside: float = Field(description="where no points show the inner surface")
     beside: float = Field(description="where no points show the skin beside it")
     fading: FadingReport | None = Field(description="of a loss that is shallow; null for one with a sharp rim")
-
-
-def report_interval(interval: Interval | None) -> tuple[float, float | None] | None:
-    """The interval as result.json has it: an open end is None."""
-    if interval is None:
-        return None
-    low, high = map(float, interval)
-    return low, high if math.isfinite(high) else None
-
-
-def report_uncertainty(site: Site) -> UncertaintyReport | None:
-    """The causes of a site's uncertainty; None where it was not measured."""
-    found = site.uncertainty
-    if found is None:
-        return None
-    fading = FadingReport(**vars(found.fading)) if found.fading else None
-    values = {k: v for k, v in vars(found).items() if k not in ("volume_95", "depth_95", "fading")}
-    return UncertaintyReport(**values, fading=fading)

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Floats, Part, Pose
+from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples, Scan
 from damageest.checks.model_fit import measure_fit
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine, Step
-from damageest.pipeline.state import JobState, Work
-from damageest.registry.contracts import Contract
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import JobState, Reasons
+from damageest.pipeline.steps import step
 from damageest.rules.notes import make_notes
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
@@ -34,23 +34,39 @@ BY_FORM = "another_part"
 """Code of the doubt in a pose that a part of another form explains."""
 
 
-def adapt_part(adapt: Contract) -> Step:
-    """A step that calls the contract, unless the job takes the part as designed, and goes on with what it gives."""
-
-    def run(engine: Engine, work: Work) -> Work:
-        stage = engine.job.stages[adapt]
-        if adapt not in engine.job.given and isinstance(stage, Adapt) and not stage.deforms:
-            return keep_designed(work)
-        if isinstance(stage, Adapt) and stage.asks_first and not is_asked_for(work.job):
-            return keep_designed(work)
-        return take_adapted(engine, replace(work, job=engine.call(adapt, work.job)))
-
-    return run
-
-
-def keep_designed(work: Work) -> Work:
-    """The work with the part as designed."""
-    return replace(work, job=work.job.with_value(JobState.adapted, None, digest("as designed")))
+@step(
+    gives=("adapted", "part", "aligned", "pose", "samples", "warnings"),
+    reads=("part", "aligned", "pose", "samples", "tolerance", "unit", "views", "warnings", "adapter"),
+    calls=(Adapt, Align, Sample),
+)
+def adapt_part(
+    engine: Engine, state: JobState
+) -> tuple[AdaptedPart | None, Part, Scan, Pose, Samples, Reasons]:  # fmt: skip
+    """Calls `adapt`, unless the job takes the part as designed, and puts what it gives in the place of the part, with
+    the scan and its pose moved onto it, and samples on its skin."""
+    as_designed = (None, state.part, state.aligned, state.pose, state.samples, state.warnings)
+    stage = state.adapter
+    if Adapt not in engine.job.given:
+        if stage is None or not stage.deforms:
+            return as_designed
+        if stage.asks_first and not is_asked_for(state):
+            return as_designed
+    called = engine.call(Adapt, state)
+    adapted: AdaptedPart | None = called.get(Adapt.gives)
+    if adapted is None:
+        return as_designed
+    key = called.key(Adapt.gives)
+    aligned = state.aligned.move(adapted.motion)
+    pose = fit_pose(state.pose, adapted.motion, aligned.points, adapted.part, state.tolerance)
+    moved = state.with_value(JobState.aligned, aligned, digest("aligned", key))
+    moved = moved.with_value(JobState.part, adapted.part, digest("part", key))
+    own = engine.make_silent()
+    samples: Samples = own.call(Sample, moved).get(Sample.gives)
+    if pose.doubts or pose.free:
+        pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
+    settled = {f"{doubt}" for doubt in state.pose.doubts} - {f"{doubt}" for doubt in pose.doubts}
+    kept = [note for note in state.warnings if note.code != "align" or note.text not in settled]
+    return adapted, adapted.part, aligned, pose, samples, (*kept, *make_notes("adapt", adapted.notes))
 
 
 def is_asked_for(state: JobState) -> bool:
@@ -62,26 +78,6 @@ def is_asked_for(state: JobState) -> bool:
     distance, _ = signed_distance(points, state.part)
     found = measure_fit(state.part, points, distance, state.aligned.noise, state.tolerance, state.unit, state.views)
     return found is not None and found.fit.model in ASKING
-
-
-def take_adapted(engine: Engine, work: Work) -> Work:
-    """The work with the adapted part as its part, the scan and its pose moved onto it, and samples on its skin."""
-    state = work.job
-    adapted = state.adapted
-    if adapted is None:
-        return work
-    aligned = state.aligned.move(adapted.motion)
-    pose = fit_pose(state.pose, adapted.motion, aligned.points, adapted.part, state.tolerance)
-    before, sources = state, (JobState.pose, JobState.adapted, JobState.tolerance)
-    state = state.derive(JobState.aligned, aligned, JobState.aligned, JobState.adapted)
-    state = state.derive(JobState.part, adapted.part, JobState.part, JobState.adapted)
-    if pose.doubts or pose.free:
-        pose = doubt_anew(pose, engine.make_silent().call(Align, state).pose, aligned.points, state.tolerance)
-    state = state.derive(JobState.pose, pose, *sources)
-    settled = {f"{doubt}" for doubt in before.pose.doubts} - {f"{doubt}" for doubt in pose.doubts}
-    warnings = tuple(note for note in work.warnings if note.code != "align" or note.text not in settled)
-    state = engine.make_silent().call(Sample, state)
-    return replace(work, job=state, warnings=(*warnings, *make_notes("adapt", adapted.notes)))
 
 
 def doubt_anew(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pose:

@@ -6,25 +6,31 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
+from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Deviation, Floats, Part, Pose, Scan, Solid
 from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid, unite
 from damageest.geometry.transforms import move_points
-from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.pipeline.state import FoundSite, JobState
+from damageest.pipeline.steps import step
 from damageest.pipeline.uncertainty import shift_interval, shift_uncertainty
 from damageest.result import Result, Site
 from damageest.rules.notes import make_notes, rank_notes
 
 
-def collect_result(engine: Engine, work: Work) -> Work:
+@step(
+    gives="result",
+    reads=(
+        "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
+        "warnings", "coverage", "surplus", "adapted", "fitted", "volume_95", "conversions",
+    ),
+)  # fmt: skip
+def collect_result(engine: Engine, state: JobState) -> Result:
     """Puts the result together. Raises the first failure where there are failures and no site."""
-    state = work.job
-    if work.failures and not work.sites:
-        raise work.failures[0]
+    if state.failures and not state.found:
+        raise state.failures[0]
     part, scan, deviation = state.part, state.scan, state.deviation
-    sites = tuple(_describe_site(site) for site in work.sites)
+    sites = tuple(_describe_site(site, part, deviation) for site in state.found)
     label = np.zeros(len(scan.points), np.int32)
     for site in sites:
         label[site.points] = site.id
@@ -36,13 +42,13 @@ def collect_result(engine: Engine, work: Work) -> Work:
     lost = unite((site.damage for site in sites if site.accepted), origin)
     damage = to_solid(lost, origin)
     # a cut-back is no damage: what was found is compared as it was found
-    cut_back = any(site.damage is not found.damage for site, found in zip(sites, work.sites, strict=True))
-    taken = (site.damage for site in work.sites if site.accepted)
+    cut_back = any(site.damage is not found.damage for site, found in zip(sites, state.found, strict=True))
+    taken = (site.damage for site in state.found if site.accepted)
     found = to_solid(unite(taken, origin), origin) if cut_back else damage
-    alone = sum(site.damage.volume for site in work.sites if site.accepted)
-    result = Result(
-        name=engine.job.name,
-        units=engine.job.units,
+    alone = sum(site.damage.volume for site in state.found if site.accepted)
+    return Result(
+        name=state.name,
+        units=state.unit,
         tolerance=state.tolerance,
         part=part,
         scan=scan,
@@ -53,24 +59,20 @@ def collect_result(engine: Engine, work: Work) -> Work:
         sites=sites,
         damage=damage,
         undamaged=to_solid(subtract_lost(to_manifold(part, origin), lost), origin) if sites else part,
-        warnings=rank_notes(work.warnings),
-        failures=tuple(str(error) for error in work.failures),
+        warnings=rank_notes(state.warnings),
+        failures=tuple(str(error) for error in state.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance, state.adapted is not None),
         stages=tuple(engine.records),
         coverage=state.coverage,
         surplus=state.surplus,
         adapted=state.adapted,
         fit=None if state.fitted is None else state.fitted.fit,
-        conversions=engine.registry.conversions,
+        conversions=state.conversions,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
-    key = digest(
-        engine.job.name, [state.keys[name] for name in sorted(state.keys)], [s.key("deposit") for s in work.sites]
-    )
-    return replace(work, job=state.with_value(JobState.result, result, key))
 
 
-def _describe_site(found: FoundSite) -> Site:
+def _describe_site(found: FoundSite, part: Part, deviation: Deviation) -> Site:
     evidence, members = found.evidence, found.members
     warnings = make_notes("enclose", found.notes)
     deposit, damage = found.deposit, found.damage
@@ -85,7 +87,7 @@ def _describe_site(found: FoundSite) -> Site:
         clusters=found.clusters,
         points=members,
         damage=damage,
-        surface=extract_ids(damage, found.job.part),
+        surface=extract_ids(damage, part),
         deposit=deposit,
         refused=found.refused,
         verdict=found.verdict,
@@ -96,7 +98,7 @@ def _describe_site(found: FoundSite) -> Site:
         path=path,
         method=found.method,
         evidence=evidence,
-        max_depth=max(float(-found.job.deviation.distance[members].min(initial=0.0)), 0.0),
+        max_depth=max(float(-deviation.distance[members].min(initial=0.0)), 0.0),
         warnings=warnings,
     )
 

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from damageest.artefacts import DAMAGE, INTACT
+from damageest.artefacts import DAMAGE, INTACT, Deviation, Part, Scan
 from damageest.checks.coverage import SkinView, measure_coverage
 from damageest.checks.facing import find_turned
 from damageest.checks.ray_evidence import trace_rays
 from damageest.checks.skin_cells import cut_skin, find_seen
-from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import JobState, Work
+from damageest.findings import Coverage
+from damageest.pipeline.state import FoundSite
+from damageest.pipeline.steps import step
 
 
-def inspect_skin(engine: Engine, work: Work) -> Work:
+@step(gives=("skin", "deviation"))
+def inspect_skin(part: Part, aligned: Scan, deviation: Deviation, tolerance: float) -> tuple[SkinView, Deviation]:
     """Maps what the scan shows of the skin, and labels as damage the points that lie on no skin: those that face
     another way, and those that rays reached through lost metal."""
-    state = work.job
-    part, aligned, deviation, tolerance = state.part, state.aligned, state.deviation, state.tolerance
     label = deviation.label.copy()
     label[find_turned(aligned, part, deviation, tolerance)] = DAMAGE
     deviation = replace(deviation, label=label)
@@ -29,17 +28,12 @@ def inspect_skin(engine: Engine, work: Work) -> Work:
         rooted = deviation.label.copy()
         rooted[rays.roots[rooted[rays.roots] == INTACT]] = DAMAGE
         deviation = replace(deviation, label=rooted)
-    sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.tolerance)
-    view = SkinView(cells, seen, perhaps_seen, distance, rays)
-    state = state.derive(JobState.skin, view, *sources)
-    return replace(work, job=state.derive(JobState.deviation, deviation, *sources))
+    return SkinView(cells, seen, perhaps_seen, distance, rays), deviation
 
 
-def describe_coverage(engine: Engine, work: Work) -> Work:
+@step(gives="coverage")
+def describe_coverage(
+    part: Part, skin: SkinView, found: tuple[FoundSite, ...], tolerance: float, aligned: Scan
+) -> Coverage:
     """Measures the share of the skin that the scan shows, and describes the rest."""
-    state = work.job
-    skin = state.skin
-    losses = [site.damage for site in work.sites]
-    coverage = measure_coverage(state.part, skin, losses, state.tolerance, state.aligned.spacing)
-    key = digest("coverage", state.key("skin"), [site.key("damage") for site in work.sites])
-    return replace(work, job=state.with_value(JobState.coverage, coverage, key))
+    return measure_coverage(part, skin, [site.damage for site in found], tolerance, aligned.spacing)

@@ -12,56 +12,51 @@ from damageest.artefacts import Deposit, Floats, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import concatenate_meshes, to_manifold, to_solid, unite
 from damageest.geometry.touching import separate_sheets
-from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine, Step
-from damageest.pipeline.state import FoundSite, Work
-from damageest.registry.contracts import Contract
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import Failures, FoundSite, JobState
+from damageest.pipeline.steps import step
+from damageest.stages.allowance import Allowance
 
 SPECK, TOLD = 1e-9, 1e-5
 """Shares of a deposit's volume: below the first, an overlap is rounding; below the second, not reported."""
 
 
-def make_deposits(allowance: Contract) -> Step:
-    """A step that calls the contract on each accepted site. A site that it refuses keeps its damage volume; what to
-    deposit is not known."""
-
-    def run(engine: Engine, work: Work) -> Work:
-        told = "others" in type(engine.job.stages[allowance]).needs()
-        done: list[FoundSite] = []
-        failures: list[StageError] = []
-        for site in work.sites:
-            if not site.accepted:
-                key = digest("not accepted", site.key("damage"))
-                done.append(site.with_value(FoundSite.deposit, None, key))
-                continue
-            rest = [other for other in work.sites if other is not site and other.accepted]
-            others = _unite([other.damage for other in rest]) if told else None
-            key = digest("others", [other.key("damage") for other in rest])
-            site = site.with_value(FoundSite.others, others, key)
-            try:
-                done.append(engine.call(allowance, site))
-            except StageError as error:
-                failures.append(error)
-                site = site.with_value(FoundSite.deposit, None, digest("refused", site.key("damage")))
-                done.append(replace(site, refused=True))
-        return replace(work, sites=tuple(done), failures=(*work.failures, *failures))
-
-    return run
+@step(gives=("found", "failures"), reads=("found",), calls=(Allowance,))
+def make_deposits(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...], Failures]:
+    """Makes the deposit of each accepted site. A site that the stage refuses keeps its damage volume; what to deposit
+    is not known."""
+    told = "others" in type(engine.job.stages[Allowance]).needs()
+    done: list[FoundSite] = []
+    failures: list[StageError] = []
+    for site in state.found:
+        if not site.accepted:
+            done.append(site.with_value(FoundSite.deposit, None))
+            continue
+        rest = [other for other in state.found if other is not site and other.accepted]
+        others = _unite([other.damage for other in rest]) if told else None
+        site = replace(site.with_value(FoundSite.others, others), job=state)
+        try:
+            done.append(engine.call(Allowance, site))
+        except StageError as error:
+            failures.append(error)
+            done.append(replace(site.with_value(FoundSite.deposit, None), refused=True))
+    return tuple(done), failures
 
 
-def separate_deposits(engine: Engine, work: Work) -> Work:
+@step(gives="found")
+def separate_deposits(found: tuple[FoundSite, ...], tolerance: float) -> tuple[FoundSite, ...]:
     """Removes from each deposit and its cavity what those of the sites before it contain, so that no volume counts
     twice."""
     done: list[FoundSite] = []
-    for site in work.sites:
+    for site in found:
         deposit = site.deposit
         if isinstance(deposit, Deposit):
             for earlier in done:
-                deposit = _subtract_earlier(deposit, earlier, site.damage, work.job.tolerance)
-            key = digest("separate", site.key("deposit"), [earlier.key("deposit") for earlier in done])
-            site = site.with_value(FoundSite.deposit, deposit, key)
+                deposit = _subtract_earlier(deposit, earlier, site.damage, tolerance)
+            if deposit is not site.deposit:
+                site = site.with_value(FoundSite.deposit, deposit)
         done.append(site)
-    return replace(work, sites=tuple(done))
+    return tuple(done)
 
 
 def _subtract_earlier(deposit: Deposit, earlier: FoundSite, damage: Solid, tolerance: float) -> Deposit:

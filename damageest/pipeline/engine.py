@@ -5,35 +5,38 @@ from __future__ import annotations
 import time
 import typing
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
 from damageest.artefacts import ArtefactError
-from damageest.errors import (
-    DamageestError,
-    InputError,
-    JobError,
-    StageError,
-    clean_message,
-    describe_missing_library,
-    is_interrupt,
-)
+from damageest.errors import StageError, clean_message, is_interrupt
 from damageest.isolation import Limits, at_work
 from damageest.job.model import Job
-from damageest.pipeline.cache import Cache, describe_unwritable, digest
+from damageest.pipeline.cache import Cache, digest
 from damageest.pipeline.calls import call_guarded, run_stage
-from damageest.pipeline.state import Candidate, FoundSite, JobState, Work
+from damageest.pipeline.stage_errors import MORE_MEMORY, locate_error
+from damageest.pipeline.state import Candidate, FoundSite, JobState
+from damageest.pipeline.steps import GATHERED, Step
 from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.outputs import check_output
-from damageest.registry.registry import Implementation, Registry
+from damageest.registry.registry import Registry
 from damageest.result import StageRecord
-from damageest.stages import Stage
+from damageest.stages.adapt import Adapt
+from damageest.stages.align import Align
+from damageest.stages.enclose import Enclose, EncloseAll
+from damageest.stages.scan import ReadScan
+from damageest.stages.segment import Segment
 
-MORE_MEMORY = "a larger tolerance, fewer scan points (scan.most_points), or a larger --memory"
+OPTIONS: dict[str, Contract] = {
+    "reader": ReadScan,
+    "aligner": Align,
+    "adapter": Adapt,
+    "segmenter": Segment,
+    "encloser": Enclose,
+    "encloser_at_once": EncloseAll,
+}
+"""The stages whose options steps read, by the names of these values."""
 
 S = TypeVar("S", JobState, Candidate, FoundSite)
 T = TypeVar("T")
@@ -75,7 +78,7 @@ class Engine:
         hooks, where = self.registry.hooks.hook, (contract.stage, item.name, state.number)
         named = dict(zip(("stage", "use", "site"), where, strict=True))
         needs = item.cls.needs()
-        key = digest(*where[:2], item.provider.fingerprint, stage.model_dump(), [state.key(name) for name in needs])
+        key = digest(self.describe(contract), [state.key(name) for name in needs])
         tell = _tell_nobody if self.silent else _tell
         tell(hooks.damageest_before_stage, **named)
         start = time.perf_counter()
@@ -94,7 +97,7 @@ class Engine:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
             tell(hooks.damageest_stage_failed, **named, error=error)
-            raise _locate(error, item, state) from error
+            raise locate_error(error, item, state) from error
         seconds = time.perf_counter() - start
         self.records.append(StageRecord(*where[:2], str(item.provider), state.number, round(seconds, 3), cached))
         tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
@@ -113,8 +116,42 @@ class Engine:
         except Exception as error:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
-            raise _locate(error, item, JobState()) from error
+            raise locate_error(error, item, JobState()) from error
         return value
+
+    def take(self, step: Step[..., Any], state: JobState) -> JobState:
+        """The state after a step. What it gives has the key of its content where that is a plain value, and else one
+        of the keys of what it took; what it hands on as it was keeps its key.
+
+        Raises StageError where memory runs out in it.
+        """
+        what = step.name.replace("_", " ").strip()
+        key = digest(step.name, [state.key(name) for name in step.takes], [self.describe(one) for one in step.calls])
+        try:
+            with at_work(what, self.limits.seconds):
+                _, given = self.remember(step.name, key, lambda: self._run(step, state), step.kept)
+        except MemoryError:
+            raise StageError(f"{what}: ran out of memory", MORE_MEMORY) from None
+        for name, value in step.name_values(given).items():
+            earlier = ""
+            if name in GATHERED:
+                value = (*(() if name in step.takes else state.get(name)), *value)
+                earlier = state.key(name)
+            if name not in state.values or value is not state.get(name):
+                is_plain = value is None or isinstance(value, (bool, int, float, str))
+                state = state.with_named(name, value, digest(value) if is_plain else digest(key, name, earlier))
+        return state
+
+    def _run(self, step: Step[..., Any], state: JobState) -> Any:
+        own = {"engine": self, "state": state.select(step.takes)}
+        return step.function(**{name: own[name] if name in own else state.get(name) for name in step.passed})
+
+    def describe(self, contract: Contract) -> str:
+        """A key of the job's implementation of a contract with all its options; the same for each job without one."""
+        if contract not in self.job.stages:
+            return digest(contract.stage)
+        item = self.job.implementations[contract]
+        return digest(contract.stage, item.name, item.provider.fingerprint, self.job.stages[contract].model_dump())
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
         """(was it known, value): from this run's memory, else from the cache, else computed and kept."""
@@ -131,51 +168,70 @@ class Engine:
         return found, value
 
 
-Step = Callable[[Engine, Work], Work]
-Route = tuple[Contract | Step, ...]
+@dataclass(frozen=True)
+class Branch:
+    """A place where the route forks: ``run`` follows some of the ``routes``, or none. ``reads``: the names of the
+    values that it chooses by."""
+
+    name: str
+    reads: tuple[str, ...]
+    routes: tuple[Route, ...]
+    run: Callable[[Engine, JobState], JobState]
 
 
-def follow(route: Sequence[Contract | Step], engine: Engine, work: Work) -> Work:
-    """Runs a route: a contract once on the job, or once on each candidate; a step on all of the work.
+AnyStep = Step[..., Any] | Branch
+Route = tuple[Contract | AnyStep, ...]
 
-    A candidate whose stage fails leaves the work as one of its ``failures``; the others go on.
+
+def follow(route: Route, engine: Engine, state: JobState) -> JobState:
+    """Runs a route: a contract once on the job, or once on each candidate; a step on the values that it names.
+
+    A candidate whose stage fails becomes one of the ``failures``; the others go on.
     """
-    for step in route:
-        if not isinstance(step, type):
-            work = _take(step, engine, work)
-        elif issubclass(step, Stage) and step.per_site:
-            work = call_each(engine, step, work)
+    for item in route:
+        if isinstance(item, Branch):
+            state = item.run(engine, state)
+        elif isinstance(item, Step):
+            state = engine.take(item, state)
+        elif item.per_site:
+            state = call_each(engine, item, state)
         else:
-            work = replace(work, job=engine.call(step, work.job))
-    return work
+            state = engine.call(item, state)
+    return state
 
 
-def _take(step: Step, engine: Engine, work: Work) -> Work:
-    """The work after a step. Raises StageError where memory runs out in it."""
-    what = step.__name__.replace("_", " ").strip()
-    try:
-        with at_work(what, engine.limits.seconds):
-            return step(engine, work)
-    except MemoryError:
-        raise StageError(f"{what}: ran out of memory", MORE_MEMORY) from None
-
-
-def call_each(engine: Engine, contract: Contract, work: Work) -> Work:
-    """The work with a contract called on each candidate."""
+def call_each(engine: Engine, contract: Contract, state: JobState) -> JobState:
+    """The state with a contract called on each candidate."""
     done: list[Candidate] = []
     failures = []
-    for candidate in work.candidates:
+    for candidate in state.candidates:
         try:
-            done.append(engine.call(contract, candidate))
+            done.append(engine.call(contract, replace(candidate, job=state)))
         except StageError as error:
             failures.append(error)
-    return replace(work, candidates=tuple(done), failures=(*work.failures, *failures))
+    key = digest(contract.stage, [candidate.key(contract.gives) for candidate in done], state.key("candidates"))
+    state = state.with_value(JobState.failures, (*state.failures, *failures), key)
+    return state.with_value(JobState.candidates, tuple(replace(one, job=JobState()) for one in done), key)
 
 
-def start(job: Job) -> Work:
-    """The work before any stage: the job's unit and tolerance."""
-    state = JobState().with_value(JobState.unit, job.units, digest(job.units))
-    return Work(state.with_named("tolerance", job.tolerance, digest(job.tolerance)))
+def start(engine: Engine) -> JobState:
+    """The state before any stage: what the job and the registry say."""
+    job, registry = engine.job, engine.registry
+    state = JobState().with_value(JobState.name, job.name).with_value(JobState.unit, job.units)
+    state = state.with_named("tolerance", job.tolerance, digest(job.tolerance))
+    state = state.with_value(JobState.asked_tolerance, job.tolerance)
+    state = state.with_value(JobState.choice, job.sites, digest(job.sites.model_dump()))
+    state = state.with_value(JobState.accept, job.accept)
+    for name, contract in OPTIONS.items():  # the content of files that they name is in the key of what they give
+        stage = job.stages.get(contract)
+        state = state.with_named(name, stage, digest(str(stage and stage.model_dump())))
+    state = state.with_value(JobState.rules, registry.rules, digest([rule.code for rule in registry.rules]))
+    state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
+    state = state.with_value(JobState.path_writers, registry.path_writers, digest(sorted(registry.path_writers)))
+    state = state.with_value(JobState.conversions, registry.conversions, digest(sorted(registry.conversions)))
+    for name in ("candidates", "found", "failures", "warnings"):
+        state = state.with_named(name, (), digest(()))
+    return state.with_value(JobState.wanted, None)
 
 
 def _tell(hook: Callable[..., Any], **what: Any) -> None:
@@ -205,57 +261,3 @@ def _check_value(value: Any, contract: Contract, state: JobState | Candidate | F
         )
     check_output(contract, value, state.get)
     return value
-
-
-def _locate(error: Exception, item: Implementation, state: JobState | Candidate | FoundSite) -> DamageestError:
-    """The error with the stage it came from. One of another kind becomes a StageError that names the provider."""
-    stage = item.contract.stage
-    if isinstance(error, JobError):
-        return error
-    if isinstance(error, DamageestError) and not isinstance(error, StageError):
-        error.args = (clean_message(error),)
-        return error
-    if not isinstance(error, StageError) and (missing := describe_missing_library(error)):
-        error = missing
-    if isinstance(error, OSError) and stage in ("part", "scan"):
-        return InputError(f"{stage}: {item.name}: {clean_message(error)}")
-    if isinstance(error, OSError) and stage in ("export", "report") and error.errno:
-        return describe_unwritable(error, Path("the output"))
-    placed = error if isinstance(error, StageError) else _explain(error, f"{item.provider}")
-    placed.message, placed.remedy = clean_message(placed.message), clean_message(placed.remedy)
-    placed.stage, placed.use, placed.site = stage, item.name, state.number
-    if isinstance(state, Candidate):
-        placed.place = describe_points(state.job, state.clusters)
-    return placed
-
-
-def describe_points(state: JobState, clusters: tuple[int, ...]) -> str:
-    """A description of where the points of some clusters lie: they have no site number, since they are no site yet."""
-    if not {"sites", "aligned"} <= set(state.values):
-        return ""
-    members = np.flatnonzero(np.isin(state.sites.label, clusters))
-    if not len(members):
-        return "no points"
-    x, y, z = np.median(state.aligned.points[members], axis=0)
-    return f"{len(members)} points near ({x:.4g}, {y:.4g}, {z:.4g})"
-
-
-def _explain(error: Exception, provider: str) -> StageError:
-    """An error that a stage did not raise on purpose, in words for the user and the author."""
-    first = next(iter(clean_message(error, 400).splitlines()), "")
-    if isinstance(error, MemoryError):
-        return StageError("ran out of memory", MORE_MEMORY)
-    if isinstance(error, ArtefactError):
-        return StageError(
-            f"gave a result that is not valid: {first}",
-            f"another implementation; report it to the authors of {provider}",
-        )
-    if isinstance(error, ValueError) and "read-only" in first:
-        return StageError(
-            f"tried to edit what it was given, which later stages use as well ({first})",
-            f"another implementation; the authors of {provider} should edit a copy",
-        )
-    return StageError(
-        f"failed unexpectedly: {type(error).__name__}: {first}",
-        f"--debug for the traceback; report it to the authors of {provider}, with job and inputs",
-    )

@@ -1,44 +1,45 @@
-"""The step that tries one route, and another one for the sites that the first fails on or that the scan contradicts."""
+"""A branch: one route, and another one for the sites that the first fails on or that the scan contradicts."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from damageest.artefacts import Reason
 from damageest.errors import StageError
-from damageest.pipeline.engine import Engine, Route, Step, follow
-from damageest.pipeline.state import FoundSite, Work
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Branch, Engine, Route, follow
+from damageest.pipeline.state import FoundSite, JobState
 
 
-def fall_back(first: Route, second: Route) -> Step:
-    """A step that follows ``first``, and ``second`` for the clusters without a site that the scan agrees with.
+def fall_back(first: Route, second: Route) -> Branch:
+    """Follows ``first``, and ``second`` for the clusters without a site that the scan agrees with.
 
     A site of the first route whose evidence is against it stays unless sites of the second route, with evidence for
     them, stand for all of its clusters. Failures of the first route are not reported: the second route has its own.
     """
 
-    def run(engine: Engine, work: Work) -> Work:
-        if not work.job.sites.count:
-            return work
+    def run(engine: Engine, state: JobState) -> JobState:
+        if not state.sites.count:
+            return state
+        before = state.failures
+        state = state.with_value(JobState.failures, (), state.key("failures"))
         try:
-            tried = follow(first, engine, replace(work, failures=()))
+            tried = follow(first, engine, state)
         except StageError as error:
             text = str(error).partition("\n")[0]  # its remedy is another method, and that is what follows
-            tried = replace(
-                work, warnings=(*work.warnings, Reason("fell_back", f"fell back to method surface: {text}"))
-            )
-        agreed = {cluster for site in tried.sites if site.evidence.consistent for cluster in site.clusters}
-        wanted = tuple(k for k in range(1, work.job.sites.count + 1) if k not in agreed)
+            told = Reason("fell_back", f"fell back to method surface: {text}")
+            tried = state.with_value(JobState.warnings, (*state.warnings, told))
+        agreed = {cluster for site in tried.found if site.evidence.consistent for cluster in site.clusters}
+        wanted = tuple(k for k in range(1, state.sites.count + 1) if k not in agreed)
         if not wanted:
-            return replace(tried, failures=work.failures)
-        again = Work(work.job, warnings=tried.warnings, wanted=wanted)
-        again = follow(second, engine, again)
-        sites = merge_sites(tried.sites, again.sites)
+            return tried.with_value(JobState.failures, before, state.key("failures"))
+        again = state.with_value(JobState.warnings, tried.warnings, tried.key("warnings"))
+        again = follow(second, engine, again.with_value(JobState.wanted, wanted))
+        sites = merge_sites(tried.found, again.found)
         done = {cluster for site in sites for cluster in site.clusters}
         failures = tuple(drop_tried(error) for error in again.failures if error.site not in done)
-        return replace(work, sites=sites, failures=(*work.failures, *failures), warnings=again.warnings)
+        key = digest("fall_back", tried.key("found"), again.key("found"))
+        return again.with_value(JobState.found, sites, key).with_value(JobState.failures, (*before, *failures), key)
 
-    return run
+    return Branch("fall_back", ("sites", "failures", "warnings"), (first, second), run)
 
 
 def drop_tried(error: StageError) -> StageError:

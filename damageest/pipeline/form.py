@@ -8,17 +8,18 @@ from typing import overload
 
 import numpy as np
 
-from damageest.artefacts import Floats, Reason, Scan
+from damageest.artefacts import AdaptedPart, Deviation, Floats, Ints, Part, Pose, Reason, Scan
+from damageest.checks.coverage import SkinView
 from damageest.checks.fit_doubts import find_fit_doubts
 from damageest.checks.form_words import describe_fit
 from damageest.checks.model_fit import FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
-from damageest.checks.view_fit import fit_views
+from damageest.checks.view_fit import ViewFits, fit_views
+from damageest.findings import Surplus
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import measure_noise_and_spacing
-from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.pipeline.state import FoundSite, Reasons
+from damageest.pipeline.steps import step
 from damageest.stages.align import Align
 from damageest.stages.scan import ReadScan
 
@@ -26,60 +27,46 @@ MEASURED = 40_000
 """Points, about, that the scale is measured with before it is corrected."""
 
 
-def correct_scan(engine: Engine, work: Work) -> Work:
-    """Compares the views, puts misplaced ones right where the alignment fits views, and corrects the scale where the
-    job says so."""
-    state = work.job
-    views = fit_views(
-        state.part, state.aligned, state.tolerance, getattr(engine.job.stages.get(Align), "fit_views", False)
-    )
-    key = digest("views", state.key("aligned"), state.key("part"), state.key("tolerance"))
-    state = state.with_value(JobState.views, views, key)
+@step(gives=("views", "pose", "aligned", "noise", "spacing", "tolerance"))
+def correct_views(
+    part: Part, pose: Pose, aligned: Scan, noise: float, spacing: float, tolerance: float,
+    asked_tolerance: float | None, aligner: Align | None,
+) -> tuple[ViewFits | None, Pose, Scan, float, float, float]:  # fmt: skip
+    """Compares the views, and puts misplaced ones right where the alignment fits views: noise, spacing and a tolerance
+    `auto` are then measured again."""
+    views = fit_views(part, aligned, tolerance, getattr(aligner, "fit_views", False))
     if views is not None and any(view.is_corrected for view in views.views):
-        pose = replace(state.pose, T_part_scan=_make_rigid(views.common @ state.pose.T_part_scan))
-        state = state.derive(JobState.pose, pose, JobState.pose, JobState.views)
-        state = _take_corrected(engine, state, views.apply(state.aligned))
-    scale = 1.0
-    if getattr(engine.job.stages.get(ReadScan), "scale", None) == "auto":
-        state, scale = _correct_scale(state)
-    state = state.with_value(JobState.corrected_scale, scale, digest("scale", key, scale))
-    return replace(work, job=state)
+        pose = replace(pose, T_part_scan=_make_rigid(views.common @ pose.T_part_scan))
+        aligned = views.apply(aligned)
+        noise, spacing = measure_noise_and_spacing(aligned.points)
+        aligned = replace(aligned, noise=noise, spacing=spacing)
+        if asked_tolerance is None:
+            tolerance = min(tolerance, choose_tolerance(None, aligned, part)[0])
+    return views, pose, aligned, noise, spacing, tolerance
 
 
-def _take_corrected(engine: Engine, state: JobState, aligned: Scan) -> JobState:
-    """The state with corrected views: noise, spacing and a tolerance `auto` are measured again."""
-    noise, spacing = measure_noise_and_spacing(aligned.points)
-    aligned = replace(aligned, noise=noise, spacing=spacing)
-    state = state.derive(JobState.aligned, aligned, JobState.aligned, JobState.views)
-    state = state.derive(JobState.noise, noise, JobState.aligned)
-    state = state.derive(JobState.spacing, spacing, JobState.aligned)
-    if engine.job.tolerance is None:
-        tolerance = min(state.tolerance, choose_tolerance(None, aligned, state.part)[0])
-        state = state.with_value(JobState.tolerance, tolerance, digest(tolerance))
-    return state
-
-
-def _correct_scale(state: JobState) -> tuple[JobState, float]:
-    """The state with the scan's scale corrected where it is wrong, and the scale that was taken out."""
-    part, aligned, tolerance = state.part, state.aligned, state.tolerance
+@step(gives=("scan", "pose", "aligned", "corrected_scale"))
+def correct_scale(
+    part: Part, scan: Scan, pose: Pose, aligned: Scan, tolerance: float, unit: str, reader: ReadScan | None
+) -> tuple[Scan, Pose, Scan, float]:
+    """Corrects the scan's scale where it is wrong and the job says so, and gives the scale that was taken out."""
+    if getattr(reader, "scale", None) != "auto":
+        return scan, pose, aligned, 1.0
     points = aligned.points[:: max(1, len(aligned.points) // MEASURED)]
     distance, _ = signed_distance(points, part)
-    found = measure_fit(part, points, distance, aligned.noise, tolerance, state.unit, None)
+    found = measure_fit(part, points, distance, aligned.noise, tolerance, unit, None)
     if found is None or found.form is None or found.fit.model != "scaled":
-        return state, 1.0
+        return scan, pose, aligned, 1.0
     scale, form = found.fit.scale, found.form
     # x = s R' p, undone by T and then by the scale about the frame's centre: a rigid motion of the scaled scan
-    T = form.T @ state.pose.T_part_scan
+    T = form.T @ pose.T_part_scan
     T[:3, 3] = (T[:3, 3] - form.frame.centre) / scale + form.frame.centre
-    scan = _divide(state.scan, scale)
-    pose = replace(state.pose, T_part_scan=_make_rigid(T))
-    state = state.derive(JobState.scan, scan, JobState.scan, JobState.aligned)
-    state = state.derive(JobState.pose, pose, JobState.pose, JobState.aligned)
+    pose = replace(pose, T_part_scan=_make_rigid(T))
     moved = form.undo(aligned.points)
     corrected = _divide(replace(aligned, points=moved * scale), scale)
     if aligned.viewpoints is not None:
         corrected = replace(corrected, viewpoints=form.undo(aligned.viewpoints))
-    return state.derive(JobState.aligned, corrected, JobState.scan, JobState.pose), scale
+    return _divide(scan, scale), pose, corrected, scale
 
 
 def _divide(scan: Scan, scale: float) -> Scan:
@@ -96,65 +83,65 @@ def _make_rigid(T: Floats) -> Floats:
     return out
 
 
-def fit_model(engine: Engine, work: Work) -> Work:
+@step(gives=("fitted", "warnings"))
+def fit_model(
+    part: Part, aligned: Scan, adapted: AdaptedPart | None, deviation: Deviation, tolerance: float, unit: str,
+    views: ViewFits | None, corrected_scale: float,
+) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
     """Measures how well the part as designed explains the intact skin, and warns where it does not."""
-    state = work.job
-    aligned, deviation = state.aligned, state.deviation
     found = measure_fit(
-        state.part, aligned.points, deviation.distance, aligned.noise, state.tolerance, state.unit, state.views,
-        state.corrected_scale,
-    )  # fmt: skip
-    sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.tolerance, JobState.views)
-    found = _tell_adapted(found, state)
-    state = state.derive(JobState.fitted, found, *sources)
+        part, aligned.points, deviation.distance, aligned.noise, tolerance, unit, views, corrected_scale
+    )
+    found = _tell_adapted(found, adapted)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
     if found is not None and told:
-        warning = Reason("model_fit", found.fit.words, amount=found.fit.amount, unit=state.unit)
-        work = replace(work, warnings=(*work.warnings, warning))
-    return replace(work, job=state)
+        return found, [Reason("model_fit", found.fit.words, amount=found.fit.amount, unit=unit)]
+    return found, ()
 
 
 @overload
-def _tell_adapted(fitted: FittedModel, state: JobState) -> FittedModel: ...
+def _tell_adapted(fitted: FittedModel, adapted: AdaptedPart | None) -> FittedModel: ...
 @overload
-def _tell_adapted(fitted: None, state: JobState) -> None: ...
-def _tell_adapted(fitted: FittedModel | None, state: JobState) -> FittedModel | None:
+def _tell_adapted(fitted: None, adapted: AdaptedPart | None) -> None: ...
+def _tell_adapted(fitted: FittedModel | None, adapted: AdaptedPart | None) -> FittedModel | None:
     """The fit in words that do not call an adapted part the part as designed."""
-    if fitted is None or state.adapted is None:
+    if fitted is None or adapted is None:
         return fitted
     words = fitted.fit.words.replace("the part as designed", "the adapted part")
     return replace(fitted, fit=replace(fitted.fit, words=words))
 
 
-def question_fit(engine: Engine, work: Work) -> Work:
+@step(gives=("fitted", "warnings"))
+def question_fit(
+    fitted: FittedModel | None, surplus: tuple[Surplus, ...], found: tuple[FoundSite, ...], pose: Pose, aligned: Scan,
+    adapted: AdaptedPart | None, deviation: Deviation, skin: SkinView, unit: str, tolerance: float, warnings: Reasons,
+) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
     """Withdraws the statement that the part as designed explains the intact skin, where there are doubts."""
-    state = work.job
-    if state.fitted is None or state.fitted.fit.model != "ok":
-        return work
-    clusters = {number for item in state.surplus if item.kind == "displaced piece" for number in item.clusters}
-    displaced = frozenset(site.number for site in work.sites if clusters & set(site.clusters))
-    verdicts = {site.number: site.verdict for site in work.sites}
-    doubts = find_fit_doubts(state.pose, verdicts, state.surplus, displaced, state.aligned, state.deviation, state.skin)
+    if fitted is None or fitted.fit.model != "ok":
+        return fitted, warnings
+    clusters = {number for item in surplus if item.kind == "displaced piece" for number in item.clusters}
+    displaced = frozenset(site.number for site in found if clusters & set(site.clusters))
+    verdicts = {site.number: site.verdict for site in found}
+    doubts = find_fit_doubts(pose, verdicts, surplus, displaced, aligned, deviation, skin)
     if not doubts:
-        return work
-    before = state.fitted.fit
-    fit = describe_fit(replace(before, model="open"), state.unit, state.tolerance, doubts)
-    fit = _tell_adapted(replace(state.fitted, fit=fit), state).fit
-    key = digest("questioned", state.key("fitted"), doubts)
-    state = state.with_value(JobState.fitted, replace(state.fitted, fit=fit), key)
+        return fitted, warnings
+    fit = describe_fit(replace(fitted.fit, model="open"), unit, tolerance, doubts)
+    fit = _tell_adapted(replace(fitted, fit=fit), adapted).fit
     # a corrected scale was reported in a note whose text is no longer true
-    warnings = tuple(note for note in work.warnings if note.code != "model_fit")
-    return replace(work, job=state, warnings=(*warnings, Reason("model_fit", fit.words)))
+    kept = [note for note in warnings if note.code != "model_fit"]
+    return replace(fitted, fit=fit), [*kept, Reason("model_fit", fit.words)]
 
 
-def measure_at_site(state: JobState, site: FoundSite) -> float:
-    """How far intact skin deviates at a site by the model that the fit names; 0 where the part is as designed."""
-    members = site.members
-    if state.fitted is None or state.fitted.fit.model == "ok" or not len(members):
+def measure_at_site(
+    fitted: FittedModel | None, part: Part, aligned: Scan, deviation: Deviation, members: Ints
+) -> float:
+    """How far intact skin deviates at the points ``members`` of a site by the model that the fit names; 0 where the
+    part is as designed."""
+    if fitted is None or fitted.fit.model == "ok" or not len(members):
         return 0.0
-    normals = state.part.face_normals[state.deviation.face[members]]
-    places = state.aligned.points[members] - state.deviation.distance[members, None] * normals
-    return measure_local(state.fitted, places, normals)
+    normals = part.face_normals[deviation.face[members]]
+    places = aligned.points[members] - deviation.distance[members, None] * normals
+    return measure_local(fitted, places, normals)
 
 
 def measure_local(fitted: FittedModel, places: Floats, normals: Floats) -> float:

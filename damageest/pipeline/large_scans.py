@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Part, Scan
+from damageest.artefacts import Flags, Floats, Ints, Part, Pose, Scan
 from damageest.errors import InputError
 from damageest.geometry.crops import Crop, PieceCrop
 from damageest.geometry.distance import signed_distance
@@ -20,9 +20,10 @@ from damageest.geometry.duplicates import list_distinct
 from damageest.geometry.transforms import move_points
 from damageest.io.large_scans import JoinedViews
 from damageest.io.scans import make_scan
-from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import JobState, Work
+from damageest.pipeline.engine import AnyStep, Branch, Engine, follow
+from damageest.pipeline.state import JobState
+from damageest.pipeline.steps import step
+from damageest.registry.contracts import Contract
 from damageest.stages.scan import ReadScan
 
 DEEP = 0.7
@@ -42,23 +43,24 @@ def check_crops(crops: Iterable[Crop]) -> None:
         )
 
 
-def add_points_near_damage(engine: Engine, work: Work) -> Work:
-    """Where the scan is thinned: adds all points near damage to it. The spacing is then that near damage."""
-    state, stage = work.job, engine.job.stages.get(ReadScan)
-    scan = state.scan
-    if not scan.total or not isinstance(stage, ReadScan):
-        return work
-    sources = (JobState.scan, JobState.pose, JobState.part, JobState.tolerance)
-    key = digest("points near damage", [state.key(source.name) for source in sources])
-    place = _Place(state.part, state.pose.T_part_scan, state.tolerance)
-    unit, most = engine.job.units, max(len(scan.points), 1_000_000)
-    _, more = engine.remember(
-        "near-damage", key, lambda: _gather(lambda: _crop(_read(engine, stage, unit), stage.crop), place, most, scan)
-    )
-    state = state.derive(JobState.scan, more, *sources)
-    state = state.derive(JobState.aligned, more.move(state.pose.T_part_scan), JobState.scan, JobState.pose)
-    state = state.derive(JobState.spacing, more.spacing, JobState.scan)
-    return replace(work, job=state)
+def where_thinned(*route: Contract | AnyStep) -> Branch:
+    """Follows a route only where the reader gives some points of a scan that has more."""
+
+    def run(engine: Engine, state: JobState) -> JobState:
+        return follow(route, engine, state) if state.scan.total and state.reader else state
+
+    return Branch("where_thinned", ("scan", "reader"), (route,), run)
+
+
+@step(gives="scan", kept=True)
+def add_points_near_damage(
+    engine: Engine, reader: ReadScan | None, scan: Scan, pose: Pose, part: Part, tolerance: float, unit: str
+) -> Scan:
+    """Adds all points near damage to the scan. The spacing is then that near damage."""
+    assert reader is not None  # as `where_thinned` asks
+    place = _Place(part, pose.T_part_scan, tolerance)
+    most = max(len(scan.points), 1_000_000)
+    return _gather(lambda: _crop(_read(engine, reader, unit), reader.crop), place, most, scan)
 
 
 class _Place:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from damageest.artefacts import Evidence, Solid
+from damageest.artefacts import Evidence, Part, Solid
+from damageest.checks.coverage import SkinView
 from damageest.geometry.bodies import label_pieces
-from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import FoundSite, Work
+from damageest.pipeline.state import FoundSite
+from damageest.pipeline.steps import step
 
 BY_RAYS_ALONE = "rays"
 """The method of a site without scan points on it."""
@@ -20,22 +18,21 @@ PASSED = 0.1
 """Share of a body's skin that rays have to have passed through."""
 
 
-def add_lost_bodies(engine: Engine, work: Work) -> Work:
+@step(gives="found")
+def add_lost_bodies(part: Part, skin: SkinView, found: tuple[FoundSite, ...]) -> tuple[FoundSite, ...]:
     """Makes a site of each connected body of the part of which the scan shows nothing, and through which rays of the
     scanner passed."""
-    state = work.job
-    part, skin = state.part, state.skin
     if skin.rays is None or not skin.rays.lost.any():
-        return work
+        return found
     piece = label_pieces(part.faces)
     if piece.max() == 0:
-        return work
+        return found
     cells, owner = skin.cells, piece[skin.cells.parent]
     total, seen, passed = (
         np.bincount(owner, weights=cells.areas * chosen)
         for chosen in (np.ones(len(owner)), skin.perhaps_seen, skin.rays.lost & ~skin.perhaps_seen)
     )
-    found = []
+    lost = []
     for number in np.flatnonzero((seen < SEEN * total) & (passed > PASSED * total)):
         used, renumbered = np.unique(part.faces[piece == number], return_inverse=True)
         try:
@@ -43,8 +40,7 @@ def add_lost_bodies(engine: Engine, work: Work) -> Work:
         except ValueError:  # a cavity
             continue
         low, high = body.bounds
-        if any((site.damage.bounds[0] < high).all() and (site.damage.bounds[1] > low).all() for site in work.sites):
+        if any((site.damage.bounds[0] < high).all() and (site.damage.bounds[1] > low).all() for site in found):
             continue
-        site = FoundSite(job=state, method=BY_RAYS_ALONE, evidence=Evidence())
-        found.append(site.with_value(FoundSite.damage, body, digest(body)))
-    return replace(work, sites=(*work.sites, *found))
+        lost.append(FoundSite(method=BY_RAYS_ALONE, evidence=Evidence()).with_value(FoundSite.damage, body))
+    return (*found, *lost)

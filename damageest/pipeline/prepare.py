@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from damageest.artefacts import INTACT, Part, Reason, Scan
+from damageest.artefacts import INTACT, Deviation, Floats, Part, Pose, Reason, Scan, Sites
 from damageest.checks.scan_quality import check_walls, choose_tolerance, describe_few, raise_tolerance, require_intact
 from damageest.errors import InputError, StageError
 from damageest.geometry.crops import crop_points
@@ -15,10 +15,10 @@ from damageest.geometry.far_points import find_far
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.units import diagnose_scale, diagnose_size
 from damageest.job.model import Job
-from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine, follow, start
 from damageest.pipeline.large_scans import check_crops
-from damageest.pipeline.state import JobState, Work
+from damageest.pipeline.state import Reasons
+from damageest.pipeline.steps import step
 from damageest.registry.registry import Registry
 from damageest.rules.notes import make_notes
 from damageest.stages.part import ReadPart
@@ -29,51 +29,49 @@ COMPARED = 20_000
 """Points that the tolerance is chosen from after the alignment."""
 
 
-def crop_scan(engine: Engine, work: Work) -> Work:
+@step(gives="scan")
+def crop_scan(scan: Scan, reader: ReadScan | None) -> Scan:
     """Removes the points that the job's crops remove. Raises InputError where no point is left."""
-    stage = engine.job.stages.get(ReadScan)
-    if not isinstance(stage, ReadScan) or not stage.crop:
-        return work
-    state = work.job
-    if state.scan.total:
-        check_crops(stage.crop)
-    return replace(work, job=state.derive(JobState.scan, crop_points(state.scan, stage.crop), JobState.scan))
+    if reader is None or not reader.crop:
+        return scan
+    if scan.total:
+        check_crops(reader.crop)
+    return crop_points(scan, reader.crop)
 
 
-def set_far_aside(engine: Engine, work: Work) -> Work:
+@step(gives=("scan", "warnings"))
+def set_far_aside(scan: Scan, part: Part) -> tuple[Scan, Reasons]:
     """Removes points that are too far from all others to be of the part, and says how many."""
-    state = work.job
-    far = find_far(state.scan.points, state.part.diagonal)
+    far = find_far(scan.points, part.diagonal)
     if not far.any():
-        return work
+        return scan, ()
     text = (
         f"{int(far.sum())} scan points were set aside, since they are farther from all others than the part is "
-        f"large ({state.part.diagonal:.4g} {state.part.unit}), and few"
+        f"large ({part.diagonal:.4g} {part.unit}), and few"
     )
-    scan = state.scan.take(~far)
-    scan = replace(scan, notes=(*scan.notes, text))
-    state = state.derive(JobState.scan, scan, JobState.scan, JobState.part)
-    return replace(work, job=state, warnings=(*work.warnings, Reason("far_points", text, amount=int(far.sum()))))
+    scan = scan.take(~far)
+    return replace(scan, notes=(*scan.notes, text)), [Reason("far_points", text, amount=int(far.sum()))]
 
 
-def measure_scan(engine: Engine, work: Work) -> Work:
-    """Measures the scan's noise and spacing and chooses the tolerance. Raises InputError for a scan of another size."""
-    state = work.job
-    scan, part = state.scan, state.part
+@step(gives=("noise", "spacing", "depth_step"), kept=True)
+def measure_scan(scan: Scan, part: Part) -> tuple[float, float, float]:
+    """Measures noise and spacing of the scan, and the step of its depth. Raises InputError for one of another size."""
     if wrong_size := diagnose_scale(scan.points, part.vertices, part.unit):
         raise InputError(f"scan: {wrong_size}")
-    step = 0.0
-    if not scan.noise:
-        key = digest("measure with steps", state.key("scan"))
-        _, (noise, spacing, step) = engine.remember("measure", key, lambda: _measure(scan))
-        scan = replace(scan, noise=noise, spacing=spacing)
-    tolerance, warnings = choose_tolerance(engine.job.tolerance, scan, part, step)
+    return (scan.noise, scan.spacing, 0.0) if scan.noise else _measure(scan)
+
+
+@step(gives=("scan", "tolerance", "warnings"))
+def take_tolerance(
+    scan: Scan, part: Part, noise: float, spacing: float, depth_step: float, asked_tolerance: float | None
+) -> tuple[Scan, float, Reasons]:
+    """Takes the tolerance of the job, or one for the scan as it was measured."""
+    scan = replace(scan, noise=noise, spacing=spacing)
+    tolerance, warnings = choose_tolerance(asked_tolerance, scan, part, depth_step)
     warnings = [*describe_few(scan), *warnings]
     if wrong_unit := diagnose_size(part.vertices, part.unit):
         warnings = [Reason("unit", wrong_unit), *warnings]
-    state = state.derive(JobState.scan, scan, JobState.scan)
-    state = state.with_value(JobState.tolerance, tolerance, digest(tolerance))
-    return replace(work, job=state, warnings=(*work.warnings, *warnings))
+    return scan, tolerance, warnings
 
 
 def _measure(scan: Scan) -> tuple[float, float, float]:
@@ -83,58 +81,59 @@ def _measure(scan: Scan) -> tuple[float, float, float]:
     return max(noise, step / math.sqrt(12)), spacing, step
 
 
-def place_scan(engine: Engine, work: Work) -> Work:
+@step(gives=("aligned", "noise", "spacing"))
+def place_scan(scan: Scan, pose: Pose) -> tuple[Scan, float, float]:
     """Brings the scan into the part's frame."""
-    state = work.job
-    pose, scan = state.pose, state.scan
-    state = state.derive(JobState.aligned, scan.move(pose.T_part_scan), JobState.scan, JobState.pose)
-    state = state.derive(JobState.noise, scan.noise, JobState.scan)
-    state = state.derive(JobState.spacing, scan.spacing, JobState.scan)
-    return replace(work, job=state, warnings=(*work.warnings, *make_notes("align", pose.notes)))
+    return scan.move(pose.T_part_scan), scan.noise, scan.spacing
 
 
-def settle_tolerance(engine: Engine, work: Work) -> Work:
+@step(gives="warnings")
+def note_pose(pose: Pose) -> Reasons:
+    """Takes over what the alignment says about the pose."""
+    return make_notes("align", pose.notes)
+
+
+@step(gives=("tolerance", "warnings"))
+def settle_tolerance(
+    tolerance: float, asked_tolerance: float | None, part: Part, aligned: Scan, noise: float
+) -> tuple[float, Reasons]:
     """Where the tolerance is auto: raises it if intact surface deviates from the part by far more than the noise.
     Warns of a tolerance that the part's walls are too thin for."""
-    state = work.job
-    part, points, tolerance = state.part, state.aligned.points, state.tolerance
+    points = aligned.points
     warnings: list[Reason] = []
-    if engine.job.tolerance is None and len(points):
+    if asked_tolerance is None and len(points):
         distance = signed_distance(points[:: max(1, math.ceil(len(points) / COMPARED))], part)[0]
-        tolerance, warnings = raise_tolerance(tolerance, distance, part, state.noise)
-        state = state.with_value(JobState.tolerance, tolerance, digest(tolerance))
-    warnings += check_walls(tolerance, part)
-    return replace(work, job=state, warnings=(*work.warnings, *warnings))
+        tolerance, warnings = raise_tolerance(tolerance, distance, part, noise)
+    return tolerance, [*warnings, *check_walls(tolerance, part)]
 
 
-def check_intact(engine: Engine, work: Work) -> Work:
+@step()
+def check_intact(deviation: Deviation, tolerance: float, part: Part, segmenter: Segment | None) -> None:
     """Stops with a StageError where too few points near the part are intact."""
-    state = work.job
     try:
-        require_intact(state.deviation.distance, state.tolerance, state.part)
+        require_intact(deviation.distance, tolerance, part)
     except StageError as error:
-        error.stage, error.use = "segment", engine.job.implementations[Segment].name
+        error.stage, error.use = "segment", segmenter.use if segmenter else ""
         raise
-    return work
 
 
-def gather_intact(engine: Engine, work: Work) -> Work:
+@step(gives=("intact", "warnings"))
+def gather_intact(aligned: Scan, deviation: Deviation, sites: Sites) -> tuple[Floats, Reasons]:
     """Gathers the intact points, which tell the enclosures what is still there."""
-    state = work.job
-    intact = state.aligned.points[state.deviation.label == INTACT]
-    state = state.derive(JobState.intact, intact, JobState.aligned, JobState.deviation)
-    notes = (*make_notes("segment", state.deviation.notes), *make_notes("cluster", state.sites.notes))
-    return replace(work, job=state, warnings=(*work.warnings, *notes))
+    intact = aligned.points[deviation.label == INTACT]
+    return intact, (*make_notes("segment", deviation.notes), *make_notes("cluster", sites.notes))
 
 
 def read_part(job: Job, registry: Registry) -> Part:
     """The part of a job, as its stage reads it."""
-    return Engine(job, registry).call(ReadPart, start(job).job).part
+    engine = Engine(job, registry)
+    return engine.call(ReadPart, start(engine)).part
 
 
 def read_inputs(job: Job, registry: Registry) -> tuple[Part, Scan]:
     """The part and the scan of a job, as their stages read them."""
-    state = follow((ReadPart, ReadScan, crop_scan, set_far_aside), Engine(job, registry), start(job)).job
+    engine = Engine(job, registry)
+    state = follow((ReadPart, ReadScan, crop_scan, set_far_aside), engine, start(engine))
     return state.part, state.scan
 
 

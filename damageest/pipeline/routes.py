@@ -1,7 +1,9 @@
 """The routes: which contracts are called in which order, and the steps between them.
 
-A contract calls the implementation that the job names, once per job or once per site as the contract says. A step takes
-all of the work and gives it changed; some steps call contracts themselves, and have them as arguments.
+A contract calls the implementation that the job names, once per job or once per site as the contract says. A step is
+the code between them. Beside each stands what it takes and what it gives, by the names of `JobState` and, for what is
+called once per site, of `Candidate`; ``+``: it adds to what is there; ``calls``: contracts that a step calls itself. A
+test compares these lines with the code.
 """
 
 from __future__ import annotations
@@ -12,9 +14,9 @@ from damageest.pipeline.coverage import describe_coverage, inspect_skin
 from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
-from damageest.pipeline.form import correct_scan, fit_model, question_fit
+from damageest.pipeline.form import correct_scale, correct_views, fit_model, question_fit
 from damageest.pipeline.grouped_enclosure import enclose_grouped
-from damageest.pipeline.large_scans import add_points_near_damage
+from damageest.pipeline.large_scans import add_points_near_damage, where_thinned
 from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.paths import plan_paths
 from damageest.pipeline.prepare import (
@@ -22,9 +24,11 @@ from damageest.pipeline.prepare import (
     crop_scan,
     gather_intact,
     measure_scan,
+    note_pose,
     place_scan,
     set_far_aside,
     settle_tolerance,
+    take_tolerance,
 )
 from damageest.pipeline.selections import check_selections
 from damageest.pipeline.sites import (
@@ -38,43 +42,96 @@ from damageest.pipeline.sites import (
 from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
-from damageest.stages.adapt import Adapt
+from damageest.pipeline.writing import describe_output, show_result, write_output
 from damageest.stages.align import Align
-from damageest.stages.allowance import Allowance
-from damageest.stages.background import Background
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
 from damageest.stages.cluster import Cluster
-from damageest.stages.enclose import Enclose, EncloseAll
+from damageest.stages.enclose import EncloseAll
 from damageest.stages.export import Export
 from damageest.stages.part import ReadPart
-from damageest.stages.path import Path
 from damageest.stages.reconstruct import Reconstruct
 from damageest.stages.repair import Repair
-from damageest.stages.report import Report
 from damageest.stages.sample import Sample
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
 ACQUIRE: Route = (
-    ReadPart, check_selections, ReadScan, crop_scan, set_far_aside, measure_scan, Sample, Align, place_scan,
-    add_points_near_damage, correct_scan, adapt_part(Adapt), settle_tolerance, Segment, check_intact, inspect_skin,
-    fit_model, Cluster, find_surplus, gather_intact,
-)  # fmt: skip
+    ReadPart,  # unit, tolerance -> part
+    check_selections,  # part ->
+    ReadScan,  # unit, part -> scan
+    crop_scan,  # scan, reader -> scan
+    set_far_aside,  # scan, part -> scan, +warnings
+    measure_scan,  # scan, part -> noise, spacing, depth_step
+    take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
+    Sample,  # part, tolerance -> samples
+    Align,  # scan, part, samples, tolerance -> pose
+    place_scan,  # scan, pose -> aligned, noise, spacing
+    note_pose,  # pose -> +warnings
+    where_thinned(  # scan, reader
+        add_points_near_damage,  # reader, scan, pose, part, tolerance, unit -> scan
+        place_scan,  # scan, pose -> aligned, noise, spacing
+    ),
+    correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner
+    #     -> views, pose, aligned, noise, spacing, tolerance
+    correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader -> scan, pose, aligned, corrected_scale
+    adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, samples, tolerance, unit, views, warnings, adapter,
+    #     scan -> adapted, part, aligned, pose, samples, warnings
+    settle_tolerance,  # tolerance, asked_tolerance, part, aligned, noise -> tolerance, +warnings
+    Segment,  # aligned, part, samples, tolerance -> deviation
+    check_intact,  # deviation, tolerance, part, segmenter ->
+    inspect_skin,  # part, aligned, deviation, tolerance -> skin, deviation
+    fit_model,  # part, aligned, adapted, deviation, tolerance, unit, views, corrected_scale -> fitted, +warnings
+    Cluster,  # aligned, deviation, tolerance -> sites
+    find_surplus,  # calls Cluster, EncloseAll: unit, aligned, deviation, tolerance, part, sites, samples
+    #     -> surplus, deviation, +warnings
+    gather_intact,  # aligned, deviation, sites -> intact, +warnings
+)
 BY_SITE: Route = (
-    take_clusters, Reconstruct, Boundary, enclose_grouped(Background, Enclose), Repair, Boolean, gather_sites,
-)  # fmt: skip
-AT_ONCE: Route = (EncloseAll, take_enclosures, Boolean, gather_sites)
+    take_clusters,  # aligned, sites, encloser, wanted -> candidates
+    Reconstruct,  # points, part, tolerance, spacing, noise -> surface
+    Boundary,  # surface, part, tolerance -> rims
+    enclose_grouped,  # calls Background, Enclose: candidates, aligned, sites, part, tolerance, spacing, intact, samples
+    #     -> candidates, +failures
+    Repair,  # enclosure, tolerance -> solid
+    Boolean,  # solid, part -> damage
+    gather_sites,  # candidates, aligned, deviation, sites, part, tolerance, unit -> found, +failures, +warnings
+)
+AT_ONCE: Route = (
+    EncloseAll,  # part, aligned, deviation, sites, samples, tolerance -> enclosures
+    take_enclosures,  # enclosures, aligned, sites, encloser_at_once -> candidates, +failures
+    Boolean,  # solid, part -> damage
+    gather_sites,  # candidates, aligned, deviation, sites, part, tolerance, unit -> found, +failures, +warnings
+)
 CLOSE: Route = (
-    add_lost_bodies, set_specks_aside, number_sites, choose_sites, describe_coverage, relate_surplus, gather_facts,
-    measure_uncertainty, judge_sites, question_fit, make_deposits(Allowance), separate_deposits, plan_paths(Path),
-    sum_uncertainty, collect_result,
-)  # fmt: skip
-
-WRITE: Route = (Export,)
+    add_lost_bodies,  # part, skin, found -> found
+    set_specks_aside,  # failures, sites, aligned, deviation, unit -> failures, +warnings
+    number_sites,  # found -> found
+    choose_sites,  # found, choice, aligned, deviation, part, tolerance -> found, +warnings
+    describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
+    relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
+    gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner -> facts
+    measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, tolerance,
+    #     unit -> found
+    judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit
+    #     -> found
+    question_fit,  # fitted, surplus, found, pose, aligned, adapted, deviation, skin, unit, tolerance, warnings
+    #     -> fitted, warnings
+    make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
+    separate_deposits,  # found, tolerance -> found
+    plan_paths,  # calls Path: found, part, tolerance -> found, +failures
+    sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance -> volume_95
+    collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
+    #     coverage, surplus, adapted, fitted, volume_95, conversions
+    #     -> result
+)
+WRITE: Route = (
+    Export,  # result, folder, writers, path_writers -> written
+    describe_output,  # result, written, target -> result, content, job_text
+    show_result,  # calls Report: written, result, folder, content, job_text -> result, written
+    write_output,  # result, written, folder, target ->
+)
 """After one of the routes, where the result goes to files."""
-SHOW: Route = (Report,)
-"""After that, when the content of result.json is known."""
 
 
 def route_of(method: str) -> Route:

@@ -6,19 +6,19 @@ from damageest.artefacts import Part
 from damageest.errors import Fault, JobError, StageError
 from damageest.job.model import Job
 from damageest.pipeline.engine import Engine, follow, start
-from damageest.pipeline.state import Work
+from damageest.pipeline.steps import step
 from damageest.registry.registry import Registry
 from damageest.stages.part import ReadPart
 
 
-def check_selections(engine: Engine, work: Work) -> Work:
+@step()
+def check_selections(engine: Engine, part: Part) -> None:
     """Raises JobError where a selector of a stage names a CAD face that the part does not have, or selects no skin of
     the part."""
     if any(stage.find_selectors() for stage in engine.job.stages.values()):
-        faults = find_wrong_selections(engine.job, work.job.part)
+        faults = find_wrong_selections(engine.job, part)
         if faults:
             raise JobError(faults, engine.job.source)
-    return work
 
 
 def check_with_part(job: Job, registry: Registry) -> None:
@@ -27,7 +27,8 @@ def check_with_part(job: Job, registry: Registry) -> None:
     Raises JobError, or InputError where the part cannot be read.
     """
     if any(stage.find_selectors() for stage in job.stages.values()):
-        follow((ReadPart, check_selections), Engine(job, registry), start(job))
+        engine = Engine(job, registry)
+        follow((ReadPart, check_selections), engine, start(engine))
 
 
 def find_wrong_selections(job: Job, part: Part) -> list[Fault]:

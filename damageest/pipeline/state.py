@@ -6,7 +6,8 @@ name values of these classes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import typing
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar, overload
@@ -32,6 +33,7 @@ from damageest.artefacts import (
     Solid,
     Surface,
 )
+from damageest.checks.beyond_points import BeyondPoints
 from damageest.checks.coverage import SkinView
 from damageest.checks.free_pose import Dependence
 from damageest.checks.model_fit import FittedModel
@@ -39,19 +41,32 @@ from damageest.checks.uncertainty import SiteError
 from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
 from damageest.findings import Coverage, Interval, Surplus, Uncertainty, Verdict
+from damageest.job.model import Accept, SiteChoice
 from damageest.pipeline.cache import digest
-from damageest.result import Result
-from damageest.rules import ScanFacts
+from damageest.result import Conversion, Result
+from damageest.rules import Rule, ScanFacts
+from damageest.stages.adapt import Adapt
+from damageest.stages.align import Align
+from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.export import ExportedFiles, PathWriter, Writer
 from damageest.stages.report import ReportFiles
+from damageest.stages.scan import ReadScan
+from damageest.stages.segment import Segment
 
 T = TypeVar("T")
+Failures = Sequence[StageError]
+Reasons = Sequence[Reason]
 
 
 class Value(Generic[T]):
     """A value of a state. Reading one that no stage or step has given yet raises KeyError."""
 
     name: str
+
+    @property
+    def kind(self) -> Any:
+        """The type of the value, as declared."""
+        return typing.get_args(getattr(self, "__orig_class__"))[0]  # noqa: B009
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -78,68 +93,30 @@ class State:
         """The key of a value, for the cache."""
         return self.keys[name]
 
-    def with_value(self, value: Value[T], content: T, key: str) -> Self:
-        """The state with one more value. Raises ValueError for an empty key."""
-        return self.with_named(value.name, content, key)
+    def with_value(self, value: Value[T], content: T, key: str | None = None) -> Self:
+        """The state with one more value. Without a ``key``, its content is the key. Raises ValueError for an empty
+        key."""
+        return self.with_named(value.name, content, digest(content) if key is None else key)
 
     def with_named(self, name: str, content: Any, key: str) -> Self:
-        """As `with_value`, for a stage's result, whose name its contract gives."""
+        """As `with_value`, for a value whose name a contract or a step gives."""
         if not key:
             raise ValueError(f"the value '{name}' needs a key that says how it was computed")
         return replace(self, values={**self.values, name: content}, keys={**self.keys, name: key})
 
-    def derive(self, value: Value[T], content: T, *sources: Value[Any]) -> Self:
-        """The state with a value that follows from the ``sources`` alone."""
-        return self.with_value(value, content, digest(value.name, [self.key(source.name) for source in sources]))
-
-
-@dataclass(frozen=True, eq=False)
-class JobState(State):
-    """The whole job. ``unit`` and ``tolerance`` are the job's; the tolerance is None until it is measured where the job
-    says `auto`. ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan, which is
-    ``part`` from then on; None: the part as designed. ``intact`` (K,3): its points on the nominal surface.
-    ``content``: that of result.json; ``job_text``: that of job.yaml."""
-
-    unit = Value[str]()
-    tolerance = Value[float]()
-    part = Value[Part]()
-    scan = Value[Scan]()
-    noise = Value[float]()
-    spacing = Value[float]()
-    samples = Value[Samples]()
-    pose = Value[Pose]()
-    aligned = Value[Scan]()
-    adapted = Value[AdaptedPart | None]()
-    deviation = Value[Deviation]()
-    sites = Value[Sites]()
-    intact = Value[Floats]()
-    skin = Value[SkinView]()
-    views = Value[ViewFits | None]()
-    corrected_scale = Value[float]()
-    fitted = Value[FittedModel | None]()
-    coverage = Value[Coverage]()
-    facts = Value[ScanFacts]()
-    surplus = Value[tuple[Surplus, ...]]()
-    volume_95 = Value[Interval | None]()
-    enclosures = Value[Enclosures]()
-    result = Value[Result]()
-    folder = Value[Path]()
-    writers = Value[Mapping[str, Writer]]()
-    path_writers = Value[Mapping[str, PathWriter]]()
-    written = Value[ExportedFiles]()
-    content = Value[Mapping[str, Any]]()
-    job_text = Value[str]()
-    reported = Value[ReportFiles]()
-
-    number = 0
-    """That of a site is 1 or more."""
+    def select(self, names: Iterable[str]) -> Self:
+        """The state with the values of these names alone."""
+        chosen = list(names)
+        return replace(
+            self, values={name: self.get(name) for name in chosen}, keys={name: self.key(name) for name in chosen}
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class _SiteState(State):
-    """Values of one site; those of the job are read through it."""
+    """Values of one site. ``job``: those of the job, read through it where a contract is called on the site."""
 
-    job: JobState = field(default_factory=JobState)
+    job: JobState = field(default_factory=lambda: JobState())
     number: int = 0
 
     def get(self, name: str) -> Any:
@@ -176,8 +153,8 @@ class FoundSite(_SiteState):
     """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
     ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
     ``displaced``, ``covered``: as in `SiteFacts`; ``uncertainty``: of the volume of ``damage``, and ``error``: the same
-    in a form that adds up over the sites; ``dependences``: on the free motions of the pose; ``enclosures``: as in
-    `Site`."""
+    in a form that adds up over the sites; ``beyond``: how ``damage`` lies against its points; ``dependences``: on the
+    free motions of the pose; ``enclosures``: as in `Site`."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -191,6 +168,7 @@ class FoundSite(_SiteState):
     covered: tuple[tuple[int, float], ...] = ()
     uncertainty: Uncertainty | None = None
     error: SiteError | None = None
+    beyond: BeyondPoints = field(default_factory=BeyondPoints)
     dependences: tuple[Dependence, ...] = ()
     enclosures: tuple[Solid, ...] = ()
 
@@ -204,15 +182,72 @@ class FoundSite(_SiteState):
 
 
 @dataclass(frozen=True, eq=False)
-class Work:
-    """What goes along the route: the job, the candidates or the sites made of them, failures and warnings.
+class JobState(State):
+    """The whole job, as it goes along the route.
 
-    ``failures``: the sites that have no damage volume or no deposit. ``wanted``: the clusters to take; None: all.
+    From the job and the registry: ``name``, ``unit``, ``asked_tolerance`` (None: `auto`), ``choice`` of sites,
+    ``accept``, the stages whose options steps read (None where the job's route has none), and ``rules``, ``writers``,
+    ``path_writers`` and ``conversions``.
+    ``tolerance``: None until it is measured where the job says `auto`. ``depth_step``: of the scan's depth, 0 where it
+    is continuous. ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan,
+    which is ``part`` from then on; None: it is as designed. ``intact`` (K,3): its points on the nominal surface.
+    ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the sites.
+    ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written into,
+    ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
     """
 
-    job: JobState
-    candidates: tuple[Candidate, ...] = ()
-    sites: tuple[FoundSite, ...] = ()
-    failures: tuple[StageError, ...] = ()
-    warnings: tuple[Reason, ...] = ()
-    wanted: tuple[int, ...] | None = None
+    name = Value[str]()
+    unit = Value[str]()
+    asked_tolerance = Value[float | None]()
+    choice = Value[SiteChoice]()
+    accept = Value[Accept]()
+    reader = Value[ReadScan | None]()
+    aligner = Value[Align | None]()
+    adapter = Value[Adapt | None]()
+    segmenter = Value[Segment | None]()
+    encloser = Value[Enclose | None]()
+    encloser_at_once = Value[EncloseAll | None]()
+    rules = Value[tuple[Rule, ...]]()
+    writers = Value[Mapping[str, Writer]]()
+    path_writers = Value[Mapping[str, PathWriter]]()
+    conversions = Value[Mapping[str, Conversion]]()
+
+    tolerance = Value[float]()
+    part = Value[Part]()
+    scan = Value[Scan]()
+    noise = Value[float]()
+    spacing = Value[float]()
+    depth_step = Value[float]()
+    samples = Value[Samples]()
+    pose = Value[Pose]()
+    aligned = Value[Scan]()
+    adapted = Value[AdaptedPart | None]()
+    deviation = Value[Deviation]()
+    sites = Value[Sites]()
+    intact = Value[Floats]()
+    skin = Value[SkinView]()
+    views = Value[ViewFits | None]()
+    corrected_scale = Value[float]()
+    fitted = Value[FittedModel | None]()
+    coverage = Value[Coverage]()
+    facts = Value[ScanFacts]()
+    surplus = Value[tuple[Surplus, ...]]()
+    volume_95 = Value[Interval | None]()
+    enclosures = Value[Enclosures]()
+
+    wanted = Value[tuple[int, ...] | None]()
+    candidates = Value[tuple[Candidate, ...]]()
+    found = Value[tuple[FoundSite, ...]]()
+    failures = Value[Failures]()
+    warnings = Value[Reasons]()
+
+    result = Value[Result]()
+    folder = Value[Path]()
+    target = Value[Path]()
+    written = Value[ExportedFiles]()
+    content = Value[Mapping[str, Any]]()
+    job_text = Value[str]()
+    reported = Value[ReportFiles]()
+
+    number = 0
+    """That of a site is 1 or more."""

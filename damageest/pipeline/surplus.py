@@ -7,16 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import ADDED, DAMAGE, Reason, Sites
+from damageest.artefacts import ADDED, DAMAGE, Deviation, Floats, Reason, Scan, Sites
 from damageest.checks.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
 from damageest.errors import DamageestError, StageError
 from damageest.findings import Surplus
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples, label_strays
 from damageest.geometry.pieces import JoinedPieces, find_pieces, join_pieces
 from damageest.geometry.solids import to_manifold, to_solid
-from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.pipeline.sites import find_place
+from damageest.pipeline.state import FoundSite, JobState, Reasons
+from damageest.pipeline.steps import step
 from damageest.stages.cluster import Cluster
 from damageest.stages.enclose import EncloseAll
 
@@ -31,48 +32,46 @@ EQUAL, EQUAL_TOUCHING = 1.35, 1.1
 the loss, and may be a weld bead on it."""
 
 
-def find_surplus(engine: Engine, work: Work) -> Work:
+@step(gives=("surplus", "deviation", "warnings"), reads=("unit",), calls=(Cluster, EncloseAll))
+def find_surplus(engine: Engine, state: JobState) -> tuple[tuple[Surplus, ...], Deviation, Reasons]:
     """Finds added metal and surroundings, and the volume of the former.
 
     A surplus is a loss of the part's complement: the job's implementations of `cluster` and `enclose` are called on
     that. Points outside the skin that are in no cluster, or in surroundings, become outliers in the deviation, so that
     they do not count as metal on the skin. Where a stage fails, the sites are found all the same.
     """
-    state = work.job
     if not (state.deviation.label == ADDED).any():
-        return replace(work, job=state.derive(JobState.surplus, (), JobState.deviation))
-    turned = state.derive(JobState.deviation, complement_deviation(state.deviation), JobState.deviation)
+        return (), state.deviation, ()
+    turned = state.with_value(JobState.deviation, complement_deviation(state.deviation))
     own = engine.make_silent(EncloseAll)
     try:
         clusters = own.call(Cluster, turned).sites
     except StageError as error:
         warning = Reason("surplus", f"points outside the nominal surface could not be grouped: {error}")
-        state = state.derive(JobState.surplus, (), JobState.deviation)
-        return replace(work, job=state, warnings=(*work.warnings, warning))
+        return (), state.deviation, [warning]
     found = describe_surplus(clusters, state.sites, state.aligned, state.deviation, state.part, state.tolerance)
     kept = _keep_metal(clusters, found)
     deviation = label_strays(state.deviation, ADDED, kept)
     surplus = _close(own, turned, found, kept) if kept.count else found
     surplus = tuple(replace(item, id=number) for number, item in enumerate(_sort(surplus), 1))
-    sources = (JobState.part, JobState.aligned, JobState.deviation, JobState.sites, JobState.samples)
-    key = digest("surplus", [state.key(source.name) for source in (*sources, JobState.tolerance)])
-    if deviation is not state.deviation:
-        state = state.derive(JobState.deviation, deviation, JobState.deviation, JobState.sites, JobState.tolerance)
-    return replace(work, job=state.with_value(JobState.surplus, surplus, key))
+    return surplus, deviation, ()
 
 
-def relate_surplus(engine: Engine, work: Work) -> Work:
+@step(gives=("surplus", "found", "warnings"))
+def relate_surplus(
+    surplus: tuple[Surplus, ...], found: tuple[FoundSite, ...], aligned: Scan, tolerance: float, unit: str
+) -> tuple[tuple[Surplus, ...], tuple[FoundSite, ...], Reasons]:
     """Names the surplus beside each site, and says what is to be done about surroundings."""
-    state, sites, done = work.job, list(work.sites), []
+    sites, done = list(found), []
     warnings: list[Reason] = []
-    reach = max(2 * state.tolerance, 1.5 * state.aligned.spacing)
-    for item in state.surplus:
+    reach = max(2 * tolerance, 1.5 * aligned.spacing)
+    for item in surplus:
         beside = [site for site in sites if set(site.clusters) & set(item.clusters)]
         item = compare_with_losses(item, [site.damage.volume for site in beside])
         done.append(item)
         if item.kind == "surroundings":
             continue
-        touching = {site.number for site in beside if _is_touching(state, item, site, reach)}
+        touching = {site.number for site in beside if _is_touching(aligned.points, item, site, reach)}
         covered = (item.id, item.area)
         sites = [replace(s, covered=(*s.covered, covered)) if s.number in touching else s for s in sites]
         if item.kind == "displaced piece":
@@ -93,16 +92,17 @@ def relate_surplus(engine: Engine, work: Work) -> Work:
                 f", and {of} its place" if of else ""
             )
             remedy = "put it back and scan again, or repair the part as if the piece were lost"
-            warnings.append(Reason("displaced_piece", text, amount=item.volume, unit=f"{state.unit}³", remedy=remedy))
+            place = find_place(aligned.points, item.points)
+            warnings.append(
+                Reason("displaced_piece", text, amount=item.volume, unit=f"{unit}³", place=place, remedy=remedy)
+            )
     if outside := [item for item in done if item.kind == "surroundings"]:
         names = "; ".join(f"surplus {item.id}: {item.share:.1%} of the scan, {item.notes[0]}" for item in outside[:5])
         share = sum(item.share for item in outside)
         text = f"{share:.1%} of the scan does not belong to the part ({names}), and was left out"
         remedy = "crop the scan to the part to be sure: scan: {crop: ...}"
         warnings.append(Reason("surroundings", text, amount=share, remedy=remedy))
-    key = digest("related", state.key("surplus"), [site.key("damage") for site in sites])
-    state = state.with_value(JobState.surplus, tuple(done), key)
-    return replace(work, job=state, sites=tuple(sites), warnings=(*work.warnings, *warnings))
+    return tuple(done), tuple(sites), warnings
 
 
 def _is_equal(item: Surplus, volumes: tuple[float, ...], most: float) -> bool:
@@ -110,10 +110,9 @@ def _is_equal(item: Surplus, volumes: tuple[float, ...], most: float) -> bool:
     return item.volume is not None and any(1 / most < volume / item.volume < most for volume in volumes)
 
 
-def _is_touching(state: JobState, item: Surplus, site: FoundSite, reach: float) -> bool:
+def _is_touching(points: Floats, item: Surplus, site: FoundSite, reach: float) -> bool:
     from scipy.spatial import cKDTree
 
-    points = state.aligned.points
     gap = cKDTree(points[item.points]).query(points[site.members], distance_upper_bound=reach, workers=2)[0]
     return bool(np.isfinite(gap).any())
 
@@ -157,12 +156,9 @@ def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces
     part, points, label = turned.part, turned.aligned.points, kept.label
     members = np.flatnonzero(label)
     deviation = label_strays(turned.deviation, DAMAGE, kept)
-    sources = (JobState.part, JobState.deviation, JobState.sites)
     box = complement_part(part, points[members], MARGIN * turned.tolerance)
-    state = turned.derive(JobState.part, box, *sources)
-    state = state.derive(JobState.deviation, deviation, *sources)
-    state = state.derive(JobState.sites, kept, *sources)
-    state = state.derive(JobState.samples, complement_samples(turned.samples), JobState.samples)
+    state = turned.with_value(JobState.part, box).with_value(JobState.deviation, deviation)
+    state = state.with_value(JobState.sites, kept).with_value(JobState.samples, complement_samples(turned.samples))
     origin = part.bounds.mean(axis=0)
     whole = to_manifold(part, origin)
     reach = max(2 * turned.tolerance, turned.aligned.spacing)

@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Flags, Ints, Solid
+from damageest.artefacts import INTACT, Deviation, Flags, Ints, Part, Pose, Scan, Solid
+from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
 from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
@@ -24,11 +25,10 @@ from damageest.checks.uncertainty import (
 )
 from damageest.findings import Fading, Interval, Uncertainty
 from damageest.geometry.skin import find_inner_faces
-from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine
 from damageest.pipeline.form import measure_at_site
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
-from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.pipeline.state import Failures, FoundSite, JobState
+from damageest.pipeline.steps import step
 from damageest.stages.allowance import Allowance
 
 COARSE = 0.05
@@ -37,40 +37,56 @@ BESIDE = 2.0
 """Distance from a damage volume, in reaches, within which unseen skin may be part of the same loss."""
 
 
-def measure_uncertainty(engine: Engine, work: Work) -> Work:
+@step(
+    gives="found",
+    reads=(
+        "found",
+        "part",
+        "aligned",
+        "adapted",
+        "deviation",
+        "skin",
+        "coverage",
+        "facts",
+        "fitted",
+        "pose",
+        "tolerance",
+        "unit",
+    ),
+)
+def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
     """Gives each site the 95 % intervals of its volume and depth, with all causes that have a size."""
-    state = work.job
-    if not work.sites:
-        return work
+    if not state.found:
+        return state.found
     pose = measure_pose_error(state.part, state.aligned, state.deviation, state.tolerance)
-    taken = _TakenSkin(state, work.sites)
-    sites = tuple(_measure_site(state, site, taken, pose) for site in work.sites)
-    return replace(work, sites=sites)
+    taken = _TakenSkin(state, state.found)
+    return tuple(_measure_site(state, site, taken, pose) for site in state.found)
 
 
-def sum_uncertainty(engine: Engine, work: Work) -> Work:
+@step(gives="volume_95")
+def sum_uncertainty(
+    found: tuple[FoundSite, ...], failures: Failures, part: Part, pose: Pose, aligned: Scan, deviation: Deviation,
+    tolerance: float,
+) -> Interval | None:  # fmt: skip
     """Gives the job the 95 % interval of its total volume.
 
     There is one where each accepted site has one, and no damage was left without a volume. Sites that are not accepted
     make its high end larger: they may be damage, too. Where no site was found in a scan that could not show one, it is
     not known either.
     """
-    state = work.job
-    if not work.sites:
-        found = None if work.failures or _may_hide_loss(state) else (0.0, measure_hidden_wear(state.part, state.pose))
-        return replace(work, job=state.with_value(JobState.volume_95, found, digest("no sites", found)))
-    lost = [error for error in work.failures if error.stage != Allowance.stage]
-    taken = [site for site in work.sites if site.accepted]
+    if not found:
+        is_unknown = failures or _may_hide_loss(part, aligned, deviation, tolerance)
+        return None if is_unknown else (0.0, measure_hidden_wear(part, pose))
+    lost = [error for error in failures if error.stage != Allowance.stage]
+    taken = [site for site in found if site.accepted]
     errors = [site.error for site in taken if site.error is not None]
-    total = None
-    if len(errors) == len(taken) and not lost:
-        # collect_result moves it to the volume of the union, which is the same but for overlaps
-        left = sum(_limit_doubtful(site) for site in work.sites if not site.accepted)
-        total = combine_total(sum(site.damage.volume for site in taken), errors, left)
-        if any(site.uncertainty and site.uncertainty.is_open for site in taken):
-            total = (total[0], math.inf)
-    key = digest("interval", total, [site.key("damage") for site in work.sites])
-    return replace(work, job=state.with_value(JobState.volume_95, total, key))
+    if len(errors) != len(taken) or lost:
+        return None
+    # collect_result moves it to the volume of the union, which is the same but for overlaps
+    left = sum(_limit_doubtful(site) for site in found if not site.accepted)
+    total = combine_total(sum(site.damage.volume for site in taken), errors, left)
+    is_open = any(site.uncertainty and site.uncertainty.is_open for site in taken)
+    return (total[0], math.inf) if is_open else total
 
 
 def _limit_doubtful(site: FoundSite) -> float:
@@ -88,10 +104,16 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         return replace(site, uncertainty=Uncertainty((known, known), None), error=error)
     points = state.aligned.points[site.members]
     inner = find_inner_faces(site.damage, state.part)
+    beyond = ask_beyond_points(
+        site.damage, state.part, points, state.aligned.points, state.aligned.noise, state.aligned.spacing,
+        state.tolerance, state.unit,
+    )  # fmt: skip
+    site = replace(site, beyond=beyond)
     # what the model fit gives is the 95 % bound of a deviation
     found = measure_site_error(
-        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts,
-        form=measure_at_site(state, site) / WIDTH, free=state.pose.free, adapted=state.adapted,
+        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts, beyond,
+        free=state.pose.free, adapted=state.adapted,
+        form=measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH,
     )  # fmt: skip
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))
@@ -127,13 +149,12 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     return replace(site, uncertainty=uncertainty, error=error, dependences=dependences)
 
 
-def _may_hide_loss(state: JobState) -> bool:
+def _may_hide_loss(part: Part, scan: Scan, deviation: Deviation, tolerance: float) -> bool:
     """Whether there are too few points to say that nothing is lost: so few or so far apart that they do not show the
     part, or far apart for the tolerance with points too deep for noise, which are in no site."""
-    scan, tolerance = state.aligned, state.tolerance
-    if describe_few(scan) or scan.spacing > COARSE * state.part.diagonal:
+    if describe_few(scan) or scan.spacing > COARSE * part.diagonal:
         return True
-    return scan.spacing > tolerance and bool((state.deviation.distance < -2 * tolerance).any())
+    return scan.spacing > tolerance and bool((deviation.distance < -2 * tolerance).any())
 
 
 def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> float:

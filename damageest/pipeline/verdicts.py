@@ -7,43 +7,47 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Reason
-from damageest.checks.beyond_points import ask_beyond_points
+from damageest.artefacts import Deviation, Part, Pose, Reason, Scan
 from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import compare_other_poses, describe_motion
+from damageest.checks.model_fit import FittedModel
+from damageest.checks.one_motion import is_one_motion
 from damageest.checks.scan_facts import gather_scan_facts
 from damageest.checks.two_sheets import measure_two_sheets
 from damageest.checks.unseen_rim import measure_unseen_rim
 from damageest.checks.verdict import ask_rules, decide, open_end
 from damageest.errors import StageError
-from damageest.findings import Level
+from damageest.findings import Level, Surplus
 from damageest.geometry.solids import to_solid, unite
 from damageest.geometry.voxels import measure_area
-from damageest.job.model import Accept
-from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine
+from damageest.job.model import Accept, SiteChoice
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
-from damageest.pipeline.state import FoundSite, JobState, Work
-from damageest.rules import FreePose, SiteFacts
+from damageest.pipeline.state import FoundSite, JobState, Reasons
+from damageest.pipeline.steps import step
+from damageest.rules import FreePose, ScanFacts, SiteFacts
 from damageest.stages.align import Align
 
 BY_RAYS = 0.5
 """Share of a site's unseen skin that rays have to have passed through, for the loss to be proven by them."""
+JUDGED_BY = ("part", "aligned", "deviation", "skin", "coverage", "pose", "tolerance", "unit")
+"""What the facts of a site are gathered from."""
 
 
-def choose_sites(engine: Engine, work: Work) -> Work:
+@step(gives=("found", "warnings"))
+def choose_sites(
+    found: tuple[FoundSite, ...], choice: SiteChoice, aligned: Scan, deviation: Deviation, part: Part, tolerance: float
+) -> tuple[tuple[FoundSite, ...], Reasons]:
     """Drops and merges sites as the job says. Numbers stay those of a run without these decisions."""
-    choice = engine.job.sites
-    _check_numbers("sites.drop", choice.drop, work.sites)
+    _check_numbers("sites.drop", choice.drop, found)
     for group in choice.merge:
-        _check_numbers("sites.merge", group, work.sites)
-    sites = {site.number: site for site in work.sites if site.number not in choice.drop}
+        _check_numbers("sites.merge", group, found)
+    sites = {site.number: site for site in found if site.number not in choice.drop}
     warnings = [Reason("site_dropped", f"site {number} was dropped, as the job says") for number in choice.drop]
     for group in choice.merge:
         members = [sites.pop(number) for number in sorted(set(group)) if number in sites]
         if members:
-            sites[members[0].number] = _merge(engine, members)
+            sites[members[0].number] = _merge(members, aligned, deviation, part, tolerance)
             named = ", ".join(str(one.number) for one in members)
             warnings.append(Reason("sites_merged", f"sites {named} were merged, as the job says"))
     if choice.keep is not None:
@@ -54,31 +58,31 @@ def choose_sites(engine: Engine, work: Work) -> Work:
                 del sites[number]
                 text = f"site {number} was dropped: its middle is outside the box of sites.keep"
                 warnings.append(Reason("site_dropped", text))
-    ordered = tuple(sites[number] for number in sorted(sites))
-    return replace(work, sites=ordered, warnings=(*work.warnings, *warnings))
+    return tuple(sites[number] for number in sorted(sites)), warnings
 
 
-def gather_facts(engine: Engine, work: Work) -> Work:
+@step(gives="facts")
+def gather_facts(
+    skin: SkinView, part: Part, aligned: Scan, deviation: Deviation, surplus: tuple[Surplus, ...], pose: Pose,
+    fitted: FittedModel | None, tolerance: float, unit: str, aligner: Align | None,
+) -> ScanFacts:  # fmt: skip
     """Measures what the whole scan says about skin that deviates and is not damaged."""
-    state = work.job
-    facts = gather_scan_facts(
-        state.skin, state.aligned, state.deviation, state.surplus, state.pose,
-        None if state.fitted is None else state.fitted.fit, state.tolerance, state.unit,
-        is_fitted=engine.job.implementations[Align].name != "none" and not state.pose.is_held,
+    return gather_scan_facts(
+        skin, part, aligned, deviation, surplus, pose, None if fitted is None else fitted.fit, tolerance, unit,
+        is_fitted=getattr(aligner, "use", "none") != "none" and not pose.is_held,
     )  # fmt: skip
-    sources = (JobState.skin, JobState.aligned, JobState.deviation, JobState.surplus, JobState.pose, JobState.fitted)
-    return replace(work, job=state.derive(JobState.facts, facts, *sources, JobState.tolerance))
 
 
-def judge_sites(engine: Engine, work: Work) -> Work:
+@step(gives="found", reads=("found", "accept", "rules", "facts", *JUDGED_BY))
+def judge_sites(state: JobState) -> tuple[FoundSite, ...]:
     """Gives each site its verdict, and takes as damage those that the job accepts."""
-    accept = engine.job.accept
+    accept = state.accept
     if not isinstance(accept, str):
-        _check_numbers("accept", accept, work.sites)
+        _check_numbers("accept", accept, state.found)
     done = []
-    for site in work.sites:
-        facts = _gather_site_facts(work.job, site)
-        reasons = ask_rules(engine.registry.rules, facts, work.job.facts)
+    for site in state.found:
+        facts = _gather_site_facts(state, site)
+        reasons = ask_rules(state.rules, facts, state.facts)
         interval = open_end(facts.interval, reasons)
         verdict = decide(facts.volume, interval, reasons)
         uncertainty = replace(site.uncertainty, volume_95=interval) if site.uncertainty else None
@@ -87,7 +91,7 @@ def judge_sites(engine: Engine, work: Work) -> Work:
                 site, verdict=verdict, uncertainty=uncertainty, accepted=is_accepted(accept, verdict.level, site.number)
             )
         )
-    return replace(work, sites=tuple(done))
+    return tuple(done)
 
 
 def is_accepted(accept: Accept, level: Level, number: int) -> bool:
@@ -101,10 +105,6 @@ def is_accepted(accept: Accept, level: Level, number: int) -> bool:
 
 def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
     depth, points = -state.deviation.distance[site.members], state.aligned.points
-    beyond = ask_beyond_points(
-        site.damage, state.part, points[site.members], points, state.aligned.noise, state.aligned.spacing,
-        state.tolerance, state.unit,
-    )  # fmt: skip
     typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
     return SiteFacts(
         volume=site.damage.volume,
@@ -121,6 +121,7 @@ def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
             site.damage, state.part, state.coverage, 2 * max(state.tolerance, state.aligned.spacing)
         ),
         two_sheets=measure_two_sheets(state.aligned, state.deviation, state.part, site.members, state.tolerance),
+        one_motion=is_one_motion(state.aligned, state.deviation, state.part, site.members, state.tolerance),
         other_poses=compare_other_poses(site.damage, state.part, state.pose, state.tolerance),
         free=tuple(
             FreePose(describe_motion(one.motion, state.unit), *one.ends, one.moved * one.reach)
@@ -128,8 +129,8 @@ def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
         ),
         displaced=site.displaced,
         covered=site.covered,
-        beyond=beyond.amount,
-        beyond_words=beyond.reason,
+        beyond=site.beyond.amount,
+        beyond_words=site.beyond.reason,
     )
 
 
@@ -140,12 +141,12 @@ def _check_numbers(field: str, numbers: Iterable[int], sites: tuple[FoundSite, .
         raise StageError(f"{field} names site {unknown[0]}; {there}", f"change {field} in the job")
 
 
-def _merge(engine: Engine, members: list[FoundSite]) -> FoundSite:
-    first, job = members[0], members[0].job
+def _merge(members: list[FoundSite], aligned: Scan, deviation: Deviation, part: Part, tolerance: float) -> FoundSite:
+    first = members[0]
     origin = first.damage.bounds.mean(axis=0)
     damage = to_solid(unite((site.damage for site in members), origin), origin) or first.damage
     points = np.unique(np.concatenate([site.members for site in members]))
-    evidence = weigh_evidence(damage, job.aligned.points[points], job.aligned, job.deviation, job.part, job.tolerance)
+    evidence = weigh_evidence(damage, aligned.points[points], aligned, deviation, part, tolerance)
     whole = replace(
         first,
         clusters=tuple(sorted({cluster for site in members for cluster in site.clusters})),
@@ -154,7 +155,7 @@ def _merge(engine: Engine, members: list[FoundSite]) -> FoundSite:
         notes=tuple(dict.fromkeys(note for site in members for note in site.notes)),
         enclosures=tuple({id(solid): solid for site in members for solid in site.enclosures}.values()),
     )
-    return whole.with_value(FoundSite.damage, damage, digest(damage))
+    return whole.with_value(FoundSite.damage, damage)
 
 
 def _is_proven_by_rays(skin: SkinView, site: FoundSite) -> bool:

@@ -35,7 +35,8 @@ class ScanFacts:
     fitted to the scan, and no unworn skin is known to hold it. ``systematic``: standard deviation of the mean distances
     of intact cells of the skin that noise does not explain. ``outward_area`` and ``outward_height``: skin that lies
     outside the part by some tolerances, and by how much. ``between_views``: how far the views differ where they
-    overlap, 0 where they agree or are not known. ``pose``: reasons that the stage align gave against its pose.
+    overlap, 0 where they agree or are not known. ``sheets_share``: share of its points at which it shows two surfaces,
+    ``sheets_apart`` from each other. ``pose``: reasons that the stage align gave against its pose.
     ``fit``: how well the part as designed explains the intact skin; None where that was not measured.
     """
 
@@ -49,6 +50,8 @@ class ScanFacts:
     outward_area: float = 0.0
     outward_height: float = 0.0
     between_views: float = 0.0
+    sheets_share: float = 0.0
+    sheets_apart: float = 0.0
     pose: tuple[Reason, ...] = ()
     fit: ModelFit | None = None
 
@@ -61,8 +64,9 @@ class SiteFacts:
     None where there is none. ``area``: skin that its points cover; ``damage_area``: of the whole surface of the DV;
     ``count``: its scan points; ``typical`` and ``deepest``: median and 95th percentile of their depth below the skin.
     ``evidence``: DV against scan. ``by_rays``: whether rays passed through the metal that it removes. ``rim_unseen``:
-    share of its rim beside skin that the scan does not show. ``two_sheets``: share of the skin that it removes on which
-    the points lie in two layers. ``other_poses``: share of its skin that is not skin in another pose that fits as well.
+    share of its rim beside skin that the scan does not show. ``two_sheets``: share of its points where the scan shows
+    another surface above them, on the skin; ``one_motion``: whether one motion of them all explains it.
+    ``other_poses``: share of its skin that is not skin in another pose that fits as well.
     ``free``: motions that the scan does not exclude. ``displaced``: numbers of the surplus as large as the loss.
     ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no scan point shows, and
     ``beyond_words``: how it was found.
@@ -80,6 +84,7 @@ class SiteFacts:
     by_rays: bool = False
     rim_unseen: float = 0.0
     two_sheets: float = 0.0
+    one_motion: bool = False
     other_poses: float = 0.0
     free: tuple[FreePose, ...] = ()
     displaced: tuple[int, ...] = ()

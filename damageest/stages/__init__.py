@@ -143,26 +143,26 @@ def _check_types(cls: type[Stage], names: tuple[str, ...]) -> None:
             f"{_name(cls)}.run: its types cannot be read ({error}); import them outside of 'if TYPE_CHECKING'"
         ) from None
     for name in names:
-        if name in declared and not _accepts(declared[name], cls.takes()[name]):
+        if name in declared and not accepts(declared[name], cls.takes()[name]):
             raise PluginError(
                 f"{_name(cls)}.run declares {_show(name, declared[name])}; stage '{cls.stage}' gives "
                 f"{_show(name, cls.takes()[name])}"
             )
-    if "return" in declared and not _accepts(cls.gives_type(), declared["return"]):
+    if "return" in declared and not accepts(cls.gives_type(), declared["return"]):
         raise PluginError(
-            f"{_name(cls)}.run declares that it returns {_text(declared['return'])}; stage '{cls.stage}' must return "
-            f"{_text(cls.gives_type())}"
+            f"{_name(cls)}.run declares that it returns {describe_type(declared['return'])}; stage '{cls.stage}' must "
+            f"return {describe_type(cls.gives_type())}"
         )
 
 
-def _accepts(wanted: Any, given: Any) -> bool:
+def accepts(wanted: Any, given: Any) -> bool:
     """Whether each value of type ``given`` is one of type ``wanted``, as far as the annotations show."""
     if wanted in (Any, object) or given is Any or wanted == given:
         return True
     if _is_union(given):
-        return all(_accepts(wanted, kind) for kind in typing.get_args(given))
+        return all(accepts(wanted, kind) for kind in typing.get_args(given))
     if _is_union(wanted):
-        return any(_accepts(kind, given) for kind in typing.get_args(wanted))
+        return any(accepts(kind, given) for kind in typing.get_args(wanted))
     outer, inner = typing.get_origin(wanted) or wanted, typing.get_origin(given) or given
     if not (isinstance(outer, type) and isinstance(inner, type)):
         return False
@@ -179,10 +179,10 @@ def _name(cls: type) -> str:
 
 
 def _show(name: str, kind: Any) -> str:
-    return f"{name}: {_text(kind)}"
+    return f"{name}: {describe_type(kind)}"
 
 
-def _text(kind: Any) -> str:
+def describe_type(kind: Any) -> str:
     """A type as it is written in code."""
     from damageest import artefacts
 

@@ -16,8 +16,10 @@ from typing import Any
 import pytest
 
 import damageest
+from damageest.batches.files import write_page
 from damageest.batches.rows import Row, read_row
 from damageest.batches.work import work
+from damageest.io.files import embed_png
 from damageest.isolation import end_workers
 from tests import damaged_box
 from tests.registry.test_registry import GROWN, Site, site
@@ -81,6 +83,19 @@ def test_rows_of_a_batch(client: Any, tmp_path: Path) -> None:
     assert told[-1] == {row.name for row in rows}
 
 
+def test_the_page_shows_the_picture_of_the_report(tmp_path: Path) -> None:
+    """It comes from the report as a value, whatever its page looks like; a run without a report has none."""
+    from PIL import Image
+
+    job = damaged_box.write_small(tmp_path)
+    row = run_one(job, "report=html")
+    write_page([row], tmp_path)
+    assert Image.open(tmp_path / ".b.png").size == (320, 240)
+    assert embed_png((tmp_path / ".b.png").read_bytes()) in (tmp_path / "batch.html").read_text()
+    write_page([run_one(job, "report=none")], tmp_path)
+    assert "<img" not in (tmp_path / "batch.html").read_text()
+
+
 HANGING = '''
 from damageest.artefacts import Part
 from damageest.stages.part import ReadPart
@@ -131,7 +146,10 @@ def test_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
     assert run_one(job, "part=none").outcome == "refused"  # the process has started, and is used again
     row = run_one(job, "part=hanging", timeout=4)
     assert row.outcome == "timeout"
-    assert row.error == "part: hanging: not finished after 4 s (--timeout)"
+    assert row.error == "part: hanging: was ended: not finished after 4 s, the time limit of a job"
+    row = run_one(job, "part=hanging", stage_timeout=1)
+    assert row.outcome == "timeout", "a stage without a process of its own has its time limit too"
+    assert row.error == "part: hanging: was ended: not finished after 1 s, the time limit of a stage"
 
 
 BATCH = """

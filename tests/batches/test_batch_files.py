@@ -6,7 +6,7 @@ import csv
 import json
 from pathlib import Path
 
-from damageest.batches.files import write_page, write_tables
+from damageest.batches.files import keep_picture, write_page, write_tables
 from damageest.batches.rows import Row, read_row
 
 EVIL = "<script>alert(1)</script>\n\"quote'"
@@ -48,13 +48,17 @@ def test_csv(tmp_path: Path) -> None:
 def test_page_is_escaped_and_needs_no_network(tmp_path: Path) -> None:
     report = tmp_path / "good/report.html"
     report.parent.mkdir()
-    report.write_text('<img class="x" src="data:image/png;base64,AAAA">')
+    report.write_text("a report of a plugin, with no picture in it")
+    keep_picture(report.parent, b"\x89PNG")
     write_page(make_rows(tmp_path), tmp_path)
     text = (tmp_path / "batch.html").read_text()
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert(1)" in text
     assert "http" not in text.replace("http-equiv", "")
     assert 'href="good/report.html"' in text
-    assert 'src="data:image/png;base64,AAAA"' in text
+    assert 'src="data:image/png;base64,iVBORw=="' in text
     assert "1 proven, 1 doubtful" in text
     assert "(2 tries)" in text
+    keep_picture(report.parent, b"")
+    write_page(make_rows(tmp_path), tmp_path)
+    assert "<img" not in (tmp_path / "batch.html").read_text()

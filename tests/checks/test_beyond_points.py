@@ -34,7 +34,9 @@ def ask(volume: Any, lost: Any, points: Floats | None = None) -> BeyondPoints:
     ids=["pocket", "edge", "pit", "deep hole"],
 )
 def test_the_truth_is_shown(lost: Any) -> None:
-    assert not ask(lost, lost).reason
+    found = ask(lost, lost)
+    assert not found.reason
+    assert found.short < 0.01 * lost.volume()
 
 
 def test_an_undercut_is_shown_by_the_points_on_it() -> None:
@@ -62,6 +64,17 @@ def test_added_metal_is_asked_as_well() -> None:
     rest = (points, 0.0, GAP, TOLERANCE, "mm")
     assert not ask_beyond_points(as_solid(pad(DEPTH)), as_part(block()), own, *rest).reason
     assert ask_beyond_points(as_solid(pad(4 * DEPTH)), as_part(block()), own, *rest).is_contradicted
+
+
+def test_a_thin_wall_that_came_out_thick_is_told() -> None:
+    """Two pockets with a wall of 0.1 mm between them; what was found has a wall of 1.1 mm on one side of it."""
+    one = Manifold.cube((10, 8, 3), True).translate((0, -4.05, 4))
+    other = Manifold.cube((10, 8, 3), True).translate((0, 4.05, 4))
+    thick = one + other.translate((0, 1, 0))
+    kept = Manifold.cube((10, 1, 3), True).translate((0, 8.55, 4))
+    found = ask(thick - kept, one + other)
+    assert 0.5 < found.short / (10 * 1.0 * 1.5) < 1.1
+    assert ask(one + other, one + other).short < 0.25 * (10 * 1.0 * 1.5)
 
 
 def test_without_points_of_its_own_nothing_is_said() -> None:

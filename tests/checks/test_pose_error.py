@@ -73,14 +73,26 @@ def test_form_of_the_skin_is_systematic_and_noise_is_not() -> None:
     part = damaged_box.box()
     assert measure(part).systematic < 0.06 * SIGMA
     assert measure(part, form=0.03).systematic == 0.03
+    assert 0.008 < measure_wavy(part, 3.5).systematic < 0.04
+
+
+def test_the_area_that_deviates_alike_follows_the_waves() -> None:
+    part = damaged_box.box()
+    patch = measure(part).patch_area
+    short, long = measure_wavy(part, 1.5), measure_wavy(part, 8.0)
+    assert short.patch_area < 2 * patch
+    assert long.patch_area > 4 * patch
+
+
+def measure_wavy(part: Part, length: float) -> PoseError:
+    """The skin is wavy, with a wavelength of 2 pi times ``length``."""
     mesh = trimesh.Trimesh(part.vertices, part.faces)
     points, index = trimesh.sample.sample_surface(mesh, 20_000, seed=1)
-    wave = 0.04 * np.sin(points[:, :1] / 3) * np.cos(points[:, 1:2] / 4)
+    wave = 0.04 * np.sin(points[:, :1] / length) * np.cos(points[:, 1:2] / length)
     points = points + wave * mesh.face_normals[index] + np.random.default_rng(0).normal(scale=SIGMA, size=points.shape)
     distance, face = signed_distance(points, part)
     deviation = Deviation(distance, face, np.zeros(len(points), np.uint8))
-    wavy = measure_pose_error(part, Scan(points, noise=SIGMA, spacing=0.5), deviation, TOLERANCE)
-    assert 0.008 < wavy.systematic < 0.04
+    return measure_pose_error(part, Scan(points, noise=SIGMA, spacing=0.5), deviation, TOLERANCE)
 
 
 def test_too_few_points_leave_a_tolerance_to_every_direction() -> None:

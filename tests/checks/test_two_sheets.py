@@ -7,8 +7,9 @@ import pytest
 
 import damageest
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Scan
-from damageest.checks.two_sheets import measure_two_sheets
+from damageest.checks.two_sheets import measure_sheets, measure_two_sheets
 from damageest.geometry.distance import signed_distance
+from damageest.rules.two_sheets import AGAINST, OF_SCAN
 from damageest.stages.scan.simulate import Simulate
 from tests.damaged_box import SIZE, box
 
@@ -28,19 +29,33 @@ def lower_top(points: Floats, depth: float, where: Floats) -> Floats:
     return out
 
 
-def measure(points: Floats) -> float:
-    part = box()
-    distance, face = signed_distance(points, part)
+def compare(points: Floats) -> tuple[Scan, Deviation]:
+    distance, face = signed_distance(points, box())
     label = np.where(distance < -TOLERANCE, DAMAGE, INTACT).astype(np.uint8)
-    scan = Scan(points, noise=NOISE, spacing=0.6)
-    return measure_two_sheets(scan, Deviation(distance, face, label), part, np.flatnonzero(label == DAMAGE), TOLERANCE)
+    return Scan(points, noise=NOISE, spacing=0.6), Deviation(distance, face, label)
+
+
+def measure(points: Floats) -> float:
+    scan, deviation = compare(points)
+    return measure_two_sheets(scan, deviation, box(), np.flatnonzero(deviation.label == DAMAGE), TOLERANCE)
+
+
+def measure_scan(points: Floats) -> float:
+    return measure_sheets(*compare(points), box(), TOLERANCE).share
 
 
 @pytest.mark.parametrize("depth", [1.5, 2.0, 4.0])
 def test_a_second_view_below_the_first_is_found(depth: float) -> None:
     first, second = scan_box(1), scan_box(2)
     low = lower_top(second, depth * TOLERANCE, second[:, 0] > -8)
-    assert measure(np.concatenate([first, low])) > 0.5
+    assert measure(np.concatenate([first, low])) > 4 * AGAINST
+
+
+def test_views_that_do_not_fit_are_found_where_none_of_them_shows_a_site() -> None:
+    """Where both show the skin, the second lies less than a tolerance below."""
+    first, second = scan_box(1), scan_box(2)
+    low = lower_top(second, 0.9 * TOLERANCE, second[:, 0] > 0)
+    assert measure_scan(np.concatenate([first, low])) > 2 * OF_SCAN
 
 
 @pytest.mark.parametrize(
@@ -55,14 +70,15 @@ def test_a_second_view_below_the_first_is_found(depth: float) -> None:
     ],
 )
 def test_the_rim_of_a_loss_is_no_second_surface(tool: dict[str, object]) -> None:
-    assert measure(scan_box(1, tool, points=40_000)) < 0.2
+    assert measure(scan_box(1, tool, points=40_000)) < AGAINST / 2
 
 
 @pytest.mark.parametrize("depth", [0.65, 0.8, 1.0])
 def test_wear_of_about_a_tolerance_is_one_surface_with_noise(depth: float) -> None:
     points = scan_box(1, points=40_000)
     assert measure(points) == 0
-    assert measure(lower_top(points, depth * TOLERANCE, points[:, 0] > -8)) < 0.1
+    assert measure_scan(points) < OF_SCAN / 2
+    assert measure(lower_top(points, depth * TOLERANCE, points[:, 0] > -8)) < AGAINST / 2
 
 
 def test_a_false_site_of_a_misplaced_view_is_doubtful_and_names_the_cause() -> None:

@@ -110,14 +110,14 @@ def test_a_picture_shows_the_damage(folder: Path, tmp_path: Path) -> None:
     assert red[120:, 160:].sum() > 3 * red[120:, :160].sum(), "the site is seen from near"
 
 
-def die(*_: object) -> None:
+def die(**_: object) -> None:
     os.abort()
 
 
 def test_a_machine_without_opengl_says_what_to_install(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pictures, "_draw_quietly", die)
+    monkeypatch.setattr(pictures, "draw_here", die)
     with pytest.raises(StageError, match="no OpenGL") as caught:
         pictures.draw_picture(pictures.Picture((open_output(folder),), (0,)), tmp_path / "picture.png")
     assert "libegl1" in str(caught.value)

@@ -42,9 +42,8 @@ def try_job(path: str, whole: bool, registry: Any) -> dict[str, Any]:
         if whole:
             result = damageest.run(job, registry=registry, limits=Limits(seconds=SECONDS))
             return {"outcome": "done", "volume": result.damage_volume, "words": "; ".join(map(str, result.warnings))}
-        state = follow(
-            (ReadPart, ReadScan, crop_scan), Engine(job, registry, limits=Limits(seconds=SECONDS)), start(job)
-        ).job
+        engine = Engine(job, registry, limits=Limits(seconds=SECONDS))
+        state = follow((ReadPart, ReadScan, crop_scan), engine, start(engine))
         part, scan = state.part, state.scan
         return {"outcome": "done", "volume": part.volume, "points": len(scan.points)}
     except DamageestError as error:

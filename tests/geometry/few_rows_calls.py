@@ -11,6 +11,7 @@ import numpy as np
 
 from damageest.artefacts import Samples, Sites
 from damageest.geometry import (
+    barycentric,
     bodies,
     body_repair,
     complement,
@@ -25,6 +26,7 @@ from damageest.geometry import (
     local_fits,
     loops,
     make_part,
+    morton,
     neighbourhoods,
     noise,
     open_surfaces,
@@ -73,6 +75,9 @@ from tests.geometry.few_rows import (
 )
 
 CALLS: dict[str, Callable[[Rows], None]] = {
+    "barycentric.find_barycentric": lambda r: expect(
+        barycentric.find_barycentric(r.points[:, None] + np.eye(3), r.points), (r.count, 3)
+    ),
     "bodies.label_pieces": lambda r: expect(bodies.label_pieces(r.mesh.faces), (len(r.mesh.faces),)),
     "body_repair.label_bodies": lambda r: expect(body_repair.label_bodies(r.mesh.faces)[0], (len(r.mesh.faces),)),
     "body_repair.orient_faces": lambda r: expect(body_repair.orient_faces(r.mesh.faces)[0], (len(r.mesh.faces), 3)),
@@ -231,6 +236,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "voxels.VoxelGrid": call_voxel_grid,
     "voxels.measure_bounds": lambda r: expect(voxels.measure_bounds(r.points), (2, 3)),
     "voxels.number_cubes": lambda r: expect(voxels.number_cubes(r.points, 0.5), (r.count, 3), (r.count,)),
+    "morton.encode_cells": lambda r: expect(morton.encode_cells(np.zeros((r.count, 3), int)), (r.count,)),
     "voxels.order_by_place": lambda r: expect(voxels.order_by_place(r.points), (r.count,)),
     "voxels.measure_area": lambda r: expect(np.asarray(voxels.measure_area(r.points, 0.5)), ()),
     "voxels.number_faced_cubes": lambda r: expect(

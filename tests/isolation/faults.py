@@ -5,8 +5,11 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+import time
 
 import numpy as np
+
+from damageest.isolation import at_work, call_isolated
 
 
 def add(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -62,3 +65,45 @@ def raise_odd() -> None:
         pass
 
     raise OddError("not known elsewhere")
+
+
+def crash_at_work() -> None:
+    with at_work("cutting", owner="acme"):
+        with at_work("measuring"):
+            pass
+        os.abort()
+
+
+def raise_at_work() -> None:
+    with at_work("cutting"), at_work("measuring"):
+        raise ValueError("no such thing")
+
+
+def fill_memory_at_work() -> None:
+    with at_work("cutting"):
+        fill_memory()
+
+
+def wait_at_work(seconds: float, limit: float, steps: int = 1) -> int:
+    """Uses no processor."""
+    for _ in range(steps):
+        with at_work("waiting", limit):
+            time.sleep(seconds)
+    return steps
+
+
+def work_at_work(limit: float) -> None:
+    with at_work("working", limit):
+        loop()
+
+
+def tell_nested_process() -> tuple[int, int]:
+    return os.getpid(), call_isolated(tell_process, {}, worker="nested")
+
+
+def use(size: int, seconds: float) -> None:
+    """Holds so many bytes, and uses so much time of the processor."""
+    held = np.ones(size, np.uint8)
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        held[0] += 1

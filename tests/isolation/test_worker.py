@@ -16,7 +16,17 @@ import pytest
 
 from damageest.artefacts import Solid
 from damageest.errors import InputError, StageError
-from damageest.isolation import Limits, call_isolated, end_workers, format_bytes, measure_free_memory, parse_memory
+from damageest.isolation import (
+    Limits,
+    ProcessError,
+    Usage,
+    call_isolated,
+    end_workers,
+    find_place,
+    format_bytes,
+    measure_free_memory,
+    parse_memory,
+)
 from damageest.isolation.limits import own_memory
 from damageest.isolation.transfer import LARGE
 from tests import damaged_box
@@ -126,6 +136,66 @@ def test_an_exception_that_cannot_pass_keeps_its_name() -> None:
     assert "raise_odd" in str(caught.value.__cause__)
 
 
+@pytest.mark.parametrize(
+    ("function", "what"),
+    [(faults.crash_at_work, "cutting"), (faults.fill_memory_at_work, "cutting"), (faults.raise_at_work, "measuring")],
+)
+def test_the_error_names_what_was_at_work(function: Callable[..., Any], what: str) -> None:
+    with pytest.raises((ProcessError, ValueError)) as caught:
+        call(function)
+    assert find_place(caught.value) == what
+    with pytest.raises(ProcessError) as caught:
+        call(faults.crash)
+    assert find_place(caught.value) == "", "it is forgotten with the call"
+
+
+def test_what_is_noted_has_a_time_limit_of_its_own() -> None:
+    assert call(faults.wait_at_work, seconds=0.7, limit=1.5, steps=3) == 3, "each by itself"
+    with pytest.raises(ProcessError, match=r"not finished after 0\.5 s, the time limit of a stage") as caught:
+        call(faults.wait_at_work, seconds=60, limit=0.5)
+    assert (caught.value.why, find_place(caught.value)) == ("time", "waiting")
+
+
+def test_a_limit_of_processor_time_counts_no_waiting() -> None:
+    def measure(function: Callable[..., Any], **arguments: Any) -> Any:
+        return call_isolated(function, arguments, worker="tests", processor_time=True)
+
+    assert measure(faults.wait_at_work, seconds=1.5, limit=0.5) == 1
+    with pytest.raises(ProcessError) as caught:
+        measure(faults.work_at_work, limit=0.5)
+    assert find_place(caught.value) == "working"
+    with pytest.raises(ProcessError) as caught:  # but what waits for ever is ended too
+        measure(faults.wait_at_work, seconds=60, limit=0.05)
+    assert find_place(caught.value) == "waiting"
+
+
+def test_a_process_for_one_call_ends_with_it() -> None:
+    import psutil
+
+    first, second = (call_isolated(faults.tell_process, {}, worker="tests", stays=False) for _ in range(2))
+    assert first != second
+    assert not psutil.pid_exists(first)
+
+
+def test_an_isolated_call_of_a_call_is_an_ordinary_one_unless_it_is_asked_for() -> None:
+    own, other = call_isolated(faults.tell_nested_process, {}, worker="tests")
+    assert own == other
+    own, other = call_isolated(faults.tell_nested_process, {}, worker="tests", nested=True)
+    assert own != other
+
+
+def test_what_a_call_used_is_told() -> None:
+    told: list[Usage] = []
+    for size in (300 * 2**20, 1):
+        call_isolated(faults.use, {"size": size, "seconds": 0.3}, worker="tests", tell=told.append)
+    assert all(0.25 < usage.seconds < 3 for usage in told)
+    much, little = (usage.megabytes for usage in told)
+    assert much is not None
+    assert little is not None
+    assert 300 < much < 600
+    assert little < much - 250, "the peak of the second call, not that of the process"
+
+
 CROWDED = """
 import os, resource
 from damageest.isolation import call_isolated
@@ -203,7 +273,5 @@ def test_sizes_that_are_none(text: str) -> None:
 
 
 def test_free_memory() -> None:
-    free = measure_free_memory()
-    assert free is not None
-    assert 0 < free < 2**50
+    assert 0 < measure_free_memory() < 2**50
     assert format_bytes(6e9) == "6 GB"

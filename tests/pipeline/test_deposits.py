@@ -20,7 +20,7 @@ from damageest.job import Job
 from damageest.output.result_json import build_report, result_schema
 from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import FoundSite, JobState, Work
+from damageest.pipeline.state import FoundSite, JobState
 from damageest.registry import Registry
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance.milling import Milling
@@ -137,8 +137,7 @@ def lane(number: int, x: float, radius: float, grown: float, cavity: float = 0.0
 
 def separate(lanes: list[FoundSite]) -> list[Any]:
     """The deposits of the sites, separated."""
-    work = separate_deposits(engine(), Work(JobState().with_value(JobState.tolerance, 0.1, "0.1"), sites=tuple(lanes)))
-    return [site.deposit for site in work.sites]
+    return [site.deposit for site in separate_deposits(tuple(lanes), 0.1)]
 
 
 def engine(stage: Allowance | None = None) -> Engine:
@@ -188,14 +187,15 @@ class Told(NoAllowance):
 
 def test_others_and_refusals() -> None:
     lanes = [lane(1, 0, 2, 0.1), lane(2, 6, 2, 0.1), lane(3, -6, 2, 0.1)]
-    work = make_deposits(Allowance)(engine(Told()), Work(JobState(), sites=tuple(lanes)))
-    ahead: Any = work.sites
+    state = JobState().with_value(JobState.found, tuple(lanes), "lanes").with_value(JobState.part, damaged_box.box())
+    found, failures = make_deposits(engine(Told()), state.with_value(JobState.tolerance, 0.1))
+    ahead: Any = found
     assert [site.number for site in ahead] == [1, 2, 3]
     assert ahead[0].deposit.volume == pytest.approx(2 * ball(0, 2).volume, rel=1e-6)
     assert iou(ahead[2].deposit, Solid(*to_arrays(to_manifold(ball(0, 2)) + to_manifold(ball(6, 2))))) > 1 - 1e-6
     assert ahead[1].deposit is None
     assert ahead[1].refused
-    assert [error.site for error in work.failures] == [2]
+    assert [error.site for error in failures] == [2]
 
 
 def test_milling_is_registered_with_its_provider() -> None:

@@ -16,7 +16,7 @@ from damageest.io.meshes import write_points
 from damageest.job import Job, load
 from damageest.pipeline.cache import Cache
 from damageest.pipeline.engine import Engine, follow
-from damageest.pipeline.state import Candidate, FoundSite, JobState, Value, Work
+from damageest.pipeline.state import Candidate, FoundSite, JobState, Value
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS, contract_of
 from damageest.registry.hookspecs import hookimpl
@@ -110,7 +110,8 @@ def test_a_site_that_fails_does_not_stop_the_others(registry: Registry, tmp_path
 
     engine = engine_with(act, registry, tmp_path)
     done = engine_with(lambda damage: None, registry, tmp_path)
-    work = Work(state().job, candidates=(state(1), state(2, "l")))
+    work = state().job.with_value(JobState.candidates, (state(1), state(2, "l")), "c")
+    work = work.with_value(JobState.failures, ())
     failed = follow((Allowance,), engine, work)
     assert not failed.candidates
     assert [error.site for error in failed.failures] == [1, 2]

@@ -50,8 +50,7 @@ def find_modes(
     _, main = np.linalg.eigh(spread.T @ spread)
     largest = columns @ main[:, ::-1][:, :MODES]
     modes = np.einsum("vm,mkc->cvk", field.basis.evaluate(places), largest)
-    near = find_distance(places, found.material[np.abs(found.distance) < tolerance])
-    beyond = BEYOND * np.maximum(near - find_spacing(body, points), 0.0)[:, None] * skin.vertex_normals
+    beyond = BEYOND * go_beyond(places, found.material[np.abs(found.distance) < tolerance], find_spacing(body, points))
     modes = np.concatenate([modes, beyond[None]])
     at = [one.freedom for one in trials].index(chosen.freedom) + 1
     alike = [one for one in trials[at:] if one.freedom.stretches == chosen.freedom.stretches]
@@ -61,11 +60,13 @@ def find_modes(
     return np.concatenate([modes, (freer.field.displace(places) - field.displace(places))[None]])
 
 
-def find_distance(places: Floats, seen: Floats) -> Floats:
-    """(V,) how far places (V,3) are from the nearest of the seen places (N,3)."""
+def go_beyond(places: Floats, seen: Floats, spacing: float) -> Floats:
+    """(V,3) the way from the nearest of the seen places (N,3) to each of the places (V,3), less the ``spacing``."""
     from scipy.spatial import cKDTree
 
-    return np.asarray(cKDTree(seen).query(places)[0])
+    distance, nearest = cKDTree(seen).query(places)
+    share = np.maximum(1 - spacing / np.maximum(distance, 1e-300), 0.0)
+    return np.asarray(share[:, None] * (places - seen[nearest]))
 
 
 def find_spacing(body: Body, points: Floats) -> float:

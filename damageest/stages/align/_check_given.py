@@ -12,7 +12,10 @@ from damageest.stages.align._check_pose import check_pose
 from damageest.stages.align._check_worn import check_with_wear, measure_given_wear
 from damageest.stages.align._fine import Fit, fit
 from damageest.stages.align._frame import Frame
+from damageest.stages.align._mirror import MIN_GAIN as LEAST_OFF
+from damageest.stages.align._mirror import MirrorTest, ask_handedness
 from damageest.stages.align._points import draw_evenly, orient_scan, orient_surface
+from damageest.stages.align._prepare_part import prepare_part
 
 REACH = 0.04
 """How far off a given pose may be for the pose nearby to be found, in diagonals of the part."""
@@ -27,18 +30,22 @@ MIN_GAIN, MIN_BESIDE, LARGE_GAIN = 0.05, 0.02, 0.4
 """Shares of the scan that have to lie on the part in the pose nearby and not in the given one, for it to be refused:
 the first, with the second beside the part in the given pose, where no damage explains it; or the third alone."""
 
+TRIALS = 60_000
+"""Number of candidate poses of the mirrored scan, where the given pose agrees badly with the part."""
+
 
 def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Reason, ...]:
     """What is doubtful about a pose ``T`` (4,4).
 
-    Raises StageError where the scan does not lie on the part, and where a pose nearby, found by the robust fit,
-    explains it much better. Damage and wear are no reason: in the given pose they lie inside the part, and in the pose
-    nearby as well. A correction that moves the part's surface by less than the tolerance is not counted either.
+    Raises StageError where the scan does not lie on the part, where a pose nearby, found by the robust fit, explains it
+    much better, and where it is a mirror image of the part. Damage and wear are no reason: in the given pose they lie
+    inside the part, and in the pose nearby as well. A correction that moves the part's surface by less than the
+    tolerance is not counted either.
     """
     frame = Frame.build(scan, part)
     noise, band = scan.noise / frame.size, tolerance / frame.size
     rng = np.random.default_rng(0)
-    dense, weights, _ = orient_scan(frame.scale_points(scan), scan.normals, noise, 100, rng)
+    dense, weights, oriented = orient_scan(frame.scale_points(scan), scan.normals, noise, 100, rng)
     points = rng.permutation(dense[draw_evenly(dense, weights, POINTS, rng)])
     start = frame.scale_pose(T)
     near = fit(frame.target, points, start, max(REACH, 2 * band), noise, 60)
@@ -66,6 +73,9 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
             "give the right T_part_scan, or use align: register, which needs none; check unit and part as well",
         )
     doubts = given.note_doubts()
+    if given.beside > MIN_BESIDE and given.agreement < 1 - LEAST_OFF:  # metal outside: no damage puts it there
+        test = MirrorTest(prepare_part(frame.target, 0), oriented, points, dense, noise, band, TRIALS)
+        doubts += ask_handedness(test, Fit(start, near.band, 0.0), given, rng).doubts
     if differs and gain > SMALL_GAIN:
         text = (
             f"in a pose that moves the part's surface by {moved:.3g} {part.unit}, {fitted.on:.0%} of the scan lies on "

@@ -84,7 +84,7 @@ def choose_pose(
             found = _compare(heads, axis, target, field, points, noise)
             if found.axis is not None:
                 return found
-    poses = poses[:MAX_POSES]
+    poses = _put_copies_last(poses)[:MAX_POSES]
     turned = turn_poses(poses, target, field, scan)
     return _compare(np.concatenate([poses, turned]), axis, target, field, points, noise)
 
@@ -203,6 +203,12 @@ def _add_counterparts(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> 
         poses, scores = _rank(np.concatenate([poses, turned]), field, scan)
         poses = poses[_select_promising(scores)]
     return poses, axis
+
+
+def _put_copies_last(poses: Floats) -> Floats:
+    """The poses (H,4,4), those last that lie near a better one: they would crowd out the counterparts of a gear."""
+    first = select_distinct(poses, -np.arange(len(poses), dtype=np.float64), APART, len(poses))
+    return np.concatenate([poses[first], np.delete(poses, first, axis=0)])
 
 
 def _rank(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Floats]:

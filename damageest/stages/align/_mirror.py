@@ -197,13 +197,13 @@ def _describe_doubt(check: PoseCheck, mirrored: PoseCheck) -> Reason:
 def _build_error(check: PoseCheck, mirrored: PoseCheck) -> StageError:
     if mirrored.agreement < DOUBTFUL_AGREEMENT:
         return StageError(
-            f"in the best pose only {check.agreement:.0%} of what the scan shows near the part lies on its surface, "
-            f"and {mirrored.agreement:.0%} of it if it were mirrored: it shows a mirrored part, another size, a "
+            f"only {check.agreement:.0%} of what the scan shows near the part lies on its surface, and "
+            f"{mirrored.agreement:.0%} of it would if it were mirrored: it shows a mirrored part, another size, a "
             "bent one, or another part",
             "scan: {scale: auto} if the scale may be wrong; otherwise check which part was scanned",
         )
     return StageError(
         f"the scan is a mirror image of the part: {mirrored.agreement:.0%} of what it shows near the part would lie "
-        f"on its surface if it were mirrored, {check.agreement:.0%} does in the best pose",
+        f"on its surface if it were mirrored, {check.agreement:.0%} does as it is",
         "check for a left-hand and a right-hand version of the part, and for an axis that an export reversed",
     )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import order_integers
 from damageest.geometry.threads import cut_evenly, map_in_threads
+from damageest.geometry.vectors import normalise
 from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
 MODEL_POINTS, MODEL_PAIRS = 1600, 800_000
@@ -139,12 +140,7 @@ def _build_frames(
     line = cloud.points[j] - cloud.points[i]
     alike = np.abs(cosine) > 0.85
     parallel = n + np.where(cosine < 0, -1.0, 1.0)[:, None] * m
-    x = _normalise(np.where(alike[:, None], parallel, n + m))
+    x = normalise(np.where(alike[:, None], parallel, n + m), 1e-12)
     y = np.where(alike[:, None], line, n - m)
-    y = _normalise(y - np.einsum("ij,ij->i", x, y)[:, None] * x)
+    y = normalise(y - np.einsum("ij,ij->i", x, y)[:, None] * x, 1e-12)
     return np.stack([x, y, np.cross(x, y)], axis=2), (cloud.points[i] + cloud.points[j]) / 2
-
-
-def _normalise(v: Floats) -> Floats:
-    unit: Floats = v / np.maximum(np.linalg.norm(v, axis=1), 1e-12)[:, None]
-    return unit

@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import order_integers
+from damageest.geometry.morton import encode_cells
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.voxels import measure_bounds
 
@@ -47,11 +48,7 @@ def draw_evenly(points: Floats, weights: Floats, wanted: int, rng: np.random.Gen
         return np.arange(len(points))
     low, high = measure_bounds(points)
     cells = ((points - low) / max(float((high - low).max()), 1e-300) * 1023).astype(np.int64)
-    code = np.zeros(len(points), np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
-    order = order_integers(code)
+    order = order_integers(encode_cells(cells))
     total = np.cumsum(weights[order])
     at = (np.arange(wanted) + rng.random(wanted)) / wanted * total[-1]
     return np.unique(order[np.minimum(np.searchsorted(total, at), len(order) - 1)])

@@ -9,6 +9,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Solid
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.geometry.vectors import normalise
 
 NEIGHBOURS = 12
 """Points that each vertex is fitted to."""
@@ -64,7 +65,7 @@ def fit_places(
     total = weights.sum(axis=1)
     share = weights / np.maximum(total, 1e-12)[:, None]
     way = np.einsum("ik,ikj->ij", share, normals[index])
-    way /= np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None]
+    way = normalise(way, 1e-12)
     chord = points[index] - at[:, None]
     height = 0.5 * np.einsum("ikj,ikj->ik", chord, normals[index] + way[:, None])
     aside = np.einsum("ik,ikj->ij", share, chord)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from typing import Any
 
@@ -13,8 +12,8 @@ from damageest.geometry.rays import RayCaster
 from damageest.geometry.views import View
 
 
-def draw(view: View, layers: list[tuple[RayCaster, Mesh, str]], size: tuple[int, int], smooth: bool) -> str:
-    """A shaded picture without perspective, as a data URI of a PNG with a transparent background.
+def draw(view: View, layers: list[tuple[RayCaster, Mesh, str]], size: tuple[int, int], smooth: bool) -> bytes:
+    """A shaded picture without perspective, as a PNG with a transparent background.
 
     ``layers``: meshes with their rays and colours; of two that lie on each other the later one is seen. ``size``: width
     and height in pixels; the view's radius fills the height. ``smooth``: drawn at twice the size and made smaller.
@@ -52,7 +51,7 @@ def draw(view: View, layers: list[tuple[RayCaster, Mesh, str]], size: tuple[int,
     small[..., :3] /= np.maximum(small[..., 3:], 1e-9)
     stream = io.BytesIO()
     Image.fromarray((np.clip(small, 0, 1) * 255).round().astype(np.uint8), "RGBA").save(stream, "png", compress_level=6)
-    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+    return stream.getvalue()
 
 
 def _read_colour(name: str) -> Floats:

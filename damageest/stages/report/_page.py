@@ -16,7 +16,7 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.errors import StageError
 from damageest.io import colours
-from damageest.io.files import file_sha256
+from damageest.io.files import embed_png, file_sha256
 from damageest.result import Result
 from damageest.rules.notes import fold_notes
 from damageest.stages.report import _style as style
@@ -56,7 +56,12 @@ def fill_page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": style.format_number, "share": style.format_share, "at": _format_point}
+    environment.filters |= {
+        "number": style.format_number,
+        "share": style.format_share,
+        "at": _format_point,
+        "png": embed_png,
+    }
     environment.filters["name"] = lambda path: Path(path).name
     view = {
         "objects": scene.objects,

@@ -32,7 +32,7 @@ MOST_DRAWN = 12
 
 @dataclass
 class Shown:
-    """A site on the page: its values as text, its pictures as data URIs, its section as SVG. Pictures are empty for a
+    """A site on the page: its values as text, its pictures as PNG, its section as SVG. Pictures are empty for a
     site beyond `MOST_DRAWN`."""
 
     id: int
@@ -50,8 +50,8 @@ class Shown:
     faces: str
     deposit: list[tuple[str, str]]
     path: list[tuple[str, str]]
-    files: list[tuple[str, str, str]] = field(default_factory=list)
-    picture: str = ""
+    files: list[tuple[str, str, bytes]] = field(default_factory=list)
+    picture: bytes = b""
     section: str = ""
     plane: str = ""
     view: dict[str, Any] = field(default_factory=dict)

@@ -38,4 +38,5 @@ class Html(Report):
         sites = describe_sites(result, content, remains)
         page = fill_page(result, content, job_text, scene, sites, choose_overview(result, remains))
         (folder / "report.html").write_text(page, encoding="utf-8")
-        return ReportFiles(("report.html",))
+        picture = next((site.picture for site in sites if site.picture), b"")
+        return ReportFiles(("report.html",), picture=picture)

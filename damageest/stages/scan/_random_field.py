@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.vectors import normalise
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,7 @@ class RandomField:
         rng = np.random.default_rng([20771, seed])
         band = np.repeat(np.arange(octaves), waves)
         direction = rng.normal(size=(len(band), 3))
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        direction = normalise(direction)
         heights = np.asarray(0.5**band, dtype=np.float64)
         heights /= np.sqrt((heights**2).sum() / 2)
         number = 2 * np.pi / wavelength * 2.0**band * rng.uniform(0.8, 1.25, len(band))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.errors import StageError
 from damageest.geometry.rays import RayCaster
+from damageest.geometry.vectors import normalise
 
 Keep = Callable[[Floats], Floats]
 """A function of points (N,3) that gives the probability (N,) with which each is kept."""
@@ -119,7 +120,7 @@ def find_mixed(mesh: Mesh, scanners: Floats, seen: Seen, count: int, rng: np.ran
     found: list[tuple[Ints, Floats]] = []
     for _ in range(8):
         beside = way + seen.step * rng.uniform(-1, 1, way.shape)
-        beside /= np.linalg.norm(beside, axis=1, keepdims=True)
+        beside = normalise(beside)
         far, _ = caster.find_first(origin, beside)
         jump = np.flatnonzero(np.isfinite(far) & (np.abs(far - near) > STEEPEST * seen.step * near))
         found.append((jump, far[jump]))
@@ -151,9 +152,9 @@ class _Projection:
         facing = faces & (np.einsum("ij,ij->i", mesh.cross, way[:, 0]) < 0)
         face = np.flatnonzero(facing)
         corner, face = _divide_wide(way[face], face)
-        centre = (corner / np.linalg.norm(corner, axis=2, keepdims=True)).sum(axis=1)
-        centre /= np.linalg.norm(centre, axis=1, keepdims=True)
-        normal = mesh.cross[face] / np.linalg.norm(mesh.cross[face], axis=1, keepdims=True)
+        centre = normalise(corner).sum(axis=1)
+        centre = normalise(centre)
+        normal = normalise(mesh.cross[face])
         height = np.einsum("ij,ij->i", normal, corner[:, 0])
         corner = corner / np.einsum("ikj,ij->ik", corner, centre)[:, :, None]
         across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -180,9 +181,9 @@ def _divide_wide(corner: Floats, face: Ints) -> tuple[Floats, Ints]:
     """Triangles (K,3,3) about a scanner at the origin, divided until each is narrow as seen from there."""
     done: list[tuple[Floats, Ints]] = []
     for _ in range(24):
-        unit = corner / np.maximum(np.linalg.norm(corner, axis=2, keepdims=True), 1e-300)
+        unit = normalise(corner)
         centre = unit.sum(axis=1)
-        centre /= np.maximum(np.linalg.norm(centre, axis=1, keepdims=True), 1e-300)
+        centre = normalise(centre)
         wide = np.einsum("ikj,ij->ik", unit, centre).min(axis=1) < WIDEST
         done.append((corner[~wide], face[~wide]))
         if not wide.any():

@@ -11,6 +11,7 @@ from pydantic import types as kinds
 
 from damageest.artefacts import Floats, Ints, Part, Scan, Truth
 from damageest.geometry.units import canonical_unit
+from damageest.geometry.vectors import normalise
 from damageest.options import Options
 from damageest.stages.scan import ReadScan, _errors, _random_field, _views
 from damageest.stages.scan._scene import DetachedPiece, Scene, Table, build_scene
@@ -234,7 +235,7 @@ class Simulate(ReadScan):
             blind = sorted(set(range(len(scanners))) - set(used.tolist()))
             notes.append(f"no points from scanner {', '.join(str(number + 1) for number in blind)}")
             scanners = scanners[used]
-        return _Draw(points, way / np.linalg.norm(way, axis=1, keepdims=True), view, scanners, tuple(notes))
+        return _Draw(points, normalise(way), view, scanners, tuple(notes))
 
     def _add_errors(
         self, draw: _Draw, part: Part, sigma: float, rng: np.random.Generator

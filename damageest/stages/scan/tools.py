@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, FiniteFloat, PositiveFloat
 
 from damageest.artefacts import Floats
+from damageest.geometry.vectors import normalise
 from damageest.options import Options
 from damageest.stages import JobPath
 from damageest.stages.scan import _random_field
@@ -182,7 +183,7 @@ class BlobTool(Tool):
 
         # the radius is a positive function of the direction, so the surface cannot intersect itself
         def displace(points: Floats) -> Floats:
-            out = points / np.linalg.norm(points, axis=1, keepdims=True)
+            out = normalise(points)
             return np.asarray(out * (self.radius * np.maximum(1 + share * field.evaluate(out), 0.2))[:, None])
 
         segments = max(96, _count_segments(self.radius, diagonal))

@@ -228,13 +228,3 @@ def _label_pieces(mesh: Mesh) -> Ints:
     ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
     graph = coo_array((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
-
-
-def barycentric(points: Floats, corners: Floats) -> Floats:
-    """(N,3) weights of ``points`` (N,3) in triangles ``corners`` (N,3,3)."""
-    u, v, w = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
-    uu, uv, vv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v)))
-    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
-    det = np.maximum(uu * vv - uv * uv, 1e-300)
-    s, t = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
-    return np.stack([1 - s - t, s, t], axis=1)

@@ -13,6 +13,7 @@ from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.geometry.vectors import normalise
 from damageest_cadquery._check import VOLUME
 from damageest_cadquery._exact import SPECK
 from damageest_cadquery._planar import build_solid
@@ -68,6 +69,6 @@ def _thicken(damage: Solid, part: Part, step: float) -> Solid:
     free = np.ones(len(damage.vertices), bool)
     free[damage.faces[inner]] = False
     moved = np.array(damage.vertices)
-    normals = damage.vertex_cross / np.maximum(np.linalg.norm(damage.vertex_cross, axis=1, keepdims=True), 1e-300)
+    normals = normalise(damage.vertex_cross)
     moved[free] += step * normals[free]
     return Solid(moved, damage.faces)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.vectors import normalise
 from damageest_cadquery._edges import Edge
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, orient_solid
@@ -90,7 +91,7 @@ def _find_turn(edge: Edge, heads: Floats, size: float) -> tuple[Any, float] | No
     spokes = edge.points - centre
     if np.cross(spokes[0], edge.tangents[0]) @ axis < 0:
         axis = -axis
-    radial = spokes / np.linalg.norm(spokes, axis=1)[:, None]
+    radial = normalise(spokes)
     along = np.cross(axis, radial)
     frames = np.stack([radial, along, np.broadcast_to(axis, radial.shape)], axis=1)  # (S,3,3)
     seen = np.einsum("sij,skj->ski", frames, heads)

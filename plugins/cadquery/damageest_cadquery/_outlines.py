@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.vectors import normalise
 
 
 def cover(triangles: Floats) -> tuple[list[Floats], float]:
@@ -48,5 +49,5 @@ def walk_outline(loop: Floats, step: float) -> tuple[Floats, Floats]:
     closed = np.concatenate([loop, loop[:1]])
     points = np.column_stack([np.interp(places, along, closed[:, k]) for k in range(2)])
     way = np.roll(points, -2, axis=0) - np.roll(points, 2, axis=0)  # outer outlines run left about, holes right about
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+    way = normalise(way)
     return points, np.column_stack([way[:, 1], -way[:, 0]])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from damageest.artefacts import Floats
+from damageest.isolation import at_work
 from damageest.stages.export import Body, DepositForm
 from damageest_cadquery._assembly import Colour, NamedShape
 from damageest_cadquery._deposit import STOCK, ExactDeposit
@@ -15,7 +16,7 @@ from damageest_cadquery._files import join_shapes, write_shapes
 from damageest_cadquery._left import FACET, cut_facets
 from damageest_cadquery._planar import build_solid
 from damageest_cadquery._read import explore
-from damageest_cadquery._request import CadFacts, Request, tell
+from damageest_cadquery._request import CadFacts, Request, name_file
 from damageest_cadquery._split import Piece
 
 INNER: Colour = (215, 50, 40)
@@ -39,19 +40,20 @@ class Writing:
 
     def save(self, stem: str, name: str, shapes: Sequence[NamedShape]) -> tuple[Sequence[NamedShape], str]:
         """Writes a file; gives its shapes as they were written, none where there is no file, and why."""
-        tell(start=0, file=stem)  # each file has the time of a site
-        if stem in self.request.left_out:
-            self.notes.append(f"{stem}.step was not written with the CAD's faces: {self.request.left_out[stem]}")
-            return (), self.request.left_out[stem]
-        path = Path(self.request.folder) / f"{stem}.step"
+        file, request = name_file(stem), self.request
+        if fault := request.skipped.get(file):
+            self.notes.append(f"{file} was not written with the CAD's faces: {fault}")
+            return (), fault
+        path = Path(request.folder) / file
         path.parent.mkdir(parents=True, exist_ok=True)
-        chord = self.request.tolerance / 16
-        done = write_shapes(Path(self.request.scratch) / "a.step", path, name, shapes, self.request.unit, chord)
+        with at_work(file, request.seconds):
+            scratch, chord = Path(request.scratch) / "a.step", request.tolerance / 16
+            done = write_shapes(scratch, path, name, shapes, request.unit, chord)
         if done.said:
-            self.notes.append(f"{stem}.step {done.said}")
+            self.notes.append(f"{file} {done.said}")
         if done.made is None:
             return (), done.fault
-        self.files.append(f"{stem}.step")
+        self.files.append(file)
         return done.made, ""
 
 

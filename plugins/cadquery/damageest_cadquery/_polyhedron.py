@@ -19,8 +19,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import lsqr
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
-from damageest_cadquery._cut import Cut, barycentric
+from damageest_cadquery._cut import Cut
 from damageest_cadquery._flat_faces import Flat, split_regions
 from damageest_cadquery._recognise import ALIKE, Shape, find_neighbours
 
@@ -238,7 +239,7 @@ def _fit_vertices(mesh: Mesh, free: Flags, points: Floats, tolerance: float) -> 
     """Moves ``free`` (V,) vertices along their normals, by less than half the tolerance, so that triangles pass through
     ``points`` (N,3) by least squares: without it, chords over a curved surface lie all on one side."""
     _, face, place = closest_on_mesh(points, mesh)
-    weights = barycentric(place, mesh.triangles[face])
+    weights = find_barycentric(mesh.triangles[face], place, clip=False)
     along = mesh.face_normals[face]
     offset = np.einsum("ij,ij->i", points - place, along)
     normal = mesh.vertex_normals

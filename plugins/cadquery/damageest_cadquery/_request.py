@@ -1,14 +1,12 @@
-"""What the process for exact solids gets, and how it says where it is."""
+"""What the process for exact solids gets, and what it gives."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from damageest.artefacts import Floats, Part
-from damageest.stages.export import Body, DepositForm
+from damageest.stages.export import Body, DepositForm, ExactForm
 from damageest_cadquery._assembly import Colour
 from damageest_cadquery._exact import SiteInput
 
@@ -19,8 +17,8 @@ class Request:
 
     ``folder``: where to write, and ``scratch``: where files are until they have been read back; ``places``: prefixes of
     the files with the transform (4,4) to their frame; ``unit``: of the files; ``bodies``: what has no exact form, by
-    the stem of its file, for the assembly; ``skipped``: sites that stopped this process before, and why; their deposits
-    by the negative of the number; ``left_out``: files that stopped it, by their stem.
+    the stem of its file, for the assembly; ``seconds``: processor time that each piece of work has; ``skipped``: those
+    that stopped this process before, by `name_site`, `name_deposit` and `name_file`, and why.
     """
 
     part: Part
@@ -32,8 +30,33 @@ class Request:
     folder: str
     scratch: str
     places: Mapping[str, Floats | None]
-    skipped: Mapping[int, str]
-    left_out: Mapping[str, str] = field(default_factory=dict)
+    seconds: float
+    skipped: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Made:
+    """The ``files`` that the process wrote, what is to be said of them, and the ``forms`` of all sites by number."""
+
+    files: tuple[str, ...]
+    notes: tuple[str, ...]
+    forms: Mapping[int, ExactForm]
+
+
+WHOLE = "the CAD file"
+"""The work between the others, such as reading."""
+
+
+def name_site(number: int) -> str:
+    return f"site {number}"
+
+
+def name_deposit(number: int) -> str:
+    return f"deposit of site {number}"
+
+
+def name_file(stem: str) -> str:
+    return f"{stem}.step"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +72,3 @@ class CadFacts:
 def describe_missing(site: SiteInput) -> DepositForm | None:
     """What to say of a deposit whose damage volume has no exact form; None where there is no deposit."""
     return None if site.deposit is None else DepositForm(reason="its damage volume has facets too")
-
-
-def tell(**what: Any) -> None:
-    """Prints a line of JSON for the process that waits."""
-    print(json.dumps(what), flush=True)

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from damageest.artefacts import Flags, Floats, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, signed_distance
 from damageest.geometry.height_spline import DEGREE, fit_height_plane, fit_parametric_spline
+from damageest.geometry.vectors import normalise
 from damageest.stages.export import Patch
 from damageest_cadquery._cut import find_rim, split_mesh, take_faces
 from damageest_cadquery._flatten import flatten
@@ -175,7 +176,7 @@ def _continue(chart: Chart, fit: Fit, part: Part, tolerance: float) -> tuple[Flo
         size = np.linalg.norm(way, axis=1, keepdims=True)
         _, face, _ = closest_on_mesh(start, part)
         skin = uniform_filter1d(part.face_normals[face], min(EVEN, len(at)), axis=0, mode="wrap")
-        skin /= np.maximum(np.linalg.norm(skin, axis=1, keepdims=True), 1e-300)
+        skin = normalise(skin)
         rise = np.einsum("ij,ij->i", way, skin)[:, None] / size
         way += np.maximum(RISE - rise, 0.0) * size * skin
         places.append((inside[:, None] + steps[:, None] * out[:, None]).reshape(-1, 2))

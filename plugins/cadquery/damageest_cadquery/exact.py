@@ -2,17 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import os
-import pickle
-import queue
-import subprocess
-import sys
 import tempfile
-import threading
-import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +13,20 @@ import numpy as np
 from damageest.artefacts import Deposit, Floats, Mesh, Solid
 from damageest.errors import InputError
 from damageest.geometry.units import MILLIMETRES
-from damageest.isolation import ONE_THREAD
+from damageest.io.files import shorten_error
+from damageest.isolation import Limits, ProcessError, call_isolated, find_place
 from damageest.result import Result
-from damageest.stages.export import Body, DepositForm, ExactForm, ExportedFiles
+from damageest.stages.export import Body, ExactForm, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._read import read
-from damageest_cadquery._request import Request, describe_missing
+from damageest_cadquery._request import WHOLE, Made, Request, describe_missing, name_site
 from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
+from damageest_cadquery._step import OWNER
+from damageest_cadquery._worker import make_exact
 
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
-WAIT = 20.0
-"""Longest time by the clock on the wall, in limits, for a process that uses no processor."""
+WORKER = "damageest_cadquery exact"
 MOST_STARTS = 8
 """How often the process is started; each time without the site that stopped it before."""
 
@@ -45,26 +39,24 @@ def write_exact(
     seconds: float,
 ) -> ExportedFiles:
     """Writes damage volumes, what is left of the part, and an assembly of all; see `damageest.stages.export.Writer`."""
-    request = make_request(result, folder, bodies, places)
+    request = make_request(result, folder, bodies, places, seconds)
     if not request.sites:
         return ExportedFiles()
-    said: dict[str, Any] = {}
+    made = Made((), (), {})
     for _ in range(MOST_STARTS):
-        said, at, reason = _run(request, seconds)
-        if said:
+        done = _run(request)
+        if isinstance(done, Made):
+            made = done
             break
-        if at.file in request.left_out or (not at.file and at.site in request.skipped):
+        what, reason = done
+        if what in request.skipped:
             break
-        if at.file:
-            request = replace(request, left_out={**request.left_out, at.file: reason})
-        elif at.site:
-            request = replace(request, skipped={**request.skipped, at.site: reason})
-        else:
-            request = replace(request, skipped={each.number: reason for each in request.sites})
-    forms = {int(number): _read_form(form) for number, form in said.get("forms", {}).items()}
-    for site_input in request.sites:
-        why = (request.skipped.get(site_input.number, "the process for exact solids stopped"),)
-        forms.setdefault(site_input.number, ExactForm("none", tried=why, deposit=describe_missing(site_input)))
+        names = [what] if what != WHOLE else [WHOLE, *(name_site(each.number) for each in request.sites)]
+        request = replace(request, skipped={**request.skipped, **dict.fromkeys(names, reason)})
+    forms = dict(made.forms)
+    for site in request.sites:
+        why = (request.skipped.get(name_site(site.number), "the process for exact solids stopped"),)
+        forms.setdefault(site.number, ExactForm("none", tried=why, deposit=describe_missing(site)))
     notes = tuple(
         f"site-{number}.step has facets, not the faces of the CAD file: {form.tried[-1] if form.tried else 'unknown'}"
         for number, form in sorted(forms.items())
@@ -75,13 +67,15 @@ def write_exact(
         for number, form in sorted(forms.items())
         if form.deposit is not None and form.deposit.reason
     )
-    notes += tuple(said.get("notes", () if not notes else ("damage.step and undamaged.step have facets too",)))
-    files = tuple(said.get("files", ()))
-    return ExportedFiles(files, notes, exact=dict(sorted(forms.items())), warnings=notes)
+    if isinstance(done, Made):
+        notes += made.notes
+    elif notes:
+        notes += ("damage.step and undamaged.step have facets too",)
+    return ExportedFiles(made.files, notes, exact=dict(sorted(forms.items())), warnings=notes)
 
 
 def make_request(
-    result: Result, folder: Path, bodies: Mapping[str, Body], places: Mapping[str, Floats | None]
+    result: Result, folder: Path, bodies: Mapping[str, Body], places: Mapping[str, Floats | None], seconds: float
 ) -> Request:
     """What the process gets: everything in millimetres."""
     factor = MILLIMETRES[result.units]
@@ -99,7 +93,7 @@ def make_request(
         folder=str(folder),
         scratch="",
         places=moved,
-        skipped={},
+        seconds=seconds,
     )
 
 
@@ -136,105 +130,21 @@ def _scale_shift(T: Floats, factor: float) -> Floats:
     return moved
 
 
-def _read_form(values: dict[str, Any]) -> ExactForm:
-    deposit = None if values["deposit"] is None else DepositForm(**values["deposit"])
-    return ExactForm(**{**values, "tried": tuple(values["tried"]), "deposit": deposit})
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Where the process was: the number of a site, the negative of it for its deposit, or the stem of a ``file``."""
-
-    site: int = 0
-    file: str = ""
-
-
-def _run(request: Request, seconds: float) -> tuple[dict[str, Any], _Place, str]:
-    """Starts the process once. Gives what it said at its end; or where it stopped, and why."""
+def _run(request: Request) -> Made | tuple[str, str]:
+    """Starts the process once. Gives what it made; or what it was doing where it stopped, and why."""
     with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
-        path = Path(place) / "request.pkl"
-        path.write_bytes(pickle.dumps(replace(request, scratch=place)))
-        leash, held = os.pipe()
+        arguments = {"request": replace(request, scratch=place)}
         try:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "damageest_cadquery._worker", str(path), str(leash)],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-                pass_fds=(leash,),
-                start_new_session=True,  # Ctrl-C reaches this process alone, with which the other one ends
-                env={**os.environ, **ONE_THREAD, "PYTHONWARNINGS": "ignore"},
-            )
-            try:
-                return _follow(process, seconds)
-            finally:
-                process.kill()
-                process.wait()
-        finally:
-            os.close(leash)
-            os.close(held)
-
-
-def _follow(process: subprocess.Popen[str], seconds: float) -> tuple[dict[str, Any], _Place, str]:
-    lines: queue.Queue[str | None] = queue.Queue()
-    errors: list[str] = []
-
-    def listen() -> None:
-        assert process.stdout is not None
-        for line in process.stdout:
-            lines.put(line)
-        lines.put(None)
-
-    def listen_to_errors() -> None:
-        assert process.stderr is not None
-        errors.extend(process.stderr)
-
-    threads = [threading.Thread(target=each, daemon=True) for each in (listen, listen_to_errors)]
-    for thread in threads:
-        thread.start()
-    at, clock = _Place(), _Clock(process.pid)
-    while True:
-        try:
-            line = lines.get(timeout=min(seconds, 0.5))
-        except queue.Empty:
-            if clock.has_passed(seconds):
-                return {}, at, f"OpenCASCADE took longer than {seconds:g} s"
-            continue
-        clock = _Clock(process.pid)
-        if line is None:
-            process.wait()
-            threads[1].join(timeout=5)
-            last = errors[-1].strip()[:200] if errors else f"exit status {process.returncode}"
-            return {}, at, f"OpenCASCADE stopped ({last})"
-        if not line.startswith("{"):
-            continue
-        said = json.loads(line)
-        if "forms" in said:
-            return said, at, ""
-        if "start" in said:
-            at = _Place(said["start"], said.get("file", ""))
-
-
-class _Clock:
-    """Time since it was made: of the processor where the system tells it, since a busy machine is no reason to stop."""
-
-    def __init__(self, process: int) -> None:
-        self.process = process
-        self.wall, self.used = time.monotonic(), self._measure()
-
-    def _measure(self) -> float | None:
-        try:
-            fields = Path(f"/proc/{self.process}/stat").read_text().rpartition(")")[2].split()
-        except OSError:
-            return None
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-    def has_passed(self, seconds: float) -> bool:
-        wall, used = time.monotonic() - self.wall, self._measure()
-        if used is None or self.used is None:
-            return wall > seconds
-        return used - self.used > seconds or wall > WAIT * seconds
+            return call_isolated(
+                make_exact, arguments, worker=WORKER, owner=OWNER, limits=Limits(seconds=0), show=False, stays=False,
+                processor_time=True,
+            )  # fmt: skip
+        except ProcessError as error:
+            late = f"OpenCASCADE took longer than {request.seconds:g} s"
+            reason = late if error.why == "time" else f"OpenCASCADE stopped ({error.message})"
+            return find_place(error) or WHOLE, reason
+        except Exception as error:  # OpenCASCADE's exceptions share no base of their own
+            return find_place(error) or WHOLE, f"OpenCASCADE stopped ({type(error).__name__}: {shorten_error(error)})"
 
 
 def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:

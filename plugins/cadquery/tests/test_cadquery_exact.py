@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import cadquery_faults
 import numpy as np
 import pytest
+from damageest_cadquery import exact
 from damageest_cadquery._assembly import NamedShape, write_assembly
 from damageest_cadquery._read import read
 from damageest_cadquery._split import measure_volume
@@ -175,28 +176,33 @@ def test_a_site_that_takes_too_long_gets_facets_and_says_so(done: Run, tmp_path:
     assert len(solid.Faces()) > 20
 
 
-@pytest.mark.slow
-def test_a_crash_of_opencascade_costs_only_the_exact_form(
-    done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        (cadquery_faults.abort_at_second, "OpenCASCADE stopped (its process ended by an abort (SIGABRT))"),
+        (cadquery_faults.raise_at_second, "OpenCASCADE stopped (RuntimeError: Standard_NoSuchObject)"),
+    ],
+    ids=["abort", "raise"],
+)
+def test_a_fault_of_opencascade_costs_only_the_exact_form(
+    fault: Any, text: str, done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A copy of the plugin that dies at site 2."""
-    (tmp_path / "crash.py").write_text(
-        "import os, sys\nfrom pathlib import Path\nfrom damageest_cadquery import _worker\nfind = _worker.find_exact\n"
-        "def fall(site, *rest):\n    if site.number == 2:\n        os.abort()\n    return find(site, *rest)\n"
-        "_worker.find_exact = fall\nimport pickle\n"
-        "_worker.start(sys.argv[1:])\n"
-    )
-    start = subprocess.Popen
-
-    def start_other(command: list[str], **options: Any) -> Any:
-        return start([command[0], str(tmp_path / "crash.py"), *command[-2:]], **options)
-
-    monkeypatch.setattr(subprocess, "Popen", start_other)
+    monkeypatch.setattr(exact, "make_exact", fault)
     told = export_again(done.result, tmp_path / "out")
     assert [told.exact[k].form for k in (1, 2)] == ["shapes", "none"]
-    assert "OpenCASCADE stopped" in told.exact[2].tried[0]
+    assert told.exact[2].tried == (text,)
     assert (tmp_path / "out/damage/site-2.step").is_file()
     assert (tmp_path / "out/undamaged.step").is_file()
+
+
+def test_opencascade_that_never_starts_costs_all_exact_forms(
+    done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exact, "make_exact", cadquery_faults.abort_at_start)
+    told = export_again(done.result, tmp_path / "out")
+    assert [told.exact[k].form for k in (1, 2)] == ["none", "none"]
+    assert all("SIGABRT" in told.exact[k].tried[0] for k in (1, 2))
+    assert (tmp_path / "out/damage/site-2.step").is_file()
 
 
 @pytest.mark.slow

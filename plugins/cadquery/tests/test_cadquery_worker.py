@@ -11,53 +11,14 @@ import time
 from pathlib import Path
 from typing import Any
 
+import cadquery_faults
+import psutil
 import pytest
 
 from tests.needs import import_for, needs_plugin
 
 pytestmark = needs_plugin("cadquery")
 cq = import_for("cadquery", "cadquery")
-
-HANG = """
-import os, sys
-from pathlib import Path
-import damageest_cadquery._worker as worker
-def hang(path):
-    Path(sys.argv[0]).with_name("worker.pid").write_text(str(os.getpid()))
-    while True:
-        pass
-worker.main = hang
-worker.start(sys.argv[1:])
-"""
-PARENT = """
-import subprocess, sys
-from damageest_cadquery import exact
-start = subprocess.Popen
-exact.subprocess.Popen = lambda command, **options: start([command[0], sys.argv[1], *command[-2:]], **options)
-exact._run(exact.Request(None, 1.0, 1.0, "mm", (), {}, "", "", {}, {}), 600.0)
-"""
-
-
-@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
-def test_the_process_ends_with_the_one_that_started_it(how: signal.Signals, tmp_path: Path) -> None:
-    (tmp_path / "hang.py").write_text(HANG)
-    (tmp_path / "parent.py").write_text(PARENT)
-    command = [sys.executable, str(tmp_path / "parent.py"), str(tmp_path / "hang.py")]
-    parent = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-    told = tmp_path / "worker.pid"
-    try:
-        wait_for(lambda: told.is_file() and bool(told.read_text()), 120)
-        worker = int(told.read_text())
-        parent.send_signal(how)
-        parent.wait(timeout=30)
-        try:
-            wait_for(lambda: not is_running(worker), 30)
-        finally:
-            if is_running(worker):
-                os.kill(worker, signal.SIGKILL)
-    finally:
-        parent.kill()
-        parent.wait()
 
 
 def test_a_terminated_run_leaves_no_process_at_its_export(tmp_path: Path) -> None:
@@ -77,48 +38,21 @@ def test_a_terminated_run_leaves_no_process_at_its_export(tmp_path: Path) -> Non
         [*command, "-o", str(tmp_path / "out")], env={**os.environ, "TMPDIR": str(tmp_path)},
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
-    workers: list[int] = []
-
-    def is_seen() -> bool:
-        workers.extend(find_workers(tmp_path))
-        return bool(workers) or run.poll() is not None
-
     try:
-        wait_for(is_seen, 120)
-        assert workers, "the run ended before its export was seen"
+        wait_for(lambda: run.poll() is not None or any(tmp_path.glob("damageest-exact-*/*")), 120)
+        others = psutil.Process(run.pid).children(recursive=True)
+        assert len(others) > 1, "the process that works, and that for exact solids"
         run.send_signal(signal.SIGTERM)
         run.wait(timeout=30)
-        try:
-            wait_for(lambda: not any(map(is_running, workers)), 30)
-        finally:
-            for worker in filter(is_running, workers):
-                os.kill(worker, signal.SIGKILL)
+        _, alive = psutil.wait_procs(others, timeout=30)
+        for other in alive:
+            other.kill()
+        assert not alive
     finally:
         run.kill()
         run.wait()
     assert run.returncode == -signal.SIGTERM
     assert not (tmp_path / "out").exists()
-
-
-def find_workers(place: Path) -> list[int]:
-    """The processes for exact solids that got their request in a folder below ``place``."""
-    found = []
-    for folder in Path("/proc").iterdir():
-        try:
-            line = (folder / "cmdline").read_bytes().decode(errors="replace") if folder.name.isdigit() else ""
-        except OSError:  # it has ended
-            continue
-        if "damageest_cadquery._worker" in line and str(place) in line:
-            found.append(int(folder.name))
-    return found
-
-
-def is_running(process: int) -> bool:
-    """Whether a process is there and no zombie."""
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def wait_for(what: Any, seconds: float) -> None:
@@ -128,20 +62,10 @@ def wait_for(what: Any, seconds: float) -> None:
         time.sleep(0.05)
 
 
-FAIL = """
-import sys
-import damageest_cadquery._worker as worker
-find = worker.find_exact
-def fail(site, *rest):
-    return (None, ("forced to fail",)) if site.damage.bounds[0, 0] > 20 else find(site, *rest)
-worker.find_exact = fail
-worker.start(sys.argv[1:])
-"""
-
-
 @pytest.mark.slow
 def test_a_site_without_an_exact_form_costs_only_its_own_solid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two solids, each with a bite; that of the round one gets facets."""
+    from damageest_cadquery import exact
     from damageest_cadquery._assembly import NamedShape, write_assembly
     from damageest_cadquery._faces import list_faces
     from damageest_cadquery._read import read
@@ -158,14 +82,7 @@ def test_a_site_without_an_exact_form_costs_only_its_own_solid(tmp_path: Path, m
         "scan": {"use": "simulate", "points": 8000, "noise": 0.04, "seed": 4, "damage": damage},
         "export": {"format": ["step"]}, "report": "none",
     }  # fmt: skip
-    (tmp_path / "fail.py").write_text(FAIL)
-    start = subprocess.Popen
-
-    def start_other(command: list[str], **options: Any) -> Any:
-        replaced = [command[0], str(tmp_path / "fail.py"), *command[-2:]] if "_worker" in command[2] else command
-        return start(replaced, **options)
-
-    monkeypatch.setattr(subprocess, "Popen", start_other)
+    monkeypatch.setattr(exact, "make_exact", cadquery_faults.find_none_beyond)
     result = damageest.run(job, output=tmp_path / "out")
     forms = {site.id: result.written.exact[site.id].form for site in result.sites} if hasattr(result, "written") else {}
     failed = next(site.id for site in result.sites if site.damage.bounds[0, 0] > 20)

@@ -1,19 +1,15 @@
-"""One case of an evaluation, from the random damage to its score, as a row of values that JSON can hold.
-
-``python -m damageest_evaluate.case CASE`` runs one case, given as JSON, and prints its row.
-"""
+"""One case of an evaluation, from the random damage to its score, as a row of values that JSON can hold."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +23,6 @@ from damageest_evaluate.damages import make_random_damage
 from damageest_evaluate.memory import PeakMemory
 from damageest_evaluate.meter import Meter, measure_libigl_seconds, measure_start_seconds
 from damageest_evaluate.parts import PARTS
-from damageest_evaluate.processes import MARK
 from damageest_evaluate.scores import measure_depth, score
 from damageest_evaluate.sized import make_sized_damage
 
@@ -55,7 +50,6 @@ class DamageCase:
     use. ``varied``: the values under which the case is listed in the tables.
     """
 
-    module: ClassVar[str] = "damageest_evaluate.case"
     part: str
     seed: int
     first: str
@@ -81,6 +75,10 @@ class DamageCase:
         row |= {"tolerance": self.tolerance, "kinds": [], "share": 0.0, "depth": 0.0, "error": "", "skipped": False}
         row |= {"iou": 0.0, "found": 0, "missed": int(self.size != 0), "false_sites": 0, "sites": 0, "flagged": False}
         return row | {"methods": [], "failures": [], "reasons": [], "seconds": 0.0}
+
+    def run(self) -> dict[str, Any]:
+        """As `run_case`."""
+        return run_case(self)
 
 
 def save_part(part: Part, path: Path) -> None:
@@ -181,7 +179,3 @@ def _score_result(result: Result, part: Part, scan: Scan) -> dict[str, Any]:
 
 def _join_lines(error: Exception) -> str:
     return " ".join(str(error).split())
-
-
-if __name__ == "__main__":
-    print(MARK + json.dumps(run_case(DamageCase(**json.loads(sys.argv[1])))), flush=True)

@@ -12,6 +12,7 @@ import numpy as np
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_manifold
+from damageest.geometry.vectors import normalise
 from damageest.stages.scan.scanner import apply_tools
 from damageest.stages.scan.tools import BlobTool, BoxTool, CylinderTool, PlaneTool, SphereTool, Tool
 from damageest_evaluate.scores import measure_depth, sample_surface
@@ -61,7 +62,7 @@ class PlacePicker:
             raise LookupError("the part has no sharp edge for this kind of damage")
         k = rng.choice(len(length), 600, p=length / length.sum())
         points = ends[k, 0] + rng.random((600, 1)) * (ends[k, 1] - ends[k, 0])
-        return np.asarray(points), np.asarray(out[k] / np.linalg.norm(out[k], axis=1, keepdims=True))
+        return np.asarray(points), normalise(out[k])
 
     def pick_edge_point(self) -> tuple[Floats, Floats]:
         """A random point (3,) on an edge, and the outward bisector (3,) there."""

@@ -1,16 +1,11 @@
-"""How often the truth lies in the 95 % intervals, over random damages at three levels of noise and three densities.
-
-``python -m damageest_evaluate.intervals CASE`` runs one case, given as JSON, and prints its row.
-"""
+"""How often the truth lies in the 95 % intervals, over random damages at three levels of noise and three densities."""
 
 from __future__ import annotations
 
-import json
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +19,7 @@ from damageest_evaluate.case import DamageCase, load_part, simulate_scan
 from damageest_evaluate.damages import KINDS
 from damageest_evaluate.job import fingerprint_code
 from damageest_evaluate.parts import PARTS
-from damageest_evaluate.processes import MARK, Row
+from damageest_evaluate.processes import Row
 from damageest_evaluate.readme import describe_measurement, format_markdown
 from damageest_evaluate.scores import measure_depth
 
@@ -42,13 +37,15 @@ UNKNOWN_POSE = 4
 class IntervalCase(DamageCase):
     """A case whose row says whether the truth lies in the intervals."""
 
-    module: ClassVar[str] = "damageest_evaluate.intervals"
-
     def make_blank_row(self) -> Row:
         """The row of a case that has no result yet."""
         row: Row = {"key": self.compute_key(), "part": self.part, "seed": self.seed, "varied": dict(self.varied)}
         row |= {"kinds": [], "true_volume": 0.0, "volume": 0.0, "volume_95": None, "true_depth": 0.0}
         return row | {"depth_95": None, "doubtful": 0, "sites": 0, "error": "", "skipped": False, "seconds": 0.0}
+
+    def run(self) -> dict[str, Any]:
+        """As `run_interval_case`."""
+        return run_interval_case(self)
 
 
 def make_interval_cases(count: int, seed: int, parts: Sequence[str], registry: Registry) -> list[IntervalCase]:
@@ -170,8 +167,3 @@ def _is_inside(row: Row, name: str) -> bool:
 def _half_width(row: Row, name: str) -> float:
     low, high = row[f"{name}_95"]
     return float((high - low) / 2 / row[f"true_{name}"])
-
-
-if __name__ == "__main__":
-    values: dict[str, Any] = json.loads(sys.argv[1])
-    print(MARK + json.dumps(run_interval_case(IntervalCase(**values))), flush=True)

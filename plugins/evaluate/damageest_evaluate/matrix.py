@@ -6,8 +6,6 @@ memory can be measured.
 
 from __future__ import annotations
 
-import json
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -24,7 +22,7 @@ from damageest.registry import Implementation, Registry
 from damageest.registry.contracts import STAGES
 from damageest_evaluate.matrix_job import MatrixJob, make_settings, prepare_matrix_job
 from damageest_evaluate.memory import PeakMemory
-from damageest_evaluate.processes import MARK, run_in_process
+from damageest_evaluate.processes import run_in_process
 from damageest_evaluate.scores import score
 
 
@@ -78,7 +76,7 @@ def _run_cell(item: Implementation, scene: MatrixJob, timeout: float) -> MatrixC
     if isinstance(settings, str):
         return MatrixCell(*name, float("nan"), refused=settings)
     case = {"folder": str(scene.folder), "stage": item.contract.stage, "use": item.name, **settings}
-    row = run_in_process("damageest_evaluate.matrix", case, timeout)
+    row = run_in_process(run_one, {"case": case}, timeout)
     return MatrixCell(*name, **row) if isinstance(row, dict) else MatrixCell(*name, float("nan"), refused=row)
 
 
@@ -123,7 +121,3 @@ def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
 def _shorten_reason(text: str) -> str:
     """The message without its remedy, and without stage and implementation, which the table's row names."""
     return text.splitlines()[0].split(": ", 2)[-1]
-
-
-if __name__ == "__main__":
-    print(MARK + json.dumps(run_one(json.loads(sys.argv[1]))), flush=True)

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
+from collections.abc import Callable, Mapping
 from typing import Any
 
-MARK = "@row "
-"""Prefix of the line with the row. It separates the row from anything that libraries print."""
+from damageest.errors import clean_message
+from damageest.isolation import Limits, ProcessError, call_isolated
 
 Row = dict[str, Any]
 
 
-def run_in_process(module: str, inputs: Row, timeout: float) -> Row | str:
-    """The row that ``python -m module`` prints for ``inputs``; a message if it crashed or exceeded ``timeout``."""
-    command = [sys.executable, "-m", module, json.dumps(inputs)]
+def run_in_process(function: Callable[..., Row], arguments: Mapping[str, Any], timeout: float) -> Row | str:
+    """The row of ``function(**arguments)``, as JSON gives it back; a message where it raised, crashed, or took longer
+    than ``timeout`` seconds."""
+    limits = Limits(seconds=timeout, of="case", option="--timeout")
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
-    except subprocess.TimeoutExpired:
-        return f"stopped: not finished after {timeout:g} s"
-    for text in done.stdout.splitlines():
-        if text.startswith(MARK):
-            row: Row = json.loads(text.removeprefix(MARK))
-            return row
-    messages = done.stderr.strip().splitlines()
-    return f"the process crashed with exit status {done.returncode}: {messages[-1] if messages else 'no message'}"
+        row = call_isolated(function, arguments, limits=limits, show=False, stays=False, nested=True)
+    except ProcessError as error:
+        return error.message
+    except Exception as error:
+        return f"the process raised {type(error).__name__}: {clean_message(error, 400)}"
+    stored: Row = json.loads(json.dumps(row))  # as a file of rows holds it
+    return stored

@@ -6,9 +6,8 @@ import contextlib
 import json
 import uuid
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Protocol
 
 from damageest.batches.cluster import open_client
 from damageest.batches.tasks import run_tasks
@@ -16,13 +15,7 @@ from damageest_evaluate.processes import Row, run_in_process
 
 
 class EvaluationCase(Protocol):
-    """A case that can be run in a process of its own: a dataclass whose fields JSON can hold.
-
-    ``module`` runs it: ``python -m module CASE`` prints its row. ``varied``: the values under which it is listed.
-    """
-
-    module: ClassVar[str]
-    __dataclass_fields__: ClassVar[dict[str, Any]]
+    """A case that can be run in a process of its own. ``varied``: the values under which it is listed."""
 
     @property
     def varied(self) -> Mapping[str, float | str]: ...
@@ -33,6 +26,10 @@ class EvaluationCase(Protocol):
 
     def make_blank_row(self) -> Row:
         """The row of the case without a result."""
+        ...
+
+    def run(self) -> Row:
+        """Runs the case and gives its row."""
         ...
 
 
@@ -84,8 +81,12 @@ def _collect_rows(cases: Sequence[EvaluationCase], rows_by_key: Mapping[str, Row
 
 def run_one(case: EvaluationCase, timeout: float) -> Row:
     """The case's row. A crash or a timeout gives a row with ``error``, not flagged."""
-    row = run_in_process(case.module, asdict(case), timeout)
+    row = run_in_process(_run, {"case": case}, timeout)
     return row if isinstance(row, dict) else case.make_blank_row() | {"error": row, "seconds": timeout}
+
+
+def _run(case: EvaluationCase) -> Row:
+    return case.run()
 
 
 def read_rows(out: Path | None) -> list[Row]:

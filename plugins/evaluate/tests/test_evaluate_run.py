@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+import math
+import os
+import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from damageest_evaluate import processes
 from damageest_evaluate import rows as rows_module
 from damageest_evaluate.case import DamageCase
 
@@ -24,8 +26,8 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The keys of the cases that were run, in place of running them."""
     keys: list[str] = []
 
-    def run(module: str, inputs: dict[str, Any], timeout: float) -> dict[str, Any]:
-        case = DamageCase(**inputs)
+    def run(function: Any, arguments: dict[str, Any], timeout: float) -> dict[str, Any]:
+        case: DamageCase = arguments["case"]
         keys.append(case.compute_key())
         return case.make_blank_row() | {"seconds": timeout}
 
@@ -56,7 +58,35 @@ def test_what_a_row_stands_for_is_up_to_the_run(tmp_path: Path, ran: list[str]) 
     assert len(ran) == 1
 
 
-def test_a_process_that_crashes_says_so() -> None:
-    message = processes.run_in_process("damageest_evaluate.case", {"part": "cuboid"}, 60)
-    assert isinstance(message, str)
-    assert message.startswith("the process crashed with exit status 1: TypeError")
+@dataclass(frozen=True)
+class OddCase(DamageCase):
+    """A case that does not give a row."""
+
+    def run(self) -> dict[str, Any]:
+        if self.first == "aborts":
+            os.abort()
+        if self.first == "hangs":
+            time.sleep(60)
+        if self.first == "raises":
+            raise TypeError("no such part")
+        return {**self.make_blank_row(), "kinds": (1, 2), "volume": math.nan}
+
+
+@pytest.mark.parametrize(
+    ("what", "error"),
+    [
+        ("aborts", "its process ended by an abort (SIGABRT)"),
+        ("hangs", "was ended: not finished after 0.5 s, the time limit of a case"),
+        ("raises", "the process raised TypeError: no such part"),
+    ],
+)
+def test_a_case_without_a_row_says_why(what: str, error: str) -> None:
+    row = rows_module.run_one(OddCase("cuboid", 0, what, 0.2, scanner=CASES[0].scanner), 0.5 if what == "hangs" else 60)
+    assert row["error"] == error
+    assert row["part"] == "cuboid"
+
+
+def test_a_row_is_as_a_file_holds_it() -> None:
+    row = rows_module.run_one(OddCase("cuboid", 0, "", 0.2, scanner=CASES[0].scanner), 60)
+    assert row["kinds"] == [1, 2]
+    assert math.isnan(row["volume"])

@@ -9,16 +9,10 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import list_distinct
+from damageest.geometry.morton import SPREAD, encode_cells
 
 Codes = NDArray[np.uint64]
 
-SPREAD = (
-    (32, 0x1F00000000FFFF),
-    (16, 0x1F0000FF0000FF),
-    (8, 0x100F00F00F00F00F),
-    (4, 0x10C30C30C30C30C3),
-    (2, 0x1249249249249249),
-)
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.int64)
 CHUNK = 20_000
 """Triangles tested at a time; they take about 60 MiB."""
@@ -26,13 +20,7 @@ CHUNK = 20_000
 
 def encode(cells: Ints) -> Codes:
     """Morton codes (N,) of cells (N,3), whose coordinates have at most 21 bits."""
-    code = np.zeros(len(cells), np.uint64)
-    for axis in range(3):
-        x = cells[:, axis].astype(np.uint64)
-        for shift, mask in SPREAD:
-            x = (x | (x << np.uint64(shift))) & np.uint64(mask)
-        code |= x << np.uint64(axis)
-    return code
+    return encode_cells(cells).view(np.uint64)
 
 
 def decode(codes: Codes) -> Ints:

@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 
 @given(arrays(np.int64, st.tuples(st.integers(1, 40), st.just(3)), elements=st.integers(0, 2**21 - 1)))
+@settings(deadline=None)
 def test_morton_codes_interleave_the_bits_and_come_back(cells: np.ndarray) -> None:
     codes = encode(cells)
     assert np.array_equal(decode(codes), cells)

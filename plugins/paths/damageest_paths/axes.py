@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats
+from damageest.geometry.vectors import normalise
 from damageest_paths.clearance import Clearance
 from damageest_paths.turning import BLOCKED, Course, cost_poses, plan_course
 
@@ -174,7 +175,7 @@ def _measure(courses: Sequence[Course], lines: Sequence[Floats], clearance: Clea
     following = np.minimum(place + 1, len(points) - 1)
     dense = points[place] + share * (points[following] - points[place])
     turned = axes[place] + share * (axes[following] - axes[place])
-    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    turned = normalise(turned)
     gaps = clearance.measure_poses(dense, turned, limits.needed)
     starts = np.cumsum(counts) - counts
     least = np.minimum.reduceat(gaps, starts)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
+from damageest.geometry.vectors import normalise
 from damageest_paths.gauges import Gauge, LeastGauge
 from damageest_paths.process import Pass, Process, measure_along
 from damageest_paths.sweeps import Sweeps
@@ -59,7 +60,7 @@ def list_ways(normals: Floats, process: Process) -> list[Floats]:
     if angle.max() > 1e-3:
         ways += [_tilt_less(upright, share * angle) for share in SHARES]
     first = np.cross(normals, [0.0, 1.0, 0.0])
-    first /= np.maximum(np.linalg.norm(first, axis=1), 1e-9)[:, None]
+    first = normalise(first, 1e-9)
     second = np.cross(normals, first)
     for lean in LEANS[: 1 if process.is_trial else None]:
         for k in range(AROUND):
@@ -126,7 +127,7 @@ def _measure(points: Floats, axes: Floats, around: Gauge, process: Process) -> _
     number = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
     poses = (1 - share) * points[number] + share * points[number + 1]
     turned = (1 - share) * axes[number] + share * axes[number + 1]
-    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    turned = normalise(turned)
     gaps = around.measure_poses(poses, turned, process.gap)
     starts = np.concatenate([[0], np.cumsum(counts)])
     # the last pose of each stretch is the first of the next

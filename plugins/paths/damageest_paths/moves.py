@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
+from damageest.geometry.vectors import normalise
 from damageest_paths.clearance import Clearance
 from damageest_paths.process import Pass
 
@@ -197,7 +198,7 @@ def _round_the_sphere(way: Floats, axes: Floats, travel: Travel) -> tuple[Floats
     inner *= far / np.maximum(np.linalg.norm(inner, axis=1), 1e-9 * far)[:, None]
     inner[0], inner[-1] = first, last
     turned = (1 - share) * axes[0] + share * axes[1]
-    turned /= np.maximum(np.linalg.norm(turned, axis=1), 1e-9)[:, None]
+    turned = normalise(turned, 1e-9)
     return travel.centre + inner, turned
 
 
@@ -210,7 +211,7 @@ def _measure_way(points: Floats, axes: Floats, clearance: Clearance, travel: Tra
     share[-1] = 1.0
     dense = points[place] + share[:, None] * (points[place + 1] - points[place])
     turned = (1 - share)[:, None] * axes[place] + share[:, None] * axes[place + 1]
-    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    turned = normalise(turned)
     moves = np.linalg.norm(np.diff(dense, axis=0), axis=1) + clearance.bound_turns(turned)
     found = clearance.measure_poses(dense, turned, travel.gap)
     return float(min(found.min(), np.min((found[1:] + found[:-1] - moves) / 2, initial=np.inf)))

@@ -11,6 +11,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import order_integers
+from damageest.geometry.morton import encode_cells
 from damageest_paths.frames import find_across
 from damageest_paths.process import Pass
 
@@ -156,20 +157,7 @@ def _order_by_place(points: Floats) -> Ints:
     low = points.min(axis=0)
     size = max(float((points.max(axis=0) - low).max()), 1e-300)
     place = ((points - low) * ((2**BITS - 1) / size)).astype(np.int64)
-    number = np.zeros(len(points), np.int64)
-    for axis in range(3):
-        number |= _spread_digits(place[:, axis]) << axis
-    return order_integers(number)
-
-
-def _spread_digits(value: Ints) -> Ints:
-    """Whole numbers (K,) below 2**21, with two zeros between neighbouring binary digits."""
-    for shift, mask in (
-        (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3),
-        (2, 0x1249249249249249),
-    ):  # fmt: skip
-        value = (value | (value << shift)) & mask
-    return value
+    return order_integers(encode_cells(place))
 
 
 def _cut_triangles(triangles: Floats, low: Floats, high: Floats, width: float) -> Floats:

@@ -10,6 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.distance import SurfaceTree, distance_to_edges, signed_distance
+from damageest.geometry.vectors import normalise
 from damageest_paths.floor import Floor
 from damageest_paths.process import Process
 
@@ -181,8 +182,8 @@ class SheetTree:
         points = np.einsum("nk,nki->ni", share, self.points[corners])
         normals = np.einsum("nk,nki->ni", share, self.normals[corners])
         upward = np.einsum("nk,nki->ni", share, self.upward[corners])
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
-        upward /= np.linalg.norm(upward, axis=1)[:, None]
+        normals = normalise(normals)
+        upward = normalise(upward)
         if exact:
             distance, upward = self.floor.measure(points)
             points = points + (self.sheet.depth - distance)[:, None] * upward

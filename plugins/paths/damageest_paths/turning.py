@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
+from damageest.geometry.vectors import normalise
 from damageest_paths.process import measure_along
 
 BLOCKED, CUT, TURN, TIGHT, TILT = 100.0, 30.0, 6.0, 0.2, 0.05
@@ -95,4 +96,4 @@ def turn_evenly(first: Floats, last: Floats, share: Floats) -> Floats:
     if angle < 1e-9:
         return np.tile(last, (len(share), 1))
     found = np.sin((1 - share) * angle)[:, None] * first + np.sin(share * angle)[:, None] * last
-    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+    return normalise(found)

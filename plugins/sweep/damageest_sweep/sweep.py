@@ -10,6 +10,7 @@ from pydantic import Field
 from damageest.artefacts import Floats, Ints, Mesh, Part, Rims, Surface, open_edges
 from damageest.errors import StageError
 from damageest.geometry.distance import is_inside
+from damageest.geometry.vectors import normalise
 from damageest.stages.enclose import Enclose
 
 REMEDY = "enclose: adaptive"
@@ -80,7 +81,7 @@ def orient_to_skin(surface: Surface, rim: Ints, part: Part) -> tuple[Ints, Ints,
     from damageest.geometry.distance import signed_distance
 
     _, nearest = signed_distance(surface.triangles.mean(axis=1), part)
-    outward = part.cross[nearest] / np.linalg.norm(part.cross[nearest], axis=1)[:, None]
+    outward = normalise(part.cross[nearest])
     sign = 1 if np.einsum("ij,ij->", surface.cross, outward) > 0 else -1
     mean = sign * surface.cross.sum(axis=0)
     if not np.linalg.norm(mean) > 0.1 * 2 * surface.area:

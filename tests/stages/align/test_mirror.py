@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from align_scenes import cut_strip, make_bracket, measure_apart, scene, watch_by_camera
 
 from damageest.artefacts import Part, Scan
 from damageest.errors import StageError
+from damageest.stages.align.none import KnownPose
 from damageest.stages.align.register import Register
 
 
@@ -34,6 +37,15 @@ def test_a_strip_of_a_mirror_image_is_not_refused() -> None:
     """A few faces have a mirror image that fits another place of the part: too little to refuse a scan for."""
     part, scan = cut_strip("block", 1000, 0.1, points=6000)
     assert not is_refused(part, mirror(scan), 4 * scan.noise)
+
+
+def test_a_mirror_image_in_a_given_pose_is_refused() -> None:
+    """The pose is the one in which most of it lies on the part; part of what is mirrored lies outside."""
+    part, scan = scene("block", 50, points=20_000)
+    assert scan.truth is not None
+    aligned = mirror(scan.move(scan.truth.T_part_scan))
+    with pytest.raises(StageError, match="mirror image"):
+        KnownPose().run(replace(aligned, noise=scan.noise), part, 4 * scan.noise)
 
 
 @pytest.mark.slow

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from align_scenes import error, scene
 from damageest_evaluate.parts import PARTS
+from damageest_evaluate.scores import measure_pose_error
+from damageest_evaluate.troubles.case import make_scan, make_scene
+from damageest_evaluate.troubles.suite import make_trouble_cases
 
 from damageest.artefacts import Scan
 from damageest.errors import StageError
@@ -173,3 +176,13 @@ def test_too_few_points() -> None:
     part, scan = scene("block", seed=2)
     with pytest.raises(StageError, match="50 points"):
         Register().run(Scan(scan.points[:50]), part, 0.1)
+
+
+def test_both_ways_up_of_a_gear_are_listed_where_steps_blur_the_search() -> None:
+    """One view by a depth camera: copies of poses that were found twice had crowded out one of the right two."""
+    case = make_trouble_cases(numbers=[157])[0]
+    scene_ = make_scene(case)
+    scan, pose = make_scan(case, scene_)
+    found = Register().run(replace(scan, noise=1 / np.sqrt(12)), scene_.part, 1.5)
+    known = [found.T_part_scan, *(found.alternatives if found.alternatives is not None else ())]
+    assert min(measure_pose_error(scene_.part, one, pose)[1] for one in known) < 1.0

@@ -1,17 +1,13 @@
-"""One case: a deformed part with known loss is scanned, the program is run, and what it found is compared.
-
-``python -m damageest_evaluate.adapting.case CASE`` runs one case, given as JSON, and prints its row.
-"""
+"""One case: a deformed part with known loss is scanned, the program is run, and what it found is compared."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import json
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +19,6 @@ from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate
 from damageest_evaluate.adapting.plain import fit_plainly
 from damageest_evaluate.parts import PARTS
-from damageest_evaluate.processes import MARK
 from damageest_evaluate.scores import iou
 from damageest_evaluate.sized import make_sized_damage
 
@@ -38,7 +33,6 @@ class DeformedCase:
     a part is thin; ``wear``: tools; ``seen``: share of the skin that is scanned, from one side; ``use``: the stage
     `adapt`, or `plain`."""
 
-    module: ClassVar[str] = "damageest_evaluate.adapting.case"
     group: str
     name: str
     part: str
@@ -74,6 +68,10 @@ class DeformedCase:
             "seconds": 0.0,
         }
 
+    def run(self) -> dict[str, Any]:
+        """Runs the case and gives its row."""
+        return measure(self)
+
     def simulate(self) -> tuple[Part, Scan]:
         """Part and scan. Raises LookupError where no loss of this depth fits the part."""
         part = PARTS[self.part]()
@@ -105,7 +103,7 @@ def measure(case: DeformedCase) -> dict[str, Any]:
     try:
         part, scan = case.simulate()
         before = cpu_seconds()
-        result = run(case, part, scan)
+        result = run_job(case, part, scan)
     except (DamageestError, LookupError) as error:
         return row | {"error": " ".join(str(error).split())[:200]}
     row["seconds"] = cpu_seconds() - before
@@ -129,7 +127,7 @@ def measure(case: DeformedCase) -> dict[str, Any]:
     }
 
 
-def run(case: DeformedCase, part: Part, scan: Scan) -> Result:
+def run_job(case: DeformedCase, part: Part, scan: Scan) -> Result:
     """The program's result. For `plain` the part is deformed by the plain fit from the rigid pose first."""
     import damageest
 
@@ -139,7 +137,3 @@ def run(case: DeformedCase, part: Part, scan: Scan) -> Result:
     pose = damageest.run(job, part=part, scan=scan).pose
     deformed = fit_plainly(part, move_points(scan.points, pose.T_part_scan))
     return damageest.run(job, part=deformed, scan=scan)
-
-
-if __name__ == "__main__":
-    print(MARK + json.dumps(measure(DeformedCase(**json.loads(sys.argv[1])))))

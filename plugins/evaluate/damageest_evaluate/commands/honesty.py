@@ -50,7 +50,7 @@ def command(
         replace_between_marks(write, None, "honesty")  # fails before the runs start if the marks are missing
     source = fingerprint_code(Registry.discover())
     cases = make_trouble_cases(
-        _split(kinds), _split(parts), _parse_numbers("--seeds", seeds), points, _parse_numbers("--case", case), source
+        _split(kinds), _split(parts), parse_numbers("--seeds", seeds), points, parse_numbers("--case", case), source
     )
     if show:
         for item in cases:
@@ -81,7 +81,7 @@ def _split(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
 
 
-def _parse_numbers(option: str, text: str) -> list[int]:
+def parse_numbers(option: str, text: str) -> list[int]:
     """The whole numbers in ``text``; raises InputError for anything else."""
     from damageest.errors import InputError
 

@@ -13,6 +13,7 @@ from manifold3d import Manifold, OpType
 from damageest.artefacts import DepositPath, Floats, Ints, Solid
 from damageest.geometry.solids import to_manifold
 from damageest.geometry.transforms import turn_to_axis
+from damageest.geometry.vectors import normalise
 
 FAR = 2.0
 """Bead widths beyond which the distance need not be known."""
@@ -91,7 +92,7 @@ def _list_poses(path: DepositPath, run: Ints, step: float) -> tuple[Floats, Floa
     number = np.repeat(np.arange(len(counts)), counts)
     points = ends[number] + share * (ends[number + 1] - ends[number])
     axes = turned[number] + share * (turned[number + 1] - turned[number])
-    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    axes = normalise(axes)
     far = np.repeat(np.concatenate([[0.0], np.cumsum(moves)[:-1]]), counts) + share[:, 0] * np.repeat(moves, counts)
     return points + path.standoff * axes, axes, far
 

@@ -1,18 +1,14 @@
-"""One case of the suite, from the trouble to the judgement, as a row of values that JSON can hold.
-
-``python -m damageest_evaluate.troubles.case CASE`` runs one case, given as JSON, and prints its row.
-"""
+"""One case of the suite, from the trouble to the judgement, as a row of values that JSON can hold."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +19,6 @@ from damageest.geometry.transforms import invert_pose
 from damageest.isolation import cpu_seconds
 from damageest.registry import Registry
 from damageest.result import Result
-from damageest_evaluate.processes import MARK
 from damageest_evaluate.troubles.classify import (
     Judgement,
     TrueState,
@@ -42,7 +37,6 @@ class TroubleCase:
     ``number``: the case's place in the whole suite, from 1. ``source``: digest of the code.
     """
 
-    module: ClassVar[str] = "damageest_evaluate.troubles.case"
     kind: str
     part: str
     seed: int
@@ -75,6 +69,10 @@ class TroubleCase:
         }
         row |= {"accepted": 0, "true_volume": 0.0, "found_volume": 0.0, "seen": None, "seen_reported": None}
         return row | {"seen_error": None, "seconds": 0.0, "cpu_seconds": 0.0, "step_seconds": 0.0}
+
+    def run(self) -> dict[str, Any]:
+        """As `run_case`."""
+        return run_case(self)
 
 
 class StageClock:
@@ -168,7 +166,3 @@ def _describe_result(result: Result, scene: TroubleScene) -> dict[str, Any]:
         "seen_reported": reported,
         "seen_error": measure_seen_error(result.coverage, scene.seen),
     }
-
-
-if __name__ == "__main__":
-    print(MARK + json.dumps(run_case(TroubleCase(**json.loads(sys.argv[1])))), flush=True)

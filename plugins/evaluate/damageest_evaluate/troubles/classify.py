@@ -13,9 +13,9 @@ from damageest.findings import Coverage
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.solids import to_manifold, to_solid
-from damageest.geometry.transforms import move_mesh
+from damageest.geometry.transforms import move_mesh, move_points
 from damageest.result import Result, Site
-from damageest_evaluate.scores import MATCH, measure_depth, measure_pose_error, score, unite_solids
+from damageest_evaluate.scores import MATCH, measure_depth, measure_pose_error, sample_surface, score, unite_solids
 
 RIGHT_IOU = 0.9
 """Least intersection over union of the accepted damage volumes and the true damage."""
@@ -243,6 +243,19 @@ def find_motion(part: Part, found: Pose, true: Floats, tolerance: float) -> Floa
     if residual < 2 * tolerance and any("symmetry" in note for note in found.notes):
         return np.asarray(found.T_part_scan @ np.linalg.inv(true))
     return None
+
+
+def _measure_left(part: Part, found: Pose, T: Floats, true: Floats) -> float:
+    """The rms path by which a pose ``T`` (4,4) differs from the true one after the best of its free motions."""
+    if not found.free:
+        return float("inf")
+    points = sample_surface(part, 4000)[0]
+    moved = move_points(points, T @ np.linalg.inv(true))
+    ways = np.stack([one.move(moved).ravel() for one in found.free], axis=1)
+    best = np.linalg.lstsq(ways, (points - moved).ravel(), rcond=None)[0]
+    amount = np.clip(best, [one.low for one in found.free], [one.high for one in found.free])
+    left = (moved - points).ravel() + ways @ amount
+    return float(np.sqrt((left**2).sum() / len(points)))
 
 
 def _split_damage(true: TrueState, motion: Floats | None) -> list[Solid]:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from damageest_evaluate.troubles import clutter, frame, lost, scanner, shape, wear
 from damageest_evaluate.troubles.form import FORM_TROUBLES
-from damageest_evaluate.troubles.ways import Trouble, TroubleWay, scan_from_few, scan_partly, spread_over
+from damageest_evaluate.troubles.ways import (
+    Trouble,
+    TroubleWay,
+    scan_from_few,
+    scan_partly,
+    spread_amounts,
+    spread_over,
+)
 
 TROUBLES: dict[str, Trouble] = {
     "ordinary damage": Trouble(
@@ -230,5 +237,22 @@ TROUBLES: dict[str, Trouble] = {
     "undamaged part, few positions, depth in steps": Trouble(scanner.scan_in_steps, scan_from_few(1.0)),
     **FORM_TROUBLES,
     **wear.WEAR_TROUBLES,
+    "second view too deep, views not given": Trouble(
+        scanner.lay_sheets,
+        (
+            *spread_amounts("rib_bracket block lever ribbed_plate cuboid plate gear coupling tube", (1.5, 2.5)),
+            TroubleWay("rib_bracket", "known", 3, False, 1.2),
+            TroubleWay("rib_bracket", "known", 8, False, 1.5),
+        ),
+    ),
+    "waves inward only": Trouble(
+        scanner.make_hollow,
+        (
+            TroubleWay("plate", "known", 0, False, 1.5),
+            TroubleWay("block", "known", 0, False, 2.0),
+            TroubleWay("lever", "unknown", 0, False, 2.0),
+            TroubleWay("cuboid", "known", 0, False, 3.0),
+        ),
+    ),
 }
 """Name of a kind: what makes it, and its cases."""

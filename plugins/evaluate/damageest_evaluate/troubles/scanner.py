@@ -9,6 +9,7 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.rays import RayCaster
+from damageest.geometry.vectors import normalise
 from damageest_evaluate.troubles.lost import bite_wall, lose_rib
 from damageest_evaluate.troubles.scene import Scanning, TroubleScene, evaluate_waves, make_random_waves
 
@@ -50,10 +51,29 @@ def make_wavy(case: Scanning) -> TroubleScene:
     return scene.with_points(scene.points + height[:, None] * find_normals(case, scene.points))
 
 
+def make_hollow(case: Scanning) -> TroubleScene:
+    """As `make_wavy`, with waves that only go inward; what lies outside is on the skin."""
+    scene = case.scan(case.part, None, noise=0)
+    waves, phases = make_random_waves(case.part.diagonal / 6, case.make_rng(7))
+    height = case.amount * case.tolerance * np.minimum(evaluate_waves(scene.points, waves, phases), 0)
+    noise = case.make_rng(12).normal(scale=case.noise, size=scene.points.shape)
+    return scene.with_points(scene.points + height[:, None] * find_normals(case, scene.points) + noise)
+
+
+def lay_sheets(case: Scanning) -> TroubleScene:
+    """The second view is ``amount`` tolerances too deep, away from its scanner; the part is undamaged."""
+    scene = case.scan(case.part, None)
+    assert scene.view is not None
+    assert scene.scanners is not None
+    way = case.part.bounds.mean(axis=0) - scene.scanners[1]
+    deeper = case.amount * case.tolerance * way / np.linalg.norm(way)
+    return scene.with_points(scene.points + (scene.view == 1)[:, None] * deeper)
+
+
 def find_normals(case: Scanning, points: Floats) -> Floats:
     """The outward unit normal (N,3) of the face of the part that is nearest to each point."""
     cross = case.part.cross[closest_on_mesh(points, case.part)[1]]
-    return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))
+    return normalise(cross)
 
 
 def mix_pixels(case: Scanning) -> TroubleScene:
@@ -66,7 +86,7 @@ def mix_pixels(case: Scanning) -> TroubleScene:
     assert scene.view is not None
     normals = find_normals(case, scene.points)
     way = scene.points - scene.scanners[scene.view]
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    way = normalise(way)
     # where the ray that passes a little above the skin does not meet the part soon, there is an edge
     beside = (
         scene.points + 0.01 * case.part.diagonal * normals + 0.004 * case.part.diagonal * _turn_across(way, normals)
@@ -83,7 +103,7 @@ def mix_pixels(case: Scanning) -> TroubleScene:
 def _turn_across(way: Floats, normals: Floats) -> Floats:
     """The part of the normals across the rays, as unit vectors (N,3)."""
     across = normals - np.einsum("ij,ij->i", normals, way)[:, None] * way
-    return np.asarray(across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12))
+    return normalise(across, 1e-12)
 
 
 def add_outliers(case: Scanning) -> TroubleScene:

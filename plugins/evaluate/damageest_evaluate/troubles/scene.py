@@ -10,6 +10,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh, Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
+from damageest.geometry.vectors import normalise
 from damageest.stages.scan.scanner import apply_tools
 from damageest_evaluate.damages import make_random_damage
 from damageest_evaluate.troubles.parts import NOISE, TOLERANCE, make_named_part
@@ -119,7 +120,7 @@ def _drop_dust(body: Any, volume: float) -> Any:
 def make_random_waves(size: float, rng: np.random.Generator, count: int = 8) -> tuple[Floats, Floats]:
     """Wave vectors (count,3) with wavelengths near ``size``, and phases (count,)."""
     direction = rng.normal(size=(count, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    direction = normalise(direction)
     return direction * 2 * np.pi / size * rng.uniform(0.8, 1.25, (count, 1)), rng.uniform(0, 2 * np.pi, count)
 
 

@@ -9,6 +9,7 @@ from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.vectors import normalise
 
 DISTANCE = 2.5
 """Distance of a scanner position from the part's centre, in diagonals."""
@@ -24,7 +25,7 @@ def place_scanners(part: Mesh, count: int, rng: np.random.Generator) -> Floats:
 
     turn = Rotation.random(random_state=rng).as_matrix()
     directions = {1: _ABOVE[:1], 2: _ABOVE[:2], 3: _ABOVE, 8: _CORNERS}[count] @ turn.T
-    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    directions = normalise(directions)
     return np.asarray(part.bounds.mean(axis=0) + DISTANCE * part.diagonal * directions)
 
 
@@ -67,7 +68,7 @@ def _sample_visible(
     caster: RayCaster, mesh: Mesh, scanners: Floats, count: int, rng: np.random.Generator
 ) -> tuple[Floats, Flags]:
     points, face = sample_by_area(mesh, count, rng)
-    normals = mesh.cross[face] / np.linalg.norm(mesh.cross[face], axis=1, keepdims=True)
+    normals = normalise(mesh.cross[face])
     visible = find_visible(caster, mesh, points, normals, scanners)
     seen = visible.any(axis=1)
     return points[seen], visible[seen]
@@ -79,5 +80,5 @@ def measure_seen_share(part: Mesh, left: Mesh, scanners: Floats | None, count: i
     intact = distance_to_mesh(points, left) < 1e-6 * part.diagonal if left is not part else np.ones(count, np.bool_)
     if scanners is None:
         return float(intact.mean())
-    normals = part.cross[face] / np.linalg.norm(part.cross[face], axis=1, keepdims=True)
+    normals = normalise(part.cross[face])
     return float((find_visible(RayCaster(left), left, points, normals, scanners).any(axis=1) & intact).mean())

@@ -34,6 +34,11 @@ def spread_over(parts: str, pose: str = "known", views: int = 8) -> tuple[Troubl
     return tuple(TroubleWay(name, poses[k % len(poses)], views) for k, name in enumerate(parts.split()))
 
 
+def spread_amounts(parts: str, amounts: tuple[float, ...]) -> tuple[TroubleWay, ...]:
+    """Each part in known pose with each amount, from two positions that the job is not told."""
+    return tuple(TroubleWay(name, "known", 2, False, amount) for name in parts.split() for amount in amounts)
+
+
 _PARTS = ("block", "gear", "tube", "ribbed_plate", "lever", "cuboid", "keyed_shaft", "coupling", "plate", "rib_bracket")
 
 

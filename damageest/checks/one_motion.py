@@ -1,0 +1,65 @@
+"""Whether one rigid motion brings the points of a site back onto the skin, as if a view of the scan were misplaced."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import Deviation, Ints, Part, Scan
+from damageest.geometry.neighbourhoods import find_neighbours
+
+LEAST_SHARE = 0.05
+"""Share of the scan's points that a site has at least, for it to be what a view shows."""
+ASKED, ROUNDS = 5000, 5
+"""Points that are used, and rounds of the robust fit."""
+OFF = 1.15
+"""Deviation of the points from the skin after the motion, in noises, up to which it explains them."""
+LEAST_NOISE = 1 / 6
+"""Noise that is reckoned with at least, in tolerances."""
+KEPT = 0.9
+"""Share of the points that it has to explain."""
+SHARP = 30.0
+"""Angle between triangles, in degrees, from which they belong to two faces of the part."""
+OTHERS, AROUND = 0.06, 6
+"""Share of the points on other faces than the one with most of them, of another direction, away from its edges: with so
+many neighbours on the same face. One face that is worn evenly, and a journal that is worn on one side, are brought back
+by a motion as well; two faces that are worn alike are hardly."""
+
+
+def is_one_motion(aligned: Scan, deviation: Deviation, part: Part, members: Ints, tolerance: float) -> bool:
+    """Whether one motion explains the points ``members`` (M,) of a site, over several faces of the part."""
+    if len(members) < LEAST_SHARE * len(aligned.points) or len(members) < 100:
+        return False
+    some = members[:: max(1, len(members) // ASKED)]
+    normals = part.face_normals[deviation.face[some]]
+    at = aligned.points[some] - aligned.points[some].mean(axis=0)
+    rows = np.concatenate([np.cross(at / np.abs(at).max(), normals), normals], axis=1)
+    distance, used = deviation.distance[some], np.ones(len(some), bool)
+    scatter, left = np.inf, np.abs(distance)
+    for _ in range(ROUNDS):
+        motion = np.linalg.lstsq(rows[used], distance[used], rcond=None)[0]
+        left = np.abs(distance - rows @ motion)
+        scatter = 1.4826 * float(np.median(left))
+        used = left <= 3 * scatter
+    most = OFF * max(aligned.noise, LEAST_NOISE * tolerance)
+    if scatter > most or float(used.mean()) < KEPT:
+        return False
+    face = _number_faces(part)[deviation.face[some]]
+    around = face[find_neighbours(at, AROUND + 1, at)[1]]
+    is_main = face == np.bincount(face).argmax()
+    is_other = ~is_main & (around == face[:, None]).all(axis=1)
+    is_other &= normals @ normals[is_main].mean(axis=0) < np.cos(np.radians(SHARP))
+    return float(is_other.mean()) > OTHERS and 1.4826 * float(np.median(left[is_other])) < most
+
+
+def _number_faces(part: Part) -> Ints:
+    """(F,) the number of the smooth face that each triangle belongs to."""
+    import trimesh
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = trimesh.graph.face_adjacency(part.faces)
+    first, second = pairs.T
+    cosine = np.einsum("ij,ij->i", part.face_normals[first], part.face_normals[second])
+    first, second = pairs[cosine > np.cos(np.radians(SHARP))].T
+    links = coo_matrix((np.ones(len(first), bool), (first, second)), shape=(len(part.faces),) * 2)
+    return np.asarray(connected_components(links, directed=False)[1])

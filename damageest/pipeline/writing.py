@@ -1,0 +1,49 @@
+"""Steps round the stages `export` and `report`: what result.json and job.yaml say, and what the stages wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from damageest.artefacts import Reason
+from damageest.errors import StageError
+from damageest.output.files import describe_job, describe_result, write_report
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import JobState
+from damageest.pipeline.steps import step
+from damageest.result import Result
+from damageest.rules.notes import make_notes, rank_notes
+from damageest.stages.export import ExportedFiles
+from damageest.stages.report import Report
+
+
+@step(gives=("result", "content", "job_text"))
+def describe_output(
+    engine: Engine, result: Result, written: ExportedFiles, target: Path
+) -> tuple[Result, Mapping[str, Any], str]:
+    """Adds to the result what the export says and all stages so far; gives the content of result.json and job.yaml."""
+    if written.warnings:
+        result = replace(result, warnings=rank_notes((*result.warnings, *make_notes("export", written.warnings))))
+    result = replace(result, stages=tuple(engine.records))
+    return result, describe_result(result, target, written), describe_job(engine.job, target)
+
+
+@step(gives=("result", "written"), reads=("written",), calls=(Report,))
+def show_result(engine: Engine, state: JobState) -> tuple[Result, ExportedFiles]:
+    """Makes the report. One that fails is a warning: the result is more than its pictures."""
+    result, written = state.result, state.written
+    try:
+        done = engine.call(Report, state).reported
+    except StageError as error:
+        warning = Reason("report", f"{error.args[0]} (the run went on without a report)")
+        return replace(result, warnings=(*result.warnings, warning)), written
+    result = replace(result, stages=tuple(engine.records))
+    return result, replace(written, files=(*written.files, *done.files), notes=(*written.notes, *done.notes))
+
+
+@step()
+def write_output(engine: Engine, result: Result, written: ExportedFiles, folder: Path, target: Path) -> None:
+    """Writes result.json and job.yaml."""
+    write_report(result, engine.job, folder, target, written)

@@ -1,0 +1,23 @@
+"""One motion of all points of the site brings them back onto the skin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from damageest.artefacts import Reason
+from damageest.rules import Rule, ScanFacts, SiteFacts
+
+
+class OneMotion(Rule):
+    code = "one_motion"
+    meaning = "one motion brings the site's points, on several faces, back onto the skin: a view is misplaced"
+    threshold = "what is left is the noise, in nine tenths of its points; a site of 5% of the scan's points or more"
+    remedy = "register the views to each other again, or give them as a list of files, so that they can be compared"
+
+    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+        if site.one_motion:
+            text = (
+                f"its {site.count} points, {site.typical:.3g} {scan.unit} deep, lie on the skin after one motion of "
+                "all: a misplaced view explains the site"
+            )
+            yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)

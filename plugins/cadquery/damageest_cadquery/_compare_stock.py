@@ -1,0 +1,144 @@
+"""Compares the exact stock of a deposit with the mesh's: volume, and distances both ways."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from damageest.artefacts import Deposit, Floats, Ints, Mesh, Part, Solid
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, is_inside, signed_distance
+from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.solids import to_arrays, to_manifold
+from damageest.geometry.vectors import normalise
+from damageest_cadquery._check import VOLUME, is_plane, measure_area
+from damageest_cadquery._cut import find_rim
+from damageest_cadquery._read import explore
+from damageest_cadquery._solids import StockError, explore_faces
+from damageest_cadquery._split import triangulate
+from damageest_cadquery._stock import Base, build_parts
+
+BEYOND = 0.02
+"""Largest share of the stock's surface that may be farther than a quarter tolerance from the mesh's."""
+OUTLINE, FARTHEST = 1.5, 4.0
+"""Nearer than the first to the outline of the damage, in tolerances, only the second counts: sides stand on the outline
+of the exact damage volume, which the mesh rounds, or draws out where the loss fades. It counts on the skin: over a
+convex face the sides are farther apart by as much as the offset is longer than the face."""
+ENTERED = 1e-4
+"""Share of the deposit's volume that the stock may have in the metal that is left."""
+SAMPLES = 6000
+
+
+def bound_entered(bases: Sequence[Base], part: Part, deposit: Solid) -> float:
+    """The volume of stock that may lie within the triangles of the part: their chords, and rounding errors."""
+    curved = sum(measure_area(base.face) for base in bases if not is_plane(base.face))
+    return ENTERED * deposit.volume + part.tessellation_error * curved
+
+
+def compare_stock(
+    bases: Sequence[Base], deposit: Deposit, lost: Solid, part: Part, tolerance: float
+) -> tuple[float, float, float]:
+    """Distance, largest distance and difference of volumes between stock, as high as the mesh's, and the mesh's. Its
+    parts are joined as triangles, which takes a second where OpenCASCADE takes a minute.
+
+    Raises StockError where it differs too much.
+    """
+    from manifold3d import Manifold, OpType
+
+    parts = build_parts(bases) if bases else []
+    origin = deposit.bounds.mean(axis=0)
+    solids = [to_manifold(triangulate(solid, tolerance / 16), origin) for solid in parts]
+    stock = Manifold.batch_boolean(solids, OpType.Add) if solids else Manifold()
+    whole = to_manifold(part, origin)
+    if (stock ^ whole).volume() > bound_entered(bases, part, deposit):
+        stock -= whole
+    volume = stock.volume()
+    difference = (volume - deposit.stock_volume) / deposit.volume
+    outside = np.flatnonzero(~find_inner_faces(lost, part))
+    wider = _compare_outlines(bases, lost, outside, part) / deposit.volume
+    curved = sum(measure_area(face) for solid in parts for face in explore_faces(solid) if not is_plane(face))
+    if abs(difference - wider) > VOLUME + part.tessellation_error * curved / deposit.volume:
+        raise StockError(
+            f"the volume of its stock differs by {difference:+.2%} of the deposit, of which the outline of the damage "
+            f"explains {wider:+.2%}"
+        )
+    if stock.is_empty():
+        return 0.0, 0.0, difference
+    vertices, faces = to_arrays(stock)
+    made = Mesh(vertices + origin, faces)
+    rim = cKDTree(lost.vertices[np.unique(find_rim(lost.faces[outside]))])
+    assert part.faces_brep is not None
+    stretch = _measure_stretch(bases, 1 + max([int(part.faces_brep.max()), *(base.number for base in bases)]))
+    far: list[Any] = []
+    off: list[Floats] = []
+    strayed = False
+    for one, other in ((made, deposit), (deposit, made)):
+        points, foot, number = _sample_above(one, part, tolerance)
+        off.append(distance_to_mesh(points, other))
+        far.append(np.asarray(rim.query(foot)[0]) > OUTLINE * tolerance)
+        strayed |= bool((off[-1] > FARTHEST * tolerance * np.where(far[-1], 1.0, stretch[number])).any())
+    farthest = float(max(each.max(initial=0.0) for each in off))
+    beyond = max(
+        float((each[away] > tolerance / 4).mean()) if away.any() else 0.0 for each, away in zip(off, far, strict=True)
+    )
+    if beyond > BEYOND or strayed:
+        raise StockError(f"its stock is up to {farthest:.3g} from the mesh, {beyond:.1%} more than a quarter tolerance")
+    inside = [each[away] for each, away in zip(off, far, strict=True)]
+    return float(max(np.quantile(each, 0.95) if len(each) else 0.0 for each in inside)), farthest, difference
+
+
+def _compare_outlines(bases: Sequence[Base], lost: Solid, outside: Ints, part: Part) -> float:
+    """By how much stock is larger because the exact damage volume has more skin than the mesh."""
+    assert part.faces_brep is not None
+    corners = lost.triangles[outside]
+    number = part.faces_brep[closest_on_mesh(corners.mean(axis=1), part)[1]]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    heights = {base.number: base.height for base in bases}
+    more = sum(base.height * measure_area(base.face) for base in bases)
+    return more - sum(height * float(areas[number == face].sum()) for face, height in heights.items())
+
+
+def _measure_stretch(bases: Sequence[Base], count: int) -> Floats:
+    """(F,) by how much longer the offset of each CAD face is at most than the face, at the border of its stock."""
+    from OCP.BRepAdaptor import BRepAdaptor_Curve2d, BRepAdaptor_Surface
+    from OCP.BRepLProp import BRepLProp_SLProps
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_REVERSED
+    from OCP.TopoDS import TopoDS
+
+    stretch = np.ones(count)
+    for base in bases:
+        properties = BRepLProp_SLProps(BRepAdaptor_Surface(base.face, False), 2, 1e-7)
+        sign = 1.0 if base.face.Orientation() == TopAbs_REVERSED else -1.0  # curvatures count towards the normal
+        for edge in explore(base.face, TopAbs_EDGE):
+            curve = BRepAdaptor_Curve2d(TopoDS.Edge_s(edge), base.face)
+            for at in np.linspace(curve.FirstParameter(), curve.LastParameter(), 9).tolist():
+                place = curve.Value(at)
+                properties.SetParameters(place.X(), place.Y())
+                if properties.IsCurvatureDefined():
+                    bend = max(sign * properties.MinCurvature(), sign * properties.MaxCurvature())
+                    stretch[base.number] = max(stretch[base.number], 1 + base.height * bend)
+    return stretch
+
+
+def _sample_above(mesh: Mesh, part: Part, tolerance: float) -> tuple[Floats, Floats, Ints]:
+    """(N,3) places on a mesh, evenly by area, that lie above the part's skin; (N,3) the nearest places on it, and (N,)
+    the CAD faces that these are on."""
+    assert part.faces_brep is not None
+    rng = np.random.default_rng(31)
+    total = np.cumsum(np.linalg.norm(mesh.cross, axis=1))
+    face = np.minimum(np.searchsorted(total, rng.random(SAMPLES) * total[-1], side="right"), len(total) - 1)
+    u, v = np.sqrt(rng.random((SAMPLES, 1))), rng.random((SAMPLES, 1))
+    a, b, c = np.moveaxis(mesh.triangles[face], 1, 0)
+    points = np.asarray(a * (1 - u) + b * u * (1 - v) + c * u * v)
+    normals = np.asarray(normalise(mesh.cross[face]))
+    above = signed_distance(points, part)[0] > tolerance / 8
+    points, normals = points[above], normals[above]
+    # between parts that touch, their chords leave slits
+    points = points[~is_inside(points + tolerance / 4 * normals, mesh)]
+    points = points[~is_inside(points, part)]  # near edges in which solids touch, the sign above can be wrong
+    if not len(points):
+        return points, points, np.empty(0, np.int64)
+    _, nearest, foot = closest_on_mesh(points, part)
+    return points, foot, part.faces_brep[nearest]

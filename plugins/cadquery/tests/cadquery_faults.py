@@ -1,0 +1,56 @@
+"""What OpenCASCADE may do, for the process for exact solids, which serves one request."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+from damageest_cadquery import _worker
+from damageest_cadquery._request import Made, Request
+
+Find = Callable[..., Any]
+
+
+def abort_at_second(request: Request) -> Made:
+    """Aborts at site 2."""
+
+    def find_or_abort(find: Find, site: Any, *rest: Any) -> Any:
+        if site.number == 2:
+            os.abort()
+        return find(site, *rest)
+
+    return make_with(find_or_abort, request)
+
+
+def raise_at_second(request: Request) -> Made:
+    """Raises at site 2 what no one expects."""
+
+    def find_or_raise(find: Find, site: Any, *rest: Any) -> Any:
+        if site.number == 2:
+            raise RuntimeError("Standard_NoSuchObject")
+        return find(site, *rest)
+
+    return make_with(find_or_raise, request)
+
+
+def abort_at_start(request: Request) -> Made:
+    """Aborts before the first site, each time."""
+    os.abort()
+
+
+def find_none_beyond(request: Request) -> Made:
+    """Finds no exact form for sites beyond x = 20."""
+
+    def find_or_fail(find: Find, site: Any, *rest: Any) -> Any:
+        return (None, ("forced to fail",)) if site.damage.bounds[0, 0] > 20 else find(site, *rest)
+
+    return make_with(find_or_fail, request)
+
+
+def make_with(replaced: Callable[..., Any], request: Request) -> Made:
+    """As `make_exact`, with ``replaced`` in the place of `find_exact`, which it gets as its first argument."""
+    names = vars(_worker)
+    find = names["find_exact"]
+    names["find_exact"] = lambda *values: replaced(find, *values)
+    return _worker.make_exact(request)
