@@ -13,7 +13,7 @@ from damageest.artefacts import AdaptedPart, Part
 from damageest.stages.adapt.auto import AutoAdapt
 from tests.stages.adapt.test_smooth import PART, SPHERE, scan
 
-JOB = {"version": 1, "units": "mm", "tolerance": 0.2, "align": "none", "report": "none"}
+JOB = {"version": 1, "units": "mm", "tolerance": 0.2, "align": "icp", "report": "none"}
 
 
 def run(folder: Path, use: str, given: Any) -> dict[str, bytes]:
