@@ -193,7 +193,9 @@ class Uncertainty:
     ``volume_95``, ``depth_95``: the 95 % intervals; None where no scan points lie on the inner surface. Causes, each
     as one standard deviation of the volume: ``noise`` of the points; ``spacing`` of the points, between which the inner
     surface is interpolated; ``rim``: where it meets the skin; ``pose`` as it was fitted; ``tessellation`` of the part;
-    ``form`` of skin that deviates over whole areas; ``outward``: skin that lies as far outside; ``views`` that differ.
+    ``form`` of skin that deviates over whole areas; ``adapt``: the field that the part was adapted by, which at this
+    site goes on for ``extrapolated`` beyond intact skin; ``outward``: skin that lies as far outside; ``views`` that
+    differ.
     ``free``: change of the volume at the ends of motions that the scan does not exclude. ``inside``, ``beside``: by how
     much the loss may be larger at most where no points show the inner surface, and the skin beside it. ``fading``: None
     for a loss that is not shallow.
@@ -209,6 +211,8 @@ class Uncertainty:
     form: float = 0.0
     outward: float = 0.0
     views: float = 0.0
+    adapt: float = 0.0
+    extrapolated: float = 0.0
     free: Interval = (0.0, 0.0)
     inside: float = 0.0
     beside: float = 0.0

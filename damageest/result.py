@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import (
+    AdaptedPart,
     DepositPath,
     Deviation,
     Evidence,
@@ -123,7 +124,8 @@ class Result:
     accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
     sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
     volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
-    high end. ``conversions``: what plugins can convert it to, see `convert`.
+    high end. ``adapted``: how ``part`` was deformed to follow
+    the scan; None: it is the part as designed. ``conversions``: what plugins can convert it to, see `convert`.
     """
 
     name: str
@@ -145,6 +147,7 @@ class Result:
     coverage: Coverage | None = None
     surplus: tuple[Surplus, ...] = ()
     fit: ModelFit | None = None
+    adapted: AdaptedPart | None = None
     volume_95: Interval | None = None
     conversions: Mapping[str, Conversion] = field(default_factory=dict, repr=False)
 

@@ -7,6 +7,7 @@ after `align` is in the part's. ``T_part_scan`` takes a point from the scanner's
 
 from __future__ import annotations
 
+from damageest.artefacts.adapted import AdaptedPart
 from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
 from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, EvidenceCause, Rims
 from damageest.artefacts.fields import ArtefactError
@@ -32,6 +33,7 @@ __all__ = [
     "DAMAGE",
     "INTACT",
     "OUTLIER",
+    "AdaptedPart",
     "ArtefactError",
     "BeadFill",
     "Deposit",

@@ -22,7 +22,7 @@ RIGID = 1e-6
 """Largest error of a pose's numbers, of the rotation and of the last row."""
 
 
-def _require_rigid(name: str, poses: Floats) -> None:
+def require_rigid(name: str, poses: Floats) -> None:
     """Raises ArtefactError where one of the poses (4,4) or (K,4,4) is no rotation and shift."""
     require_finite(name, poses)
     turn = poses[..., :3, :3]
@@ -39,17 +39,19 @@ def _require_rigid(name: str, poses: Floats) -> None:
 @dataclass(frozen=True, eq=False)
 class Truth(Checked):
     """The truth of a virtual scan: the true ``damage`` in the part's frame (None if there is none), the pose, and the
-    metal ``added`` outside the part, in the part's frame (None if there is none)."""
+    metal ``added`` outside the part, in the part's frame (None if there is none). ``deformed``: the damage where it
+    lies in a part that was deformed before it was scanned; None where it was not."""
 
     damage: Solid | None
     T_part_scan: Floats
     added: Solid | None = None
+    deformed: Solid | None = None
     _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64}
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require_shape("T_part_scan", self.T_part_scan, 4, 4)
-        _require_rigid("T_part_scan", self.T_part_scan)
+        require_rigid("T_part_scan", self.T_part_scan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,10 +197,10 @@ class Pose(Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_shape("T_part_scan", self.T_part_scan, 4, 4)
-        _require_rigid("T_part_scan", self.T_part_scan)
+        require_rigid("T_part_scan", self.T_part_scan)
         if self.alternatives is not None:
             require_shape("alternatives", self.alternatives, "K", 4, 4)
-            _require_rigid("alternatives", self.alternatives)
+            require_rigid("alternatives", self.alternatives)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import Evidence, Flags, Floats, FreeMotion, Part, Scan, Solid
+from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Part, Scan, Solid
 from damageest.checks.beyond_points import BeyondPoints
 from damageest.checks.inner_surface import measure_inner_surface, pair_faces
 from damageest.checks.pose_error import PoseError
 from damageest.findings import Coverage, Interval
+from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby
 from damageest.rules import ScanFacts
@@ -57,7 +58,8 @@ class SiteError:
     """The errors of one site's volume, each as one standard deviation, and of its largest depth.
 
     ``pose`` (K,): signed, by the columns of `PoseError.spread`; ``excess``: by how much the volume is too large on
-    average; ``rates`` (M,): change of the volume for each unit of each free motion, and ``motions`` (M,2): their ends;
+    average; ``adapt`` (J,): signed, by the modes of an adapted part; ``rates`` (M,): change of the volume for each unit
+    of each free motion, and by the other field of an adapted part, and ``motions`` (M,2): their ends;
     ``inside`` (where points do not bound it), ``beside``, ``fading``: by how much the loss may be larger; ``less``: by
     how much it may be smaller, since the inner surface was closed across what was not seen. ``depth``: of the damage
     volume, corrected for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free
@@ -74,6 +76,7 @@ class SiteError:
     form: float = 0.0
     outward: float = 0.0
     views: float = 0.0
+    adapt: Floats = field(default_factory=lambda: np.empty(0))
     rates: Floats = field(default_factory=lambda: np.empty(0))
     motions: Floats = field(default_factory=lambda: np.empty((0, 2)))
     inside: float = 0.0
@@ -94,6 +97,7 @@ class SiteError:
 def measure_site_error(
     damage: Solid, inner: Flags, part: Part, aligned: Scan, members: Floats, evidence: Evidence, pose: PoseError,
     scan: ScanFacts, beyond: BeyondPoints, form: float = 0.0, free: Sequence[FreeMotion] = (),
+    adapted: AdaptedPart | None = None,
 ) -> SiteError | None:  # fmt: skip
     """The errors of one site; None where no scan point lies on its inner surface.
 
@@ -122,7 +126,9 @@ def measure_site_error(
     hole = evidence.ids_gap if evidence.ids_gap > GAP * max(tolerance, aligned.spacing) ** 2 else 0.0
     deepest = _find_deepest(damage, inner, part, members, 3 * max(surface.gap, tolerance))
     by_pose = pose.of_distance(deepest.at, deepest.normal)
-    beside = by_pose**2 + max(form, systematic) ** 2 + part.tessellation_error**2 / 3
+    bent, bent_depth = measure_adapt(adapted, damage, skin, area, deepest)
+    has_other = adapted is not None and adapted.other is not None
+    beside = by_pose**2 + bent_depth**2 + max(form, systematic) ** 2 + part.tessellation_error**2 / 3
     by_point = float(np.sqrt(aligned.noise**2 + beside))
     return SiteError(
         volume=damage.volume,
@@ -136,6 +142,9 @@ def measure_site_error(
         form=float(max(form, systematic / np.sqrt(patches), AVERAGED * tolerance) * exposed),
         outward=outward * exposed / WIDTH,
         views=scan.between_views * exposed / WIDTH,
+        adapt=bent[:-1] if has_other else bent,
+        rates=bent[-1:] if has_other else np.empty(0),
+        motions=np.array([[0.0, 1.0]]) if has_other else np.empty((0, 2)),
         inside=HOLE * hole**1.5 + beyond.short,
         less=damage.volume * evidence.ids_unseen if hole else 0.0,
         depth=deepest.depth - surface.depth_excess,
@@ -145,6 +154,23 @@ def measure_site_error(
             max(-one.low, one.high) * abs(float(one.move(deepest.at[None])[0] @ deepest.normal)) for one in free
         ),
     )
+
+
+def measure_adapt(
+    adapted: AdaptedPart | None, damage: Solid, skin: Flags, area: Floats, deepest: _Place
+) -> tuple[Floats, float]:
+    """What the errors (J,) of an adapted part's field make of a volume, and the standard deviation of the distance of
+    its deepest place to the skin. Last, where there is one, what another field that explains the scan makes of the
+    volume. The skin that is gone lies elsewhere by them; the volume ends there."""
+    if adapted is None:
+        return np.empty(0), 0.0
+    fields = adapted.modes if adapted.other is None else np.concatenate([adapted.modes, adapted.other[None]])
+    centres = np.concatenate([damage.triangles[skin].mean(axis=1), deepest.at[None]])
+    normals = np.concatenate([damage.face_normals[skin], deepest.normal[None]])
+    _, face, place = closest_on_mesh(centres, adapted.part)
+    weights = find_barycentric(adapted.part.triangles[face], place)
+    moved = np.einsum("nc,jnck,nk->jn", weights, fields[:, adapted.part.faces[face]], normals)
+    return np.asarray(moved[:, :-1] @ area[skin]), float(np.linalg.norm(moved[: len(adapted.modes), -1]))
 
 
 def combine_site(error: SiteError) -> tuple[Interval, Interval]:
@@ -165,9 +191,11 @@ def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 
     alone = np.array([[one.noise, one.spacing, one.rim] for one in errors])
     shared = np.array([[one.form, one.tessellation, one.outward, one.views] for one in errors]).sum(axis=0)
     moved = np.sum([one.pose for one in errors], axis=0)
-    deviation = float(np.sqrt((alone**2).sum() + (shared**2).sum() + (moved**2).sum()))
+    bent = np.sum([one.adapt for one in errors if len(one.adapt)], axis=0)
+    deviation = float(np.sqrt((alone**2).sum() + (shared**2).sum() + (moved**2).sum() + (bent**2).sum()))
     more = sum(one.inside + one.beside + one.fading for one in errors)
-    free = _sweep(np.sum([one.rates for one in errors], axis=0), errors[0].motions)
+    moving = [one for one in errors if len(one.rates)]  # a whole body that is lost has none
+    free = _sweep(np.sum([one.rates for one in moving], axis=0), moving[0].motions) if moving else (0.0, 0.0)
     middle = volume - sum(one.excess for one in errors)
     low = min(middle - WIDTH * deviation, volume) + free[0] - sum(one.less for one in errors)
     high = max(middle + WIDTH * deviation, volume) + free[1] + more

@@ -22,6 +22,7 @@ pytest.register_assert_rewrite(
     )
 )
 
+from damageest.conformance._adapt import AdaptContract  # noqa: E402
 from damageest.conformance._base import StageContract  # noqa: E402
 from damageest.conformance._contracts import AllowanceContract, BooleanContract, RepairContract, SampleContract  # noqa: E402
 from damageest.conformance._enclose import EncloseAllContract, EncloseContract  # noqa: E402
@@ -33,6 +34,7 @@ from damageest.conformance._surface import BackgroundContract, BoundaryContract,
 
 __all__ = [
     "NEAR",
+    "AdaptContract",
     "AlignContract",
     "AllowanceContract",
     "BackgroundContract",

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from damageest.artefacts import Floats, Vector
+from damageest.output.adapt_json import AdaptReport, report_adapt
 from damageest.output.base import JsonModel
 from damageest.output.deviation_json import DeviationReport, report_deviation
 from damageest.output.fit_json import FitReport, report_fit
@@ -91,6 +92,7 @@ class Report(JsonModel):
     alignment: AlignmentReport
     deviation: DeviationReport
     coverage: CoverageReport | None
+    adapt: AdaptReport | None = Field(description="null where the part is as designed")
     fit: FitReport | None = Field(description="null where too few points lie near the skin")
     sites: list[SiteReport]
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
@@ -141,6 +143,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             held=pose.is_held,
         ),
         deviation=report_deviation(result.deviation),
+        adapt=report_adapt(result.adapted),
         fit=report_fit(result.fit),
         sites=sites,
         surplus=[report_surplus(item, result, written) for item in result.surplus],

@@ -19,7 +19,7 @@ class FadingReport(JsonModel):
 
 
 class UncertaintyReport(JsonModel):
-    """The causes. The first eight are standard deviations of the volume; `free`: its change at the ends of motions that
+    """The causes. The first nine are standard deviations of the volume; `free`: its change at the ends of motions that
     the scan does not exclude; the next two, how much larger it may be."""
 
     noise: float = Field(description="noise of the points on the inner surface")
@@ -30,6 +30,8 @@ class UncertaintyReport(JsonModel):
     form: float = Field(description="skin that deviates over whole areas")
     outward: float = Field(description="skin that lies as far outside the part")
     views: float = Field(description="views that differ where they overlap")
+    adapt: float = Field(description="the field that the part was adapted by; 0 where it was not")
+    extrapolated: float = Field(description="length, no deviation: how far that field goes on beyond intact skin here")
     free: tuple[float, float] = Field(description="least and largest change")
     inside: float = Field(description="where no points show the inner surface")
     beside: float = Field(description="where no points show the skin beside it")

@@ -22,7 +22,7 @@ from damageest.rules.notes import make_notes, rank_notes
     gives="result",
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
-        "warnings", "coverage", "surplus", "fitted", "volume_95", "conversions",
+        "warnings", "coverage", "surplus", "adapted", "fitted", "volume_95", "conversions",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -61,10 +61,11 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         undamaged=to_solid(subtract_lost(to_manifold(part, origin), lost), origin) if sites else part,
         warnings=rank_notes(state.warnings),
         failures=tuple(str(error) for error in state.failures),
-        truth=_compare_with_truth(found, scan, state.pose, state.tolerance),
+        truth=_compare_with_truth(found, scan, state.pose, state.tolerance, state.adapted is not None),
         stages=tuple(engine.records),
         coverage=state.coverage,
         surplus=state.surplus,
+        adapted=state.adapted,
         fit=None if state.fitted is None else state.fitted.fit,
         conversions=state.conversions,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
@@ -102,16 +103,20 @@ def _describe_site(found: FoundSite, part: Part, deviation: Deviation) -> Site:
     )
 
 
-def _compare_with_truth(damage: Solid | None, scan: Scan, pose: Pose, tolerance: float) -> Floats | None:
+def _compare_with_truth(
+    damage: Solid | None, scan: Scan, pose: Pose, tolerance: float, is_adapted: bool
+) -> Floats | None:
     """(volume, IoU) against a virtual scan's known damage. On a symmetric part any of the poses that map it onto itself
-    is right, so where the pose found is another one, the truth is moved by the difference."""
+    is right, so where the pose found is another one, the truth is moved by the difference. ``is_adapted``: the damage
+    is that of the deformed part, and its truth too."""
     if scan.truth is None:
         return None
-    truth = scan.truth.damage
+    deformed = scan.truth.deformed if is_adapted else None
+    truth = deformed or scan.truth.damage
     if truth is None:
         return np.array([0.0, iou(None, damage)])
     D = pose.T_part_scan @ np.linalg.inv(scan.truth.T_part_scan)
     moved = move_points(truth.vertices, D)
-    if np.linalg.norm(moved - truth.vertices, axis=1).max() > 5 * tolerance:
+    if deformed or np.linalg.norm(moved - truth.vertices, axis=1).max() > 5 * tolerance:
         truth = Solid(moved, truth.faces)
     return np.array([truth.volume, iou(truth, damage)])

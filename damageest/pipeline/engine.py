@@ -22,6 +22,7 @@ from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.outputs import check_output
 from damageest.registry.registry import Registry
 from damageest.result import StageRecord
+from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
 from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.scan import ReadScan
@@ -30,6 +31,7 @@ from damageest.stages.segment import Segment
 OPTIONS: dict[str, Contract] = {
     "reader": ReadScan,
     "aligner": Align,
+    "adapter": Adapt,
     "segmenter": Segment,
     "encloser": Enclose,
     "encloser_at_once": EncloseAll,

@@ -4,10 +4,11 @@ right."""
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import overload
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Floats, Ints, Part, Pose, Reason, Scan
+from damageest.artefacts import AdaptedPart, Deviation, Floats, Ints, Part, Pose, Reason, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.fit_doubts import find_fit_doubts
 from damageest.checks.form_words import describe_fit
@@ -84,23 +85,36 @@ def _make_rigid(T: Floats) -> Floats:
 
 @step(gives=("fitted", "warnings"))
 def fit_model(
-    part: Part, aligned: Scan, deviation: Deviation, tolerance: float, unit: str, views: ViewFits | None,
-    corrected_scale: float,
+    part: Part, aligned: Scan, adapted: AdaptedPart | None, deviation: Deviation, tolerance: float, unit: str,
+    views: ViewFits | None, corrected_scale: float,
 ) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
     """Measures how well the part as designed explains the intact skin, and warns where it does not."""
     found = measure_fit(
         part, aligned.points, deviation.distance, aligned.noise, tolerance, unit, views, corrected_scale
     )
+    found = _tell_adapted(found, adapted)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
     if found is not None and told:
         return found, [Reason("model_fit", found.fit.words, amount=found.fit.amount, unit=unit)]
     return found, ()
 
 
+@overload
+def _tell_adapted(fitted: FittedModel, adapted: AdaptedPart | None) -> FittedModel: ...
+@overload
+def _tell_adapted(fitted: None, adapted: AdaptedPart | None) -> None: ...
+def _tell_adapted(fitted: FittedModel | None, adapted: AdaptedPart | None) -> FittedModel | None:
+    """The fit in words that do not call an adapted part the part as designed."""
+    if fitted is None or adapted is None:
+        return fitted
+    words = fitted.fit.words.replace("the part as designed", "the adapted part")
+    return replace(fitted, fit=replace(fitted.fit, words=words))
+
+
 @step(gives=("fitted", "warnings"))
 def question_fit(
     fitted: FittedModel | None, surplus: tuple[Surplus, ...], found: tuple[FoundSite, ...], pose: Pose, aligned: Scan,
-    deviation: Deviation, skin: SkinView, unit: str, tolerance: float, warnings: Reasons,
+    adapted: AdaptedPart | None, deviation: Deviation, skin: SkinView, unit: str, tolerance: float, warnings: Reasons,
 ) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
     """Withdraws the statement that the part as designed explains the intact skin, where there are doubts."""
     if fitted is None or fitted.fit.model != "ok":
@@ -112,6 +126,7 @@ def question_fit(
     if not doubts:
         return fitted, warnings
     fit = describe_fit(replace(fitted.fit, model="open"), unit, tolerance, doubts)
+    fit = _tell_adapted(replace(fitted, fit=fit), adapted).fit
     # a corrected scale was reported in a note whose text is no longer true
     kept = [note for note in warnings if note.code != "model_fit"]
     return replace(fitted, fit=fit), [*kept, Reason("model_fit", fit.words)]

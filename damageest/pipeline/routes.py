@@ -8,6 +8,7 @@ test compares these lines with the code.
 
 from __future__ import annotations
 
+from damageest.pipeline.adapt import adapt_part
 from damageest.pipeline.collect import collect_result
 from damageest.pipeline.coverage import describe_coverage, inspect_skin
 from damageest.pipeline.deposits import make_deposits, separate_deposits
@@ -74,11 +75,13 @@ ACQUIRE: Route = (
     correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner
     #     -> views, pose, aligned, noise, spacing, tolerance
     correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader -> scan, pose, aligned, corrected_scale
+    adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, samples, tolerance, unit, views, warnings, adapter,
+    #     scan -> adapted, part, aligned, pose, samples, warnings
     settle_tolerance,  # tolerance, asked_tolerance, part, aligned, noise -> tolerance, +warnings
     Segment,  # aligned, part, samples, tolerance -> deviation
     check_intact,  # deviation, tolerance, part, segmenter ->
     inspect_skin,  # part, aligned, deviation, tolerance -> skin, deviation
-    fit_model,  # part, aligned, deviation, tolerance, unit, views, corrected_scale -> fitted, +warnings
+    fit_model,  # part, aligned, adapted, deviation, tolerance, unit, views, corrected_scale -> fitted, +warnings
     Cluster,  # aligned, deviation, tolerance -> sites
     find_surplus,  # calls Cluster, EncloseAll: unit, aligned, deviation, tolerance, part, sites, samples
     #     -> surplus, deviation, +warnings
@@ -108,18 +111,18 @@ CLOSE: Route = (
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
     gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner -> facts
-    measure_uncertainty,  # found, part, aligned, deviation, skin, coverage, facts, fitted, pose, tolerance, unit
-    #     -> found
+    measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, tolerance,
+    #     unit -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit
     #     -> found
-    question_fit,  # fitted, surplus, found, pose, aligned, deviation, skin, unit, tolerance, warnings
+    question_fit,  # fitted, surplus, found, pose, aligned, adapted, deviation, skin, unit, tolerance, warnings
     #     -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     separate_deposits,  # found, tolerance -> found
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
     sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance -> volume_95
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
-    #     coverage, surplus, fitted, volume_95, conversions
+    #     coverage, surplus, adapted, fitted, volume_95, conversions
     #     -> result
 )
 WRITE: Route = (

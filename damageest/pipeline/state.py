@@ -15,6 +15,7 @@ from typing import Any, Generic, Self, TypeVar, overload
 import numpy as np
 
 from damageest.artefacts import (
+    AdaptedPart,
     DepositPath,
     Deviation,
     Enclosures,
@@ -44,6 +45,7 @@ from damageest.job.model import Accept, SiteChoice
 from damageest.pipeline.cache import digest
 from damageest.result import Conversion, Result
 from damageest.rules import Rule, ScanFacts
+from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
 from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.export import ExportedFiles, PathWriter, Writer
@@ -187,7 +189,8 @@ class JobState(State):
     ``accept``, the stages whose options steps read (None where the job's route has none), and ``rules``, ``writers``,
     ``path_writers`` and ``conversions``.
     ``tolerance``: None until it is measured where the job says `auto`. ``depth_step``: of the scan's depth, 0 where it
-    is continuous. ``aligned``: the scan in the part's frame. ``intact`` (K,3): its points on the nominal surface.
+    is continuous. ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan,
+    which is ``part`` from then on; None: it is as designed. ``intact`` (K,3): its points on the nominal surface.
     ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the sites.
     ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written into,
     ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
@@ -200,6 +203,7 @@ class JobState(State):
     accept = Value[Accept]()
     reader = Value[ReadScan | None]()
     aligner = Value[Align | None]()
+    adapter = Value[Adapt | None]()
     segmenter = Value[Segment | None]()
     encloser = Value[Enclose | None]()
     encloser_at_once = Value[EncloseAll | None]()
@@ -217,6 +221,7 @@ class JobState(State):
     samples = Value[Samples]()
     pose = Value[Pose]()
     aligned = Value[Scan]()
+    adapted = Value[AdaptedPart | None]()
     deviation = Value[Deviation]()
     sites = Value[Sites]()
     intact = Value[Floats]()

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Flags, Ints, Part, Pose, Scan
+from damageest.artefacts import INTACT, Deviation, Flags, Ints, Part, Pose, Scan, Solid
 from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
@@ -39,7 +39,20 @@ BESIDE = 2.0
 
 @step(
     gives="found",
-    reads=("found", "part", "aligned", "deviation", "skin", "coverage", "facts", "fitted", "pose", "tolerance", "unit"),
+    reads=(
+        "found",
+        "part",
+        "aligned",
+        "adapted",
+        "deviation",
+        "skin",
+        "coverage",
+        "facts",
+        "fitted",
+        "pose",
+        "tolerance",
+        "unit",
+    ),
 )
 def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
     """Gives each site the 95 % intervals of its volume and depth, with all causes that have a size."""
@@ -99,7 +112,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     # what the model fit gives is the 95 % bound of a deviation
     found = measure_site_error(
         site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts, beyond,
-        free=state.pose.free,
+        free=state.pose.free, adapted=state.adapted,
         form=measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH,
     )  # fmt: skip
     if found is None:
@@ -111,8 +124,8 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         found,
         beside=limit_beside(state.coverage, site.damage, reach, found.depth),
         fading=fading.beyond if fading else 0.0,
-        rates=np.array([one.rate for one in dependences]),
-        motions=np.array([[one.motion.low, one.motion.high] for one in dependences]).reshape(-1, 2),
+        rates=np.append(found.rates, [one.rate for one in dependences]),
+        motions=np.concatenate([found.motions, *([[one.motion.low, one.motion.high]] for one in dependences)]),
     )
     volume, depth = combine_site(error)
     uncertainty = Uncertainty(
@@ -126,6 +139,8 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         form=error.form,
         outward=error.outward,
         views=error.views,
+        adapt=float(np.linalg.norm(error.adapt)),
+        extrapolated=_measure_extrapolated(state, site.damage, inner),
         free=error.free,
         inside=error.inside,
         beside=error.beside,
@@ -140,6 +155,17 @@ def _may_hide_loss(part: Part, scan: Scan, deviation: Deviation, tolerance: floa
     if describe_few(scan) or scan.spacing > COARSE * part.diagonal:
         return True
     return scan.spacing > tolerance and bool((deviation.distance < -2 * tolerance).any())
+
+
+def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> float:
+    """How far skin that a site removes is from intact points, at most; 0 where the part is as designed."""
+    if state.adapted is None or inner.all():
+        return 0.0
+    from scipy.spatial import cKDTree
+
+    intact = state.aligned.points[state.deviation.label == INTACT]
+    places = damage.triangles[~inner].mean(axis=1)
+    return float(np.max(cKDTree(intact).query(places)[0])) if len(intact) else 0.0
 
 
 def _measure_fading(

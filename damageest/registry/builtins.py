@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 def damageest_stages() -> list[type[Stage]]:
     """Every built-in implementation. Imported here, so that loading the built-ins costs a command line little."""
 
+    from damageest.stages.adapt.auto import AutoAdapt
+    from damageest.stages.adapt.none import NoAdapt as NoAdapt
+    from damageest.stages.adapt.smooth import Smooth
     from damageest.stages.align.icp import Icp
     from damageest.stages.align.none import KnownPose
     from damageest.stages.align.points import Points
@@ -53,9 +56,9 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.segment.mesh_distance import MeshDistance
 
     return [
-        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, Points, MeshDistance, Dbscan, PyVista,
-        LargestLoop, AllLoops, Offset, BoundingBox, Capsule, CylinderBackground, Minkowski, BuildVolume, ShortestPath,
-        Adaptive, Implicit,
+        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, Points, NoAdapt, Smooth,
+        AutoAdapt, MeshDistance, Dbscan, PyVista, LargestLoop, AllLoops, Offset, BoundingBox, Capsule,
+        CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
         NoRepair, Manifold, NoAllowance, Milling, NoPath, Files, Uniform, CloudDistance, SignedDistance,
         PartFromScan, Html, NoReport,
     ]  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from damageest.stages import Stage
+from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
 from damageest.stages.allowance import Allowance
 from damageest.stages.background import Background
@@ -27,6 +28,7 @@ DEFAULTS: dict[Contract, str] = {
     ReadScan: "file",
     Sample: "edge_aware",
     Align: "register",
+    Adapt: "none",
     Segment: "mesh_distance",
     Cluster: "dbscan",
     Reconstruct: "pyvista",

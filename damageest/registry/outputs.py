@@ -16,6 +16,7 @@ import numpy as np
 from damageest.artefacts import (
     ADDED,
     DAMAGE,
+    AdaptedPart,
     ArtefactError,
     Deposit,
     Deviation,
@@ -31,7 +32,9 @@ from damageest.artefacts import (
     Surface,
 )
 from damageest.artefacts.fields import require_finite, require_index, require_shape
+from damageest.geometry.distance import distance_to_mesh
 from damageest.registry.contracts import Contract
+from damageest.stages.adapt import Adapt
 from damageest.stages.allowance import Allowance
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
@@ -76,6 +79,19 @@ def _check_samples(samples: Samples, get: Get) -> None:
     if not len(samples.points) or not samples.spacing > 0:
         raise ArtefactError("points: there are none, or their spacing is 0")
     require_index("face", samples.face, len(get("part").faces), "triangles of the part")
+
+
+def _check_adapted(adapted: AdaptedPart, get: Get) -> None:
+    part: Part = get("part")
+    if adapted.part.unit != part.unit:
+        raise ArtefactError(f"part: its unit is {adapted.part.unit}, that of the part as designed {part.unit}")
+    if (adapted.part.faces_brep is None) != (part.faces_brep is None):
+        raise ArtefactError("part: has other CAD faces than the part as designed")
+    off = float(np.abs(adapted.displacement).max())
+    if off < part.diagonal:
+        off = float(distance_to_mesh(adapted.part.vertices - adapted.displacement, part).max())
+    if off > SLACK * part.diagonal:
+        raise ArtefactError(f"displacement: it leads back to places that are {off:.3g} off the part as designed")
 
 
 def _check_deviation(deviation: Deviation, get: Get) -> None:
@@ -163,6 +179,7 @@ CHECKS: Mapping[Contract, Callable[[Any, Get], None]] = {
     ReadPart: _check_part,
     ReadScan: _check_scan,
     Sample: _check_samples,
+    Adapt: _check_adapted,
     Segment: _check_deviation,
     Cluster: _check_sites,
     Reconstruct: _check_surface,

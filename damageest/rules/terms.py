@@ -15,6 +15,10 @@ CAUSES = {
     "form": ("intact skin that deviates over whole areas", "find out whether the part is bent, or the scan scaled"),
     "outward": ("skin that lies as far outside the part", "find out whether the pose is wrong, or the scan scaled"),
     "views": ("views that differ where they overlap", "register the views to each other again"),
+    "adapt": (
+        "the field that the part was adapted by",
+        "scan more of the intact skin beside it, or give a datum or a second part of its type",
+    ),
     "pose": ("the fitted pose", "scan more of the intact skin, or name unworn faces in align.datum"),
     "rim": ("where the inner surface meets the skin", "a smaller tolerance, if the noise allows it"),
     "spacing": ("the gaps between the points", "scan this place more densely"),

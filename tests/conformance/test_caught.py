@@ -6,17 +6,30 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from damageest_paths.layers import Layers, Nozzle
 
 from damageest import conformance
-from damageest.artefacts import DepositPath, Enclosures, Mesh, Pose, Rims, Samples, Scan, Sites, Solid
+from damageest.artefacts import (
+    AdaptedPart,
+    DepositPath,
+    Enclosures,
+    Mesh,
+    Part,
+    Pose,
+    Rims,
+    Samples,
+    Scan,
+    Sites,
+    Solid,
+)
 from damageest.conformance import _scene
 from damageest.conformance._base import PlacementContract, StageContract
 from damageest.io.meshes import write_stl
+from damageest.stages.adapt import Adapt
 from damageest.stages.align.none import KnownPose
 from damageest.stages.allowance.none import NoAllowance as NoAllowance
 from damageest.stages.background.bbox import BoundingBox
@@ -39,11 +52,24 @@ from damageest.stages.segment.mesh_distance import MeshDistance
 BEADS = Layers(
     height=0.25, width=0.4, feed=60, nozzle=Nozzle(tip_radius=0.2, length=20, body_radius=2), standoff=1, simulate=False
 )
+
+
+class Still(Adapt):
+    """Leaves the part as it is, in the words of one that was deformed."""
+
+    use: Literal["still"] = "still"
+
+    def run(self, part: Part) -> AdaptedPart | None:
+        still = np.zeros(part.vertices.shape)
+        return AdaptedPart(part, still, np.eye(4), still[None], 0.0, 0.0)
+
+
 GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
     "Part": (PartFile(path=Path("prism.stl")), {"volume": _scene.make_prism().volume}),
     "Scan": (Simulate(points=5000), {}),
     "Sample": (Uniform(), {}),
     "Align": (KnownPose(), {"pose": np.eye(4)}),
+    "Adapt": (Still(), {}),
     "Segment": (MeshDistance(), {}),
     "Cluster": (Dbscan(), {}),
     "Reconstruct": (SignedDistance(), {}),
@@ -63,6 +89,7 @@ MEANING = {
     "Scan": "test_lies_on_what_was_scanned",
     "Sample": "test_lies_on_the_part",
     "Align": "test_finds_the_pose",
+    "Adapt": "test_follows_skin_and_not_damage",
     "Segment": "test_labels_the_dents",
     "Cluster": "test_one_site_for_each_dent",
     "Reconstruct": "test_follows_the_dent",
@@ -80,6 +107,7 @@ MEANING = {
 """By contract: the check of the meaning of a result."""
 BAD_INPUT: dict[str, tuple[str, tuple[Any, ...]]] = {
     "Align": ("test_few_points", (3,)),
+    "Adapt": ("test_few_points", (30,)),
     "Segment": ("test_few_points", (0,)),
     "Cluster": ("test_few_points", (4,)),
     "Reconstruct": ("test_few_points", (0,)),
@@ -103,6 +131,8 @@ def spoil(value: Any, by: float) -> Any:
             name = "vertices" if isinstance(value, Mesh) else "points"
             low = points.min(axis=0)
             return replace(value, **{name: low + (points - low) * (1 + by / np.ptp(points, axis=0).max())})
+        case AdaptedPart():
+            return replace(value, part=spoil(value.part, by))
         case Pose():
             return replace(value, T_part_scan=value.T_part_scan + by * np.eye(4, k=3))
         case Sites():

@@ -65,8 +65,8 @@ WITH: dict[str, dict[str, Any]] = {
 """By implementation: the ``options`` to check it with, and other attributes of its class."""
 
 
-SLOW = {"poisson_subtract", "register"}
-"""Implementations that are checked by -m slow only."""
+SLOW = {"poisson_subtract", "register", "auto"}
+"""Implementations that are checked by -m slow only; `adapt: auto` runs what `smooth` does."""
 
 
 def base(contract: type) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import (
+    AdaptedPart,
     Deposit,
     DepositPath,
     Enclosure,
@@ -50,6 +51,7 @@ def make_valid(folder: Path) -> dict[str, Any]:
     """A valid value of each contract, by its class's name."""
     given = make_given(folder)
     damage, background = given["damage"], given["background"]
+    count = len(given["part"].vertices)
     up = np.tile([0.0, 0.0, 1.0], (3, 1))
     path = DepositPath(
         np.arange(9.0).reshape(3, 3), up, up, np.full(3, 60.0), np.array([False, True, True]), np.ones(3, int),
@@ -64,6 +66,18 @@ def make_valid(folder: Path) -> dict[str, Any]:
         "ReadScan": viewed,
         "Sample": given["samples"],
         "Align": Pose(np.eye(4), 0.1, 0.9, np.eye(4)[None]),
+        "Adapt": AdaptedPart(
+            given["part"],
+            np.zeros((count, 3)),
+            np.eye(4),
+            np.zeros((2, count, 3)),
+            0.3,
+            0.1,
+            0.01,
+            0.01,
+            (4, 3, 2),
+            other=np.zeros((count, 3)),
+        ),
         "Segment": given["deviation"],
         "Cluster": given["sites"],
         "Reconstruct": given["surface"],

@@ -12,6 +12,7 @@ import trimesh
 
 from damageest import artefacts
 from damageest.artefacts import (
+    AdaptedPart,
     BeadFill,
     Deposit,
     DepositPath,
@@ -93,6 +94,20 @@ ARTEFACTS: list[Any] = [
     Enclosure(SOLID, (1, 3), ("doubtful",)),
     Enclosures((Enclosure(SOLID, (1,)), Enclosure(SOLID, (2,)))),
     Evidence(0.1, 2, 0.3, 0.4, False, ("why",)),
+    AdaptedPart(
+        Part(BOX.vertices, BOX.faces),
+        BOX.vertices / 3,
+        TURN,
+        np.ones((2, *BOX.vertices.shape)) / 7,
+        0.3,
+        0.1,
+        0.01,
+        0.02,
+        (4, 3, 2),
+        210,
+        0.5,
+        ("bent",),
+    ),
     (0.25, 1e-300),
     None,
 ]

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import (
+    AdaptedPart,
     Deposit,
     Enclosure,
     Enclosures,
@@ -81,6 +82,9 @@ LEGAL = {
     ("Path", "clearance"): ("-1",),
     ("Path", "travel_clearance"): ("-1",),
     ("Align", "alternatives"): ("None", "twice as long", "one row less"),
+    ("Adapt", "displacement"): ("-7.5",),  # leads back to the skin by chance
+    ("Adapt", "other"): ("-1e+300", "-7.5", "1e+09", "None"),
+    ("Adapt", "modes"): ("-1e+300", "-7.5", "1e+09", "twice as long", "one row less"),
     ("ReadPart", "faces_brep"): ("None", "1e+09", "-7.5"),
     # a mesh with other vertices or fewer triangles is a mesh
     ("Reconstruct", "vertices"): ("-1e+300", "-7.5", "1e+09", "twice as long"),
@@ -143,6 +147,13 @@ def test_a_value_of_another_type_is_an_error(name: str, bad: Any, registry: Regi
 
 
 SPOILED: dict[str, tuple[str, Callable[[dict[str, Any]], Any], str]] = {
+    "a deformation of another part": (
+        "Adapt",
+        lambda g: AdaptedPart(
+            g["part"], np.ones((len(g["part"].vertices), 3)), np.eye(4), np.zeros((0, len(g["part"].vertices), 3)), 1, 1
+        ),
+        "off the part as designed",
+    ),
     "faces of another part": (
         "Segment",
         lambda g: dataclasses.replace(g["deviation"], face=g["deviation"].face + len(g["part"].faces)),

@@ -144,7 +144,12 @@ class Files(Export):
         if not result.part.cad_scale:
             if self.solids == "auto":
                 return ExportedFiles()
-            note = "solids: exact was asked for, but the part is a mesh without CAD faces; STEP solids have facets"
+            why = (
+                "the part was adapted to the scan, and its CAD faces were not"
+                if result.adapted
+                else ("the part is a mesh without CAD faces")
+            )
+            note = f"solids: exact was asked for, but {why}; STEP solids have facets"
             return ExportedFiles(notes=(note,), warnings=(note,))
         return writer(folder, result, bodies, places, self.limit)
 
@@ -170,7 +175,10 @@ class Files(Export):
         _make_folder(folder, "truth/pose.json").write_text(json.dumps(pose, indent=1) + "\n", encoding="utf-8")
         if truth.damage is None:
             return ExportedFiles(("truth/pose.json",))
-        body = Body("true damage", truth.damage, DAMAGE)
+        lost = truth.damage
+        if result.adapted is not None and truth.deformed is not None:  # where it lies in the adapted part
+            lost = move_mesh(truth.deformed, result.pose.T_part_scan @ np.linalg.inv(truth.T_part_scan))
+        body = Body("true damage", lost, DAMAGE)
         name = "ply" if "ply" in self.format else "stl"
         done = _write(writers[name], folder, "truth/damage", [body], result.units)
         return ExportedFiles((*done.files, "truth/pose.json"), done.notes)

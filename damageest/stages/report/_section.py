@@ -86,7 +86,15 @@ def draw_section(result: Result, site: Site, plane: Plane, part: Any, paper: Any
     margin = 0.22 * float((high - low).max()) + 4 * result.tolerance
     low, high = np.minimum(low, 0) - margin, np.maximum(high, 0) + margin
     low, high = _widen(low, high, WIDTH / HEIGHT)
-    _fill(axes, _cut(part, plane, result.part.bounds.mean(axis=0)), METAL, INK, 1.1, "part as designed", 1.0)
+    _fill(
+        axes,
+        _cut(part, plane, result.part.bounds.mean(axis=0)),
+        METAL,
+        INK,
+        1.1,
+        "adapted part" if result.adapted else "part as designed",
+        1.0,
+    )
     origin = site.damage.bounds.mean(axis=0)
     colour = colours.colour_site(site.id)
     if site.deposit is not None:

@@ -15,7 +15,7 @@ from damageest.geometry.vectors import normalise
 from damageest.options import Options
 from damageest.stages.scan import ReadScan, _errors, _random_field, _views
 from damageest.stages.scan._scene import DetachedPiece, Scene, Table, build_scene
-from damageest.stages.scan.deformation import Deformation, deform
+from damageest.stages.scan.deformation import Deformation, deform, deform_solid
 from damageest.stages.scan.scanner import sample_seen
 from damageest.stages.scan.tools import AnyTool, Direction, RigidMatrix, SolidTool, Vector
 
@@ -69,7 +69,7 @@ class Simulate(ReadScan):
         (), description="tools that are bodies beside the part, such as a fixture: scanned with it, and they hide it"
     )
     deform: Deformation | None = Field(
-        None, description="how the part with its damage is bent and twisted before it is scanned; default: not at all"
+        None, description="how the part with its damage is deformed before it is scanned; default: not"
     )
     table: Table | None = Field(None, description="a plane plate that the part stands on; default: none")
     points: kinds.PositiveInt = Field(150_000, description="number of points, outliers included")
@@ -180,11 +180,12 @@ class Simulate(ReadScan):
             points, scanners = self.scale * points, self.scale * scanners
         notes = (f"simulated: damage tools: {len(self.damage)}, noise {sigma:.4g} {canonical_unit(unit)}", *scene.notes)
         known = self.scanners is not None and self.positions_known
+        lost = deform_solid(scene.damage, self.deform, part) if self.deform and scene.damage else None
         return Scan(
             points,
             None,
             canonical_unit(unit),
-            truth=Truth(scene.damage, inverse, scene.added),
+            truth=Truth(scene.damage, inverse, scene.added, lost),
             notes=(*notes, *draw.notes),
             viewpoints=scanners if known else None,
             view=view.astype(np.int32) if known else None,

@@ -20,7 +20,17 @@ def measure(moved: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize(
-    "how", [{"bend": 0.4}, {"twist": 0.4}, {"bend": -0.4, "along": [0, 1, 0], "toward": [1, 0, 0]}]
+    "how",
+    [
+        {"bend": 0.4},
+        {"twist": 0.4},
+        {"bend": -0.4, "along": [0, 1, 0], "toward": [1, 0, 0]},
+        {"scale": 0.4},
+        {"scale": -0.4},
+        {"stretch": 0.4},
+        {"taper": 0.4},
+        {"free": 0.4, "seed": 3},
+    ],
 )
 def test_the_amount_is_the_largest_displacement_beyond_a_rigid_motion(how: dict[str, object]) -> None:
     assert measure(deform(POINTS, Deformation.model_validate(how), PART)) == pytest.approx(0.4, rel=0.05)
@@ -41,6 +51,26 @@ def test_a_scan_is_deformed_and_its_truth_is_not() -> None:
     assert np.linalg.norm(scan.points - plain.points, axis=1).max() == pytest.approx(0.5, rel=0.1)
     assert scan.truth is not None
     assert scan.truth.damage is None
+
+
+def test_the_truth_in_the_deformed_part_is_deformed_with_it() -> None:
+    sphere = {"tool": "sphere", "centre": [15, 0, 10], "radius": 4}
+    options = {"points": 4000, "noise": 0, "damage": [sphere], "deform": {"scale": 2.0}}
+    truth = Simulate.model_validate(options).run("mm", PART).truth
+    assert truth is not None
+    assert truth.damage is not None
+    assert truth.deformed is not None
+    share = 1 + 2.0 / (PART.diagonal / 2)
+    assert truth.deformed.volume == pytest.approx(share**3 * truth.damage.volume, rel=0.01)
+    plain = Simulate.model_validate({**options, "deform": None}).run("mm", PART).truth
+    assert plain is not None
+    assert plain.deformed is None
+
+
+def test_a_free_form_is_another_for_another_seed() -> None:
+    one, same, other = (deform(POINTS, Deformation(free=0.4, seed=seed), PART) for seed in (1, 1, 2))
+    assert np.array_equal(one, same)
+    assert np.abs(one - other).max() > 0.1
 
 
 def test_surroundings_are_not_deformed_with_the_part() -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from damageest_evaluate.commands import honesty, path, speed, steady
+from damageest_evaluate.commands import adapt, honesty, path, speed, steady
 from damageest_evaluate.commands.intervals import run_intervals
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from damageest_evaluate.matrix import MatrixCell
 
 app = typer.Typer(no_args_is_help=True, help="Measure accuracy and cost against known truth.")
+app.command("adapt")(adapt.command)
 app.command("honesty")(honesty.command)
 app.command("steady")(steady.command)
 app.command("speed")(speed.command)

@@ -1,0 +1,108 @@
+"""The step that puts the adapted part in the place of the part as designed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples, Scan
+from damageest.checks.model_fit import measure_fit
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.transforms import move_points
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import JobState, Reasons
+from damageest.pipeline.steps import step
+from damageest.rules.notes import make_notes
+from damageest.stages.adapt import Adapt
+from damageest.stages.align import Align
+from damageest.stages.sample import Sample
+
+AGREES = 0.72
+"""Share of the scan near the part that has to lie on the adapted skin, for it to show this part: as stage align asks
+of a rigid part."""
+NEAR = 0.05
+"""Distance outside the part, in diagonals, from which a point shows something beside it."""
+ASKED = 15_000
+"""Points that the share is estimated from."""
+MEASURED = 40_000
+"""Points, about, that the form of the part is measured with before it is adapted."""
+ASKING = ("deformed", "scaled", "wavy")
+"""What the fit of the model calls a part that a field may explain."""
+BY_FORM = "another_part"
+"""Code of the doubt in a pose that a part of another form explains."""
+
+
+@step(
+    gives=("adapted", "part", "aligned", "pose", "samples", "warnings"),
+    reads=("part", "aligned", "pose", "samples", "tolerance", "unit", "views", "warnings", "adapter"),
+    calls=(Adapt, Align, Sample),
+)
+def adapt_part(
+    engine: Engine, state: JobState
+) -> tuple[AdaptedPart | None, Part, Scan, Pose, Samples, Reasons]:  # fmt: skip
+    """Calls `adapt`, unless the job takes the part as designed, and puts what it gives in the place of the part, with
+    the scan and its pose moved onto it, and samples on its skin."""
+    as_designed = (None, state.part, state.aligned, state.pose, state.samples, state.warnings)
+    stage = state.adapter
+    if Adapt not in engine.job.given:
+        if stage is None or not stage.deforms:
+            return as_designed
+        if stage.asks_first and not is_asked_for(state):
+            return as_designed
+    called = engine.call(Adapt, state)
+    adapted: AdaptedPart | None = called.get(Adapt.gives)
+    if adapted is None:
+        return as_designed
+    key = called.key(Adapt.gives)
+    aligned = state.aligned.move(adapted.motion)
+    pose = fit_pose(state.pose, adapted.motion, aligned.points, adapted.part, state.tolerance)
+    moved = state.with_value(JobState.aligned, aligned, digest("aligned", key))
+    moved = moved.with_value(JobState.part, adapted.part, digest("part", key))
+    own = engine.make_silent()
+    samples: Samples = own.call(Sample, moved).get(Sample.gives)
+    if pose.doubts or pose.free:
+        pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
+    settled = {f"{doubt}" for doubt in state.pose.doubts} - {f"{doubt}" for doubt in pose.doubts}
+    kept = [note for note in state.warnings if note.code != "align" or note.text not in settled]
+    return adapted, adapted.part, aligned, pose, samples, (*kept, *make_notes("adapt", adapted.notes))
+
+
+def is_asked_for(state: JobState) -> bool:
+    """Whether the intact skin shows a part that is not as designed: a form that the fit of the model names, or a scan
+    of which too little lies on the part in the best pose."""
+    if any(doubt.code == BY_FORM for doubt in state.pose.doubts):
+        return True
+    points = state.aligned.points[:: max(1, len(state.aligned.points) // MEASURED)]
+    distance, _ = signed_distance(points, state.part)
+    found = measure_fit(state.part, points, distance, state.aligned.noise, state.tolerance, state.unit, state.views)
+    return found is not None and found.fit.model in ASKING
+
+
+def doubt_anew(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pose:
+    """The pose of the aligned ``points`` (N,3) with the doubts and free motions that an alignment to the adapted part
+    has, where that agrees. Those of the part as designed may come from its form: it fits nowhere, so it fits as well
+    moved a little."""
+    moved = move_points(points[:: max(1, len(points) // ASKED)], again.T_part_scan @ np.linalg.inv(pose.T_part_scan))
+    off = float(np.linalg.norm(moved - points[:: max(1, len(points) // ASKED)], axis=1).max(initial=0.0))
+    if off > tolerance:
+        return pose
+    return replace(pose, doubts=again.doubts, free=again.free, notes=again.notes, is_held=again.is_held)
+
+
+def fit_pose(pose: Pose, motion: Floats, points: Floats, part: Part, tolerance: float) -> Pose:
+    """The pose of the aligned ``points`` (N,3) on the adapted part. That little of the scan lay on the part as designed
+    is no doubt where it lies on the adapted part."""
+    distance, _ = signed_distance(points[:: max(1, len(points) // ASKED)], part)
+    on = np.abs(distance) <= tolerance
+    near = max(int((distance < NEAR * part.diagonal).sum()), 1)
+    doubts, notes = pose.doubts, pose.notes
+    if on.sum() >= AGREES * near:
+        doubts = tuple(doubt for doubt in doubts if doubt.code != BY_FORM)
+        settled = {f"{doubt}" for doubt in pose.doubts} - {f"{doubt}" for doubt in doubts}
+        notes = tuple(note for note in notes if note not in settled)
+    rms = float(np.sqrt((distance[on] ** 2).mean())) if on.any() else pose.rms
+    return replace(
+        pose, T_part_scan=motion @ pose.T_part_scan, rms=rms, inliers=float(on.mean()), doubts=doubts, notes=notes
+    )

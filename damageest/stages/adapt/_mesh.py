@@ -1,0 +1,80 @@
+"""The deformed part: its mesh, the rigid motion in the field, and whether it is still a solid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import ArtefactError, Floats, Part
+from damageest.errors import StageError
+from damageest.geometry.refinement import cut_into_cells
+from damageest.stages.adapt._field import Field
+
+FOLLOWS = 0.1
+"""How far the deformed triangles may lie from the deformed skin, in tolerances."""
+FINEST = 150.0
+"""Edges along the part's diagonal that its triangles are never shorter than."""
+STEEPEST = 0.8
+"""Largest change of the displacement per length. Below 1 everywhere in the part's box, no two places meet: the
+deformed part has no self-intersection that the part as designed does not have."""
+REMEDY = "adapt: none; or crop what is not the part from the scan"
+
+
+def find_motion(places: Floats, moved: Floats, weights: Floats) -> Floats:
+    """The rigid motion (4,4) nearest to that of places (N,3), by weighted least squares (Kabsch 1976)."""
+    share = weights / weights.sum()
+    before, after = share @ places, share @ moved
+    u, _, v = np.linalg.svd((moved - after).T @ ((places - before) * share[:, None]))
+    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = turn, after - turn @ before
+    return T
+
+
+def refine(part: Part, field: Field, centre: Floats, tolerance: float) -> tuple[Part, float]:
+    """The part as designed with triangles that follow the field, and by how much they may not."""
+    sharp = bound_curvature(field, part.vertices - centre)
+    edge = float(np.sqrt(8 * FOLLOWS * tolerance / max(sharp, 1e-300)))
+    edge = max(edge, part.diagonal / FINEST)
+    mesh, origin = cut_into_cells(part, edge)
+    brep = None if part.faces_brep is None else part.faces_brep[origin]
+    return replace(part, vertices=mesh.vertices, faces=mesh.faces, faces_brep=brep), min(
+        edge, part.diagonal
+    ) ** 2 * sharp / 8
+
+
+def bound_curvature(field: Field, places: Floats) -> float:
+    """The largest second derivative of the displacement over the box of places (N,3)."""
+    at = _fill_box(places, 9)
+    second = np.einsum("nms,mk->nsk", field.basis.bound_curvature(at), field.coefficients)
+    double = np.array([1, 1, 1, 2, 2, 2])[None, :, None]
+    return float(np.sqrt((double * second**2).sum(axis=(1, 2))).max())
+
+
+def require_injective(field: Field, turn: Floats, places: Floats) -> None:
+    """Raises StageError where the field folds the metal, or may bring two places together."""
+    at = np.concatenate([places, _fill_box(places, 12)])
+    gradient = np.einsum("ka,nkb->nab", turn, field.differentiate(at))
+    steep = float(np.linalg.norm(gradient - np.eye(3), ord=2, axis=(1, 2)).max())
+    if steep > STEEPEST or float(np.linalg.det(gradient).min()) <= 0:
+        raise StageError(
+            f"the field that fits the scan would fold the part: it changes by {steep:.2f} of a length, and at most "
+            f"{STEEPEST:g} is safe",
+            REMEDY,
+        )
+
+
+def deform_part(part: Part, moved: Floats, error: float) -> Part:
+    """The part with its vertices moved; the CAD file is no longer its shape. Raises StageError where it is no solid."""
+    try:
+        return replace(part, vertices=moved, tessellation_error=part.tessellation_error + error, cad_scale=0.0)
+    except ArtefactError as problem:
+        raise StageError(f"the deformed part is no solid: {problem}", REMEDY) from None
+
+
+def _fill_box(places: Floats, count: int) -> Floats:
+    """An even grid of places over the box of others."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    axes = [np.linspace(a, b, count) for a, b in zip(low, high, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -1,0 +1,86 @@
+"""How exactly a fitted field is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import Floats, Mesh
+from damageest.stages.adapt._choose import Trial, cut_patches
+from damageest.stages.adapt._field import Body, Equations, match, weigh, weigh_points, weigh_roughness, weigh_strain
+
+MODES = 24
+"""Independent errors that are kept."""
+PRIOR = 0.002
+"""Strain that is allowed for where no point shows the field, at least, as one standard deviation."""
+BEYOND = 0.004
+"""Strain of the metal beyond the skin that is seen, as one standard deviation: that of a bend about an axis which is
+some way from the middle of the section."""
+ASKED = 1500
+"""Places on the skin by which the largest errors are chosen."""
+
+
+def find_modes(
+    chosen: Trial, trials: Sequence[Trial], points: Floats, body: Body, skin: Mesh, tolerance: float
+) -> Floats:
+    """(K,V,3) independent errors of the displacement at the vertices of the skin as designed, each as one standard
+    deviation.
+
+    The posterior of a Gaussian prior on the strain, with the points' error as large as the means of patches show it;
+    what the metal may be strained by beyond the skin that is seen, which grows with the distance from it; and the
+    difference to the next freer field that was tried, since the truth may be as free as that.
+    """
+    field, places = chosen.field, skin.vertices
+    last = max(tolerance, 3 * body.noise)
+    found = match(field, points, body)
+    loose = replace(chosen.freedom, bound=max(chosen.freedom.bound, PRIOR))
+    weights = weigh(found, last, body.noise)
+    shown = weigh_points(field, found, weights)
+    # the mean square of all points, as their number and their error make it, against a strain that is drawn once
+    shown = Equations(shown.square + weigh_roughness(field, shown), shown.right)
+    precision = len(points) / _measure_error(found.distance, weights, points, body)
+    square = precision * shown.stiffen() + weigh_strain(field, body, loose).square / body.step**2
+    covariance = np.linalg.inv(square)[:-1, :-1]
+    root = np.linalg.cholesky((covariance + covariance.T) / 2)
+    asked = field.basis.evaluate(places[:: max(1, len(places) // ASKED)])
+    columns = root.reshape(field.basis.count, 3, -1)
+    spread = np.einsum("vm,mkc->vkc", asked, columns).reshape(3 * len(asked), -1)
+    _, main = np.linalg.eigh(spread.T @ spread)
+    largest = columns @ main[:, ::-1][:, :MODES]
+    modes = np.einsum("vm,mkc->cvk", field.basis.evaluate(places), largest)
+    beyond = BEYOND * go_beyond(places, found.material[np.abs(found.distance) < tolerance], find_spacing(body, points))
+    modes = np.concatenate([modes, beyond[None]])
+    at = [one.freedom for one in trials].index(chosen.freedom) + 1
+    alike = [one for one in trials[at:] if one.freedom.stretches == chosen.freedom.stretches]
+    freer = alike[0] if alike else None
+    if freer is None:
+        return np.asarray(modes)
+    return np.concatenate([modes, (freer.field.displace(places) - field.displace(places))[None]])
+
+
+def go_beyond(places: Floats, seen: Floats, spacing: float) -> Floats:
+    """(V,3) the way from the nearest of the seen places (N,3) to each of the places (V,3), less the ``spacing``."""
+    from scipy.spatial import cKDTree
+
+    distance, nearest = cKDTree(seen).query(places)
+    share = np.maximum(1 - spacing / np.maximum(distance, 1e-300), 0.0)
+    return np.asarray(share[:, None] * (places - seen[nearest]))
+
+
+def find_spacing(body: Body, points: Floats) -> float:
+    """How far skin may be from a point between points, where all of it is seen."""
+    area = float(np.linalg.norm(body.mesh.cross, axis=1).sum()) / 2
+    return 2 * float(np.sqrt(area / max(len(points), 1)))
+
+
+def _measure_error(distance: Floats, weights: Floats, points: Floats, body: Body) -> float:
+    """The variance of one point, as if the errors of points were independent: larger than that of the noise where the
+    means of patches deviate by more than noise explains."""
+    patch, _ = cut_patches(points, body.mesh.diagonal)
+    total = np.bincount(patch, weights)
+    kept = total > 5
+    mean = np.bincount(patch, weights * distance)[kept] / total[kept]
+    square = float(np.median(mean**2 * total[kept])) / 0.455 if kept.any() else 0.0  # the median of a chi square
+    return max(square, body.noise**2)

@@ -1,0 +1,18 @@
+"""A smooth field, only for parts that are not as designed."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from damageest.stages.adapt.smooth import Smooth
+
+
+class AutoAdapt(Smooth):
+    """As `smooth`, but tried only where intact skin shows a bent, twisted, stretched or scaled part.
+
+    Where it does not, and where held-out patches of the scan do not bear the field out, the result is that of `none`,
+    byte for byte.
+    """
+
+    use: Literal["auto"] = "auto"  # type: ignore[assignment]
+    asks_first: ClassVar[bool] = True

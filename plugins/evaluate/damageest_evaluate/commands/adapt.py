@@ -1,0 +1,53 @@
+"""`damageest evaluate adapt`: parts that are bent, twisted, scaled and worn, with known loss."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def command(
+    groups: Annotated[
+        str, typer.Option(metavar="A,B", help="damaged, lost end, seen in part, large loss, whole, worn. Default: all.")
+    ] = "",
+    only: Annotated[str, typer.Option(metavar="TEXT", help="Only cases with this in their name.")] = "",
+    use: Annotated[str, typer.Option(metavar="A,B", help="none, auto, plain. Default: all.")] = "",
+    every: Annotated[int, typer.Option(min=1, help="Take one case of so many.")] = 1,
+    points: Annotated[int, typer.Option(min=1000, help="Number of points of each scan.")] = 30_000,
+    workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 1,
+    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,
+    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for adapt.jsonl, to resume from.")] = None,
+) -> None:
+    """Measure the stage adapt on deformed parts with known loss, against a rigid part and a plain non-rigid fit."""
+    from damageest.errors import InputError
+    from damageest.registry import Registry
+    from damageest_evaluate.adapting.report import format_adapting_row, make_adapting_table
+    from damageest_evaluate.adapting.suite import GROUPS, USES, make_adapting_cases
+    from damageest_evaluate.job import fingerprint_code
+    from damageest_evaluate.rows import run_all
+
+    chosen = {"--groups": (_split(groups), GROUPS), "--use": (_split(use), USES)}
+    for option, (given, known) in chosen.items():
+        if wrong := [name for name in given if name not in known]:
+            raise InputError(f"{option}: there is no '{wrong[0]}'; there are: {', '.join(known)}")
+    cases = make_adapting_cases(_split(groups), only, points, fingerprint_code(Registry.discover()))
+    names = list(dict.fromkeys((case.group, case.name) for case in cases))[::every]
+    uses = _split(use) or USES
+    cases = [case for case in cases if (case.group, case.name) in names and case.use in uses]
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+    count = 0
+
+    def print_row(row: dict[str, Any]) -> None:
+        nonlocal count
+        count += 1
+        typer.echo(f"[{count}/{len(cases)}] {format_adapting_row(row)}", err=True)
+
+    rows = run_all(cases, out / "adapt.jsonl" if out else None, workers, timeout, print_row)
+    typer.echo("\n" + make_adapting_table(rows))
+
+
+def _split(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]

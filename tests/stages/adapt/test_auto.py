@@ -1,0 +1,61 @@
+"""Stage `adapt: auto`: tried where the diagnosis asks, kept where it is borne out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import damageest
+from damageest.artefacts import AdaptedPart, Part
+from damageest.stages.adapt.auto import AutoAdapt
+from tests.stages.adapt.test_smooth import PART, SPHERE, scan
+
+JOB = {"version": 1, "units": "mm", "tolerance": 0.2, "align": "icp", "report": "none"}
+
+
+def run(folder: Path, use: str, given: Any) -> dict[str, bytes]:
+    """The files that a job writes, but for those that tell its settings and times."""
+    damageest.run(JOB, part=PART, scan=given, settings=[f"adapt={use}"], output=folder)
+    kept = ("damage", "sites", "deposit", "undamaged")
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name.startswith(kept)
+    }
+
+
+def test_a_part_as_designed_is_not_even_tried(tmp_path: Path, monkeypatch: Any) -> None:
+    def refuse(*_: Any) -> AdaptedPart | None:
+        raise AssertionError("it was tried")
+
+    monkeypatch.setattr(AutoAdapt, "run", lambda self, part, aligned, tolerance: refuse())
+    given = scan([SPHERE])
+    rigid, auto = (run(tmp_path / use, use, given) for use in ("none", "auto"))
+    assert rigid
+    assert rigid == auto
+
+
+@pytest.mark.slow
+def test_what_is_not_borne_out_leaves_the_rigid_result(tmp_path: Path, monkeypatch: Any) -> None:
+    tried = []
+    given = scan([SPHERE], bend=0.3)
+
+    def give_up(self: Any, part: Part, aligned: Any, tolerance: float) -> AdaptedPart | None:
+        tried.append(part)
+        return None
+
+    monkeypatch.setattr(AutoAdapt, "run", give_up)
+    rigid, auto = (run(tmp_path / use, use, given) for use in ("none", "auto"))
+    assert tried
+    assert rigid
+    assert rigid == auto
+
+
+def test_a_bent_part_is_adapted(tmp_path: Path) -> None:
+    found = damageest.run(JOB, part=PART, scan=scan(bend=1.0), settings=["adapt=auto"])
+    assert found.adapted is not None
+    assert not found.sites
+    assert np.isclose(found.adapted.amount, 1.0, rtol=0.2)
