@@ -38,11 +38,12 @@ class Entry:
 
 class Page:
     """A page with one entry. ``file``: the number of the open file that another process has opened it with; without
-    one, a new page."""
+    one, a new page. ``forked``: only forks of this process share it; it needs no file, which a limit of file sizes
+    would refuse."""
 
-    def __init__(self, file: int | None = None) -> None:
-        self.file = make_shared_file() if file is None else file
-        if file is None:
+    def __init__(self, file: int | None = None, forked: bool = False) -> None:
+        self.file = -1 if forked else make_shared_file() if file is None else file
+        if file is None and not forked:
             os.ftruncate(self.file, _SIZE)
         self._data = mmap.mmap(self.file, _SIZE)
         if file is None:
@@ -65,7 +66,8 @@ class Page:
 
     def close(self) -> None:
         self._data.close()
-        os.close(self.file)
+        if self.file >= 0:
+            os.close(self.file)
 
 
 _own: Page | None = None

@@ -50,7 +50,7 @@ def supervise(work: Callable[[], int]) -> End:
     what it notes (`at_work`) for longer than the time limit noted with it, and where this process ends.
     """
     global is_watched
-    page = Page()
+    page = Page(forked=True)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     leash, held = os.pipe()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {*PASSED, signal.SIGCHLD})

@@ -90,10 +90,9 @@ def sum_uncertainty(
 
 
 def _limit_doubtful(site: FoundSite) -> float:
-    """How large the loss of a site that is not accepted may be: the high end of its interval. Where that is open, its
-    volume: what contradicts the site does not open the total."""
-    interval = site.uncertainty.volume_95 if site.uncertainty else None
-    return interval[1] if interval and math.isfinite(interval[1]) else site.damage.volume
+    """How large the loss of a site that is not accepted may be: the high end of its interval without what opens it.
+    What contradicts the site does not open the total."""
+    return combine_site(site.error)[0][1] if site.error else site.damage.volume
 
 
 def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: PoseError) -> FoundSite:

@@ -11,6 +11,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh
 from damageest.geometry.distance import SurfaceTree
+from damageest.geometry.vectors import normalise
 from damageest.stages.adapt._basis import Basis
 
 INSIDE = 0.6
@@ -148,8 +149,8 @@ def match(field: Field, points: Floats, body: Body) -> Match:
     """The nearest places on the deformed part. They are looked for on the part as designed, where the points are taken
     back to: the field hardly strains the metal, and the tree of the part's triangles is built once."""
     _, face, material = body.tree.closest(field.undo(points))
-    normal = np.linalg.solve(field.differentiate(material).transpose(0, 2, 1), body.normals[face][:, :, None])[:, :, 0]
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    turned = np.linalg.solve(field.differentiate(material).transpose(0, 2, 1), body.normals[face][:, :, None])[:, :, 0]
+    normal = normalise(np.asarray(turned, float))
     away = points - field.move(material)
     signed: Floats = np.einsum("ij,ij->i", away, normal)
     off = np.linalg.norm(away - signed[:, None] * normal, axis=1)

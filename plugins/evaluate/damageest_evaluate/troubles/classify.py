@@ -231,14 +231,14 @@ def find_motion(part: Part, found: Pose, true: Floats, tolerance: float) -> Floa
     """The motion (4,4) of a symmetric part onto itself by which the found pose differs from the true one.
 
     The identity where the pose is right as it is; None where it is wrong. A pose is right within two tolerances (rms
-    over the part's surface). On a symmetric part the true pose has to be among the alternatives, or, where the symmetry
-    is continuous, a note has to name it.
+    over the part's surface), if need be after motions that the result calls free, between their ends. On a symmetric
+    part the true pose has to be among the alternatives, or, where the symmetry is continuous, a note has to name it.
     """
     residual, path = measure_pose_error(part, found.T_part_scan, true)
-    if path < 2 * tolerance:
+    if min(path, _measure_left(part, found, found.T_part_scan, true)) < 2 * tolerance:
         return np.eye(4)
     for other in () if found.alternatives is None else found.alternatives:
-        if measure_pose_error(part, other, true)[1] < 2 * tolerance:
+        if min(measure_pose_error(part, other, true)[1], _measure_left(part, found, other, true)) < 2 * tolerance:
             return np.asarray(found.T_part_scan @ np.linalg.inv(other))
     if residual < 2 * tolerance and any("symmetry" in note for note in found.notes):
         return np.asarray(found.T_part_scan @ np.linalg.inv(true))
