@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples, Scan
 from damageest.checks.model_fit import measure_fit
+from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
@@ -63,7 +65,8 @@ def adapt_part(
     own = engine.make_silent()
     samples: Samples = own.call(Sample, moved).get(Sample.gives)
     if pose.doubts or pose.free:
-        pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
+        with suppress(StageError):  # a given pose, which the adapted part moves away from, keeps its doubts
+            pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
     settled = {f"{doubt}" for doubt in state.pose.doubts} - {f"{doubt}" for doubt in pose.doubts}
     kept = [note for note in state.warnings if note.code != "align" or note.text not in settled]
     return adapted, adapted.part, aligned, pose, samples, (*kept, *make_notes("adapt", adapted.notes))
