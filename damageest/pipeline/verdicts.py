@@ -26,6 +26,7 @@ from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules import FreePose, ScanFacts, SiteFacts
+from damageest.rules.scattered import SHALLOW
 from damageest.stages.align import Align
 
 BY_RAYS = 0.5
@@ -80,8 +81,7 @@ def judge_sites(state: JobState) -> tuple[FoundSite, ...]:
     if not isinstance(accept, str):
         _check_numbers("accept", accept, state.found)
     done = []
-    for site in state.found:
-        facts = _gather_site_facts(state, site)
+    for site, facts in zip(state.found, _gather_all_facts(state), strict=True):
         reasons = ask_rules(state.rules, facts, state.facts)
         interval = open_end(facts.interval, reasons)
         verdict = decide(facts.volume, interval, reasons)
@@ -101,6 +101,14 @@ def is_accepted(accept: Accept, level: Level, number: int) -> bool:
     if accept == "proven":
         return level == "proven"
     return level != "doubtful" or (not isinstance(accept, str) and number in accept)
+
+
+def _gather_all_facts(state: JobState) -> list[SiteFacts]:
+    """The facts of each site, with what the others say about it."""
+    each = [_gather_site_facts(state, site) for site in state.found]
+    shifted = max((one.typical for one in each if one.one_motion), default=0.0)
+    shallow = sum(one.deepest < SHALLOW * state.tolerance for one in each if one.count)
+    return [replace(one, shifted=shifted, shallow=shallow) for one in each]
 
 
 def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:

@@ -81,13 +81,14 @@ def damageest_rules() -> list[type[Rule]]:
     from damageest.rules.off_boundary import OffBoundary
     from damageest.rules.one_motion import OneMotion
     from damageest.rules.pose import PoseDoubt
+    from damageest.rules.scattered import Scattered
     from damageest.rules.terms import Terms
     from damageest.rules.two_sheets import TwoSheets
     from damageest.rules.wide_loss import WideLoss
 
     return [
-        Nothing, PoseDoubt, Displaced, TwoSheets, OneMotion, OffBoundary, IntactInside, IntactOver, BeyondPointsRule,
-        WideLoss, InnerSurface, Beside, Covered, FreePoseRule, FewPoints, FadingOut, Terms,
+        Nothing, PoseDoubt, Displaced, TwoSheets, OneMotion, Scattered, OffBoundary, IntactInside, IntactOver,
+        BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered, FreePoseRule, FewPoints, FadingOut, Terms,
     ]  # fmt: skip
 
 

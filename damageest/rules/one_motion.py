@@ -7,11 +7,17 @@ from collections.abc import Iterable
 from damageest.artefacts import Reason
 from damageest.rules import Rule, ScanFacts, SiteFacts
 
+ALIKE = 1.5
+"""Depth of another site, in depths of the one that a motion explains, up to which it is of the same view."""
+
 
 class OneMotion(Rule):
     code = "one_motion"
     meaning = "one motion brings the site's points, on several faces, back onto the skin: a view is misplaced"
-    threshold = "what is left is the noise, in nine tenths of its points; a site of 5% of the scan's points or more"
+    threshold = (
+        "what is left is the noise, in nine tenths of its points; a site of 5% of the scan's points or more. Other "
+        f"sites up to {ALIKE:g} times as deep may be of the same view"
+    )
     remedy = "register the views to each other again, or give them as a list of files, so that they can be compared"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
@@ -21,3 +27,9 @@ class OneMotion(Rule):
                 "all: a misplaced view explains the site"
             )
             yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)
+        elif 0 < site.typical < ALIKE * site.shifted:
+            text = (
+                f"a misplaced view explains another site, {site.shifted:.3g} {scan.unit} deep: this one may be of the "
+                "same view"
+            )
+            yield Reason(self.code, text, "contradicts", site.shifted, scan.unit, remedy=self.remedy)
