@@ -40,6 +40,7 @@ def result():
         units="mm",
         tolerance=0.1,
         pose=Pose(np.eye(4)),
+        adapted=None,
         scan=Scan(points, truth=Truth(body, np.eye(4))),
         aligned=Scan(points),
         deviation=Deviation(rng.normal(size=200), np.zeros(200, int), rng.integers(0, 4, 200)),
