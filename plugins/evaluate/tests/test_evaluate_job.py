@@ -92,7 +92,7 @@ def test_a_case_that_takes_too_long_is_a_row_with_an_error(tmp_path: Path) -> No
     job = damaged_box.write(tmp_path, SIMULATED)
     done = evaluate("job", job, "--seeds", 1, "--size", "4", "--timeout", 0.01)
     assert done.returncode == 0, done.stderr
-    assert "stopped: not finished after 0.01 s" in done.stderr
+    assert "was ended: not finished after 0.01 s" in done.stderr
     assert "Damage of no depth was found in at least 95 % of the cases (0 of 1 at 4 mm, the deepest)" in done.stdout
 
 
