@@ -21,6 +21,11 @@ most the second. Twelve points of one surface are split by 1.6 with a spread of 
 APART = 0.85
 """Distance of the middles of both along the skin, in radii of the neighbours, from which they lie side by side, as at
 the rim of a loss. Half discs lie 1.2 apart, twice six points drawn at random 0.58."""
+AMONG = 1.3
+"""Mean distance of the points of one surface along the skin, in those of the other, up to which they lie among each other.
+In a groove that is narrower than the neighbourhood, the upper ones lie on both sides and farther."""
+FARTHEST = 6.0
+"""Distance of both in tolerances, from which they are no misplaced view: that is found by what lies outside."""
 ON_SKIN = 0.5
 """Largest depth, in tolerances, of the upper surface over a site."""
 FACING = 3.0
@@ -99,9 +104,14 @@ def _find_double(
     lower, lower_spread = _measure_spread(depth, is_lower)
     upper, upper_spread = _measure_spread(depth, ~is_lower)
     side = np.linalg.norm(_find_middle(offset, is_lower) - _find_middle(offset, ~is_lower), axis=1)
+    away = np.linalg.norm(offset, axis=2)
+    is_self = away < 1e-9 * weight
+    near_lower, near_upper = (_measure_spread(away, kind & ~is_self)[0] for kind in (is_lower, ~is_lower))
     radius = np.sqrt(((offset - offset.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1))
     is_double = (lower - upper > SEPARATE * noise) & (gaps.max(axis=1) > EMPTY * noise) & (side < APART * radius)
     is_double &= is_asked_straight & (np.maximum(lower_spread, upper_spread) < INSIDE * noise)
+    is_double &= (near_upper < AMONG * near_lower) & (near_lower < AMONG * near_upper)
+    is_double &= lower - upper < FARTHEST * tolerance
     return is_double, upper, lower - upper
 
 

@@ -48,7 +48,7 @@ def measure_scan(points: Floats) -> float:
 def test_a_second_view_below_the_first_is_found(depth: float) -> None:
     first, second = scan_box(1), scan_box(2)
     low = lower_top(second, depth * TOLERANCE, second[:, 0] > -8)
-    assert measure(np.concatenate([first, low])) > 4 * AGAINST
+    assert measure(np.concatenate([first, low])) > 1.3 * AGAINST
 
 
 def test_views_that_do_not_fit_are_found_where_none_of_them_shows_a_site() -> None:
