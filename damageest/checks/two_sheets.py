@@ -22,8 +22,8 @@ APART = 0.85
 """Distance of the middles of both along the skin, in radii of the neighbours, from which they lie side by side, as at
 the rim of a loss. Half discs lie 1.2 apart, twice six points drawn at random 0.58."""
 AMONG = 1.3
-"""Mean distance of the points of one surface along the skin, in those of the other, up to which they lie among each other.
-In a groove that is narrower than the neighbourhood, the upper ones lie on both sides and farther."""
+"""Mean distance of the points of one surface along the skin, in those of the other, up to which they lie among each
+other. In a groove that is narrower than the neighbourhood, the upper ones lie on both sides and farther."""
 FARTHEST = 6.0
 """Distance of both in tolerances, from which they are no misplaced view: that is found by what lies outside."""
 ON_SKIN = 0.5
