@@ -9,8 +9,8 @@ from damageest.rules import Rule, ScanFacts, SiteFacts
 
 AGAINST = 0.12
 """Share of a site's points with another surface above them, on the skin. Of 40 scans with losses, wear and waves of
-known truth one has 0.07 (a narrow groove), the others at most 0.01; views that are 1.5 tolerances and more too deep have
-0.06 to 0.4 where they overlap."""
+known truth one has 0.07 (a narrow groove), the others at most 0.01; views that are 1.5 tolerances and more too deep
+have 0.06 to 0.4 where they overlap."""
 OF_SCAN = 0.01
 """Share of all points of a scan that lie on two surfaces, from which its views do not fit together. On the scans above
 it is at most 0.006, on a shaft whose journals are worn on one side; of 20 misplaced views 0.012 to 0.32, but for three
