@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Deviation, Ints, Part, Scan
+from damageest.checks.two_sheets import LEAST_NOISE
 from damageest.geometry.neighbourhoods import find_neighbours
 
 LEAST_SHARE = 0.05
@@ -13,8 +14,6 @@ ASKED, ROUNDS = 5000, 5
 """Points that are used, and rounds of the robust fit."""
 OFF = 1.15
 """Deviation of the points from the skin after the motion, in noises, up to which it explains them."""
-LEAST_NOISE = 1 / 6
-"""Noise that is reckoned with at least, in tolerances."""
 KEPT = 0.9
 """Share of the points that it has to explain."""
 SHARP = 30.0

@@ -87,8 +87,9 @@ def doubt_anew(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pos
     """The pose of the aligned ``points`` (N,3) with the doubts and free motions that an alignment to the adapted part
     has, where that agrees. Those of the part as designed may come from its form: it fits nowhere, so it fits as well
     moved a little."""
-    moved = move_points(points[:: max(1, len(points) // ASKED)], again.T_part_scan @ np.linalg.inv(pose.T_part_scan))
-    off = float(np.linalg.norm(moved - points[:: max(1, len(points) // ASKED)], axis=1).max(initial=0.0))
+    some = points[:: max(1, len(points) // ASKED)]
+    moved = move_points(some, again.T_part_scan @ np.linalg.inv(pose.T_part_scan))
+    off = float(np.linalg.norm(moved - some, axis=1).max(initial=0.0))
     if off > tolerance:
         return pose
     return replace(pose, doubts=again.doubts, free=again.free, notes=again.notes, is_held=again.is_held)

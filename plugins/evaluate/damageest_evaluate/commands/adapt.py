@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -25,29 +25,16 @@ def command(
     from damageest.registry import Registry
     from damageest_evaluate.adapting.report import format_adapting_row, make_adapting_table
     from damageest_evaluate.adapting.suite import GROUPS, USES, make_adapting_cases
+    from damageest_evaluate.commands._counted import run_counted, split_words
     from damageest_evaluate.job import fingerprint_code
-    from damageest_evaluate.rows import run_all
 
-    chosen = {"--groups": (_split(groups), GROUPS), "--use": (_split(use), USES)}
+    chosen = {"--groups": (split_words(groups), GROUPS), "--use": (split_words(use), USES)}
     for option, (given, known) in chosen.items():
         if wrong := [name for name in given if name not in known]:
             raise InputError(f"{option}: there is no '{wrong[0]}'; there are: {', '.join(known)}")
-    cases = make_adapting_cases(_split(groups), only, points, fingerprint_code(Registry.discover()))
+    cases = make_adapting_cases(split_words(groups), only, points, fingerprint_code(Registry.discover()))
     names = list(dict.fromkeys((case.group, case.name) for case in cases))[::every]
-    uses = _split(use) or USES
+    uses = split_words(use) or USES
     cases = [case for case in cases if (case.group, case.name) in names and case.use in uses]
-    if out:
-        out.mkdir(parents=True, exist_ok=True)
-    count = 0
-
-    def print_row(row: dict[str, Any]) -> None:
-        nonlocal count
-        count += 1
-        typer.echo(f"[{count}/{len(cases)}] {format_adapting_row(row)}", err=True)
-
-    rows = run_all(cases, out / "adapt.jsonl" if out else None, workers, timeout, print_row)
+    rows = run_counted(cases, out, "adapt.jsonl", workers, timeout, format_adapting_row)
     typer.echo("\n" + make_adapting_table(rows))
-
-
-def _split(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]

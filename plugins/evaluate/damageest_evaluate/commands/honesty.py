@@ -40,9 +40,9 @@ def command(
     interval, and the site is not doubtful.
     """
     from damageest.registry import Registry
+    from damageest_evaluate.commands._counted import run_counted, split_words
     from damageest_evaluate.job import fingerprint_code
     from damageest_evaluate.readme import replace_between_marks
-    from damageest_evaluate.rows import run_all
     from damageest_evaluate.troubles.report import describe_case, format_trouble_row, make_trouble_tables
     from damageest_evaluate.troubles.suite import make_trouble_cases
 
@@ -50,22 +50,22 @@ def command(
         replace_between_marks(write, None, "honesty")  # fails before the runs start if the marks are missing
     source = fingerprint_code(Registry.discover())
     cases = make_trouble_cases(
-        _split(kinds), _split(parts), parse_numbers("--seeds", seeds), points, parse_numbers("--case", case), source
+        split_words(kinds),
+        split_words(parts),
+        parse_numbers("--seeds", seeds),
+        points,
+        parse_numbers("--case", case),
+        source,
     )
     if show:
         for item in cases:
             typer.echo(f"{item.number} {describe_case(item.make_blank_row())}")
         return
-    if out:
-        out.mkdir(parents=True, exist_ok=True)
-    count = 0
 
-    def print_row(row: dict[str, Any]) -> None:
-        nonlocal count
-        count += 1
-        typer.echo(f"[{count}/{len(cases)}] {row['number']} {format_trouble_row(row)}", err=True)
+    def describe(row: dict[str, Any]) -> str:
+        return f"{row['number']} {format_trouble_row(row)}"
 
-    rows = run_all(cases, out / "honesty.jsonl" if out else None, workers, timeout, print_row, scheduler)
+    rows = run_counted(cases, out, "honesty.jsonl", workers, timeout, describe, scheduler)
     text = make_trouble_tables(rows, _format_command())
     typer.echo("\n" + text)
     if out:
@@ -77,16 +77,13 @@ def command(
         )
 
 
-def _split(text: str) -> list[str]:
-    return [word.strip() for word in text.split(",") if word.strip()]
-
-
 def parse_numbers(option: str, text: str) -> list[int]:
     """The whole numbers in ``text``; raises InputError for anything else."""
     from damageest.errors import InputError
+    from damageest_evaluate.commands._counted import split_words
 
     try:
-        values = [int(word) for word in _split(text)]
+        values = [int(word) for word in split_words(text)]
     except ValueError:
         values = [-1]
     if any(value < 0 for value in values):

@@ -1,0 +1,38 @@
+"""What the commands that run many cases share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import typer
+
+from damageest_evaluate.processes import Row
+from damageest_evaluate.rows import EvaluationCase, run_all
+
+
+def split_words(text: str) -> list[str]:
+    """The words of an option, which commas separate."""
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def run_counted(
+    cases: Sequence[EvaluationCase],
+    out: Path | None,
+    name: str,
+    workers: int,
+    timeout: float,
+    describe: Callable[[Row], str],
+    scheduler: str = "",
+) -> list[Row]:
+    """The rows of all cases, which the file ``name`` in the folder ``out`` keeps; each is told with its number."""
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+    count = 0
+
+    def print_row(row: Row) -> None:
+        nonlocal count
+        count += 1
+        typer.echo(f"[{count}/{len(cases)}] {describe(row)}", err=True)
+
+    return run_all(cases, out / name if out else None, workers, timeout, print_row, scheduler)
