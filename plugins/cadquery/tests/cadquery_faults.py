@@ -34,6 +34,17 @@ def raise_at_second(request: Request) -> Made:
     return make_with(find_or_raise, request)
 
 
+def compute_on_at_first(request: Request) -> Made:
+    """Computes without end at site 1."""
+
+    def find_or_compute(find: Find, site: Any, *rest: Any) -> Any:
+        while site.number == 1:
+            pass
+        return find(site, *rest)
+
+    return make_with(find_or_compute, request)
+
+
 def abort_at_start(request: Request) -> Made:
     """Aborts before the first site, each time."""
     os.abort()
