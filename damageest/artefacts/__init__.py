@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from damageest.artefacts.adapted import AdaptedPart
 from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
+from damageest.artefacts.displacement import DisplacementField, fit_displacement
 from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, EvidenceCause, Rims
 from damageest.artefacts.fields import ArtefactError
 from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
@@ -39,6 +40,7 @@ __all__ = [
     "Deposit",
     "DepositPath",
     "Deviation",
+    "DisplacementField",
     "Effect",
     "Enclosure",
     "Enclosures",
@@ -61,5 +63,6 @@ __all__ = [
     "Truth",
     "Unreached",
     "Vector",
+    "fit_displacement",
     "open_edges",
 ]

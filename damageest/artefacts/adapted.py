@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from damageest.artefacts.arrays import Floats
+from damageest.artefacts.displacement import DisplacementField
 from damageest.artefacts.fields import MOST, Checked, Range, require_finite, require_shape
 from damageest.artefacts.meshes import Part
 from damageest.artefacts.scans import require_rigid
@@ -24,8 +25,9 @@ class AdaptedPart(Checked):
     ``amount``, ``rms``: largest and root of the mean square of the displacement over the seen skin. ``growth``: the
     uniform scale in it, less 1; ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells
     along the axes, (0, 0, 0) for a polynomial; ``functions``: how many functions each coordinate is a sum of.
-    ``gain``: share by which it explains held-out patches of the scan better than
-    a rigid part. ``notes`` are warnings.
+    ``gain``: share by which it explains held-out patches of the scan better than a rigid part. ``field``: the same
+    displacement at any place, for CAD faces and for other parts of the type; None where there is none. ``notes`` are
+    warnings.
     """
 
     part: Part
@@ -41,6 +43,7 @@ class AdaptedPart(Checked):
     gain: float = 0.0
     notes: tuple[str, ...] = ()
     other: Floats | None = None
+    field: DisplacementField | None = None
     _dtypes: ClassVar[dict[str, Any]] = {
         "displacement": np.float64,
         "motion": np.float64,

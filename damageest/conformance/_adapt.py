@@ -70,6 +70,8 @@ class AdaptContract(PlacementContract):
         before = adapted.part.vertices - adapted.displacement
         distance, _ = signed_distance(before, self.make_inputs()["part"])
         assert np.abs(distance).max() < 1e-6 * adapted.part.diagonal
+        if adapted.field is not None:
+            assert np.abs(adapted.field.displace(before) - adapted.displacement).max() < 0.01 * _scene.TOLERANCE
         length = np.linalg.norm(adapted.displacement, axis=1)
         assert adapted.rms <= adapted.amount <= 1.2 * length.max()
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field as Option
 
-from damageest.artefacts import AdaptedPart, Floats, Mesh, Part, Scan
+from damageest.artefacts import AdaptedPart, Floats, Mesh, Part, Scan, fit_displacement
 from damageest.errors import StageError
 from damageest.geometry.distance import is_inside, signed_distance
 from damageest.geometry.neighbourhoods import pick_one_per_cube
@@ -163,6 +163,12 @@ class Smooth(Adapt):
             lattice=field.basis.shape_of_cells,
             functions=field.basis.count,
             gain=gain,
+            field=fit_displacement(
+                lambda at: undo(field.move(at - centre)) - (at - centre),
+                part.bounds[0],
+                part.bounds[1],
+                field.basis.shape_of_cells,
+            ),
         )
         rival, is_open = find_other(trials, chosen)
         other = (rival.field.displace(places) - field.displace(places)) @ turn.T if rival and is_open else None
