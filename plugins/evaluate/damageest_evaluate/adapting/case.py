@@ -31,7 +31,8 @@ KINDS = ("chip", "pit", "cut")
 class DeformedCase:
     """``deform``: options of the virtual scanner's `deform`; ``losses``: depth in mm of each random loss, less where
     a part is thin; ``wear``: tools; ``seen``: share of the skin that is scanned, from one side; ``use``: the stage
-    `adapt`, or `plain`."""
+    `adapt`, `plain`, or `straight`: the same losses in a part as designed, which is what this density of points and
+    this noise allow."""
 
     group: str
     name: str
@@ -41,12 +42,12 @@ class DeformedCase:
     wear: Sequence[Mapping[str, Any]] = ()
     seen: float = 1.0
     seed: int = 0
-    points: int = 30_000
+    points: int = 120_000
     use: str = "auto"
     source: str = ""
 
     def adapted_by(self, use: str) -> DeformedCase:
-        return replace(self, use=use)
+        return replace(self, use=use, deform={} if use == "straight" else self.deform)
 
     @property
     def varied(self) -> Mapping[str, float | str]:
@@ -133,7 +134,8 @@ def run_job(case: DeformedCase, part: Part, scan: Scan) -> Result:
 
     job = {"version": 1, "units": part.unit, "tolerance": TOLERANCE, "report": "none"}
     if case.use != "plain":
-        return damageest.run(job, part=part, scan=scan, settings=[f"adapt={case.use}"])
+        use = "none" if case.use == "straight" else case.use
+        return damageest.run(job, part=part, scan=scan, settings=[f"adapt={use}"])
     pose = damageest.run(job, part=part, scan=scan).pose
     deformed = fit_plainly(part, move_points(scan.points, pose.T_part_scan))
     return damageest.run(job, part=deformed, scan=scan)

@@ -12,7 +12,7 @@ from damageest_evaluate.adapting.suite import GROUPS, USES
 from damageest_evaluate.processes import Row
 from damageest_evaluate.readme import format_markdown
 
-NAMES = {"none": "rigid", "plain": "plain non-rigid fit"}
+NAMES = {"straight": "none, the part as designed", "none": "rigid", "plain": "plain non-rigid fit"}
 SURE = ("likely", "proven")
 
 

@@ -13,14 +13,14 @@ def command(
         str, typer.Option(metavar="A,B", help="damaged, lost end, seen in part, large loss, whole, worn. Default: all.")
     ] = "",
     only: Annotated[str, typer.Option(metavar="TEXT", help="Only cases with this in their name.")] = "",
-    use: Annotated[str, typer.Option(metavar="A,B", help="none, auto, plain. Default: all.")] = "",
+    use: Annotated[str, typer.Option(metavar="A,B", help="straight, none, auto, plain. Default: all.")] = "",
     every: Annotated[int, typer.Option(min=1, help="Take one case of so many.")] = 1,
-    points: Annotated[int, typer.Option(min=1000, help="Number of points of each scan.")] = 30_000,
+    points: Annotated[int, typer.Option(min=1000, help="Number of points of each scan.")] = 120_000,
     workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 1,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,
     out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for adapt.jsonl, to resume from.")] = None,
 ) -> None:
-    """Measure the stage adapt on deformed parts with known loss, against a rigid part and a plain non-rigid fit."""
+    """Measure the stage adapt on deformed parts with known loss, against parts as designed, rigid and plainly fitted."""
     from damageest.errors import InputError
     from damageest.registry import Registry
     from damageest_evaluate.adapting.report import format_adapting_row, make_adapting_table
