@@ -20,7 +20,7 @@ def command(
     timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,
     out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for adapt.jsonl, to resume from.")] = None,
 ) -> None:
-    """Measure the stage adapt on deformed parts with known loss, against parts as designed, rigid and plainly fitted."""
+    """Measure the stage adapt on deformed parts with known loss, against rigid and plain fits and parts as designed."""
     from damageest.errors import InputError
     from damageest.registry import Registry
     from damageest_evaluate.adapting.report import format_adapting_row, make_adapting_table
