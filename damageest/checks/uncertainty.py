@@ -59,7 +59,8 @@ class SiteError:
 
     ``pose`` (K,): signed, by the columns of `PoseError.spread`; ``excess``: by how much the volume is too large on
     average; ``adapt`` (J,): signed, by the modes of an adapted part; ``rates`` (M,): change of the volume for each unit
-    of each free motion, and by the other field of an adapted part, and ``motions`` (M,2): their ends;
+    of each free motion, by the other field of an adapted part, and where its growth is the scan's; ``motions`` (M,2):
+    their ends;
     ``inside`` (where points do not bound it), ``beside``, ``fading``: by how much the loss may be larger; ``less``: by
     how much it may be smaller, since the inner surface was closed across what was not seen. ``depth``: of the damage
     volume, corrected for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free
@@ -128,6 +129,9 @@ def measure_site_error(
     by_pose = pose.of_distance(deepest.at, deepest.normal)
     bent, bent_depth = measure_adapt(adapted, damage, skin, area, deepest)
     has_other = adapted is not None and adapted.other is not None
+    rates = bent[-1:] if has_other else np.empty(0)
+    if adapted is not None and adapted.growth:  # of the part, or of the scan's scale: then the loss is of another size
+        rates = np.append(rates, damage.volume * ((1 + adapted.growth) ** -3 - 1))
     beside = by_pose**2 + bent_depth**2 + max(form, systematic) ** 2 + part.tessellation_error**2 / 3
     by_point = float(np.sqrt(aligned.noise**2 + beside))
     return SiteError(
@@ -143,8 +147,8 @@ def measure_site_error(
         outward=outward * exposed / WIDTH,
         views=scan.between_views * exposed / WIDTH,
         adapt=bent[:-1] if has_other else bent,
-        rates=bent[-1:] if has_other else np.empty(0),
-        motions=np.array([[0.0, 1.0]]) if has_other else np.empty((0, 2)),
+        rates=rates,
+        motions=np.tile([0.0, 1.0], (len(rates), 1)),
         inside=HOLE * hole**1.5 + beyond.short,
         less=damage.volume * evidence.ids_unseen if hole else 0.0,
         depth=deepest.depth - surface.depth_excess,

@@ -28,7 +28,7 @@ DEFAULTS: dict[Contract, str] = {
     ReadScan: "file",
     Sample: "edge_aware",
     Align: "register",
-    Adapt: "none",
+    Adapt: "auto",
     Segment: "mesh_distance",
     Cluster: "dbscan",
     Reconstruct: "pyvista",

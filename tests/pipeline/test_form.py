@@ -16,7 +16,7 @@ from damageest.output.result_json import build_report
 from damageest.stages.scan.deformation import Deformation, deform
 from tests.checks.form_scenes import TOLERANCE, add_noise, draw_skin, get_part
 
-SETTINGS = ["align=none", "allowance=none", f"tolerance={TOLERANCE}"]
+SETTINGS = ["align=none", "adapt=none", "allowance=none", f"tolerance={TOLERANCE}"]
 
 
 def dent(points: np.ndarray, normals: np.ndarray, depth: float, width: float) -> np.ndarray:
@@ -51,7 +51,7 @@ def make_scaled(folder: Path, scale: float) -> Path:
     x, y, z = scale * add_noise(dent(points, normals, 2.5, 8.0)).T
     write_points(folder / "scan.ply", {"x": x, "y": y, "z": z})
     job = folder / "job.yaml"
-    job.write_text(f"version: 1\ntolerance: {TOLERANCE}\nalign: none\npart: plate.stl\nscan: scan.ply\n")
+    job.write_text(f"version: 1\ntolerance: {TOLERANCE}\nalign: none\nadapt: none\npart: plate.stl\nscan: scan.ply\n")
     return job
 
 

@@ -18,7 +18,9 @@ def describe(adapted: AdaptedPart, tolerance: float) -> str:
         f"by {100 * adapted.gain:.0f} %"
     )
     if abs(adapted.growth) > TOLD:
-        words += f"; its scale changed by {100 * adapted.growth:+.2g} %"
+        words += (
+            f"; its scale changed by {100 * adapted.growth:+.2g} %, or that of the scan (scan.scale: auto corrects it)"
+        )
         if adapted.growth < 0:
-            words += ", which wear of that depth all over the part would look like"
+            words += "; wear of that depth all over the part would look like it"
     return words
