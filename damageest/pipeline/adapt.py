@@ -53,7 +53,13 @@ def adapt_part(
             return as_designed
         if stage.asks_first and not is_asked_for(state):
             return as_designed
-    called = engine.call(Adapt, state)
+    try:
+        called = engine.call(Adapt, state)
+    except StageError as error:
+        if stage is None or not stage.asks_first:
+            raise
+        failed = f"the part was not adapted: {error.message}; the result is that of the part as designed"
+        return *as_designed[:-1], (*state.warnings, *make_notes("adapt", (failed,)))
     adapted: AdaptedPart | None = called.get(Adapt.gives)
     if adapted is None:
         return as_designed

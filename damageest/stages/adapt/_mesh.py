@@ -16,8 +16,8 @@ FOLLOWS = 0.1
 FINEST = 150.0
 """Edges along the part's diagonal that its triangles are never shorter than."""
 STEEPEST = 0.8
-"""Largest change of the displacement per length. Below 1 everywhere in the part's box, no two places meet: the
-deformed part has no self-intersection that the part as designed does not have."""
+"""Largest change of the displacement per length. Below 1 on the way between two places, they do not meet: the deformed
+part has no self-intersection that the part as designed does not have."""
 REMEDY = "adapt: none; or crop what is not the part from the scan"
 
 
@@ -52,9 +52,18 @@ def bound_curvature(field: Field, places: Floats) -> float:
     return float(np.sqrt((double * second**2).sum(axis=(1, 2))).max())
 
 
-def require_injective(field: Field, turn: Floats, places: Floats) -> None:
-    """Raises StageError where the field folds the metal, or may bring two places together."""
-    at = np.concatenate([places, _fill_box(places, 12)])
+def require_injective(field: Field, turn: Floats, places: Floats, largest: float) -> None:
+    """Raises StageError where the field folds the metal, or may bring two places together.
+
+    ``places`` (N,3): all over the skin; ``largest``: the largest displacement. Two places of the metal between which
+    the way leads farther from it than that cannot meet; the way between all others goes through where the slope is
+    asked for.
+    """
+    from scipy.spatial import cKDTree
+
+    box = _fill_box(places, 16)
+    step = float(np.linalg.norm(np.ptp(places, axis=0))) / 15
+    at = np.concatenate([places, box[cKDTree(places).query(box)[0] < largest + step]])
     gradient = np.einsum("ka,nkb->nab", turn, field.differentiate(at))
     steep = float(np.linalg.norm(gradient - np.eye(3), ord=2, axis=(1, 2)).max())
     if steep > STEEPEST or float(np.linalg.det(gradient).min()) <= 0:

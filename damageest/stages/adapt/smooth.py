@@ -114,11 +114,14 @@ class Smooth(Adapt):
                 take(Freedom(bound, grows))
             chosen = freest if is_better(freest.score, chosen.score) else chosen
         trials.append(freest)
-        is_rough = chosen.freedom.bound >= LOOSE and np.median(chosen.score.both) > LEFT * body.noise**2
+        is_rough = np.median(chosen.score.both) > LEFT * body.noise**2
         for cells in self.lattice if is_rough else ():
             finer = replace(body, inside=body.inside[::2], basis=replace(body.basis, cells=cells))
             start = chosen.field.to_basis(finer.basis, np.concatenate([body.inside, body.mesh.vertices]))
-            trials.append(attempt(replace(chosen.freedom, cells=cells), start, [last] * ROUNDS, finer))
+            # waves are no polynomial: the best one may be none, and lie far off
+            is_near = chosen.freedom.bound >= LOOSE
+            freedom = chosen.freedom if is_near else Freedom(STRAINED[-1], grows)
+            trials.append(attempt(replace(freedom, cells=cells), start, [last] * ROUNDS if is_near else scales, finer))
             chosen = trials[-1] if is_better(trials[-1].score, chosen.score) else chosen
         if chosen is rigid:
             return trials, chosen
@@ -135,12 +138,14 @@ class Smooth(Adapt):
         seen = found.material
         motion = find_motion(seen, field.move(seen), weights)
         turn = motion[:3, :3].T
-        require_injective(field, turn, body.mesh.vertices)
-        fine, error = refine(part, field, centre, tolerance)
-        places = fine.vertices - centre
 
         def undo(at: Floats) -> Floats:
             return (at - motion[:3, 3]) @ turn.T
+
+        skin = body.mesh.vertices
+        require_injective(field, turn, skin, float(np.linalg.norm(undo(field.move(skin)) - skin, axis=1).max()))
+        fine, error = refine(part, field, centre, tolerance)
+        places = fine.vertices - centre
 
         moved = undo(field.move(places))
         modes = find_modes(chosen, trials, points, body, Mesh(places, fine.faces), tolerance) @ turn.T

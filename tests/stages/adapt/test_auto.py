@@ -10,7 +10,9 @@ import pytest
 
 import damageest
 from damageest.artefacts import AdaptedPart, Part
+from damageest.errors import StageError
 from damageest.stages.adapt.auto import AutoAdapt
+from damageest.stages.adapt.smooth import Smooth
 from tests.stages.adapt.test_smooth import PART, SPHERE, scan
 
 JOB = {"version": 1, "units": "mm", "tolerance": 0.2, "align": "icp", "report": "none"}
@@ -52,6 +54,21 @@ def test_what_is_not_borne_out_leaves_the_rigid_result(tmp_path: Path, monkeypat
     assert tried
     assert rigid
     assert rigid == auto
+
+
+def test_a_field_that_would_fold_the_part_leaves_the_rigid_result(tmp_path: Path, monkeypatch: Any) -> None:
+    def fold(self: Any, part: Part, aligned: Any, tolerance: float) -> AdaptedPart | None:
+        raise StageError("the field would fold the part")
+
+    given = scan([SPHERE], bend=1.0)
+    monkeypatch.setattr(AutoAdapt, "run", fold)
+    rigid, auto = (run(tmp_path / use, use, given) for use in ("none", "auto"))
+    assert rigid == auto
+    found = damageest.run(JOB, part=PART, scan=given)
+    assert any(note.code == "adapt" and "not adapted: the field would fold" in note.text for note in found.warnings)
+    monkeypatch.setattr(Smooth, "run", fold)
+    with pytest.raises(StageError, match="fold"):  # what was asked for by name is no guess
+        damageest.run(JOB, part=PART, scan=given, settings=["adapt=smooth"])
 
 
 def test_a_bent_part_is_adapted(tmp_path: Path) -> None:

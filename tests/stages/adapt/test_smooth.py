@@ -96,11 +96,11 @@ def test_a_field_that_folds_is_refused() -> None:
     basis = Basis(np.zeros(3), 1.0, np.ones(3))
     field = Field(basis, np.zeros((basis.count, 3)))
     places = np.random.default_rng(0).uniform(-1, 1, (50, 3))
-    require_injective(field, np.eye(3), places)
+    require_injective(field, np.eye(3), places, 0.0)
     folded = field.coefficients.copy()
     folded[np.argmax(basis.differentiate(np.zeros((1, 3)))[0, :, 0]), 0] = -1.5
     with pytest.raises(StageError, match="fold"):
-        require_injective(Field(basis, folded), np.eye(3), places)
+        require_injective(Field(basis, folded), np.eye(3), places, 1.5)
 
 
 @pytest.mark.parametrize("cells", [0, 3])

@@ -144,7 +144,7 @@ def run_case(case: TroubleCase) -> dict[str, Any]:
     row["seconds"], row["cpu_seconds"] = time.perf_counter() - start, cpu_seconds() - cpu_start
     row["step_seconds"] = row["cpu_seconds"] - clock.stage_seconds
     row |= _describe_result(result, scene)
-    state = TrueState(scene.part, scene.damage, pose if scene.has_pose else None, scanning.tolerance)
+    state = TrueState(scene.part, scene.damage, pose if scene.has_pose else None, scanning.tolerance, scene.deform)
     row |= _describe_judgement(judge(result, state))
     return {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in row.items()}
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -40,13 +40,15 @@ class TrueState:
     """The truth of a run.
 
     ``pose`` (4,4) T_part_scan, None where no pose is right; ``damage`` in the part's frame. ``tolerance``: the one that
-    the scan allows; a larger one of the job does not make damage tiny or a pose right.
+    the scan allows; a larger one of the job does not make damage tiny or a pose right. ``deform``: where places (N,3)
+    of the part as designed are in the scanned one; None where it is not deformed.
     """
 
     part: Part
     damage: Solid | None
     pose: Floats | None
     tolerance: float = float("inf")
+    deform: Callable[[Floats], Floats] | None = None
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,10 @@ def judge_error(message: str) -> Judgement:
 def judge(result: Result, true: TrueState) -> Judgement:
     """The judgement on a run that gave a result."""
     tolerance = min(result.tolerance, true.tolerance)
-    motion = None if true.pose is None else find_motion(true.part, result.pose, true.pose, tolerance)
+    if result.adapted is not None and true.deform is not None and true.pose is not None:
+        true, motion = _follow(result, true, true.deform, true.pose, tolerance)
+    else:
+        motion = None if true.pose is None else find_motion(true.part, result.pose, true.pose, tolerance)
     bodies = _split_damage(true, motion)
     reported = {id(body): _find_report(body, result) for body in bodies}
     unseen = [body for body in bodies if reported[id(body)] == "unseen"]
@@ -243,6 +248,18 @@ def find_motion(part: Part, found: Pose, true: Floats, tolerance: float) -> Floa
     if residual < 2 * tolerance and any("symmetry" in note for note in found.notes):
         return np.asarray(found.T_part_scan @ np.linalg.inv(true))
     return None
+
+
+def _follow(
+    result: Result, true: TrueState, deform: Callable[[Floats], Floats], pose: Floats, tolerance: float
+) -> tuple[TrueState, Floats | None]:
+    """The truth of a deformed part for a result with an adapted one, and the motion (4,4) between their frames; None
+    where the adapted part is another than the deformed one: its surface has to be that within a tolerance (rms)."""
+    motion: Floats = np.asarray(result.pose.T_part_scan @ np.linalg.inv(pose))
+    skin = move_points(deform(sample_surface(true.part, 4000)[0]), motion)
+    off = float(np.sqrt((distance_to_mesh(skin, result.part) ** 2).mean()))
+    damage = None if true.damage is None else Solid(deform(true.damage.vertices), true.damage.faces)
+    return replace(true, part=result.part, damage=damage), motion if off < tolerance else None
 
 
 def _measure_left(part: Part, found: Pose, T: Floats, true: Floats) -> float:

@@ -27,7 +27,11 @@ def _scale(case: Scanning, left: Mesh, damage: Solid | None) -> TroubleScene:
     scene = case.scan(left, damage)
     centre = case.part.bounds.mean(axis=0)
     scanners = None if scene.scanners is None else centre + case.amount * (scene.scanners - centre)
-    return replace(scene, points=centre + case.amount * (scene.points - centre), scanners=scanners)
+
+    def deform(at: Floats) -> Floats:
+        return np.asarray(centre + case.amount * (at - centre))
+
+    return replace(scene, points=deform(scene.points), scanners=scanners, deform=deform)
 
 
 def bend(case: Scanning) -> TroubleScene:
@@ -47,8 +51,12 @@ def bend_chipped(case: Scanning) -> TroubleScene:
 
 def _deform(case: Scanning, left: Mesh, damage: Solid | None, how: Deformation) -> TroubleScene:
     exact = case.scan(left, damage, noise=0)
-    points = deform(exact.points, how, case.part)
-    return replace(exact, points=points + case.make_rng(12).normal(scale=case.noise, size=points.shape))
+
+    def move(at: Floats) -> Floats:
+        return deform(at, how, case.part)
+
+    noise = case.make_rng(12).normal(scale=case.noise, size=exact.points.shape)
+    return replace(exact, points=move(exact.points) + noise, deform=move)
 
 
 def misplace_and_dent(case: Scanning) -> TroubleScene:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,7 +25,8 @@ class TroubleScene:
     ``part``: what the job is given. ``points`` (N,3), ``view`` (N,) and ``scanners`` (V,3), or None for a scan of all
     skin at once. ``damage``: the true damage. ``seen``: share of the part's skin that the scanner sees. ``added``:
     whether there is metal or other matter outside the nominal surface. ``has_pose``: whether there is a right pose;
-    ``shift`` (4,4): the error of the pose that the job is given. ``settings`` of the job.
+    ``shift`` (4,4): the error of the pose that the job is given. ``settings`` of the job. ``deform``: where places
+    (N,3) of the part as designed are in the scanned one; None where it is not deformed.
     """
 
     part: Part
@@ -37,6 +39,7 @@ class TroubleScene:
     has_pose: bool = True
     shift: Floats = field(default_factory=lambda: np.eye(4))
     settings: tuple[str, ...] = ()
+    deform: Callable[[Floats], Floats] | None = None
 
     def with_points(self, points: Floats, keep_views: bool = True) -> TroubleScene:
         """The scene with other points. Points that follow the first N belong to no view."""

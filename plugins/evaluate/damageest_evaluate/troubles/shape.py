@@ -16,7 +16,11 @@ def scale_scan(case: Scanning) -> TroubleScene:
     scene = case.scan(case.part, None)
     centre = case.part.bounds.mean(axis=0)
     scanners = None if scene.scanners is None else centre + case.amount * (scene.scanners - centre)
-    return replace(scene, points=centre + case.amount * (scene.points - centre), scanners=scanners)
+
+    def deform(at: Floats) -> Floats:
+        return np.asarray(centre + case.amount * (at - centre))
+
+    return replace(scene, points=deform(scene.points), scanners=scanners, deform=deform)
 
 
 def bend_part(case: Scanning) -> TroubleScene:
@@ -30,29 +34,31 @@ def twist_part(case: Scanning) -> TroubleScene:
 
 
 def _deform(case: Scanning, move: Any, amount: float) -> TroubleScene:
-    points = move(case.part, case.scan(case.part, None, noise=0), amount)
+    def deform(at: Floats) -> Floats:
+        return np.asarray(move(case.part, at, amount))
+
+    points = deform(case.scan(case.part, None, noise=0).points)
     points += case.make_rng(12).normal(scale=case.noise, size=points.shape)
-    scene = case.scan(case.part, None)
-    return replace(scene, points=points)
+    return replace(case.scan(case.part, None), points=points, deform=deform)
 
 
-def _bend(part: Mesh, scene: TroubleScene, amount: float) -> Floats:
+def _bend(part: Mesh, at: Floats, amount: float) -> Floats:
     low, high = part.bounds
     axis, across = int(np.argmax(high - low)), int(np.argmin(high - low))
-    t = (scene.points[:, axis] - low[axis]) / (high - low)[axis]
-    points = scene.points.copy()
+    t = (at[:, axis] - low[axis]) / (high - low)[axis]
+    points = at.copy()
     # one end stays where it is
     points[:, across] += amount * (high - low)[axis] * t**2
     return points
 
 
-def _twist(part: Mesh, scene: TroubleScene, amount: float) -> Floats:
+def _twist(part: Mesh, at: Floats, amount: float) -> Floats:
     low, high = part.bounds
     axis = int(np.argmax(high - low))
     u, v = (axis + 1) % 3, (axis + 2) % 3
-    angle = np.radians(amount) * (scene.points[:, axis] - low[axis]) / (high - low)[axis]
-    points = scene.points.copy()
-    off = scene.points - part.bounds.mean(axis=0)
+    angle = np.radians(amount) * (at[:, axis] - low[axis]) / (high - low)[axis]
+    points = at.copy()
+    off = at - part.bounds.mean(axis=0)
     points[:, u] = part.bounds.mean(axis=0)[u] + np.cos(angle) * off[:, u] - np.sin(angle) * off[:, v]
     points[:, v] = part.bounds.mean(axis=0)[v] + np.sin(angle) * off[:, u] + np.cos(angle) * off[:, v]
     return points
