@@ -45,6 +45,8 @@ BENT = 0.001
 RIGID, SCALED = Freedom(STIFF, grows=False, bends=False), Freedom(STIFF, bends=False)
 STRAINED = (0.006, 0.03)
 """Strains beyond that of a bend or a twist that freer fields may have, in the order in which they are tried."""
+LOOSEST = 0.1
+"""The same where those leave much."""
 LOOSE = 0.006
 """Strain from which a lattice is tried too."""
 LEFT = 1.15
@@ -114,6 +116,9 @@ class Smooth(Adapt):
                 take(Freedom(bound, grows))
             chosen = freest if is_better(freest.score, chosen.score) else chosen
         trials.append(freest)
+        if np.median(chosen.score.both) > LEFT * body.noise**2:  # as a taper of a thin part, which is of wear's kind
+            take(Freedom(LOOSEST, grows))
+            take(Freedom(LOOSEST, grows, stretches=True))
         is_rough = np.median(chosen.score.both) > LEFT * body.noise**2
         for cells in self.lattice if is_rough else ():
             finer = replace(body, inside=body.inside[::2], basis=replace(body.basis, cells=cells))
