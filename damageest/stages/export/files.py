@@ -144,12 +144,13 @@ class Files(Export):
         if not result.part.cad_scale:
             if self.solids == "auto":
                 return ExportedFiles()
-            why = (
-                "the part was adapted to the scan, and its CAD faces were not"
-                if result.adapted
-                else ("the part is a mesh without CAD faces")
+            note = "solids: exact was asked for, but the part is a mesh without CAD faces; STEP solids have facets"
+            return ExportedFiles(notes=(note,), warnings=(note,))
+        if result.adapted is not None and result.adapted.field is None:
+            note = (
+                "STEP solids have facets, not the faces of the CAD file: the part was adapted to the scan by a stage "
+                "that gives no field to move them by; take adapt: smooth, or adapt: none"
             )
-            note = f"solids: exact was asked for, but {why}; STEP solids have facets"
             return ExportedFiles(notes=(note,), warnings=(note,))
         return writer(folder, result, bodies, places, self.limit)
 
