@@ -125,8 +125,8 @@ def find_exact(
                 break
             cut_off = measure_inner_area(rest) - inner_before
             measured = check_pieces(
-                form.split()[0], pieces, cut_off, bodies, site.damage, site.surface, part, site.points, tolerance, faces,
-                off,
+                form.split()[0], pieces, cut_off, bodies, site.damage, site.surface, part, site.points, tolerance,
+                faces, off,
             )  # fmt: skip
             if not measured.reason and not is_sound([piece for piece in rest if piece not in solids]):
                 measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)

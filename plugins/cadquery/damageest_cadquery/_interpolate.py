@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -86,8 +87,8 @@ def interpolate_surface(
     lines = [np.linspace(one.at[0], one.at[-1], LINES) for one in breaks]
     found: tuple[tuple[Axis, Axis], Floats, float] | None = None
     for _ in range(2):
-        along = choose_knots(lambda u, v=lines[1]: surface(u, v), breaks[0], aim / 2)
-        across = choose_knots(lambda v, u=lines[0]: surface(u, v).swapaxes(0, 1), breaks[1], aim / 2)
+        along = choose_knots(partial(_take_lines, surface, lines[1]), breaks[0], aim / 2)
+        across = choose_knots(partial(_take_lines, _swap(surface), lines[0]), breaks[1], aim / 2)
         poles = solve(along, surface(along.places, across.places))
         poles = solve(across, poles.swapaxes(0, 1)).swapaxes(0, 1)
         mixed = evaluate(along, poles, along.between)
@@ -95,11 +96,22 @@ def interpolate_surface(
         off = float(np.linalg.norm(there - surface(along.between, across.between), axis=-1).max())
         if found is None or off < found[2]:
             found = (along, across), poles, off
-        if off <= aim or max(len(axis.knots) - len(one.at) for axis, one in zip(found[0], breaks, strict=True)) >= MOST_SPANS:
+        if (
+            off <= aim
+            or max(len(axis.knots) - len(one.at) for axis, one in zip(found[0], breaks, strict=True)) >= MOST_SPANS
+        ):
             break
         lines = [along.places, across.places]  # what lies between the lines was missed
     assert found is not None
     return found
+
+
+def _take_lines(surface: Surface, lines: Floats, at: Floats) -> Floats:
+    return surface(at, lines)
+
+
+def _swap(surface: Surface) -> Surface:
+    return lambda v, u: surface(u, v).swapaxes(0, 1)
 
 
 def choose_knots(curve: Curve, breaks: Breaks, aim: float) -> Axis:

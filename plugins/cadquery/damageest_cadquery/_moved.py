@@ -108,7 +108,8 @@ class _Mover:
         axes, poles, off = interpolate_surface(place, breaks, self.aim)
         if not off <= self.most:
             raise MoveError(
-                f"the B-spline of face {self.number} is up to {off:.2g} mm off the adapted skin, more than {self.most:.2g}"
+                f"the B-spline of face {self.number} is up to {off:.2g} mm off the adapted skin, more than "
+                f"{self.most:.2g}"
             )
         return _make_surface(axes, _join_ends(poles))
 
@@ -159,8 +160,8 @@ class _Mover:
     def _trim(self, edge: Any, original: Any, made: Any) -> None:
         """Gives an edge its curve in the parameters of a moved face, and the distance that it is off the face."""
         from OCP.BRep import BRep_Builder, BRep_Tool
-        from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d
-        from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_VERTEX
+        from OCP.BRepAdaptor import BRepAdaptor_Curve
+        from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
         from OCP.TopExp import TopExp
         from OCP.TopoDS import TopoDS
 

@@ -43,8 +43,8 @@ def _make(request: Request) -> Made:
         cad = take_solids(model, request)
     except MoveError as error:
         why = f"the faces of the CAD file could not be adapted: {error}"
-        forms = {site.number: ExactForm("none", tried=(why,), deposit=describe_missing(site)) for site in request.sites}
-        return Made((), ("damage.step and undamaged.step have facets too",), forms)
+        none = {site.number: ExactForm("none", tried=(why,), deposit=describe_missing(site)) for site in request.sites}
+        return Made((), ("damage.step and undamaged.step have facets too",), none)
     solids, faces = start_solids(cad.solids)
     originals = [face for solid in model.solids for face in _explore_faces(solid)]
     facts = CadFacts(
@@ -63,9 +63,7 @@ def _make(request: Request) -> Made:
             continue
         with at_work(name_site(site.number), request.seconds):
             around = rest if site.accepted else solids
-            exact, reasons[site.number] = find_exact(
-                site, around, faces, part, request.tolerance, cad.off
-            )
+            exact, reasons[site.number] = find_exact(site, around, faces, part, request.tolerance, cad.off)
         if exact is None:
             continue
         found[site.number] = exact

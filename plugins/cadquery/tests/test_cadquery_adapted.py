@@ -9,11 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
+from damageest_cadquery._split import measure_volume, triangulate
 
 import damageest
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Mesh, Solid
 from damageest.errors import InputError
 from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.solids import iou
+from damageest.registry import Registry
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 from damageest.stages.export.files import Files
@@ -24,7 +28,6 @@ cq = import_for("cadquery", "cadquery")
 
 TOLERANCE = 0.2
 BALL = {"tool": "sphere", "centre": [10, 3, 6], "radius": 5.5}
-NOTCH = {"tool": "box", "centre": [-22, -10, 3], "size": [8, 5, 8]}
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ def run(folder: Path, part: Path, *settings: str) -> Run:
     job = {
         "version": 1, "units": "mm", "tolerance": TOLERANCE, "part": str(part), "align": "none", "report": "none",
         "scan": {
-            "use": "simulate", "points": 16000, "noise": 0.03, "seed": 4, "damage": [BALL, NOTCH],
+            "use": "simulate", "points": 16000, "noise": 0.03, "seed": 4, "damage": [BALL],
             "deform": {"bend": 1.0},
         },
         "adapt": {"use": "smooth", "points": 4000, "lattice": []},
@@ -68,23 +71,22 @@ def sample(shape: Any) -> Floats:
 def test_sites_of_a_bent_part_keep_few_exact_faces(done: Run) -> None:
     assert done.result.adapted is not None
     assert done.result.adapted.amount > 2 * TOLERANCE, "bent by more than the tolerance"
-    assert len(done.said["sites"]) == 2
-    for site in done.said["sites"]:
-        assert site["exact"]["form"] in ("shapes", "spline", "planes"), site["exact"]["tried"]
-        (solid,) = take_solids(done.folder / f"damage/site-{site['id']}.step")
-        assert solid.isValid()
-        assert len(solid.Faces()) < 12
-        kinds = [face.geomType() for face in solid.Faces()]
-        assert kinds.count("BSPLINE") >= len(kinds) - site["exact"]["inner_faces"]
-        assert solid.Volume() == pytest.approx(site["volume"], rel=0.01)
+    (site,) = done.said["sites"]
+    assert site["exact"]["form"] in ("shapes", "spline"), site["exact"]["tried"]
+    (solid,) = take_solids(done.folder / "damage/site-1.step")
+    assert solid.isValid()
+    kinds = [face.geomType() for face in solid.Faces()]
+    assert len(kinds) == 2
+    assert "BSPLINE" in kinds
+    assert measure_volume(solid.wrapped) == pytest.approx(site["volume"], rel=0.005)
 
 
 def test_what_is_left_has_the_moved_faces_of_the_part(done: Run) -> None:
     assert done.result.undamaged is not None
     (left,) = take_solids(done.folder / "undamaged.step")
     assert left.isValid()
-    assert len(left.Faces()) < 20
-    assert left.Volume() == pytest.approx(done.result.undamaged.volume, rel=0.003)
+    assert len(left.Faces()) == 8
+    assert measure_volume(left.wrapped) == pytest.approx(done.result.undamaged.volume, rel=0.003)
 
 
 def test_the_part_itself_is_the_adapted_one(done: Run) -> None:
@@ -99,7 +101,7 @@ def test_the_part_itself_is_the_adapted_one(done: Run) -> None:
     moved = result.adapted.field.move(sample(nominal.val()))
     near = np.array([cq.Vertex.makeVertex(*place).distance(shape.Shells()[0]) for place in moved[::5].tolist()])
     assert near.max() < TOLERANCE / 10, "the faces follow the field, not the triangles"
-    assert shape.Volume() == pytest.approx(result.part.volume, rel=0.003)
+    assert measure_volume(shape.wrapped) == pytest.approx(result.part.volume, rel=0.003)
 
 
 def test_faces_keep_their_names(done: Run) -> None:
@@ -114,21 +116,14 @@ def test_files_in_the_scan_frame_lie_where_the_scan_is(done: Run) -> None:
     truth = done.result.scan.truth
     assert truth is not None
     assert truth.deformed is not None
-    for suffix in ("step", "ply"):
-        found = np.concatenate([read_points(done.folder / f"scan_frame/damage/site-{k}.{suffix}") for k in (1, 2)])
-        assert np.quantile(distance_to_mesh(found, truth.deformed), 0.95) < TOLERANCE / 2
-    import trimesh
-
-    there = trimesh.load(done.folder / "scan_frame/scan.ply").vertices
+    (solid,) = take_solids(done.folder / "scan_frame/damage/site-1.step")
+    assert iou(triangulate(solid.wrapped, 0.02), truth.deformed) > 0.98
+    left = trimesh.load(done.folder / "scan_frame/undamaged.ply", process=False)
+    assert iou(Solid(left.vertices, left.faces), truth.deformed) < 1e-3
+    there = trimesh.load(done.folder / "scan_frame/scan.ply", process=False).vertices
     assert np.allclose(there, done.result.scan.points)
-
-
-def read_points(path: Path) -> Floats:
-    import trimesh
-
-    if path.suffix == ".step":
-        return np.concatenate([sample(solid) for solid in take_solids(path)])
-    return np.asarray(trimesh.load(path).vertices)
+    intact = done.result.deviation.label == 0
+    assert np.median(distance_to_mesh(there[intact], Mesh(left.vertices, left.faces))) < TOLERANCE / 4
 
 
 def test_without_a_field_sites_have_facets_and_the_part_is_refused(done: Run, tmp_path: Path) -> None:
@@ -146,16 +141,16 @@ def test_a_field_that_is_not_that_of_the_mesh_is_refused(done: Run, tmp_path: Pa
     adapted = done.result.adapted
     assert adapted is not None
     assert adapted.field is not None
-    other = replace(adapted.field, controls=adapted.field.controls + [0, 0, TOLERANCE])
+    other = replace(adapted.field, controls=adapted.field.controls + np.array([0, 0, TOLERANCE]))
     wrong = replace(done.result, adapted=replace(adapted, field=other))
     written = write(wrong, tmp_path)
-    assert [form.form for form in written.exact.values()] == ["none", "none"]
+    assert [form.form for form in written.exact.values()] == ["none"]
     assert all("off the adapted part" in form.tried[-1] for form in written.exact.values())
-    assert {"damage/site-1.step", "damage/site-2.step", "undamaged.step"} <= set(written.files)
+    assert "damage/site-1.step" in written.files
 
 
 def write(result: Result, folder: Path) -> ExportedFiles:
-    from damageest.registry import Registry
-
+    """The damage volumes as STEP. What is left of the part has many facets, which take long."""
     folder.mkdir(exist_ok=True)
-    return Files(format=("step",), solids="exact").run(result, folder, Registry.discover().writers, {})
+    sites = replace(result, undamaged=None, damage=None)
+    return Files(format=("step",), solids="exact").run(sites, folder, Registry.discover().writers, {})
