@@ -81,14 +81,17 @@ def interpolate_curve(curve: Curve, breaks: Breaks, aim: float) -> tuple[Axis, F
 
 
 def interpolate_surface(
-    surface: Surface, breaks: tuple[Breaks, Breaks], aim: float
+    surface: Surface, breaks: tuple[Breaks, Breaks], aim: float, most: int = MOST_SPANS
 ) -> tuple[tuple[Axis, Axis], Floats, float]:
-    """Both axes and the poles (N,M,3) of the B-spline that follows a surface within ``aim``, and its largest error."""
+    """Both axes and the poles (N,M,3) of the B-spline that follows a surface within ``aim``, and its largest error.
+
+    ``most``: spans along each parameter, beside those given, at which no more knots are inserted.
+    """
     lines = [np.linspace(one.at[0], one.at[-1], LINES) for one in breaks]
     found: tuple[tuple[Axis, Axis], Floats, float] | None = None
     for _ in range(2):
-        along = choose_knots(partial(_take_lines, surface, lines[1]), breaks[0], aim / 2)
-        across = choose_knots(partial(_take_lines, _swap(surface), lines[0]), breaks[1], aim / 2)
+        along = choose_knots(partial(_take_lines, surface, lines[1]), breaks[0], aim / 2, most)
+        across = choose_knots(partial(_take_lines, _swap(surface), lines[0]), breaks[1], aim / 2, most)
         poles = solve(along, surface(along.places, across.places))
         poles = solve(across, poles.swapaxes(0, 1)).swapaxes(0, 1)
         mixed = evaluate(along, poles, along.between)
@@ -114,17 +117,17 @@ def _swap(surface: Surface) -> Surface:
     return lambda v, u: surface(u, v).swapaxes(0, 1)
 
 
-def choose_knots(curve: Curve, breaks: Breaks, aim: float) -> Axis:
+def choose_knots(curve: Curve, breaks: Breaks, aim: float, most: int = MOST_SPANS) -> Axis:
     """The axis with which the values (N,...,3) of a curve are interpolated within ``aim``, each span halved until they
     are, or until there are too many."""
     for degree in (PLAIN, CURVED):
-        axis, most = breaks.start(degree), MOST_SPANS + len(breaks.at)
+        axis = breaks.start(degree)
         while True:
             poles = solve(axis, curve(axis.places))
             off = np.linalg.norm(evaluate(axis, poles, axis.between) - curve(axis.between), axis=-1)
             worst = off.reshape(len(axis.knots) - 1, -1).max(axis=1)
             late = np.flatnonzero(worst > aim)
-            room = most - len(axis.knots)
+            room = most + len(breaks.at) - len(axis.knots)
             if not len(late) or degree == PLAIN or room <= 0:
                 break
             axis = halve_spans(axis, late[np.argsort(-worst[late], kind="stable")][:room].tolist())

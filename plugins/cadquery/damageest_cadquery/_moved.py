@@ -19,10 +19,12 @@ from damageest_cadquery._split import ShapeMap
 
 Move = Callable[[Floats], Floats]
 """Gives where places (N,3) are after the displacement."""
-CHECKED = 47
-"""Places along an edge at which it is compared with its faces; OpenCASCADE looks at every second of them."""
-ROOM = 1.1
+CHECKED = 193
+"""Places along an edge at which it is compared with its faces: OpenCASCADE looks for the largest distance."""
+ROOM = 1.3
 """What an edge claims to be off its faces, as a share of what is measured."""
+MANY = 120
+"""Knots, beside those given, with which a face is tried at last."""
 LEAST = 1e-7
 """Least distance in millimetres that OpenCASCADE tells apart."""
 
@@ -87,8 +89,9 @@ class _Mover:
                 builder.Add(loop, self._move_edge(TopoDS.Edge_s(edge)).Oriented(edge.Orientation()))
             loop.Closed(True)
             builder.Add(made, loop.Oriented(wire.Orientation()))
-        for edge in explore(original, edges[0].ShapeType()):
-            self._trim(TopoDS.Edge_s(edge), original, made)
+        used = [TopoDS.Edge_s(edge) for edge in explore(original, edges[0].ShapeType())]
+        for edge in used:
+            self._trim(edge, sum(edge.IsSame(other) for other in used) > 1, original, made)
         self.number += 1
         return made.Oriented(face.Orientation())
 
@@ -106,6 +109,8 @@ class _Mover:
             _find_breaks(adaptor.NbVIntervals, adaptor.VIntervals),
         )
         axes, poles, off = interpolate_surface(place, breaks, self.aim)
+        if not off <= self.most:  # as of a helix of many turns
+            axes, poles, off = interpolate_surface(place, breaks, self.most / 2, MANY)
         if not off <= self.most:
             raise MoveError(
                 f"the B-spline of face {self.number} is up to {off:.2g} mm off the adapted skin, more than "
@@ -157,8 +162,10 @@ class _Mover:
         self.known.set(vertex, made)
         return made
 
-    def _trim(self, edge: Any, original: Any, made: Any) -> None:
-        """Gives an edge its curve in the parameters of a moved face, and the distance that it is off the face."""
+    def _trim(self, edge: Any, is_seam: bool, original: Any, made: Any) -> None:
+        """Gives an edge its curve in the parameters of a moved face, and the distance that it is off the face; both
+        curves where the face meets itself there, ``is_seam``. Two faces of one closed surface may meet at its seam too;
+        each of them has a surface of its own now."""
         from OCP.BRep import BRep_Builder, BRep_Tool
         from OCP.BRepAdaptor import BRepAdaptor_Curve
         from OCP.TopAbs import TopAbs_FORWARD, TopAbs_REVERSED
@@ -167,11 +174,12 @@ class _Mover:
 
         moved, builder = TopoDS.Edge_s(self.known.get(edge)), BRep_Builder()
         ahead, back = (TopoDS.Edge_s(edge.Oriented(way)) for way in (TopAbs_FORWARD, TopAbs_REVERSED))
-        curves = [BRep_Tool.CurveOnSurface_s(each, original, 0.0, 0.0) for each in (ahead, back)]
+        sides = [ahead, back] if is_seam else [edge]
+        curves = [BRep_Tool.CurveOnSurface_s(each, original, 0.0, 0.0) for each in sides]
         if any(curve is None for curve in curves):
             raise MoveError(f"an edge of face {self.number} has no curve in its parameters")
         first, last = BRep_Tool.Range_s(ahead, original)
-        if BRep_Tool.IsClosed_s(ahead, original):
+        if is_seam:
             builder.UpdateEdge(moved, curves[0], curves[1], made, LEAST)
         else:
             builder.UpdateEdge(moved, curves[0], made, LEAST)

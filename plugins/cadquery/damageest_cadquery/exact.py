@@ -54,7 +54,10 @@ def write_exact(
         if what in request.skipped:
             break
         names = [what] if what not in (WHOLE, ADAPTING) else [what, *(name_site(each.number) for each in request.sites)]
+        reason = f"{reason} with {ADAPTING}" if what == ADAPTING else reason
         request = replace(request, skipped={**request.skipped, **dict.fromkeys(names, reason)})
+        if what == ADAPTING:
+            break
     forms = dict(made.forms)
     for site in request.sites:
         why = (request.skipped.get(name_site(site.number), "the process for exact solids stopped"),)

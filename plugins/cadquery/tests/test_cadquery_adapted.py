@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import cadquery_faults
 import numpy as np
 import pytest
 import trimesh
+from damageest_cadquery import exact
 from damageest_cadquery._split import measure_volume, triangulate
 
 import damageest
@@ -63,8 +65,8 @@ def take_solids(path: Path) -> list[Any]:
     return list(cq.importers.importStep(str(path)).solids().vals())
 
 
-def sample(shape: Any) -> Floats:
-    vertices, _ = shape.tessellate(0.05, 0.3)
+def sample(shape: Any, chord: float = 0.05) -> Floats:
+    vertices, _ = shape.tessellate(chord, 0.3)
     return np.array([vertex.toTuple() for vertex in vertices])
 
 
@@ -149,8 +151,39 @@ def test_a_field_that_is_not_that_of_the_mesh_is_refused(done: Run, tmp_path: Pa
     assert "damage/site-1.step" in written.files
 
 
-def write(result: Result, folder: Path) -> ExportedFiles:
+def test_faces_that_take_too_long_to_move_cost_the_exact_form(
+    done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exact, "make_exact", cadquery_faults.compute_on_while_adapting)
+    written = write(done.result, tmp_path, limit=2)
+    assert written.exact[1].form == "none"
+    assert "longer than 2 s with the CAD faces of the adapted part" in written.exact[1].tried[0]
+    assert any("site-1.step has facets" in warning for warning in written.warnings)
+    assert "damage/site-1.step" in written.files
+
+
+def test_the_field_is_in_the_unit_of_the_job(done: Run) -> None:
+    """The CAD file is in millimetres, this result in centimetres."""
+    mm, adapted = done.result, done.result.adapted
+    assert adapted is not None
+    assert adapted.field is not None
+    part = replace(
+        mm.part, vertices=mm.part.vertices / 10, unit="cm", cad_scale=0.1,
+        tessellation_error=mm.part.tessellation_error / 10,
+    )  # fmt: skip
+    field = adapted.field
+    smaller = replace(field, low=field.low / 10, high=field.high / 10, controls=field.controls / 10)
+    moved = replace(adapted, part=part, field=smaller)
+    cm = replace(mm, units="cm", tolerance=TOLERANCE / 10, part=part, adapted=moved, sites=())
+    shape = cm.as_cadquery("undamaged")
+    assert shape.isValid()
+    assert distance_to_mesh(sample(shape, 0.005), part).max() < TOLERANCE / 100 + part.tessellation_error
+    assert measure_volume(shape.wrapped) == pytest.approx(part.volume, rel=0.003)
+
+
+def write(result: Result, folder: Path, **options: object) -> ExportedFiles:
     """The damage volumes as STEP. What is left of the part has many facets, which take long."""
     folder.mkdir(exist_ok=True)
     sites = replace(result, undamaged=None, damage=None)
-    return Files(format=("step",), solids="exact").run(sites, folder, Registry.discover().writers, {})
+    stage = Files.model_validate({"format": ["step"], "solids": "exact", "detail": 0.3, **options})
+    return stage.run(sites, folder, Registry.discover().writers, {})
