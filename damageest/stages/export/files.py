@@ -142,10 +142,12 @@ class Files(Export):
         coarse = {}
         if detail and any(writers[name].simplify for name in self.format):
             coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}
-        rounded = {
-            stem: replace(body, solid=_keep_closed(body.solid, result, "/" in stem or len(body.solid.faces) <= FEW))
-            for stem, body in bodies.items()
-        }
+        rounded = {}
+        if any(writers[name].single for name in self.format):
+            rounded = {
+                stem: replace(body, solid=_keep_closed(body.solid, result, "/" in stem or len(body.solid.faces) <= FEW))
+                for stem, body in bodies.items()
+            }
         return {"all": bodies, "simplify": coarse or bodies, "single": rounded}
 
     def _write_shapes(
