@@ -28,3 +28,8 @@ class JsonModel(BaseModel):
 
 Bound = Annotated[float | None, BeforeValidator(lambda value: value if math.isfinite(value) else None)]
 """A number that is null where it is infinite: nothing limits it."""
+
+
+def strip_frame(name: str) -> str:
+    """The path of a file below the folder of its frame."""
+    return name.removeprefix("scan_frame/").removeprefix("nominal_frame/")

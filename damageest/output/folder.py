@@ -44,9 +44,12 @@ class OutputFolder:
 
     @cached_property
     def place(self) -> Path:
-        """Where the files in the part's frame are; where there are none, those in the scan's."""
-        other = self.folder / "scan_frame"
-        return other if other.is_dir() and not (self.folder / "scan.ply").is_file() else self.folder
+        """Where the files in the part's frame are; where there are none, those in the scan's, or those on the part as
+        designed."""
+        if (self.folder / "scan.ply").is_file():
+            return self.folder
+        others = (self.folder / name for name in ("scan_frame", "nominal_frame"))
+        return next((other for other in others if other.is_dir()), self.folder)
 
     @cached_property
     def _in_one_file(self) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from damageest.artefacts import Vector
-from damageest.output.base import Bound, JsonModel
+from damageest.output.base import Bound, JsonModel, strip_frame
 from damageest.result import Site
 from damageest.stages.export import ExportedFiles
 
@@ -56,5 +56,5 @@ def report_path(site: Site, written: ExportedFiles) -> PathReport | None:
     path = site.path
     if path is None:
         return None
-    files = [name for name in written.files if name.removeprefix("scan_frame/").startswith(f"path/site-{site.id}.")]
+    files = [name for name in written.files if strip_frame(name).startswith(f"path/site-{site.id}.")]
     return PathReport.read(path, layer_heights=path.heights, unreachable_volume=path.unreached_volume, files=files)

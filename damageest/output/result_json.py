@@ -58,7 +58,10 @@ class AlignmentReport(JsonModel):
 
 
 class ExportReport(JsonModel):
-    files: list[str] = Field(description="all that were written; those below scan_frame/ are in the scan's frame")
+    files: list[str] = Field(
+        description="all that were written, in the part's frame, which is that of the adapted part where adapt is not "
+        "null; those below scan_frame/ are in the scan's frame, those below nominal_frame/ on the part as designed"
+    )
     notes: list[str] = Field(description="what differs from what the job asks for, and why")
 
 

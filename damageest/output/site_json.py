@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from damageest.artefacts import Deposit, Vector
-from damageest.output.base import JsonModel
+from damageest.output.base import JsonModel, strip_frame
 from damageest.output.path_json import PathReport, report_path
 from damageest.output.reason_json import ReasonReport
 from damageest.output.uncertainty_json import ReportedInterval, UncertaintyReport
@@ -134,10 +134,10 @@ class SiteReport(JsonModel):
 
 
 def index_files(files: Iterable[str]) -> dict[str, list[str]]:
-    """The files by their path up to the first dot, in either frame."""
+    """The files by their path up to the first dot, in any frame."""
     found: dict[str, list[str]] = {}
     for name in files:
-        found.setdefault(name.removeprefix("scan_frame/").partition(".")[0], []).append(name)
+        found.setdefault(strip_frame(name).partition(".")[0], []).append(name)
     return found
 
 

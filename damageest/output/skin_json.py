@@ -9,7 +9,7 @@ from pydantic import Field
 
 from damageest.artefacts import Vector
 from damageest.findings import Surplus
-from damageest.output.base import JsonModel
+from damageest.output.base import JsonModel, strip_frame
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
@@ -54,7 +54,7 @@ class SurplusReport(JsonModel):
 def report_surplus(item: Surplus, result: Result, written: ExportedFiles) -> SurplusReport:
     points = result.aligned.points[item.points]
     bounds = np.array([points.min(axis=0), points.max(axis=0)]) if item.solid is None else item.solid.bounds
-    own = [f for f in written.files if f.removeprefix("scan_frame/").startswith(f"surplus/site-{item.id}.")]
+    own = [f for f in written.files if strip_frame(f).startswith(f"surplus/site-{item.id}.")]
     return SurplusReport.read(
         item,
         points=len(item.points),

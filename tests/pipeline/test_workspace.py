@@ -102,7 +102,8 @@ def test_what_is_someone_elses_is_refused(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["empty", "file", "folder"]
 
 
-NAMES_OF_FOLDERS = ("stages", "damage", "surface", "deposit", "path", "surplus", "doubtful", "truth", "scan_frame")
+NAMES_OF_FOLDERS = ("stages", "damage", "surface", "deposit", "path", "surplus", "doubtful", "truth",
+                    "scan_frame", "nominal_frame")  # fmt: skip
 NAMES_OF_FILES = ("scan.ply", "damage.stl", "report.html", "job.yaml", "result.3mf", "undamaged.step")
 
 

@@ -24,8 +24,8 @@ class Adapt(Stage, ABC):
     Returns:
         None where the part as designed explains the scan: everything goes on as without this stage. Else the adapted
         part: the skin of ``part``, with a displacement that is 0 on average over intact skin and does not turn it, and
-        the rigid ``motion`` that takes the aligned scan onto it. ``part`` keeps unit, path and CAD faces. Neither wear
-        nor damage nor added metal may be followed.
+        the rigid ``motion`` that takes the aligned scan onto it. ``part`` keeps unit, path and CAD faces; these follow
+        where there is a ``field``. Neither wear nor damage nor added metal may be followed.
 
     Raises:
         StageError: where the deformed part would not be a solid, or the scan has too few points.

@@ -75,9 +75,9 @@ def require_injective(field: Field, turn: Floats, places: Floats, largest: float
 
 
 def deform_part(part: Part, moved: Floats, error: float) -> Part:
-    """The part with its vertices moved; the CAD file is no longer its shape. Raises StageError where it is no solid."""
+    """The part with its vertices moved. Raises StageError where it is no solid."""
     try:
-        return replace(part, vertices=moved, tessellation_error=part.tessellation_error + error, cad_scale=0.0)
+        return replace(part, vertices=moved, tessellation_error=part.tessellation_error + error)
     except ArtefactError as problem:
         raise StageError(f"the deformed part is no solid: {problem}", REMEDY) from None
 

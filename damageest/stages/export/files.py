@@ -20,12 +20,17 @@ from damageest.io.meshes import write_ply, write_points
 from damageest.stages import JobPath
 from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathWriter, Writer
 from damageest.stages.export._coverage import write_coverage
+from damageest.stages.export._nominal import map_to_nominal
 from damageest.stages.export._options import Formats, PathFormats, check_spline_writer
 from damageest.stages.export._paths import write_paths
 
 if TYPE_CHECKING:
     from damageest.result import Result
 
+SCAN, NOMINAL = "scan_frame/", "nominal_frame/"
+"""Folders of the files in the scan's frame, and of those on the part as designed."""
+PLACES = {"part": ("",), "scan": (SCAN,), "both": ("", SCAN), "nominal": (NOMINAL,), "all": ("", SCAN, NOMINAL)}
+"""Folders by the frame that is asked for."""
 UNDAMAGED, DAMAGE, DEPOSIT, DOUBTFUL = (150, 155, 165), (215, 50, 40), (40, 130, 205), (225, 165, 40)
 SURPLUS = (150, 90, 190)
 FEW = 20_000
@@ -55,8 +60,11 @@ class Files(Export):
         le=3600,
         description="longest time for the exact form of a site, in seconds of the processor; then it gets facets",
     )
-    frame: Literal["part", "scan", "both"] = Field(
-        "part", description="frame of the files: the part's, the scan's as measured (files in scan_frame/), or both"
+    frame: Literal["part", "scan", "both", "nominal", "all"] = Field(
+        "part",
+        description="frame of the files: part (of an adapted part, that of the adapted part), scan (as measured, files "
+        "in scan_frame/), both, nominal (files in nominal_frame/: where the part was adapted, all is moved back to the "
+        "part as designed; else as part), or all three",
     )
     detail: float | None = Field(
         None,
@@ -97,36 +105,69 @@ class Files(Export):
             from damageest.stages.export._spline import fit_spline
 
             splines = {site.id: fit_spline(site.surface, result.tolerance) for site in result.sites}
-        detail = result.tolerance / 4 if self.detail is None else self.detail
-        bodies, coarse = _collect_bodies(result), {}
-        if detail and any(writers[name].simplify for name in self.format):
-            coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}
-        rounded = {
-            stem: replace(body, solid=_keep_closed(body.solid, result, "/" in stem or len(body.solid.faces) <= FEW))
-            for stem, body in bodies.items()
-        }
+        places = {place: invert_pose(result.pose) if place == SCAN else None for place in PLACES[self.frame]}
+        bodies = _collect_bodies(result)
+        back = map_to_nominal(result, bodies) if NOMINAL in places and result.adapted else None
         done: list[ExportedFiles] = []
-        chosen_places = {"part": [""], "scan": ["scan_frame/"], "both": ["", "scan_frame/"]}[self.frame]
-        places = {place: invert_pose(result.pose) if place else None for place in chosen_places}
-        ready = self._write_exact(result, folder, writers, coarse or bodies, places)
-        done.append(ready)
-        for place, T in places.items():
-            for name in self.format:
-                chosen = coarse if coarse and writers[name].simplify else rounded if writers[name].single else bodies
-                left = {stem: body for stem, body in chosen.items() if f"{place}{stem}.{name}" not in ready.files}
-                done += _write_solids(writers[name], folder, place, left, T, result.units)
-            done += self._write_surfaces(result, folder, place, T)
+        ready = ExportedFiles()
+        here = {place: T for place, T in places.items() if not (back and place == NOMINAL)}
+        if here:
+            shapes = self._prepare(bodies, result, writers)
+            ready = self._write_exact(result, folder, writers, shapes["simplify"], here)
+            done.append(ready)
+        for place, T in here.items():
+            done += self._write_shapes(result, shapes, folder, place, T, writers, ready.files)
             told = (_read_text(self.path_header), _read_text(self.path_footer), self.path_options)
             done.append(write_paths(result, folder, place, T, self.paths, path_writers, *told))
             if splines:
                 patches = {number: patch for number, (patch, _) in splines.items() if patch}
                 done += _write_patches(writers, folder, place, patches, T, result.units)
+        if back:
+            shapes = self._prepare(back.bodies, result, writers)
+            done += self._write_shapes(back.result, shapes, folder, NOMINAL, None, writers, ())
+            done.append(back.tell(bool(splines), any(writers[name].exact for name in self.format)))
         done.append(self._write_truth(result, folder, writers))
         files = dict.fromkeys(f for one in done for f in one.files)  # the writer of STL may have written a PLY already
         notes = tuple(n for one in done for n in one.notes)
         fits = {number: spline for number, (_, spline) in splines.items()}
         warnings = tuple(n for one in done for n in one.warnings)
         return ExportedFiles(tuple(files), notes, fits, ready.exact, warnings)
+
+    def _prepare(
+        self, bodies: Mapping[str, Body], result: Result, writers: Mapping[str, Writer]
+    ) -> dict[str, Mapping[str, Body]]:
+        """The bodies, by the stems of their files: ``all`` as they are; for formats that ``simplify``; and for those in
+        ``single`` precision."""
+        detail = result.tolerance / 4 if self.detail is None else self.detail
+        coarse = {}
+        if detail and any(writers[name].simplify for name in self.format):
+            coarse = {stem: replace(body, solid=simplify_within(body.solid, detail)) for stem, body in bodies.items()}
+        rounded = {}
+        if any(writers[name].single for name in self.format):
+            rounded = {
+                stem: replace(body, solid=_keep_closed(body.solid, result, "/" in stem or len(body.solid.faces) <= FEW))
+                for stem, body in bodies.items()
+            }
+        return {"all": bodies, "simplify": coarse or bodies, "single": rounded}
+
+    def _write_shapes(
+        self,
+        result: Result,
+        shapes: Mapping[str, Mapping[str, Body]],
+        folder: Path,
+        place: str,
+        T: Floats | None,
+        writers: Mapping[str, Writer],
+        ready: Sequence[str],
+    ) -> list[ExportedFiles]:
+        """Writes solids, surfaces and scan below ``place``, but for the solids that are ``ready``; ``shapes``: as
+        `_prepare` gives them."""
+        done = []
+        for name in self.format:
+            kind = "simplify" if writers[name].simplify else "single" if writers[name].single else "all"
+            left = {stem: body for stem, body in shapes[kind].items() if f"{place}{stem}.{name}" not in ready}
+            done += _write_solids(writers[name], folder, place, left, T, result.units)
+        return done + self._write_surfaces(result, folder, place, T)
 
     def _write_exact(
         self,
@@ -144,12 +185,13 @@ class Files(Export):
         if not result.part.cad_scale:
             if self.solids == "auto":
                 return ExportedFiles()
-            why = (
-                "the part was adapted to the scan, and its CAD faces were not"
-                if result.adapted
-                else ("the part is a mesh without CAD faces")
+            note = "solids: exact was asked for, but the part is a mesh without CAD faces; STEP solids have facets"
+            return ExportedFiles(notes=(note,), warnings=(note,))
+        if result.adapted is not None and result.adapted.field is None:
+            note = (
+                "STEP solids have facets, not the faces of the CAD file: the part was adapted to the scan by a stage "
+                "that gives no field to move them by; take adapt: smooth, or adapt: none"
             )
-            note = f"solids: exact was asked for, but {why}; STEP solids have facets"
             return ExportedFiles(notes=(note,), warnings=(note,))
         return writer(folder, result, bodies, places, self.limit)
 

@@ -51,12 +51,13 @@ def check_pieces(
     points: Floats,
     tolerance: float,
     cad_faces: Sequence[Any],
+    off_faces: float = 0.0,
 ) -> Measured:
     """Measures the pieces of a damage volume, all in the part's frame and the job's unit.
 
     ``cut_off``: area of new faces on what is left of the part; ``bodies``: how many solids are expected; ``points``
     (N,3): the scan's points on the inner damage surface;
-    ``cad_faces``: the part's faces by number.
+    ``cad_faces``: the part's faces by number; ``off_faces``: how far their own corners may lie off them.
     """
     from OCP.BRep import BRep_Tool
     from OCP.BRepCheck import BRepCheck_Analyzer
@@ -100,7 +101,7 @@ def check_pieces(
     farthest = max(float(there.max()), float(back.max()))
     off = max((_measure_off(face, cad_faces[number]) for face, (number, _) in faces if number >= 0), default=0.0)
     numbers = (distance, farthest, beyond, off)
-    if off > ON_CAD * part.diagonal:
+    if off > ON_CAD * part.diagonal + off_faces:
         return refuse(f"an outer corner lies {off:.2g} off the CAD's surface", *numbers)
     share, most = LIMITS[form]
     if farthest > most * tolerance or beyond > share:

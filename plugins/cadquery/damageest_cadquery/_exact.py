@@ -96,9 +96,12 @@ def start_solids(solids: Sequence[Any]) -> tuple[tuple[Piece, ...], tuple[Any, .
 
 
 def find_exact(
-    site: SiteInput, solids: Sequence[Piece], faces: Sequence[Any], part: Part, tolerance: float
+    site: SiteInput, solids: Sequence[Piece], faces: Sequence[Any], part: Part, tolerance: float, off: float = 0.0
 ) -> tuple[Exact | None, tuple[str, ...]]:
-    """The exact damage volume of a site in ``solids``, which are in the job's unit, or None; and what was refused."""
+    """The exact damage volume of a site in ``solids``, which are in the job's unit, or None; and what was refused.
+
+    ``off``: how far corners of ``solids`` may lie off their faces.
+    """
     start, tried = time.process_time(), []
     cut = make_cut(site.damage, site.surface, part, site.enclosures, tolerance)
     if cut is None:
@@ -122,8 +125,9 @@ def find_exact(
                 break
             cut_off = measure_inner_area(rest) - inner_before
             measured = check_pieces(
-                form.split()[0], pieces, cut_off, bodies, site.damage, site.surface, part, site.points, tolerance, faces
-            )
+                form.split()[0], pieces, cut_off, bodies, site.damage, site.surface, part, site.points, tolerance,
+                faces, off,
+            )  # fmt: skip
             if not measured.reason and not is_sound([piece for piece in rest if piece not in solids]):
                 measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)
             if not measured.reason:

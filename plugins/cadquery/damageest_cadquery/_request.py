@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from damageest.artefacts import Floats, Part
+from damageest.artefacts import DisplacementField, Floats, Part
 from damageest.stages.export import Body, DepositForm, ExactForm
 from damageest_cadquery._assembly import Colour
 from damageest_cadquery._exact import SiteInput
@@ -17,7 +18,8 @@ class Request:
 
     ``folder``: where to write, and ``scratch``: where files are until they have been read back; ``places``: prefixes of
     the files with the transform (4,4) to their frame; ``unit``: of the files; ``bodies``: what has no exact form, by
-    the stem of its file, for the assembly; ``seconds``: processor time that each piece of work has; ``skipped``: those
+    the stem of its file, for the assembly; ``field``: what moves the part as designed, as its CAD file has it, to
+    ``part``, None for nothing; ``seconds``: processor time that each piece of work has; ``skipped``: those
     that stopped this process before, by `name_site`, `name_deposit` and `name_file`, and why.
     """
 
@@ -31,7 +33,8 @@ class Request:
     scratch: str
     places: Mapping[str, Floats | None]
     seconds: float
-    skipped: Mapping[str, str] = field(default_factory=dict)
+    field: DisplacementField | None = None
+    skipped: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Made:
 
 WHOLE = "the CAD file"
 """The work between the others, such as reading."""
+ADAPTING = "the CAD faces of the adapted part"
+"""The work of moving them."""
 
 
 def name_site(number: int) -> str:

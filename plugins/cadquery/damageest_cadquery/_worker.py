@@ -8,12 +8,16 @@ from typing import Any
 
 from damageest.isolation import at_work
 from damageest.stages.export import DepositForm, ExactForm
+from damageest_cadquery._adapted import MovedSolids, move_solids
 from damageest_cadquery._colours import read_colours
 from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit
 from damageest_cadquery._exact import Exact, find_exact, scale_shape, start_solids
+from damageest_cadquery._files import join_shapes
+from damageest_cadquery._moved import MoveError
 from damageest_cadquery._output import Writing, write_all
-from damageest_cadquery._read import explore, read
+from damageest_cadquery._read import Model, explore, read
 from damageest_cadquery._request import (
+    ADAPTING,
     WHOLE,
     CadFacts,
     Made,
@@ -35,8 +39,13 @@ def make_exact(request: Request) -> Made:
 def _make(request: Request) -> Made:
     part = request.part
     model = read(Path(part.path), Path(part.path).suffix.lower())
-    shapes = [scale_shape(solid, request.scale) if abs(request.scale - 1) > 1e-12 else solid for solid in model.solids]
-    solids, faces = start_solids(shapes)
+    try:
+        cad = take_solids(model, request)
+    except MoveError as error:
+        why = f"the faces of the CAD file could not be adapted: {error}"
+        none = {site.number: ExactForm("none", tried=(why,), deposit=describe_missing(site)) for site in request.sites}
+        return Made((), ("damage.step and undamaged.step have facets too",), none)
+    solids, faces = start_solids(cad.solids)
     originals = [face for solid in model.solids for face in _explore_faces(solid)]
     facts = CadFacts(
         [model.name_of(face) or f"face {number}" for number, face in enumerate(originals)],
@@ -54,7 +63,7 @@ def _make(request: Request) -> Made:
             continue
         with at_work(name_site(site.number), request.seconds):
             around = rest if site.accepted else solids
-            exact, reasons[site.number] = find_exact(site, around, faces, part, request.tolerance)
+            exact, reasons[site.number] = find_exact(site, around, faces, part, request.tolerance, cad.off)
         if exact is None:
             continue
         found[site.number] = exact
@@ -77,6 +86,31 @@ def _make(request: Request) -> Made:
     said |= {number: _describe(found[number]) for number in writing.exact}
     said = {number: replace(form, deposit=forms[number]) for number, form in said.items()}
     return Made(tuple(writing.files), tuple(writing.notes), said)
+
+
+def take_solids(model: Model, request: Request) -> MovedSolids:
+    """The solids of the part in millimetres: those of its CAD file, moved where the part was adapted. Raises MoveError
+    where they cannot be."""
+    scale = request.scale
+    shapes = [scale_shape(solid, scale) if abs(scale - 1) > 1e-12 else solid for solid in model.solids]
+    if request.field is None:
+        return MovedSolids(shapes, 0.0)
+    with at_work(ADAPTING, request.seconds):
+        return move_solids(shapes, request.field, request.part, request.tolerance)
+
+
+def write_part(request: Request, file: str) -> str:
+    """Writes the solids of the part as BREP, in millimetres; gives why not, where its faces could not be moved."""
+    from OCP.BRepTools import BRepTools
+
+    with at_work(WHOLE, request.seconds):
+        path = Path(request.part.path)
+        try:
+            cad = take_solids(read(path, path.suffix.lower()), request)
+        except MoveError as error:
+            return str(error)
+        BRepTools.Write_s(join_shapes(cad.solids), file)
+    return ""
 
 
 def _explore_faces(solid: Any) -> list[Any]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from damageest.artefacts import Deposit, Floats, Mesh, Solid
+from damageest.artefacts import Deposit, DisplacementField, Floats, Mesh, Solid
 from damageest.errors import InputError
 from damageest.geometry.units import MILLIMETRES
 from damageest.io.files import shorten_error
@@ -19,11 +19,13 @@ from damageest.result import Result
 from damageest.stages.export import Body, ExactForm, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._read import read
-from damageest_cadquery._request import WHOLE, Made, Request, describe_missing, name_site
+from damageest_cadquery._request import ADAPTING, WHOLE, Made, Request, describe_missing, name_site
 from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
 from damageest_cadquery._step import OWNER
-from damageest_cadquery._worker import make_exact
+from damageest_cadquery._worker import make_exact, write_part
 
+Given = TypeVar("Given")
+NO_FIELD = "the part was adapted to the scan by a stage that gives no field, so its CAD faces cannot follow"
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
 WORKER = "damageest_cadquery exact"
@@ -44,15 +46,18 @@ def write_exact(
         return ExportedFiles()
     made = Made((), (), {})
     for _ in range(MOST_STARTS):
-        done = _run(request)
+        done = _run(request, make_exact)
         if isinstance(done, Made):
             made = done
             break
         what, reason = done
         if what in request.skipped:
             break
-        names = [what] if what != WHOLE else [WHOLE, *(name_site(each.number) for each in request.sites)]
+        names = [what] if what not in (WHOLE, ADAPTING) else [what, *(name_site(each.number) for each in request.sites)]
+        reason = f"{reason} with {ADAPTING}" if what == ADAPTING else reason
         request = replace(request, skipped={**request.skipped, **dict.fromkeys(names, reason)})
+        if what == ADAPTING:
+            break
     forms = dict(made.forms)
     for site in request.sites:
         why = (request.skipped.get(name_site(site.number), "the process for exact solids stopped"),)
@@ -94,6 +99,7 @@ def make_request(
         scratch="",
         places=moved,
         seconds=seconds,
+        field=_scale_field(result, factor),
     )
 
 
@@ -124,19 +130,26 @@ def _scale(mesh: Any, factor: float) -> Any:
     return mesh if factor == 1 else replace(mesh, vertices=np.asarray(mesh.vertices) * factor)
 
 
+def _scale_field(result: Result, factor: float) -> DisplacementField | None:
+    field = None if result.adapted is None else result.adapted.field
+    if field is None or factor == 1:
+        return field
+    return DisplacementField(field.low * factor, field.high * factor, field.controls * factor)
+
+
 def _scale_shift(T: Floats, factor: float) -> Floats:
     moved = np.array(T)
     moved[:3, 3] *= factor
     return moved
 
 
-def _run(request: Request) -> Made | tuple[str, str]:
+def _run(request: Request, work: Callable[..., Given], **more: str) -> Given | tuple[str, str]:
     """Starts the process once. Gives what it made; or what it was doing where it stopped, and why."""
     with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
-        arguments = {"request": replace(request, scratch=place)}
+        arguments = {"request": replace(request, scratch=place), **more}
         try:
             return call_isolated(
-                make_exact, arguments, worker=WORKER, owner=OWNER, limits=Limits(seconds=0), show=False, stays=False,
+                work, arguments, worker=WORKER, owner=OWNER, limits=Limits(seconds=0), show=False, stays=False,
                 processor_time=True,
             )  # fmt: skip
         except ProcessError as error:
@@ -164,8 +177,12 @@ def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
         what = "damage" if known[site].deposit is None else what
     if not result.part.cad_scale:
         raise InputError("the part is a mesh: only a part from STEP, IGES or BREP has CAD faces")
+    if result.adapted is not None and result.adapted.field is None:
+        raise InputError(f"{NO_FIELD}; take as_trimesh, or a stage adapt that gives a field, as adapt: smooth")
     if what == "part" or (what == "undamaged" and not result.sites):
-        return _take_shape(Path(result.part.path), result.part.cad_scale)
+        if result.adapted is None:
+            return _take_shape(Path(result.part.path), result.part.cad_scale)
+        return _take_adapted(result)
     chosen = result if what == "undamaged" else replace(result, sites=tuple(s for s in result.sites if s.id == site))
     with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
         bodies = {}
@@ -183,6 +200,17 @@ def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
         if not wanted:
             raise InputError(f"{what} has no exact form; take as_trimesh ({'; '.join(done.notes)})")
         return _take_shape(Path(place) / wanted[0], 1 / MILLIMETRES[result.units])
+
+
+def _take_adapted(result: Result) -> Any:
+    """The adapted part. Raises InputError where the faces of its CAD file cannot follow it."""
+    with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
+        file = Path(place) / "part.brep"
+        done = _run(make_request(result, Path(place), {}, {}, LIMIT), write_part, file=str(file))
+        why = done if isinstance(done, str) else done[1]
+        if why:
+            raise InputError(f"the adapted part has no exact form: {why}; take as_trimesh")
+        return _take_shape(file, 1 / MILLIMETRES[result.units])
 
 
 def _take_shape(path: Path, scale: float) -> Any:

@@ -45,6 +45,17 @@ def compute_on_at_first(request: Request) -> Made:
     return make_with(find_or_compute, request)
 
 
+def compute_on_while_adapting(request: Request) -> Made:
+    """Computes without end while faces are moved."""
+
+    def compute(*values: Any) -> Any:
+        while values:
+            pass
+
+    vars(_worker)["move_solids"] = compute
+    return _worker.make_exact(request)
+
+
 def abort_at_start(request: Request) -> Made:
     """Aborts before the first site, each time."""
     os.abort()

@@ -194,7 +194,10 @@ def test_nothing_lost_and_nothing_left(tmp_path: Path, registry: Registry) -> No
         ("export: {format: [stl, obj]}\n", r"export\.format\.1: no format 'obj'; there are: 3mf, ply, (step, )?stl"),
         ("export: {format: []}\n", r"export\.format: .*at least 1"),
         ("export: {format: 3}\n", r"export\.format"),
-        ("export: {frame: robot}\n", r"export\.frame: expected 'part', 'scan' or 'both', not 'robot'"),
+        (
+            "export: {frame: robot}\n",
+            r"export\.frame: expected 'part', 'scan', 'both', 'nominal' or 'all', not 'robot'",
+        ),
     ],
 )
 def test_what_cannot_be_written_is_refused_with_the_job(
