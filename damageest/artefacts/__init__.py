@@ -7,7 +7,7 @@ after `align` is in the part's. ``T_part_scan`` takes a point from the scanner's
 
 from __future__ import annotations
 
-from damageest.artefacts.adapted import AdaptedPart
+from damageest.artefacts.adapted import AdaptedPart, PriorUse
 from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
 from damageest.artefacts.displacement import DisplacementField, fit_displacement
 from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, EvidenceCause, Rims
@@ -53,6 +53,7 @@ __all__ = [
     "Mesh",
     "Part",
     "Pose",
+    "PriorUse",
     "Reason",
     "Rims",
     "Samples",
