@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from damageest.artefacts.adapted import AdaptedPart, PriorUse
 from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
-from damageest.artefacts.displacement import DisplacementField, fit_displacement
+from damageest.artefacts.displacement import DisplacementField, fit_displacement, fit_scattered
 from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, EvidenceCause, Rims
 from damageest.artefacts.fields import ArtefactError
 from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
@@ -65,5 +65,6 @@ __all__ = [
     "Unreached",
     "Vector",
     "fit_displacement",
+    "fit_scattered",
     "open_edges",
 ]

@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import ArtefactError, DisplacementField, Floats, Part, Scan
+from damageest.artefacts import ArtefactError, DisplacementField, Floats, Part, Scan, fit_scattered
 from damageest.errors import InputError
+from damageest.geometry.families import Family, build_family, find_nearest_motion
+from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.transforms import move_points
 from damageest.io.digests import digest
 from damageest.io.files import check_file, file_sha256
 
@@ -21,6 +24,12 @@ FORM = "adapt.npz"
 VERSION = 1
 MOST_BYTES = 64 * 2**20
 """Size of the arrays of a file, unpacked, that are read; a run writes less than a hundredth of it."""
+PLACES = 1500
+"""Places on the skin by which parts of a type are compared."""
+SMALL = 0.05
+"""Difference between parts that does not matter, in tolerances."""
+SMOOTH = 1e-6
+"""Weight of the third differences of a lattice that is fitted to places on skin."""
 MARKS = 24
 """Points of a scan by whose distances it is known again in any frame."""
 SAME = 1e-6
@@ -131,6 +140,37 @@ def require_type(forms: Sequence[MeasuredForm], part: Part) -> None:
                 f"{form.path}: is the form of another part: its CAD file differs from {part.path or 'that of this job'}"
                 "; give only parts of the same type, measured against the same file"
             )
+
+
+def gather_family(forms: Sequence[MeasuredForm], part: Part, error: float) -> tuple[Family, Floats]:
+    """The forms of a type at places on the skin of the part as designed, about the centre of its box; and the normals
+    (N,3) there. ``error``: deviation of a place that does not matter."""
+    from scipy.spatial import cKDTree
+
+    centre = part.bounds.mean(axis=0)
+    places, face = sample_by_area(part, PLACES, np.random.default_rng(7))
+    moved = np.stack([form.field.move(places) - centre for form in forms])
+    apart = 2 * float(np.sqrt(part.area / PLACES))
+    seen = np.zeros(moved.shape[:2], bool)
+    for k, form in enumerate(forms):
+        if len(form.seen):
+            seen[k] = cKDTree(form.seen).query(places)[0] <= max(form.reach, apart)
+    return build_family(places - centre, moved, seen, error), part.face_normals[face]
+
+
+def average_forms(forms: Sequence[MeasuredForm], part: Part) -> tuple[MeasuredForm, float]:
+    """The mean of forms of a type, without a rigid motion, and the share of the skin that was seen on one of them."""
+    error = SMALL * min(form.tolerance for form in forms)
+    family, _ = gather_family(forms, part, error)
+    centre = part.bounds.mean(axis=0)
+    seen = family.count > 0
+    used = seen if seen.any() else ~seen
+    mean = move_points(family.mean, find_nearest_motion(family.mean, family.places, used))
+    cells = np.max([form.field.cells for form in forms], axis=0).tolist()
+    field = fit_scattered(family.places + centre, mean - family.places, *part.bounds, cells, SMOOTH)
+    places = family.places[seen] + centre
+    reach = 2 * float(np.sqrt(part.area / PLACES))
+    return MeasuredForm(field, places, reach, part.unit, forms[0].tolerance, identify_part(part)), float(seen.mean())
 
 
 def _read_texts(array: Any) -> tuple[str, ...]:

@@ -10,17 +10,14 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Part, PriorUse, Scan
 from damageest.errors import StageError
-from damageest.geometry.families import Errors, Family, build_family, leave_one_out
-from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.families import Errors, Family, leave_one_out
 from damageest.geometry.transforms import make_motions, move_points
-from damageest.io.forms import MeasuredForm, read_form, require_type
+from damageest.io.forms import PLACES, MeasuredForm, gather_family, read_form, require_type
 from damageest.stages.adapt._basis import Basis
 from damageest.stages.adapt._choose import cut_patches
 from damageest.stages.adapt._field import Body, Field, match, weigh
 from damageest.stages.adapt._posterior import BEYOND, find_spacing, go_beyond
 
-PLACES = 1500
-"""Places on the skin by which parts are compared."""
 FEW = 3
 """Parts that have to show a place, for their spread to say how well it is known."""
 SMALL = 0.05
@@ -100,16 +97,14 @@ def read_prior(paths: Sequence[Path], part: Part, scan: Scan) -> list[MeasuredFo
 
 
 def start_from(
-    forms: Sequence[MeasuredForm], part: Part, centre: Floats, points: Floats, body: Body, scales: Sequence[float],
-    tolerance: float,
-) -> Start:  # fmt: skip
+    forms: Sequence[MeasuredForm], part: Part, points: Floats, body: Body, scales: Sequence[float], tolerance: float
+) -> Start:
     """The form that the parts predict for the one with these points (N,3) about the centre: their mean, and how they
     differ, as seen skin shows it. A part as they are not is said to be one (``used.is_used``)."""
-    places, face = sample_by_area(part, PLACES, np.random.default_rng(7))
-    normals = part.face_normals[face]
-    family = _build(forms, places, centre, SMALL * tolerance)
+    family, normals = gather_family(forms, part, SMALL * tolerance)
     basis = replace(body.basis, cells=max(1, *(max(form.field.cells) for form in forms)))
-    mean, *modes = [_fit_lattice(shape, places - centre, basis) for shape in (family.mean - family.places, *family.modes)]
+    shapes = (family.mean - family.places, *family.modes)
+    mean, *modes = [_fit_lattice(shape, family.places, basis) for shape in shapes]
     field, motion, coefficients = _place(mean, modes, points, body, scales)
     found = match(field, move_points(points, motion), body)
     weights = weigh(found, scales[-1], body.noise)
@@ -145,20 +140,6 @@ def describe_prior(start: Start, tolerance: float, unit: str) -> str:
     if unshown > 0.005:
         words += f"; {100 * unshown:.2g} % of the skin is shown by fewer than {FEW} of them, and is no better known"
     return words
-
-
-def _build(forms: Sequence[MeasuredForm], places: Floats, centre: Floats, error: float) -> Family:
-    """The family of the forms, about the centre."""
-    moved = np.stack([form.field.move(places) - centre for form in forms])
-    apart = 2 * float(np.sqrt(2.0)) * _space(places)
-    seen = np.stack([_find_distance(places, form.seen) <= max(form.reach, apart) for form in forms])
-    return build_family(places - centre, moved, seen, error)
-
-
-def _space(places: Floats) -> float:
-    from scipy.spatial import cKDTree
-
-    return float(np.median(cKDTree(places).query(places, 2)[0][:, 1]))
 
 
 def _find_distance(places: Floats, seen: Floats) -> Floats:

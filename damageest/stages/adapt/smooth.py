@@ -101,7 +101,7 @@ class Smooth(Adapt):
             raise StageError(f"only {len(points)} points lie near the part", "scan more of the part, or adapt: none")
         start = None
         if forms:
-            start = start_from(forms, part, centre, points, body, choose_scales(points, body, tolerance), tolerance)
+            start = start_from(forms, part, points, body, choose_scales(points, body, tolerance), tolerance)
         if start and start.used.is_used and (adapted := self._go_on(start, part, centre, points, body, tolerance)):
             return adapted
         trials, chosen = self._climb(points, body, part.diagonal, tolerance)
@@ -204,12 +204,14 @@ class Smooth(Adapt):
 
         moved = undo(field.move(begin(places)))
         intact = weights > 0
-        beyond = None
+        beyond, shown = None, points
         if start:
             at = seen[np.abs(found.distance) < tolerance]
             own = None if chosen.freedom == RIGID else field.displace(begin(places))
             beyond = start.go_beyond(places, at, find_spacing(body, points), own)
-        modes = find_modes(chosen, trials, points, body, Mesh(begin(places), fine.faces), tolerance, beyond) @ turn.T
+            # how far the others miss an end is in `beyond`: the field that is fitted beside is held there
+            shown = np.concatenate([points, start.find_held(len(points))])
+        modes = find_modes(chosen, trials, shown, body, Mesh(begin(places), fine.faces), tolerance, beyond) @ turn.T
         back = np.eye(4)
         back[:3, :3] = turn
         back[:3, 3] = centre - turn @ (centre + motion[:3, 3])

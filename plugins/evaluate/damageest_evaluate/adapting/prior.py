@@ -90,29 +90,31 @@ def measure_end(part: Part, adapted: AdaptedPart, how: dict[str, float]) -> dict
     }
 
 
-def measure(name: str, kind: str, others: int, targets: int, counts: Sequence[int], points: int, seed: int) -> list[dict[str, Any]]:  # fmt: skip
+def measure(name: str, kind: str, others: int, targets: int, counts: Sequence[int], points: int, seed: int, folder: Path) -> list[dict[str, Any]]:  # fmt: skip
     """Rows of all targets, one for each number of other parts; each part is scanned and adapted on its own."""
     part, rng, rows = PARTS[name](), np.random.default_rng(seed), []
     tip = [cut_end(name, LOST)]
-    with TemporaryDirectory(prefix="damageest-prior-") as folder:
-        files = []
-        for number in range(others):
-            how = draw_deformation(kind, rng, False)
-            given = scan(part, how, 1000 * seed + number, tip if kind == "tips lost" else [], points)
-            if (adapted := adapt(part, given, [])) is not None:
-                files.append(Path(folder) / f"{number}.npz")
-                keep(files[-1], part, given, adapted)
-        for target in range(targets):
-            how = draw_deformation(kind, rng, True)
-            given = scan(part, how, 1000 * seed + 500 + target, tip, points)
-            for count in counts:
-                adapted = adapt(part, given, files[:count])
-                row: dict[str, Any] = {"part": name, "kind": kind, "target": target, "others": count, "adapted": False}
-                if adapted is not None:
-                    used = adapted.prior.is_used if adapted.prior else None
-                    row |= {"adapted": True, "used": used, **measure_end(part, adapted, how)}
-                rows.append(row)
-                print(json.dumps(row), flush=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"{number}.npz" for number in range(others)]
+    for number, path in enumerate(files):
+        how = draw_deformation("common" if kind == "other" else kind, rng, False)
+        if path.is_file():
+            continue
+        given = scan(part, how, 1000 * seed + number, tip if kind == "tips lost" else [], points)
+        if (adapted := adapt(part, given, [])) is not None:
+            keep(path, part, given, adapted)
+    files = [path for path in files if path.is_file()]
+    for target in range(targets):
+        how = draw_deformation(kind, rng, True)
+        given = scan(part, how, 1000 * seed + 500 + target, tip, points)
+        for count in counts:
+            adapted = adapt(part, given, files[:count])
+            row: dict[str, Any] = {"part": name, "kind": kind, "target": target, "others": count, "adapted": False}
+            if adapted is not None:
+                used = adapted.prior.is_used if adapted.prior else None
+                row |= {"adapted": True, "used": used, **measure_end(part, adapted, how)}
+            rows.append(row)
+            print(json.dumps(row), flush=True)
     return rows
 
 
@@ -141,9 +143,12 @@ def main() -> None:
     parser.add_argument("--counts", default="0,1,3,12")
     parser.add_argument("--points", type=int, default=12_000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--forms", type=Path, help="folder that keeps the forms of the others; those there are taken")
     asked = parser.parse_args()
     counts = [int(text) for text in asked.counts.split(",")]
-    rows = measure(asked.part, asked.kind, asked.others, asked.targets, counts, asked.points, asked.seed)
+    with TemporaryDirectory(prefix="damageest-prior-") as scratch:
+        folder = asked.forms or Path(scratch)
+        rows = measure(asked.part, asked.kind, asked.others, asked.targets, counts, asked.points, asked.seed, folder)
     print(make_prior_table(rows))
 
 
