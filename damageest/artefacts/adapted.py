@@ -16,9 +16,9 @@ from damageest.artefacts.scans import require_rigid
 
 @dataclass(frozen=True)
 class PriorUse(Checked):
-    """What other parts of the type said. ``parts``: how many; ``misfit``: what they leave on seen skin, root mean square
-    along the normals; ``limit``: from which a part counts as none of them; ``is_used``: whether the part was predicted
-    from them."""
+    """What other parts of the type said. ``parts``: how many; ``misfit``: what they leave on seen skin, root mean
+    square along the normals; ``limit``: from which a part counts as none of them; ``is_used``: whether the part was
+    predicted from them."""
 
     parts: int
     misfit: float
@@ -41,9 +41,10 @@ class AdaptedPart(Checked):
     ``gain``: share by which it explains held-out patches of the scan better than a rigid part; ``held_out``: what the
     rigid part and the field leave there, root mean square, deviations limited; ``patches``: their number. ``field``:
     the same displacement at any place, for CAD faces and for other parts of the type; None where there is none.
-    ``seen`` (S,3): places on the skin as designed where intact skin was scanned; skin within ``reach`` of one was seen.
-    ``prior``: what other parts of the type said; None where none were given. ``designed``: hashes that name the part as
-    designed, for jobs on other parts of its type. ``notes`` are warnings.
+    ``seen`` (S,3): places on the skin as designed where intact skin was scanned; skin within ``reach`` of one was seen;
+    ``left`` (S,): how far the scan lies outside the adapted skin there, noise averaged out. ``prior``: what other parts of the type said; None where none were
+    given. ``designed``: hashes that name the part as designed, for jobs on other parts of its type. ``notes`` are
+    warnings.
     """
 
     part: Part
@@ -64,6 +65,7 @@ class AdaptedPart(Checked):
     patches: int = 0
     seen: Floats | None = None
     reach: float = 0.0
+    left: Floats | None = None
     prior: PriorUse | None = None
     designed: tuple[str, ...] = ()
     _dtypes: ClassVar[dict[str, Any]] = {
@@ -72,6 +74,7 @@ class AdaptedPart(Checked):
         "modes": np.float64,
         "other": np.float64,
         "seen": np.float64,
+        "left": np.float64,
     }
     _ranges: ClassVar[dict[str, Range]] = {
         "amount": (0.0, MOST),
@@ -98,5 +101,8 @@ class AdaptedPart(Checked):
         if self.seen is not None:
             require_shape("seen", self.seen, "S", 3)
             require_finite("seen", self.seen)
+        if self.left is not None:
+            require_shape("left", self.left, 0 if self.seen is None else len(self.seen))
+            require_finite("left", self.left)
         require_shape("motion", self.motion, 4, 4)
         require_rigid("motion", self.motion)

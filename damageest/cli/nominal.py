@@ -75,7 +75,9 @@ def _read_part(folder: Path) -> Part:
 
     path = folder / "job.yaml"
     if not path.is_file():
-        raise InputError(f"{folder}: there is no job.yaml, so this is not an output folder; name one of `damageest run`")
+        raise InputError(
+            f"{folder}: there is no job.yaml, so this is not an output folder; name one of `damageest run`"
+        )
     job = load(path, Registry.discover(), given={ReadScan: None}, without=("scan", "adapt"))
     if ReadPart not in job.stages:
         raise InputError(f"{path}: its part was an array and no file; run the job on a file")

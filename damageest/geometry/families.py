@@ -99,7 +99,7 @@ def predict(
         target = np.einsum("ndc,nc->nd", used, moved[shown] - now[shown]).ravel()
         square = weight * matrix.T @ matrix + np.diag(own + 1e-12)
         right = weight * matrix.T @ target - own * np.append(coefficients, np.zeros(6))
-        found = np.linalg.lstsq(square, right, rcond=1e-13)[0]
+        found: Floats = np.asarray(np.linalg.lstsq(square, right, rcond=1e-13)[0], np.float64)
         coefficients = coefficients + found[: len(modes)]
         T = make_motions(found[None, -6:])[0] @ T
     return move_points(mean + np.einsum("k,knc->nc", coefficients, modes), T), coefficients
@@ -120,6 +120,13 @@ def leave_one_out(family: Family, shown: Flags, normals: Floats) -> Errors:
         hidden = family.seen[k] & ~shown
         beyond[k, hidden] = off[hidden]
     return Errors(beyond, float(np.sqrt((np.concatenate(within) ** 2).mean())))
+
+
+def widen(count: int) -> float:
+    """By how much a 95 % interval from the spread of so many parts is wider than from a known one (Student's t)."""
+    from scipy.stats import t
+
+    return float(t.ppf(0.975, count - 1) / 1.96)
 
 
 def _find_modes(moved: Floats, mean: Floats, places: Floats, error: float) -> Floats:

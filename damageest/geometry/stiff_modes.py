@@ -39,7 +39,8 @@ def name_modes(places: Floats, displacement: Floats) -> tuple[list[StiffMode], f
     shapes = {name: remove_rigid(places, shape, even) for name, shape in _make_shapes(places)}
     shapes = {name: shape / largest for name, shape in shapes.items() if (largest := _measure(shape)) > 1e-9}
     chosen: list[tuple[str, str, str]] = []
-    left, found = target, np.empty(0)
+    found: Floats
+    left, found = target, np.zeros(0)
     while len(chosen) < MOST:
         explained = {
             name: float((shape * left).sum()) ** 2 / float((shape**2).sum())
@@ -51,7 +52,7 @@ def name_modes(places: Floats, displacement: Floats) -> tuple[list[StiffMode], f
             break
         chosen.append(best)
         matrix = np.stack([shapes[name].ravel() for name in chosen], axis=1)
-        found = np.linalg.lstsq(matrix, target.ravel(), rcond=1e-9)[0]
+        found = np.asarray(np.linalg.lstsq(matrix, target.ravel(), rcond=1e-9)[0])
         left = target - (matrix @ found).reshape(target.shape)
     modes = [StiffMode(*name, float(amount)) for name, amount in zip(chosen, found, strict=True)]
     modes.sort(key=lambda mode: -abs(mode.amount))

@@ -41,11 +41,13 @@ AGAIN = "run the job that wrote it again"
 class MeasuredForm:
     """A measured part of a type. ``field``: its displacement, in ``unit``, for places of the part as designed, whose
     hashes are ``part``: of its file and of its mesh. ``seen`` (S,3): places of its skin where intact skin was scanned;
-    skin within ``reach`` of one of them was seen. ``tolerance``: that of the run. ``scan``: hashes of the scan's files;
-    ``marks``: distances between some of its points. ``path``: where it was read from."""
+    skin within ``reach`` of one of them was seen; ``left`` (S,): how far it lies outside the field's there.
+    ``tolerance``: that of the run. ``scan``: hashes of the scan's files; ``marks``: distances between some of its
+    points. ``path``: where it was read from."""
 
     field: DisplacementField
     seen: Floats
+    left: Floats
     reach: float
     unit: str
     tolerance: float
@@ -75,8 +77,10 @@ def hash_scan(scan: Scan) -> tuple[str, ...]:
 
 def mark_scan(scan: Scan) -> tuple[float, ...]:
     """Distances between points of a scan, which are the same in any frame."""
-    some = scan.points[np.linspace(0, len(scan.points) - 1, MARKS).astype(np.int64)] if len(scan.points) else []
-    return tuple(np.linalg.norm(np.diff(some, axis=0), axis=1).tolist()) if len(some) else ()
+    if not len(scan.points):
+        return ()
+    some = scan.points[np.linspace(0, len(scan.points) - 1, MARKS).astype(np.int64)]
+    return tuple(np.linalg.norm(np.diff(some, axis=0), axis=1).tolist())
 
 
 def write_form(path: Path, form: MeasuredForm) -> None:
@@ -89,6 +93,7 @@ def write_form(path: Path, form: MeasuredForm) -> None:
         "high": field.high,
         "controls": field.controls,
         "seen": form.seen.astype(np.float32),
+        "left": form.left.astype(np.float32),
         "reach": form.reach,
         "tolerance": form.tolerance,
         "part": np.array(form.part, dtype="U64"),
@@ -114,10 +119,13 @@ def read_form(path: Path) -> MeasuredForm:
             raise InputError(f"{path}: has version {version}, and this program reads {VERSION}; {AGAIN}")
         field = DisplacementField(arrays["low"], arrays["high"], arrays["controls"])
         seen, reach, tolerance = np.asarray(arrays["seen"], float), float(arrays["reach"]), float(arrays["tolerance"])
-        if seen.ndim != 2 or seen.shape[1] != 3 or not np.isfinite([*seen.ravel(), reach, tolerance]).all():
+        left = np.asarray(arrays["left"], float)
+        if seen.ndim != 2 or seen.shape[1] != 3 or left.shape != seen.shape[:1]:
             raise ValueError("the places that were seen are no points")
+        if not np.isfinite([*seen.ravel(), *left, reach, tolerance]).all():
+            raise ValueError("some of its numbers are not finite")
         return MeasuredForm(
-            field, seen, reach, str(arrays["unit"]), tolerance, _read_texts(arrays["part"]),
+            field, seen, left, reach, str(arrays["unit"]), tolerance, _read_texts(arrays["part"]),
             _read_texts(arrays["scan"]), tuple(np.asarray(arrays["marks"], float).ravel().tolist()), str(path),
         )  # fmt: skip
     except (OSError, EOFError, ValueError, LookupError, TypeError, ArtefactError, zipfile.BadZipFile, zlib.error,
@@ -152,10 +160,14 @@ def gather_family(forms: Sequence[MeasuredForm], part: Part, error: float) -> tu
     moved = np.stack([form.field.move(places) - centre for form in forms])
     apart = 2 * float(np.sqrt(part.area / PLACES))
     seen = np.zeros(moved.shape[:2], bool)
+    normals = part.face_normals[face]
     for k, form in enumerate(forms):
-        if len(form.seen):
-            seen[k] = cKDTree(form.seen).query(places)[0] <= max(form.reach, apart)
-    return build_family(places - centre, moved, seen, error), part.face_normals[face]
+        if not len(form.seen):
+            continue
+        distance, near = cKDTree(form.seen).query(places)
+        seen[k] = distance <= max(form.reach, apart)
+        moved[k, seen[k]] += (form.left[near, None] * normals)[seen[k]]  # what its field did not follow
+    return build_family(places - centre, moved, seen, error), normals
 
 
 def average_forms(forms: Sequence[MeasuredForm], part: Part) -> tuple[MeasuredForm, float]:
@@ -167,10 +179,13 @@ def average_forms(forms: Sequence[MeasuredForm], part: Part) -> tuple[MeasuredFo
     used = seen if seen.any() else ~seen
     mean = move_points(family.mean, find_nearest_motion(family.mean, family.places, used))
     cells = np.max([form.field.cells for form in forms], axis=0).tolist()
-    field = fit_scattered(family.places + centre, mean - family.places, *part.bounds, cells, SMOOTH)
+    low, high = part.bounds
+    field = fit_scattered(family.places + centre, mean - family.places, low, high, cells, SMOOTH)
     places = family.places[seen] + centre
     reach = 2 * float(np.sqrt(part.area / PLACES))
-    return MeasuredForm(field, places, reach, part.unit, forms[0].tolerance, identify_part(part)), float(seen.mean())
+    return MeasuredForm(
+        field, places, np.zeros(len(places)), reach, part.unit, forms[0].tolerance, identify_part(part)
+    ), float(seen.mean())
 
 
 def _read_texts(array: Any) -> tuple[str, ...]:

@@ -26,7 +26,9 @@ class StiffModeReport(JsonModel):
         "cross-sections grow, or which becomes an arc; empty for scale"
     )
     toward: str = Field(description="of a bend, where the ends go; else empty")
-    amount: float = Field(description="largest displacement that it makes beyond a rigid motion; negative: the other way")
+    amount: float = Field(
+        description="largest displacement that it makes beyond a rigid motion; negative: the other way"
+    )
 
 
 class HeldOutReport(JsonModel):

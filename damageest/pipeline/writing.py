@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from damageest.artefacts import AdaptedPart, Reason, Scan
 from damageest.errors import StageError
 from damageest.io.forms import FORM, MeasuredForm, hash_scan, mark_scan, write_form
@@ -30,6 +32,7 @@ def keep_form(
     form = MeasuredForm(
         field=adapted.field,
         seen=adapted.seen,
+        left=np.zeros(len(adapted.seen)) if adapted.left is None else adapted.left,
         reach=adapted.reach,
         unit=adapted.part.unit,
         tolerance=tolerance,

@@ -57,7 +57,11 @@ def _find_files(value: Any, info: ValidationInfo) -> Any:
     found: list[Any] = []
     for text in texts:
         matched = [text]
-        if isinstance(text, (str, Path)) and glob.has_magic(str(text)) and not resolve_path(Path(text), folder).exists():
+        if (
+            isinstance(text, (str, Path))
+            and glob.has_magic(str(text))
+            and not resolve_path(Path(text), folder).exists()
+        ):
             pattern = str(expand_home(Path(text)))
             matched = sorted(glob.glob(pattern, root_dir=folder, recursive=True))
             if not matched:
@@ -67,9 +71,7 @@ def _find_files(value: Any, info: ValidationInfo) -> Any:
     return tuple(unique)
 
 
-JobPaths = Annotated[
-    tuple[JobPath, ...], BeforeValidator(_find_files, json_schema_input_type=str | tuple[str, ...])
-]
+JobPaths = Annotated[tuple[JobPath, ...], BeforeValidator(_find_files, json_schema_input_type=str | tuple[str, ...])]
 """Type of an option that is a list of paths, or a glob, or a list of both; see `JobPath`."""
 
 

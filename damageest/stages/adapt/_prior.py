@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Part, PriorUse, Scan
 from damageest.errors import StageError
-from damageest.geometry.families import Errors, Family, leave_one_out
+from damageest.geometry.families import Errors, Family, leave_one_out, widen
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.io.forms import PLACES, MeasuredForm, gather_family, read_form, require_type
 from damageest.stages.adapt._basis import Basis
@@ -30,6 +30,10 @@ RARE = 0.99
 """Share of the parts of a type whose coefficients are nearer to the mean than those of one that is none of them."""
 EFFECTIVE = 300.0
 """Independent points that a scan counts as, against the spread of the parts."""
+KEPT = 40
+"""Independent errors that are kept of many parts."""
+CELLS = 4
+"""Cells, along the longest edge of the box, of the lattice that holds the form of the type, at least."""
 SMOOTH = 1e-6
 """Weight of the third differences of a lattice that is fitted to places on skin."""
 
@@ -38,13 +42,15 @@ SMOOTH = 1e-6
 class Start:
     """The form that other parts of the type predict.
 
-    ``field``: of the part as designed, about its centre; ``motion`` (4,4) takes the scan's points, about the centre,
-    onto it. ``family``: the other parts; ``shown`` (N,): whether the scan shows skin at each of its places; ``errors``: how well each of them is predicted from the others where the scan
-    shows no skin, None where they are too few; ``factor``: by how much wider this is for a 95 % interval, since there
-    are few, and since the part is less like them than they are. ``used``: what the result says of it.
+    ``field``: of the part as designed, about its centre; ``mean``: of the type; ``motion`` (4,4) takes the scan's
+    points, about the centre, onto the field. ``family``: the other parts; ``shown`` (N,): whether the scan shows skin at each of its places; ``errors``:
+    how well each of the parts is predicted from the others where the scan shows no skin, None where they are too few;
+    ``factor``: by how much wider this is for a 95 % interval, since there are few, and since the part is less like them
+    than they are. ``used``: what the result says of it.
     """
 
     field: Field
+    mean: Field
     motion: Floats
     family: Family
     shown: Flags
@@ -72,11 +78,17 @@ class Start:
         apart = 2 * float(np.median(cKDTree(self.family.places).query(self.family.places, 2)[0][:, 1]))
         rest = BEYOND * go_beyond(places, np.concatenate([seen, known]), max(spacing, 2 * apart))
         each = self.factor * self.errors.beyond / np.sqrt(np.maximum(count, 1))[:, None]
-        distance, near = cKDTree(self.family.places).query(places, 4)
+        distance, near = (np.asarray(one) for one in cKDTree(self.family.places).query(places, 4))
         weight = 1 / np.maximum(distance, 1e-6 * apart)
         weight /= weight.sum(axis=1, keepdims=True)
         off, _ = cKDTree(seen).query(places)
         share = np.clip(off / spacing - 1, 0.0, 1.0)
+        # what the lattice does not hold of the mean
+        unheld = self.family.mean - self.family.places - self.mean.displace(self.family.places)
+        each = np.concatenate([each, unheld[None]])
+        if len(each) > KEPT:
+            _, size, shapes = np.linalg.svd(each.reshape(len(each), -1), full_matrices=False)
+            each = (size[:KEPT, None] * shapes[:KEPT]).reshape(KEPT, *each.shape[1:])
         spread = np.einsum("vn,pvnc->pvc", weight, each[:, near]) * share[:, None]
         more = [] if own is None else [(share[:, None] * own)[None]]
         return np.concatenate([spread, *more, rest[None]])
@@ -102,7 +114,7 @@ def start_from(
     """The form that the parts predict for the one with these points (N,3) about the centre: their mean, and how they
     differ, as seen skin shows it. A part as they are not is said to be one (``used.is_used``)."""
     family, normals = gather_family(forms, part, SMALL * tolerance)
-    basis = replace(body.basis, cells=max(1, *(max(form.field.cells) for form in forms)))
+    basis = replace(body.basis, cells=max(CELLS, *(max(form.field.cells) for form in forms)))
     shapes = (family.mean - family.places, *family.modes)
     mean, *modes = [_fit_lattice(shape, family.places, basis) for shape in shapes]
     field, motion, coefficients = _place(mean, modes, points, body, scales)
@@ -119,8 +131,8 @@ def start_from(
     limit = max(STRANGE * tolerance, OUTSIDE * within)
     is_alike = misfit <= limit and _are_usual(coefficients, count)
     stretch = max(misfit / max(within, SMALL * tolerance), 1.0)
-    factor = stretch * _widen(count) if enough else 1.0
-    return Start(field, motion, family, shown, errors, factor, PriorUse(count, misfit, limit, is_alike))
+    factor = stretch * widen(count) if enough else 1.0
+    return Start(field, mean, motion, family, shown, errors, factor, PriorUse(count, misfit, limit, is_alike))
 
 
 def describe_prior(start: Start, tolerance: float, unit: str) -> str:
@@ -130,12 +142,14 @@ def describe_prior(start: Start, tolerance: float, unit: str) -> str:
     if not used.is_used:
         return (
             f"the form of {parts} was not used: this part is deformed in another way (they leave {used.misfit:.3g} "
-            f"{unit} on its seen skin, where up to {used.limit:.3g} {unit} is usual, or it is far from their mean); skin "
-            "that is lost is predicted from its own skin alone"
+            f"{unit} on its seen skin, where up to {used.limit:.3g} {unit} is usual, or it is far from their mean); "
+            "skin that is lost is predicted from its own skin alone"
         )
     words = f"the form was predicted from {parts}, which leave {used.misfit:.3g} {unit} on its seen skin"
     if start.errors is None:
-        return f"{words}; so few say little about how parts differ, and lost skin is no better known: give {FEW} or more"
+        return (
+            f"{words}; so few say little about how parts differ, and lost skin is no better known: give {FEW} or more"
+        )
     unshown = float((start.family.count < FEW).mean())
     if unshown > 0.005:
         words += f"; {100 * unshown:.2g} % of the skin is shown by fewer than {FEW} of them, and is no better known"
@@ -175,7 +189,7 @@ def _place(
         weight = weights * min(1.0, EFFECTIVE / len(points)) / max(body.noise, scale / 3) ** 2
         square = matrix.T @ (matrix * weight[:, None]) + np.diag(own)
         right = matrix.T @ (weight * found.distance) - own * np.append(coefficients, np.zeros(6))
-        step = np.linalg.lstsq(square, right, rcond=1e-13)[0]
+        step: Floats = np.asarray(np.linalg.lstsq(square, right, rcond=1e-13)[0], np.float64)
         coefficients = coefficients + step[: len(modes)]
         T = make_motions(step[None, -6:])[0] @ T
         field = Field(mean.basis, mean.coefficients + np.einsum("k,kmc->mc", coefficients, shapes))
@@ -195,8 +209,8 @@ def _measure_misfit(distance: Floats, weights: Floats, points: Floats, body: Bod
 
 
 def _are_usual(coefficients: Floats, count: int) -> bool:
-    """Whether coefficients (K,), in standard deviations of ``count`` parts, are those of one more of them: by Hotelling's
-    statistic, which is wide for few parts."""
+    """Whether coefficients (K,), in standard deviations of ``count`` parts, are those of one more of them: by
+    Hotelling's statistic, which is wide for few parts."""
     from scipy.stats import f
 
     modes = len(coefficients)
@@ -204,12 +218,3 @@ def _are_usual(coefficients: Floats, count: int) -> bool:
         return True
     limit = modes * (count**2 - 1) / (count * (count - modes)) * float(f.ppf(RARE, modes, count - modes))
     return bool(coefficients @ coefficients <= limit)
-
-
-def _widen(count: int) -> float:
-    """By how much an interval from the spread of so many parts is wider than from a known one (Student's t)."""
-    from scipy.stats import t
-
-    return float(t.ppf(0.975, count - 1) / 1.96)
-
-

@@ -52,6 +52,8 @@ STRAINED = (0.006, 0.03)
 """Strains beyond that of a bend or a twist that freer fields may have, in the order in which they are tried."""
 LOOSE = 0.006
 """Strain from which a lattice is tried too."""
+AVERAGED = 16
+"""Neighbours whose deviations are averaged, so that noise is not taken for form."""
 SEEN = 4000
 """Places that tell which skin was seen, about."""
 LEFT = 1.15
@@ -74,7 +76,7 @@ class Smooth(Adapt):
 
     prior: JobPaths = Option(
         (),
-        max_length=10_000,
+        max_length=500,
         description="files adapt.npz of other parts of the type, by which skin that is lost is predicted, or a glob of "
         "them; default: none",
     )
@@ -111,9 +113,7 @@ class Smooth(Adapt):
         if start is None:
             return adapted
         unused = replace(start, used=replace(start.used, is_used=False))
-        return replace(
-            adapted, prior=unused.used, notes=(*adapted.notes, describe_prior(unused, tolerance, part.unit))
-        )
+        return replace(adapted, prior=unused.used, notes=(*adapted.notes, describe_prior(unused, tolerance, part.unit)))
 
     def _go_on(
         self, start: Start, part: Part, centre: Floats, points: Floats, body: Body, tolerance: float
@@ -216,6 +216,7 @@ class Smooth(Adapt):
         back[:3, :3] = turn
         back[:3, 3] = centre - turn @ (centre + motion[:3, 3])
         length = np.linalg.norm(undo(field.move(found.material)) - seen, axis=1)
+        told = np.flatnonzero(intact)[:: max(1, int(intact.sum()) // SEEN)]
         gradient = field.differentiate(body.inside)
         growth = field.growth
         if start:
@@ -243,7 +244,8 @@ class Smooth(Adapt):
             ),
             held_out=(float(np.sqrt(before.both.mean())), float(np.sqrt(after.both.mean()))),
             patches=len(after.both),
-            seen=seen[intact][:: max(1, int(intact.sum()) // SEEN)] + centre,
+            seen=seen[told] + centre,
+            left=average(found.material[intact], found.distance[intact], found.material[told]),
             reach=find_spacing(body, points[: max(SEEN, 1)]),
             prior=start.used if start else None,
             designed=identify_part(part),
@@ -287,6 +289,15 @@ def score(
     half, body = points[::2], replace(body, basis=field.basis)
     last = max(tolerance, 3 * body.noise)
     return cross_validate(field, half, body, freedom, last, HELD, *cut_patches(half, diagonal))
+
+
+def average(places: Floats, values: Floats, asked: Floats) -> Floats:
+    """(M,) the means of values (N,) at the nearest of their places (N,3) to those asked for (M,3)."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(
+        values[cKDTree(places).query(asked, min(AVERAGED, len(places)))[1]].reshape(len(asked), -1).mean(axis=1)
+    )
 
 
 def about(T: Floats, centre: Floats) -> Floats:

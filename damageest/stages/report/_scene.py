@@ -130,7 +130,9 @@ def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
         plot += item
     snapshot = base64.b64encode(plot.get_binary_snapshot(compression_level=4)).decode()
     half = (np.ptp(part.bounds, axis=0) / 2).tolist()
-    return Scene(snapshot, stage.objects, stage.origin.tolist(), half, limit, count, len(result.scan.points), exaggerate)
+    return Scene(
+        snapshot, stage.objects, stage.origin.tolist(), half, limit, count, len(result.scan.points), exaggerate
+    )
 
 
 def choose_limit(result: Result) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from tempfile import mkdtemp
@@ -53,7 +52,9 @@ def write_others(count: int, lost: bool = False) -> tuple[Path, ...]:
     files = []
     for number in range(count):
         field = fit_displacement(lambda at, k=number: displace(at, *draw(k)), *PART.bounds, (4, 3, 2))
-        form = MeasuredForm(field, seen, 2.0, PART.unit, TOLERANCE, identify_part(PART), marks=(float(number + 1),))
+        form = MeasuredForm(
+            field, seen, np.zeros(len(seen)), 2.0, PART.unit, TOLERANCE, identify_part(PART), marks=(float(number + 1),)
+        )
         files.append(folder / f"{number}.npz")
         write_form(files[-1], form)
     return tuple(files)
@@ -98,7 +99,7 @@ def test_a_lost_end_is_predicted_from_other_parts() -> None:
 
 
 def test_few_parts_give_a_wider_interval() -> None:
-    many, few, one = (measure(adapt(write_others(count))) for count in (8, 3, 1))
+    many, few, one = (measure(adapt(write_others(count))) for count in (8, 4, 1))
     assert many[1] < few[1]
     assert few[2] > 0.9
     assert one[1] > 0.8 * measure(adapt(()))[1]
@@ -145,7 +146,9 @@ def test_a_part_is_no_evidence_for_itself(tmp_path: Path) -> None:
     assert found.field is not None
     from damageest.io.forms import mark_scan
 
-    form = MeasuredForm(found.field, SKIN[::9], 2.0, "mm", TOLERANCE, identify_part(PART), marks=mark_scan(given))
+    form = MeasuredForm(
+        found.field, SKIN[::9], np.zeros(1000), 2.0, "mm", TOLERANCE, identify_part(PART), marks=mark_scan(given)
+    )
     write_form(tmp_path / "own.npz", form)
     with pytest.raises(StageError, match="nothing about itself"):
         Smooth(points=2000, lattice=(), prior=(tmp_path / "own.npz",)).run(PART, given, TOLERANCE)
@@ -202,7 +205,9 @@ JOB = {"version": 1, "units": "mm", "tolerance": TOLERANCE, "align": "none", "re
 
 def test_a_job_writes_its_form_and_takes_those_of_others(tmp_path: Path) -> None:
     given = scan(1.1, 0.4)
-    first = damageest.run(JOB, part=PART, scan=given, settings=["adapt=smooth", "adapt.points=2000"], output=tmp_path / "a")
+    first = damageest.run(
+        JOB, part=PART, scan=given, settings=["adapt=smooth", "adapt.points=2000"], output=tmp_path / "a"
+    )
     form = read_form(tmp_path / "a/adapt.npz")
     assert first.adapted is not None
     assert first.adapted.field is not None

@@ -64,11 +64,9 @@ def keep(path: Path, part: Part, given: Scan, adapted: AdaptedPart) -> None:
     """Writes the form of a part, as a run does."""
     assert adapted.field is not None
     assert adapted.seen is not None
-    marks = mark_scan(given)
-    names = identify_part(part)
-    write_form(
-        path, MeasuredForm(adapted.field, adapted.seen, adapted.reach, part.unit, TOLERANCE, names, (), marks)
-    )
+    assert adapted.left is not None
+    seen, names = (adapted.seen, adapted.left, adapted.reach), identify_part(part)
+    write_form(path, MeasuredForm(adapted.field, *seen, part.unit, TOLERANCE, names, marks=mark_scan(given)))
 
 
 def measure_end(part: Part, adapted: AdaptedPart, how: dict[str, float]) -> dict[str, float]:
@@ -90,7 +88,9 @@ def measure_end(part: Part, adapted: AdaptedPart, how: dict[str, float]) -> dict
     }
 
 
-def measure(name: str, kind: str, others: int, targets: int, counts: Sequence[int], points: int, seed: int, folder: Path) -> list[dict[str, Any]]:  # fmt: skip
+def measure(
+    name: str, kind: str, others: int, targets: int, counts: Sequence[int], points: int, seed: int, folder: Path
+) -> list[dict[str, Any]]:
     """Rows of all targets, one for each number of other parts; each part is scanned and adapted on its own."""
     part, rng, rows = PARTS[name](), np.random.default_rng(seed), []
     tip = [cut_end(name, LOST)]
