@@ -42,9 +42,9 @@ class AdaptedPart(Checked):
     rigid part and the field leave there, root mean square, deviations limited; ``patches``: their number. ``field``:
     the same displacement at any place, for CAD faces and for other parts of the type; None where there is none.
     ``seen`` (S,3): places on the skin as designed where intact skin was scanned; skin within ``reach`` of one was seen;
-    ``left`` (S,): how far the scan lies outside the adapted skin there, noise averaged out. ``prior``: what other parts of the type said; None where none were
-    given. ``designed``: hashes that name the part as designed, for jobs on other parts of its type. ``notes`` are
-    warnings.
+    ``left`` (S,): how far the scan lies outside the adapted skin there, noise averaged out. ``prior``: what other parts
+    of the type said; None where none were given. ``designed``: hashes that name the part as designed, for jobs on other
+    parts of its type. ``notes`` are warnings.
     """
 
     part: Part

@@ -43,10 +43,10 @@ class Start:
     """The form that other parts of the type predict.
 
     ``field``: of the part as designed, about its centre; ``mean``: of the type; ``motion`` (4,4) takes the scan's
-    points, about the centre, onto the field. ``family``: the other parts; ``shown`` (N,): whether the scan shows skin at each of its places; ``errors``:
-    how well each of the parts is predicted from the others where the scan shows no skin, None where they are too few;
-    ``factor``: by how much wider this is for a 95 % interval, since there are few, and since the part is less like them
-    than they are. ``used``: what the result says of it.
+    points, about the centre, onto the field. ``family``: the other parts; ``shown`` (N,): whether the scan shows skin
+    at each of its places; ``errors``: how well each of the parts is predicted from the others where the scan shows no
+    skin, None where they are too few; ``factor``: by how much wider this is for a 95 % interval, since there are few,
+    and since the part is less like them than they are. ``used``: what the result says of it.
     """
 
     field: Field
@@ -75,7 +75,7 @@ class Start:
             return np.asarray(BEYOND * go_beyond(places, seen, spacing))[None]
         count = self.family.count
         known = self.family.places[count >= FEW]
-        apart = 2 * float(np.median(cKDTree(self.family.places).query(self.family.places, 2)[0][:, 1]))
+        apart = 2 * float(np.median(np.asarray(cKDTree(self.family.places).query(self.family.places, 2)[0])[:, 1]))
         rest = BEYOND * go_beyond(places, np.concatenate([seen, known]), max(spacing, 2 * apart))
         each = self.factor * self.errors.beyond / np.sqrt(np.maximum(count, 1))[:, None]
         distance, near = (np.asarray(one) for one in cKDTree(self.family.places).query(places, 4))
