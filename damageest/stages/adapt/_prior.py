@@ -66,9 +66,10 @@ class Start:
         held = self.family.places[~self.shown & (self.family.count >= FEW)]
         return np.repeat(self.field.move(held), max(1, round(count / PLACES)), axis=0)
 
-    def go_beyond(self, places: Floats, seen: Floats, spacing: float, own: Floats | None) -> Floats:
+    def go_beyond(self, places: Floats, seen: Floats, spacing: float, own: Floats | None, left: Floats) -> Floats:
         """(K,V,3) independent errors at places (V,3) of the skin as designed beyond the ``seen`` places (N,3). ``own``
-        (V,3): what seen skin adds to the form of the type, which may not go on."""
+        (V,3): what seen skin adds to the form of the type, which may not go on; ``left`` (V,3): what is left on seen
+        skin after that, since as much may be left there."""
         from scipy.spatial import cKDTree
 
         if self.errors is None:
@@ -90,7 +91,7 @@ class Start:
             _, size, shapes = np.linalg.svd(each.reshape(len(each), -1), full_matrices=False)
             each = (size[:KEPT, None] * shapes[:KEPT]).reshape(KEPT, *each.shape[1:])
         spread = np.einsum("vn,pvnc->pvc", weight, each[:, near]) * share[:, None]
-        more = [] if own is None else [(share[:, None] * own)[None]]
+        more = [(share[:, None] * one)[None] for one in (own, left) if one is not None]
         return np.concatenate([spread, *more, rest[None]])
 
 

@@ -208,7 +208,9 @@ class Smooth(Adapt):
         if start:
             at = seen[np.abs(found.distance) < tolerance]
             own = None if chosen.freedom == RIGID else field.displace(begin(places))
-            beyond = start.go_beyond(places, at, find_spacing(body, points), own)
+            left = average(found.material[intact], found.distance[intact], found.material[intact][::8])
+            off = float(np.sqrt((left**2).mean())) * Mesh(begin(places), fine.faces).vertex_normals
+            beyond = start.go_beyond(places, at, find_spacing(body, points), own, off)
             # how far the others miss an end is in `beyond`: the field that is fitted beside is held there
             shown = np.concatenate([points, start.find_held(len(points))])
         modes = find_modes(chosen, trials, shown, body, Mesh(begin(places), fine.faces), tolerance, beyond) @ turn.T

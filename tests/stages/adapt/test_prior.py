@@ -116,12 +116,14 @@ def test_a_part_of_another_kind_is_noticed() -> None:
     assert np.array_equal(adapted.modes, alone.modes)
 
 
+@pytest.mark.slow
 def test_an_end_that_all_have_lost_is_no_better_known() -> None:
     adapted = adapt(write_others(8, lost=True))
     assert measure(adapted)[1] > 0.8 * measure(adapt(()))[1]
     assert any("is shown by fewer than" in note for note in adapted.notes)
 
 
+@pytest.mark.slow
 def test_where_skin_is_seen_the_scan_decides() -> None:
     """The others have no kink at all, and this part has: its seen skin is followed."""
     files = write_others(8)
