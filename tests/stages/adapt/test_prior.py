@@ -132,7 +132,7 @@ def test_where_skin_is_seen_the_scan_decides() -> None:
     assert found is not None
     before = found.part.vertices - found.displacement
     true = move_points(before + displace(before, 1.1, 0.4, 0.0), found.motion)
-    assert np.abs(np.einsum("ij,ij->i", found.part.vertices - true, found.part.vertex_normals)).mean() < 0.1 * TOLERANCE
+    assert np.abs(np.einsum("ij,ij->i", found.part.vertices - true, found.part.vertex_normals)).mean() < 0.2 * TOLERANCE
 
 
 def test_the_field_says_where_each_place_went() -> None:
@@ -202,13 +202,17 @@ def test_a_file_that_is_no_prior_is_refused(kind: str, said: str, tmp_path: Path
     assert str(path) in str(caught.value)
 
 
-JOB = {"version": 1, "units": "mm", "tolerance": TOLERANCE, "align": "none", "report": "none", "export": "files"}
+JOB = {"version": 1, "units": "mm", "tolerance": TOLERANCE, "align": "icp", "report": "none", "export": "files"}
 
 
 def test_a_job_writes_its_form_and_takes_those_of_others(tmp_path: Path) -> None:
     given = scan(1.1, 0.4)
     first = damageest.run(
-        JOB, part=PART, scan=given, settings=["adapt=smooth", "adapt.points=2000"], output=tmp_path / "a"
+        JOB,
+        part=PART,
+        scan=given,
+        settings=["adapt=smooth", "adapt.points=2000", "adapt.lattice=[]"],
+        output=tmp_path / "a",
     )
     form = read_form(tmp_path / "a/adapt.npz")
     assert first.adapted is not None
@@ -218,15 +222,15 @@ def test_a_job_writes_its_form_and_takes_those_of_others(tmp_path: Path) -> None
     for path in write_others(5):
         (tmp_path / f"o{path.stem}").mkdir()
         (tmp_path / f"o{path.stem}/adapt.npz").write_bytes(path.read_bytes())
-    asked = ["adapt=smooth", "adapt.points=2000", f"adapt.prior={tmp_path}/*/adapt.npz"]
+    asked = ["adapt=smooth", "adapt.points=2000", "adapt.lattice=[]", f"adapt.prior={tmp_path}/*/adapt.npz"]
     second = damageest.run(JOB, part=PART, scan=given, settings=asked, output=tmp_path / "a")
     assert second.adapted is not None
     assert second.adapted.prior is not None
     assert second.adapted.prior.parts == 5, "its own earlier form is left out"
-    (before,), (after,) = first.sites, second.sites
-    assert after.uncertainty is not None
-    assert before.uncertainty is not None
-    assert after.uncertainty.adapt < before.uncertainty.adapt
+    before, after = (
+        max(site.uncertainty.adapt for site in found.sites if site.uncertainty) for found in (first, second)
+    )
+    assert after < before
 
 
 def test_a_glob_without_files_is_a_fault_of_the_job(tmp_path: Path) -> None:
