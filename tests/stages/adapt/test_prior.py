@@ -206,7 +206,10 @@ JOB = {"version": 1, "units": "mm", "tolerance": TOLERANCE, "align": "icp", "rep
 
 
 def test_a_job_writes_its_form_and_takes_those_of_others(tmp_path: Path) -> None:
-    given = scan(1.1, 0.4)
+    flat = CENTRE + np.random.default_rng(8).uniform(-0.5, 0.5, (1500, 3)) * np.ptp(PART.bounds, axis=0)
+    flat[:, 0] = CENTRE[0] + LOST * HALF  # where it broke
+    noise = np.random.default_rng(9).normal(0, NOISE, flat.shape)
+    given = Scan(np.concatenate([scan(1.1, 0.4).points, flat + displace(flat, 1.1, 0.4) + noise]))
     first = damageest.run(
         JOB,
         part=PART,
