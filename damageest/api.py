@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,7 @@ def run(
         engine = Engine(job, registry, limits=limits)
         return follow(route_of(job.method), engine, start(engine)).result
     target = job.output if output is True else resolve_path(Path(output), working_folder())
+    job = replace(job, stages={contract: stage.leave_out(target) for contract, stage in job.stages.items()})
     with open_workspace(target, cache) as place:
         engine = Engine(job, registry, place.cache, limits=limits)
         state = start(engine).with_value(JobState.folder, place.folder, digest(str(target)))

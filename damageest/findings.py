@@ -194,7 +194,8 @@ class Uncertainty:
     as one standard deviation of the volume: ``noise`` of the points; ``spacing`` of the points, between which the inner
     surface is interpolated; ``rim``: where it meets the skin; ``pose`` as it was fitted; ``tessellation`` of the part;
     ``form`` of skin that deviates over whole areas; ``adapt``: the field that the part was adapted by, which at this
-    site goes on for ``extrapolated`` beyond intact skin; ``outward``: skin that lies as far outside; ``views`` that
+    site goes on for ``extrapolated`` beyond intact skin, where it is off by a standard deviation of
+    ``extrapolated_error`` at most; ``outward``: skin that lies as far outside; ``views`` that
     differ.
     ``free``: change of the volume at the ends of motions that the scan does not exclude. ``inside``, ``beside``: by how
     much the loss may be larger at most where no points show the inner surface, and the skin beside it. ``fading``: None
@@ -213,6 +214,7 @@ class Uncertainty:
     views: float = 0.0
     adapt: float = 0.0
     extrapolated: float = 0.0
+    extrapolated_error: float = 0.0
     free: Interval = (0.0, 0.0)
     inside: float = 0.0
     beside: float = 0.0

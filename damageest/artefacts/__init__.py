@@ -7,9 +7,9 @@ after `align` is in the part's. ``T_part_scan`` takes a point from the scanner's
 
 from __future__ import annotations
 
-from damageest.artefacts.adapted import AdaptedPart
+from damageest.artefacts.adapted import AdaptedPart, PriorUse
 from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
-from damageest.artefacts.displacement import DisplacementField, fit_displacement
+from damageest.artefacts.displacement import DisplacementField, fit_displacement, fit_scattered
 from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, EvidenceCause, Rims
 from damageest.artefacts.fields import ArtefactError
 from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
@@ -53,6 +53,7 @@ __all__ = [
     "Mesh",
     "Part",
     "Pose",
+    "PriorUse",
     "Reason",
     "Rims",
     "Samples",
@@ -64,5 +65,6 @@ __all__ = [
     "Unreached",
     "Vector",
     "fit_displacement",
+    "fit_scattered",
     "open_edges",
 ]

@@ -14,6 +14,19 @@ from damageest.artefacts.meshes import Part
 from damageest.artefacts.scans import require_rigid
 
 
+@dataclass(frozen=True)
+class PriorUse(Checked):
+    """What other parts of the type said. ``parts``: how many; ``misfit``: what they leave on seen skin, root mean
+    square along the normals; ``limit``: from which a part counts as none of them; ``is_used``: whether the part was
+    predicted from them."""
+
+    parts: int
+    misfit: float
+    limit: float
+    is_used: bool
+    _ranges: ClassVar[dict[str, Range]] = {"parts": (1, MOST), "misfit": (0.0, MOST), "limit": (0.0, MOST)}
+
+
 @dataclass(frozen=True, eq=False)
 class AdaptedPart(Checked):
     """The part as it was scanned but for its damage: the part as designed, deformed by a smooth field.
@@ -25,9 +38,13 @@ class AdaptedPart(Checked):
     ``amount``, ``rms``: largest and root of the mean square of the displacement over the seen skin. ``growth``: the
     uniform scale in it, less 1; ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells
     along the axes, (0, 0, 0) for a polynomial; ``functions``: how many functions each coordinate is a sum of.
-    ``gain``: share by which it explains held-out patches of the scan better than a rigid part. ``field``: the same
-    displacement at any place, for CAD faces and for other parts of the type; None where there is none. ``notes`` are
-    warnings.
+    ``gain``: share by which it explains held-out patches of the scan better than a rigid part; ``held_out``: what the
+    rigid part and the field leave there, root mean square, deviations limited; ``patches``: their number. ``field``:
+    the same displacement at any place, for CAD faces and for other parts of the type; None where there is none.
+    ``seen`` (S,3): places on the skin as designed where intact skin was scanned; skin within ``reach`` of one was seen;
+    ``left`` (S,): how far the scan lies outside the adapted skin there, noise averaged out. ``prior``: what other parts
+    of the type said; None where none were given. ``designed``: hashes that name the part as designed, for jobs on other
+    parts of its type. ``notes`` are warnings.
     """
 
     part: Part
@@ -44,11 +61,20 @@ class AdaptedPart(Checked):
     notes: tuple[str, ...] = ()
     other: Floats | None = None
     field: DisplacementField | None = None
+    held_out: tuple[float, float] = (0.0, 0.0)
+    patches: int = 0
+    seen: Floats | None = None
+    reach: float = 0.0
+    left: Floats | None = None
+    prior: PriorUse | None = None
+    designed: tuple[str, ...] = ()
     _dtypes: ClassVar[dict[str, Any]] = {
         "displacement": np.float64,
         "motion": np.float64,
         "modes": np.float64,
         "other": np.float64,
+        "seen": np.float64,
+        "left": np.float64,
     }
     _ranges: ClassVar[dict[str, Range]] = {
         "amount": (0.0, MOST),
@@ -57,6 +83,9 @@ class AdaptedPart(Checked):
         "growth": (-0.5, 1.0),
         "functions": (0, MOST),
         "gain": (0.0, 1.0),
+        "held_out": (0.0, MOST),
+        "patches": (0, MOST),
+        "reach": (0.0, MOST),
     }
 
     def __post_init__(self) -> None:
@@ -69,5 +98,11 @@ class AdaptedPart(Checked):
         if self.other is not None:
             require_shape("other", self.other, count, 3)
             require_finite("other", self.other)
+        if self.seen is not None:
+            require_shape("seen", self.seen, "S", 3)
+            require_finite("seen", self.seen)
+        if self.left is not None:
+            require_shape("left", self.left, 0 if self.seen is None else len(self.seen))
+            require_finite("left", self.left)
         require_shape("motion", self.motion, 4, 4)
         require_rigid("motion", self.motion)

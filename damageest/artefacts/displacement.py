@@ -95,3 +95,23 @@ def fit_displacement(
         inverse = np.linalg.pinv(field._evaluate(places, axis, 0))
         values = np.moveaxis(np.tensordot(inverse, values, axes=(1, axis)), 0, axis)
     return DisplacementField(low, high, values)
+
+
+def fit_scattered(
+    places: Floats, displacement: Floats, low: Floats, high: Floats, cells: tuple[int, int, int], smooth: float
+) -> DisplacementField:
+    """The field of so many cells in the box from ``low`` to ``high`` (3,) that is nearest to the displacement (N,3) of
+    places (N,3), and smooth where there are none: third differences of the coefficients count ``smooth`` times as much
+    as places."""
+    shape = tuple(max(1, count) + DEGREE for count in cells)
+    field = DisplacementField(low, high, np.zeros((*shape, 3)))
+    factors = [field._evaluate(places, axis, 0) for axis in range(3)]
+    columns = np.einsum("ni,nj,nk->nijk", *factors).reshape(len(places), -1)
+    rough = 1e-6 * np.eye(columns.shape[1])
+    for axis in range(3):
+        squares = [np.eye(count) for count in shape]
+        differences = np.diff(np.eye(shape[axis]), n=DEGREE, axis=0)
+        squares[axis] = differences.T @ differences
+        rough += np.kron(np.kron(squares[0], squares[1]), squares[2])
+    found = np.linalg.solve(columns.T @ columns + smooth * len(places) * rough, columns.T @ displacement)
+    return DisplacementField(low, high, found.reshape(*shape, 3))

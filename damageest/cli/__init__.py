@@ -50,6 +50,7 @@ def _add_commands() -> None:
         batch,
         faces,
         init,
+        nominal,
         picture,
         plugins,
         run,
@@ -60,7 +61,7 @@ def _add_commands() -> None:
         view,
     )
 
-    for module in (run, batch, view, picture, verify, validate, init, faces, stages, plugins, schema):
+    for module in (run, batch, view, picture, nominal, verify, validate, init, faces, stages, plugins, schema):
         app.command(module.__name__.rsplit(".", 1)[1])(module.command)
 
 

@@ -2,30 +2,116 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
 from pydantic import Field
 
-from damageest.artefacts import AdaptedPart
+from damageest.artefacts import AdaptedPart, Vector
+from damageest.geometry.barycentric import find_barycentric
+from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.stiff_modes import StiffMode, name_modes
 from damageest.output.base import JsonModel
+from damageest.result import Site
+
+PLACES = 4000
+"""Places on the skin by which the displacement is named."""
+
+
+class StiffModeReport(JsonModel):
+    kind: Literal["scale", "stretch", "bend", "twist", "taper"]
+    axis: str = Field(
+        description="x, y or z of the part's frame: along which it is longer, about which it turns, along which its "
+        "cross-sections grow, or which becomes an arc; empty for scale"
+    )
+    toward: str = Field(description="of a bend, where the ends go; else empty")
+    amount: float = Field(
+        description="largest displacement that it makes beyond a rigid motion; negative: the other way"
+    )
+
+
+class HeldOutReport(JsonModel):
+    """Cross-validation: the scan is cut into patches, half of which are held out of a fit to the others."""
+
+    patches: int = Field(description="patches of the scan")
+    rigid: float = Field(description="root mean square of what the part as designed leaves in them, outliers limited")
+    adapted: float = Field(description="of what the field leaves")
+
+
+class ExtrapolationReport(JsonModel):
+    site: int
+    distance: float = Field(description="from intact skin to the farthest place of the skin that is lost")
+    deviation: float = Field(description="largest standard deviation of the adapted skin there, along its normal")
+
+
+class PriorReport(JsonModel):
+    """What the job's other parts of the type said."""
+
+    used: bool = Field(description="whether lost skin was predicted from them; false: this part is none of them")
+    parts: int
+    misfit: float = Field(description="root mean square of what their forms leave on seen skin")
+    limit: float = Field(description="largest misfit of a part of the type")
 
 
 class AdaptReport(JsonModel):
     """How the part as designed was deformed. Sites, damage and coordinates are those of the deformed part."""
 
     amount: float = Field(description="largest displacement of the seen intact skin, without a rigid motion")
+    where: Vector | None = Field(description="its place on the deformed part; null where it is not known")
     rms: float = Field(description="root of the mean square of the same")
     growth: float = Field(description="uniform scale in it, less 1")
     strain: float = Field(description="largest strain of the metal beyond that, without unit")
+    modes: list[StiffModeReport] = Field(description="what it is a sum of, the largest first")
+    left: float = Field(description="root mean square of what is none of these modes")
     lattice: tuple[int, int, int] = Field(description="cells along the axes; 0, 0, 0: a cubic polynomial")
     functions: int = Field(description="how many smooth functions each coordinate of the displacement is a sum of")
     gain: float = Field(description="share by which it explains held-out patches of the scan better than a rigid part")
+    cross_validation: HeldOutReport
+    extrapolation: list[ExtrapolationReport] = Field(description="how the field goes on into each site")
+    prior: PriorReport | None = Field(description="null where no other parts of the type were given")
     motion: list[list[float]] = Field(
         description="4x4, the rigid motion beside it, which is in alignment.transform too"
     )
 
 
-def report_adapt(adapted: AdaptedPart | None) -> AdaptReport | None:
+def report_adapt(adapted: AdaptedPart | None, sites: Sequence[Site]) -> AdaptReport | None:
     """The deformation as values for JSON."""
     if adapted is None:
         return None
-    names = ("amount", "rms", "growth", "strain", "lattice", "functions", "gain")
-    return AdaptReport(**{name: getattr(adapted, name) for name in names}, motion=adapted.motion.tolist())
+    modes, left = _name(adapted)
+    before, after = adapted.held_out
+    prior = adapted.prior
+    return AdaptReport.read(
+        adapted,
+        where=find_largest(adapted),
+        modes=[StiffModeReport(**mode._asdict()) for mode in modes],
+        left=left,
+        cross_validation=HeldOutReport(patches=adapted.patches, rigid=before, adapted=after),
+        extrapolation=[
+            ExtrapolationReport(
+                site=site.id, distance=site.uncertainty.extrapolated, deviation=site.uncertainty.extrapolated_error
+            )
+            for site in sites
+            if site.uncertainty is not None
+        ],
+        prior=prior and PriorReport.read(prior, used=prior.is_used),
+    )
+
+
+def find_largest(adapted: AdaptedPart) -> Vector | None:
+    """The place on the adapted part where seen skin is displaced most."""
+    if adapted.seen is None or adapted.field is None or not len(adapted.seen):
+        return None
+    moved = adapted.field.displace(adapted.seen)
+    most = int(np.linalg.norm(moved, axis=1).argmax())
+    x, y, z = (adapted.seen[most] + moved[most]).tolist()
+    return x, y, z
+
+
+def _name(adapted: AdaptedPart) -> tuple[list[StiffMode], float]:
+    """The displacement's modes over the whole skin."""
+    places, face = sample_by_area(adapted.part, PLACES, np.random.default_rng(3))
+    weights = find_barycentric(adapted.part.triangles[face], places)
+    moved = np.einsum("nc,nck->nk", weights, adapted.displacement[adapted.part.faces[face]])
+    return name_modes(places - moved, moved)

@@ -146,7 +146,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             held=pose.is_held,
         ),
         deviation=report_deviation(result.deviation),
-        adapt=report_adapt(result.adapted),
+        adapt=report_adapt(result.adapted, result.sites),
         fit=report_fit(result.fit),
         sites=sites,
         surplus=[report_surplus(item, result, written) for item in result.surplus],

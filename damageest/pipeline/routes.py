@@ -42,7 +42,7 @@ from damageest.pipeline.sites import (
 from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
-from damageest.pipeline.writing import describe_output, show_result, write_output
+from damageest.pipeline.writing import describe_output, keep_form, show_result, write_output
 from damageest.stages.align import Align
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
@@ -127,6 +127,7 @@ CLOSE: Route = (
 )
 WRITE: Route = (
     Export,  # result, folder, writers, path_writers -> written
+    keep_form,  # written, adapted, aligned, tolerance, folder -> written
     describe_output,  # result, written, target -> result, content, job_text
     show_result,  # calls Report: written, result, folder, content, job_text -> result, written
     write_output,  # result, written, folder, target ->

@@ -24,6 +24,8 @@ from damageest.checks.uncertainty import (
     measure_site_error,
 )
 from damageest.findings import Fading, Interval, Uncertainty
+from damageest.geometry.barycentric import find_barycentric
+from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.form import measure_at_site
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
@@ -119,6 +121,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     reach = BESIDE * max(2 * state.tolerance, 1.5 * state.aligned.spacing)
     fading = _measure_fading(state, site, inner, taken, pose)
     dependences = measure_dependence(site.damage, state.part, state.pose)
+    extrapolated, extrapolated_error = _measure_extrapolated(state, site.damage, inner)
     error = replace(
         found,
         beside=limit_beside(state.coverage, site.damage, reach, found.depth),
@@ -139,7 +142,8 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         outward=error.outward,
         views=error.views,
         adapt=float(np.linalg.norm(error.adapt)),
-        extrapolated=_measure_extrapolated(state, site.damage, inner),
+        extrapolated=extrapolated,
+        extrapolated_error=extrapolated_error,
         free=error.free,
         inside=error.inside,
         beside=error.beside,
@@ -156,15 +160,21 @@ def _may_hide_loss(part: Part, scan: Scan, deviation: Deviation, tolerance: floa
     return scan.spacing > tolerance and bool((deviation.distance < -2 * tolerance).any())
 
 
-def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> float:
-    """How far skin that a site removes is from intact points, at most; 0 where the part is as designed."""
-    if state.adapted is None or inner.all():
-        return 0.0
+def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> tuple[float, float]:
+    """How far skin that a site removes is from intact points, at most, and the largest standard deviation of the
+    adapted skin there; 0 where the part is as designed."""
+    adapted = state.adapted
+    if adapted is None or inner.all():
+        return 0.0, 0.0
     from scipy.spatial import cKDTree
 
     intact = state.aligned.points[state.deviation.label == INTACT]
-    places = damage.triangles[~inner].mean(axis=1)
-    return float(np.max(cKDTree(intact).query(places)[0])) if len(intact) else 0.0
+    places, normals = damage.triangles[~inner].mean(axis=1), damage.face_normals[~inner]
+    far = float(np.max(cKDTree(intact).query(places)[0])) if len(intact) else 0.0
+    _, face, at = closest_on_mesh(places, adapted.part)
+    corners = find_barycentric(adapted.part.triangles[face], at)
+    moved = np.einsum("nc,jnck,nk->jn", corners, adapted.modes[:, adapted.part.faces[face]], normals)
+    return far, float(np.sqrt((moved**2).sum(axis=0)).max(initial=0.0))
 
 
 def _measure_fading(

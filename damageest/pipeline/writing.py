@@ -7,8 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from damageest.artefacts import Reason
+import numpy as np
+
+from damageest.artefacts import AdaptedPart, Reason, Scan
 from damageest.errors import StageError
+from damageest.io.forms import FORM, MeasuredForm, hash_scan, mark_scan, write_form
 from damageest.output.files import describe_job, describe_result, write_report
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState
@@ -17,6 +20,28 @@ from damageest.result import Result
 from damageest.rules.notes import make_notes, rank_notes
 from damageest.stages.export import ExportedFiles
 from damageest.stages.report import Report
+
+
+@step(gives="written")
+def keep_form(
+    written: ExportedFiles, adapted: AdaptedPart | None, aligned: Scan, tolerance: float, folder: Path
+) -> ExportedFiles:
+    """Writes how an adapted part differs from the part as designed, for jobs on other parts of its type."""
+    if adapted is None or adapted.field is None or adapted.seen is None or not adapted.designed:
+        return written
+    form = MeasuredForm(
+        field=adapted.field,
+        seen=adapted.seen,
+        left=np.zeros(len(adapted.seen)) if adapted.left is None else adapted.left,
+        reach=adapted.reach,
+        unit=adapted.part.unit,
+        tolerance=tolerance,
+        part=adapted.designed,
+        scan=hash_scan(aligned),
+        marks=mark_scan(aligned),
+    )
+    write_form(folder / FORM, form)
+    return replace(written, files=(*written.files, FORM))
 
 
 @step(gives=("result", "content", "job_text"))

@@ -7,6 +7,7 @@ of the contract lists all parameters that are available; the ``run`` of an imple
 
 from __future__ import annotations
 
+import glob
 import inspect
 import re
 import sys
@@ -15,12 +16,12 @@ import typing
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 
 from damageest.errors import PluginError
-from damageest.io.files import resolve_path
+from damageest.io.files import expand_home, resolve_path
 from damageest.options import Options
 
 if TYPE_CHECKING:
@@ -47,6 +48,33 @@ JobPath = Annotated[Path, AfterValidator(_resolve_beside_job)]
 """Type of an option that is a path. A job gives it relative to the job file's folder; the check makes it absolute."""
 
 
+def _find_files(value: Any, info: ValidationInfo) -> Any:
+    """The files that globs among the texts match, beside the job, each once."""
+    texts = [value] if isinstance(value, (str, Path)) else value
+    if not isinstance(texts, (list, tuple)):
+        return value
+    folder = Path((info.context or {}).get("folder") or ".")
+    found: list[Any] = []
+    for text in texts:
+        matched = [text]
+        if (
+            isinstance(text, (str, Path))
+            and glob.has_magic(str(text))
+            and not resolve_path(Path(text), folder).exists()
+        ):
+            pattern = str(expand_home(Path(text)))
+            matched = sorted(glob.glob(pattern, root_dir=folder, recursive=True))
+            if not matched:
+                raise ValueError(f"no file matches '{text}'")
+        found += matched
+    unique = dict.fromkeys(str(one) if isinstance(one, (str, Path)) else one for one in found)
+    return tuple(unique)
+
+
+JobPaths = Annotated[tuple[JobPath, ...], BeforeValidator(_find_files, json_schema_input_type=str | tuple[str, ...])]
+"""Type of an option that is a list of paths, or a glob, or a list of both; see `JobPath`."""
+
+
 class Stage(Options):
     """Base of all contracts.
 
@@ -65,6 +93,11 @@ class Stage(Options):
     isolated: ClassVar[bool] = False
 
     use: str
+
+    def leave_out(self, folder: Path) -> Self:
+        """The stage without what it would read from ``folder``, which the run writes anew. Raises InputError where
+        nothing is left of what it needs."""
+        return self
 
     def find_selectors(self) -> list[tuple[tuple[str | int, ...], Selector]]:
         """The selectors of skin among the options, each with its place below the stage's name in a job."""

@@ -104,7 +104,7 @@ def test_what_is_someone_elses_is_refused(tmp_path: Path) -> None:
 
 NAMES_OF_FOLDERS = ("stages", "damage", "surface", "deposit", "path", "surplus", "doubtful", "truth",
                     "scan_frame", "nominal_frame")  # fmt: skip
-NAMES_OF_FILES = ("scan.ply", "damage.stl", "report.html", "job.yaml", "result.3mf", "undamaged.step")
+NAMES_OF_FILES = ("scan.ply", "adapt.npz", "damage.stl", "report.html", "job.yaml", "result.3mf", "undamaged.step")
 
 
 @pytest.mark.parametrize("kind", ["file", "link", "dead link"])

@@ -32,9 +32,9 @@ def find_motion(places: Floats, moved: Floats, weights: Floats) -> Floats:
     return T
 
 
-def refine(part: Part, field: Field, centre: Floats, tolerance: float) -> tuple[Part, float]:
-    """The part as designed with triangles that follow the field, and by how much they may not."""
-    sharp = bound_curvature(field, part.vertices - centre)
+def refine(part: Part, centre: Floats, tolerance: float, *fields: Field) -> tuple[Part, float]:
+    """The part as designed with triangles that follow the fields, one after the other, and by how much they may not."""
+    sharp = sum(bound_curvature(field, part.vertices - centre) for field in fields)
     edge = float(np.sqrt(8 * FOLLOWS * tolerance / max(sharp, 1e-300)))
     edge = max(edge, part.diagonal / FINEST)
     mesh, origin = cut_into_cells(part, edge)

@@ -23,14 +23,16 @@ ASKED = 1500
 
 
 def find_modes(
-    chosen: Trial, trials: Sequence[Trial], points: Floats, body: Body, skin: Mesh, tolerance: float
-) -> Floats:
+    chosen: Trial, trials: Sequence[Trial], points: Floats, body: Body, skin: Mesh, tolerance: float,
+    beyond: Floats | None = None,
+) -> Floats:  # fmt: skip
     """(K,V,3) independent errors of the displacement at the vertices of the skin as designed, each as one standard
     deviation.
 
     The posterior of a Gaussian prior on the strain, with the points' error as large as the means of patches show it;
     what the metal may be strained by beyond the skin that is seen, which grows with the distance from it; and the
-    difference to the next freer field that was tried, since the truth may be as free as that.
+    difference to the next freer field that was tried, since the truth may be as free as that. ``beyond`` (J,V,3):
+    what other parts of the type say about skin that is not seen, in place of a strain.
     """
     field, places = chosen.field, skin.vertices
     last = max(tolerance, 3 * body.noise)
@@ -50,8 +52,10 @@ def find_modes(
     _, main = np.linalg.eigh(spread.T @ spread)
     largest = columns @ main[:, ::-1][:, :MODES]
     modes = np.einsum("vm,mkc->cvk", field.basis.evaluate(places), largest)
-    beyond = BEYOND * go_beyond(places, found.material[np.abs(found.distance) < tolerance], find_spacing(body, points))
-    modes = np.concatenate([modes, beyond[None]])
+    if beyond is None:
+        seen, spacing = found.material[np.abs(found.distance) < tolerance], find_spacing(body, points)
+        beyond = BEYOND * go_beyond(places, seen, spacing)[None]
+    modes = np.concatenate([modes, beyond])
     at = [one.freedom for one in trials].index(chosen.freedom) + 1
     alike = [one for one in trials[at:] if one.freedom.stretches == chosen.freedom.stretches]
     freer = alike[0] if alike else None

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from pathlib import Path
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import Field as Option
 
 from damageest.artefacts import AdaptedPart, Floats, Mesh, Part, Scan, fit_displacement
-from damageest.errors import StageError
+from damageest.errors import InputError, StageError
 from damageest.geometry.distance import is_inside, signed_distance
 from damageest.geometry.neighbourhoods import pick_one_per_cube
 from damageest.geometry.refinement import cut_into_cells
+from damageest.geometry.transforms import move_points
+from damageest.io.forms import identify_part
+from damageest.stages import JobPaths
 from damageest.stages.adapt import Adapt
 from damageest.stages.adapt._basis import Basis
-from damageest.stages.adapt._choose import Trial, cross_validate, cut_patches, explains_more, is_better
+from damageest.stages.adapt._choose import SHARE, Score, Trial, cross_validate, cut_patches, explains_more, is_better
 from damageest.stages.adapt._field import STIFF, Body, Field, Freedom, fit, match, weigh
 from damageest.stages.adapt._mesh import deform_part, find_motion, refine, require_injective
 from damageest.stages.adapt._other import (
@@ -26,7 +30,8 @@ from damageest.stages.adapt._other import (
     find_thinned,
     measure_unknown,
 )
-from damageest.stages.adapt._posterior import find_modes
+from damageest.stages.adapt._posterior import find_modes, find_spacing
+from damageest.stages.adapt._prior import Start, describe_prior, read_prior, start_from
 from damageest.stages.adapt._words import describe
 
 FEWEST = 200
@@ -49,6 +54,10 @@ LOOSEST = 0.1
 """The same where those leave much."""
 LOOSE = 0.006
 """Strain from which a lattice is tried too."""
+AVERAGED = 16
+"""Neighbours whose deviations are averaged, so that noise is not taken for form."""
+SEEN = 4000
+"""Places that tell which skin was seen, about."""
 LEFT = 1.15
 """What a polynomial has to leave in half of the patches for it, in mean squares of the noise."""
 
@@ -67,27 +76,70 @@ class Smooth(Adapt):
         (4,), max_length=4, description="cells of the lattices that are tried, along the longest edge of the box"
     )
 
+    prior: JobPaths = Option(
+        (),
+        max_length=500,
+        description="files adapt.npz of other parts of the type, by which skin that is lost is predicted, or a glob of "
+        "them; default: none",
+    )
+
+    def leave_out(self, folder: Path) -> Self:
+        """Without the form that an earlier run of the same job wrote: a part is no evidence for itself."""
+        others = tuple(path for path in self.prior if path.parent != folder)
+        if self.prior and not others:
+            raise InputError(
+                f"adapt.prior: names no file but {self.prior[0]}, which this run writes anew; give the files of other "
+                "parts of the type"
+            )
+        return self.model_copy(update={"prior": others}) if len(others) < len(self.prior) else self
+
     def run(self, part: Part, aligned: Scan, tolerance: float) -> AdaptedPart | None:
         """The adapted part; None where no field explains the scan better than the part as designed. Raises StageError
-        for too few points, and where the field would fold the part."""
+        for too few points, and where the field would fold the part; InputError for a prior of another part."""
+        forms = read_prior(self.prior, part, aligned) if self.prior else []
         centre = part.bounds.mean(axis=0)
         noise = max(aligned.noise, 0.02 * tolerance)
         body = prepare(part, centre, tolerance, noise)
         points = thin(aligned.points, part, self.points, WIDEST * tolerance) - centre
         if len(points) < FEWEST:
             raise StageError(f"only {len(points)} points lie near the part", "scan more of the part, or adapt: none")
+        start = None
+        if forms:
+            start = start_from(forms, part, points, body, choose_scales(points, body, tolerance), tolerance)
+        if start and start.used.is_used and (adapted := self._go_on(start, part, centre, points, body, tolerance)):
+            return adapted
         trials, chosen = self._climb(points, body, part.diagonal, tolerance)
         if chosen is trials[0]:
             return None
-        return self._finish(part, centre, points, body, trials, chosen, tolerance)
+        adapted = self._finish(part, centre, points, body, trials, chosen, tolerance)
+        if start is None:
+            return adapted
+        unused = replace(start, used=replace(start.used, is_used=False))
+        return replace(adapted, prior=unused.used, notes=(*adapted.notes, describe_prior(unused, tolerance, part.unit)))
+
+    def _go_on(
+        self, start: Start, part: Part, centre: Floats, points: Floats, body: Body, tolerance: float
+    ) -> AdaptedPart | None:
+        """The part from the form that others of its type predict, and a field that holds what the scan shows beside;
+        None where the part as designed explains the scan as well."""
+        fine, _ = refine(part, centre, tolerance, start.field)
+        shape = replace(fine, vertices=start.field.move(fine.vertices - centre) + centre)
+        own, moved = prepare(shape, centre, tolerance, body.noise), move_points(points, start.motion)
+        held = start.find_held(len(points))
+        trials, chosen = self._climb(np.concatenate([moved, held]), own, part.diagonal, tolerance)
+        # the points that hold the field where no skin is left are no part of the scan
+        after = score(chosen.field, chosen.freedom, moved, own, part.diagonal, tolerance)
+        rigid = fit(Field.zero(body.basis), points[::2], body, RIGID, choose_scales(points, body, tolerance))
+        before = score(rigid, RIGID, points, body, part.diagonal, tolerance)
+        if after.both.mean() > (1 - SHARE) * before.both.mean():
+            return None
+        return self._finish(part, centre, moved, own, trials, chosen, tolerance, start, (before, after))
 
     def _climb(self, points: Floats, body: Body, diagonal: float, tolerance: float) -> tuple[list[Trial], Trial]:
         """The fields that were tried on half of the points, and the one that held-out patches bear out."""
         half, zero = points[::2], Field.zero(body.basis)
-        distance = np.abs(match(zero, half, body).distance)
-        last = max(tolerance, 3 * body.noise)
-        first = float(np.clip(3 * np.quantile(distance, 0.9), last, WIDEST * tolerance))
-        scales = [*np.geomspace(first, last, ROUNDS), *[last] * LAST]
+        scales = choose_scales(half, body, tolerance)
+        last = scales[-1]
         patch, held = cut_patches(half, diagonal)
 
         def attempt(freedom: Freedom, start: Field, scales: list[float], body: Body = body) -> Trial:
@@ -135,32 +187,55 @@ class Smooth(Adapt):
 
     def _finish(
         self, part: Part, centre: Floats, points: Floats, body: Body, trials: list[Trial], chosen: Trial,
-        tolerance: float,
+        tolerance: float, start: Start | None = None, scores: tuple[Score, Score] | None = None,
     ) -> AdaptedPart:  # fmt: skip
+        """The adapted part: of the chosen field, after the ``start`` that other parts gave, where there is one; the
+        ``scores`` are then those of the part as designed and of both."""
         field, body = chosen.field, replace(body, basis=chosen.field.basis)
+        before, after = scores or (trials[0].score, chosen.score)
         found = match(field, points, body)
         weights = weigh(found, tolerance, body.noise) * (np.abs(found.distance) < 2 * tolerance)
-        seen = found.material
-        motion = find_motion(seen, field.move(seen), weights)
+        seen = start.field.undo(found.material) if start else found.material
+        motion = find_motion(seen, field.move(found.material), weights)
         turn = motion[:3, :3].T
+
+        def begin(at: Floats) -> Floats:
+            return start.field.move(at) if start else at
 
         def undo(at: Floats) -> Floats:
             return (at - motion[:3, 3]) @ turn.T
 
-        skin = body.mesh.vertices
+        skin = begin(body.mesh.vertices)
         require_injective(field, turn, skin, float(np.linalg.norm(undo(field.move(skin)) - skin, axis=1).max()))
-        fine, error = refine(part, field, centre, tolerance)
+        if start:
+            first = body.mesh.vertices
+            require_injective(start.field, np.eye(3), first, float(np.linalg.norm(skin - first, axis=1).max()))
+        fine, error = refine(part, centre, tolerance, *([start.field] if start else []), field)
         places = fine.vertices - centre
-
-        moved = undo(field.move(places))
-        modes = find_modes(chosen, trials, points, body, Mesh(places, fine.faces), tolerance) @ turn.T
+        moved = undo(field.move(begin(places)))
+        intact = weights > 0
+        beyond, shown = None, points
+        if start:
+            at = seen[np.abs(found.distance) < tolerance]
+            own = None if chosen.freedom == RIGID else field.displace(begin(places))
+            left = average(found.material[intact], found.distance[intact], found.material[intact][::8])
+            off = float(np.sqrt((left**2).mean())) * Mesh(begin(places), fine.faces).vertex_normals
+            beyond = start.go_beyond(places, at, find_spacing(body, points), own, off)
+            # how far the others miss an end is in `beyond`: the field that is fitted beside is held there
+            shown = np.concatenate([points, start.find_held(len(points))])
+        modes = find_modes(chosen, trials, shown, body, Mesh(begin(places), fine.faces), tolerance, beyond) @ turn.T
         back = np.eye(4)
         back[:3, :3] = turn
         back[:3, 3] = centre - turn @ (centre + motion[:3, 3])
-        length = np.linalg.norm(undo(field.move(seen)) - seen, axis=1)
-        intact = weights > 0
-        strain = np.linalg.svd(field.differentiate(body.inside), compute_uv=False) / (1 + field.growth) - 1
-        _, gain = explains_more(chosen.score.both, trials[0].score.both)
+        length = np.linalg.norm(undo(field.move(found.material)) - seen, axis=1)
+        told = np.flatnonzero(intact)[:: max(1, int(intact.sum()) // SEEN)]
+        gradient = field.differentiate(body.inside)
+        growth = field.growth
+        if start:
+            gradient = gradient @ start.field.differentiate(start.field.undo(body.inside))
+            growth = float(np.cbrt(np.median(np.linalg.det(gradient)))) - 1
+            back = back @ about(start.motion, centre)
+        strain = np.linalg.svd(gradient, compute_uv=False) / (1 + growth) - 1
         adapted = AdaptedPart(
             part=deform_part(fine, moved + centre, error),
             displacement=moved - places,
@@ -168,21 +243,31 @@ class Smooth(Adapt):
             modes=modes,
             amount=float(length[intact].max()),
             rms=float(np.sqrt((length[intact] ** 2).mean())),
-            growth=field.growth,
+            growth=growth,
             strain=float(np.abs(strain).max()),
             lattice=field.basis.shape_of_cells,
             functions=field.basis.count,
-            gain=gain,
+            gain=max(1 - float(after.both.mean() / max(before.both.mean(), 1e-300)), 0.0),
             field=fit_displacement(
-                lambda at: undo(field.move(at - centre)) - (at - centre),
+                lambda at: undo(field.move(begin(at - centre))) - (at - centre),
                 part.bounds[0],
                 part.bounds[1],
-                field.basis.shape_of_cells,
+                np.maximum(field.basis.shape_of_cells, start.field.basis.shape_of_cells if start else 0).tolist(),
             ),
+            held_out=(float(np.sqrt(before.both.mean())), float(np.sqrt(after.both.mean()))),
+            patches=len(after.both),
+            seen=seen[told] + centre,
+            left=average(found.material[intact], found.distance[intact], found.material[told]),
+            reach=find_spacing(body, points[: max(SEEN, 1)]),
+            prior=start.used if start else None,
+            designed=identify_part(part),
         )
         rival, is_open = find_other(trials, chosen)
-        other = (rival.field.displace(places) - field.displace(places)) @ turn.T if rival and is_open else None
+        other = (rival.field.displace(begin(places)) - field.displace(begin(places))) if rival and is_open else None
+        other = None if other is None else other @ turn.T
         notes = (describe(adapted, tolerance), *_compare(body, trials, chosen, tolerance, part.unit))
+        if start:
+            notes = (*notes, describe_prior(start, tolerance, part.unit))
         if (unknown := measure_unknown(modes, adapted.part.vertex_normals)) > tolerance / 2:
             notes = (*notes, describe_unknown(unknown, tolerance, part.unit))
         return replace(adapted, notes=notes, other=other)
@@ -199,6 +284,39 @@ def _compare(body: Body, trials: list[Trial], chosen: Trial, tolerance: float, u
         if (thinned := find_thinned(body.mesh, stiff.field, chosen.field, tolerance)).area:
             notes.append(describe_hidden(thinned, unit))
     return notes
+
+
+def choose_scales(points: Floats, body: Body, tolerance: float) -> list[float]:
+    """The robust scales of a fit to points (N,3), from the widest to the narrowest, which comes more than once."""
+    distance = np.abs(match(Field.zero(body.basis), points, body).distance)
+    last = max(tolerance, 3 * body.noise)
+    first = float(np.clip(3 * np.quantile(distance, 0.9), last, WIDEST * tolerance))
+    return [*np.geomspace(first, last, ROUNDS), *[last] * LAST]
+
+
+def score(
+    field: Field, freedom: Freedom, points: Floats, body: Body, diagonal: float, tolerance: float
+) -> Score:  # fmt: skip
+    """How well a field of some freedom explains held-out patches of half of the points (N,3)."""
+    half, body = points[::2], replace(body, basis=field.basis)
+    last = max(tolerance, 3 * body.noise)
+    return cross_validate(field, half, body, freedom, last, HELD, *cut_patches(half, diagonal))
+
+
+def average(places: Floats, values: Floats, asked: Floats) -> Floats:
+    """(M,) the means of values (N,) at the nearest of their places (N,3) to those asked for (M,3)."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(
+        values[cKDTree(places).query(asked, min(AVERAGED, len(places)))[1]].reshape(len(asked), -1).mean(axis=1)
+    )
+
+
+def about(T: Floats, centre: Floats) -> Floats:
+    """A motion (4,4) about the centre (3,) as one about the origin."""
+    shift = np.eye(4)
+    shift[:3, 3] = centre
+    return np.asarray(shift @ T @ np.linalg.inv(shift))
 
 
 def prepare(part: Part, centre: Floats, tolerance: float, noise: float) -> Body:

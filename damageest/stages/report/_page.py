@@ -20,7 +20,7 @@ from damageest.io.files import embed_png, file_sha256
 from damageest.result import Result
 from damageest.rules.notes import fold_notes
 from damageest.stages.report import _style as style
-from damageest.stages.report._scene import LAYERS, Scene
+from damageest.stages.report._scene import EXAGGERATED, LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
 from damageest.stages.report._sites import MOST_DRAWN, Shown
 from damageest.stages.report._values import list_fit, list_freedom, show_total_interval
@@ -71,6 +71,7 @@ def fill_page(
         "origin": scene.origin,
         "size": scene.size,
         "unit": result.units,
+        "exaggerate": scene.exaggerate,
     }
     scripts = [DEFINE, _read_library(), (FOLDER / "report.js").read_text(encoding="utf-8")]
     return environment.get_template("report.html").render(
@@ -80,6 +81,7 @@ def fill_page(
         sites=sites,
         notes=list(map(str, fold_notes(result.warnings))),
         drawn=MOST_DRAWN,
+        exaggerated=EXAGGERATED,
         heights=max((item["height"] for item in scene.objects), default=0),
         verdict=describe_run(result),
         tone=choose_tone(result),

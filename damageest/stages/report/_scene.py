@@ -26,8 +26,17 @@ LAYERS = {
     "nozzle": ("Nozzle where it is tightest", False),
     "surplus": ("Surplus", True),
     "unseen": ("Skin that the scan does not show", True),
+    "form": ("Form, exaggerated", False),
 }
 """Name in the page's script, to name on the page and whether it is shown at first."""
+
+
+EXAGGERATED = 50
+"""How many times the form of an adapted part is exaggerated at most."""
+FORM_TRIANGLES = 20_000
+"""Triangles at most of the part that is drawn with its form exaggerated."""
+VISIBLE = 0.04
+"""How much of the part's diagonal it moves at first, about."""
 
 
 @dataclass
@@ -36,7 +45,8 @@ class Scene:
     none) and, for passes, the number of the deposit's layer that they belong to, counted over its parts (else 0).
     ``views``: for each site, by number, centre, radius and viewing direction. ``origin`` (3,): what was subtracted from
     all coordinates. ``size`` (3,): half of the part's extents. ``limit``: the deviation at the ends of the colour bar.
-    ``shown``, ``points``: how many scan points are shown, of how many."""
+    ``shown``, ``points``: how many scan points are shown, of how many. ``exaggerate``: by how much the form of an
+    adapted part is exaggerated at first; 0 where the part is as designed."""
 
     snapshot: str
     objects: list[dict[str, Any]]
@@ -45,6 +55,7 @@ class Scene:
     limit: float
     shown: int
     points: int
+    exaggerate: int = 0
 
 
 @dataclass
@@ -110,6 +121,7 @@ def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
             places = places[thin_points(places, most_points // 8)]
             stage.add_points(places, "surplus", 0, part.diagonal / 300, color=style.to_number(colours.SURPLUS))
     _add_unseen(stage, result, share)
+    exaggerate = _add_form(stage, result, min(share, FORM_TRIANGLES))
     plot = k3d.plot(
         grid_visible=False, menu_visibility=False, camera_auto_fit=False, camera_mode="trackball", axes_helper=1.0,
         mode="callback", colorbar_object_id=0, camera_fov=35.0, lighting=1.6, fps=0, antialias=2,
@@ -118,7 +130,9 @@ def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
         plot += item
     snapshot = base64.b64encode(plot.get_binary_snapshot(compression_level=4)).decode()
     half = (np.ptp(part.bounds, axis=0) / 2).tolist()
-    return Scene(snapshot, stage.objects, stage.origin.tolist(), half, limit, count, len(result.scan.points))
+    return Scene(
+        snapshot, stage.objects, stage.origin.tolist(), half, limit, count, len(result.scan.points), exaggerate
+    )
 
 
 def choose_limit(result: Result) -> float:
@@ -221,6 +235,30 @@ def _add_path(stage: _Stage, site: Site) -> None:
         point, axis = path.tightest
         places = path.nozzle.vertices @ turn_to_axis(axis).T + point + path.standoff * axis
         stage.add_mesh(Mesh(places, path.nozzle.faces), "nozzle", "#c9a227", site.id, opacity=0.5)
+
+
+def _add_form(stage: _Stage, result: Result, share: int) -> int:
+    """Adds the part as designed, with its displacement at each end of the page's slider, coloured by its length; gives
+    how many times the displacement is exaggerated at first, 0 where there is none."""
+    import k3d
+    from scipy.spatial import cKDTree
+
+    adapted = result.adapted
+    if adapted is None or not adapted.amount:
+        return 0
+    designed = adapted.part.vertices - adapted.displacement
+    shown = thin_mesh(Mesh(designed, adapted.part.faces), share)
+    moved = adapted.displacement[cKDTree(designed).query(shown.vertices)[1]]
+    length = np.linalg.norm(moved, axis=1)
+    most = style.round_nice(float(length.max()))
+    ends = {"0": stage.place(shown.vertices), f"{EXAGGERATED}": stage.place(shown.vertices + EXAGGERATED * moved)}
+    item = k3d.mesh(
+        ends, shown.faces.astype(np.uint32), attribute=(np.round(length / most * 127) / 127 * most).astype(np.float32),
+        color_range=[0.0, most], color_map=k3d.matplotlib_color_maps.Viridis, side="double", flat_shading=True,
+        name="form",
+    )  # fmt: skip
+    stage.add(item, "form")
+    return int(np.clip(VISIBLE * result.part.diagonal / adapted.amount, 1, EXAGGERATED))
 
 
 def _add_unseen(stage: _Stage, result: Result, share: int) -> None:

@@ -11,7 +11,7 @@ from tempfile import mkdtemp
 import numpy as np
 
 import damageest
-from damageest.artefacts import DAMAGE, Deviation, Reason, Scan
+from damageest.artefacts import DAMAGE, AdaptedPart, Deviation, Reason, Scan
 from damageest.findings import Verdict
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.sampling import sample_by_area
@@ -49,6 +49,18 @@ def two_sites(count: int = 12_000) -> Result:
     return replace(
         plain, scan=scan, aligned=scan, deviation=Deviation(distance, face, label), site_label=number, sites=sites
     )
+
+
+@cache
+def sheared(amount: float = 0.4) -> Result:
+    """The same on a part of which one end is higher by an amount, and the other lower."""
+    plain = two_sites()
+    low, high = plain.part.bounds
+    share = (2 * plain.part.vertices[:, :1] - (low + high)[0]) / (high - low)[0]
+    moved = amount * share * np.array([0.0, 0.0, 1.0])
+    part = replace(plain.part, vertices=plain.part.vertices + moved)
+    adapted = AdaptedPart(part, moved, np.eye(4), np.zeros((0, *moved.shape)), amount, amount / 2)
+    return replace(plain, part=part, adapted=adapted)
 
 
 def twelve_sites(folder: Path) -> Path:

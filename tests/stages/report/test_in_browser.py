@@ -180,6 +180,38 @@ def test_in_the_dark_on_a_tablet_and_on_paper(chromium: Any) -> None:
     report.page.close()
 
 
+def test_the_form_is_exaggerated_by_a_slider(chromium: Any) -> None:
+    report = browser.Shown(chromium, pages.write(pages.sheared()))
+    slider = report.page.locator("#exaggerate")
+    assert not slider.is_visible()
+    report.switch("part", False)
+    report.switch("damage", False)
+    report.switch("form", True)
+    assert slider.is_visible()
+
+    def measure(factor: int) -> tuple[np.ndarray, float]:
+        """The picture, and how high the drawn form is."""
+        slider.evaluate(f"(one) => {{ one.value = {factor}; one.dispatchEvent(new Event('input')); }}")
+        report.settle()
+        item = next(one["id"] for one in report.page.evaluate("report.scene.objects") if one["layer"] == "form")
+        heights = report.page.evaluate(
+            f"(() => {{ const g = report.view3d.getObjectById({item}).geometry; g.computeBoundingBox();"
+            " return g.boundingBox.max.z - g.boundingBox.min.z; })()"
+        )
+        return report.picture(), float(heights)
+
+    straight, low = measure(0)
+    assert report.page.inner_text("#exaggerate-text") == "as designed"
+    sheared, high = measure(30)
+    assert report.page.inner_text("#exaggerate-text") == "30 times"
+    part = pages.two_sites().part
+    assert low == pytest.approx(float(np.ptp(part.vertices[:, 2])), abs=0.01)
+    assert high - low == pytest.approx(2 * 30 * 0.4, rel=0.05)
+    assert count_changed(straight, sheared) > 500
+    assert not report.faults
+    report.page.close()
+
+
 @pytest.mark.slow
 def test_without_sites_and_with_markup_in_every_name(chromium: Any) -> None:
     nasty, result = pages.NASTY, pages.two_sites()

@@ -21,6 +21,8 @@
       const object = view3d.getObjectById(item.id);
       if (object) object.visible = isChecked("layer", item.layer) && (!item.site || isChecked("site", item.site)) && isBelow(item.height);
     }
+    const form = document.getElementById("form");
+    if (form) form.hidden = !isChecked("layer", "form");
     document.getElementById("scale").hidden = !isChecked("layer", "scan") || !document.querySelector("[data-layer=scan]");
     view3d.render();
   }
@@ -88,6 +90,14 @@
     view3d.render();
   }
 
+  // the snapshot has the part as designed at time 0, and with its displacement times the slider's end there
+  function exaggerate() {
+    const slider = document.getElementById("exaggerate"), factor = Number(slider.value);
+    const said = { 0: "as designed", 1: "as it is" }[factor] || `${factor} times`;
+    document.getElementById("exaggerate-text").textContent = said;
+    return view3d.setTime(factor).then(showObjects);
+  }
+
   function listen() {
     for (const box of find("input.layer, input.site")) box.addEventListener("change", showObjects);
     for (const id of ["clip-axis", "clip-flip", "clip-at"]) document.getElementById(id).addEventListener("input", clip);
@@ -98,6 +108,8 @@
         showObjects();
       });
     }
+    const form = document.getElementById("exaggerate");
+    if (form) form.addEventListener("input", exaggerate);
     document.getElementById("fit").addEventListener("click", () => { chooseRow(0); flyTo(viewFrom("iso")); });
     for (const button of find("button.from")) button.addEventListener("click", () => flyTo(viewFrom(button.dataset.from)));
     const siteOf = Object.fromEntries(scene.objects.filter((item) => item.site).map((item) => [item.id, item.site]));
@@ -135,6 +147,7 @@
     view3d.setCamera(viewFrom("iso"));
     listen();
     showObjects();
+    if (scene.exaggerate) await exaggerate();
     followTheme();
     const wanted = /^#site-(\d+)$/.exec(location.hash);
     if (wanted && scene.sites[wanted[1]]) flyToSite(wanted[1]);

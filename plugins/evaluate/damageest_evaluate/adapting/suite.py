@@ -40,10 +40,10 @@ def _make_all(points: int, source: str) -> Iterator[DeformedCase]:
         yield make("damaged", part, {**kind, **_seed(kind, number)}, number, losses=losses)
     for number, (part, share) in enumerate((p, s) for p in ("blade", "lever", "keyed_shaft") for s in (0.05, 0.1)):
         for kind in ({"bend": 5}, {"twist": 3}):
-            yield make("lost end", part, kind, number, wear=[_cut_end(part, share)], told=f", {share:.0%} of its end")
+            yield make("lost end", part, kind, number, wear=[cut_end(part, share)], told=f", {share:.0%} of its end")
     for number, part in enumerate(("blade", "lever", "block", "ribbed_plate", "coupling", "tube")):
         yield make("seen in part", part, {"bend": 5}, number, losses=[5.0], seen=1 / 3, told=", a third seen")
-        yield make("large loss", part, {"bend": 5}, number, wear=[_cut_end(part, 0.125)], told=", an eighth lost")
+        yield make("large loss", part, {"bend": 5}, number, wear=[cut_end(part, 0.125)], told=", an eighth lost")
     for number in range(20):
         part, kind = SHAPES[number % len(SHAPES)], DEFORMED[(5 * number) % len(DEFORMED)]
         yield make("whole", part, {**kind, **_seed(kind, number)}, number)
@@ -56,7 +56,7 @@ def _seed(kind: Mapping[str, float], number: int) -> dict[str, float]:
     return {"seed": number} if "free" in kind else {}
 
 
-def _cut_end(part: str, share: float) -> dict[str, Any]:
+def cut_end(part: str, share: float) -> dict[str, Any]:
     """A plane across the longest edge of the box, that takes this share of its length off."""
     low, high = PARTS[part]().bounds
     axis = int((high - low).argmax())
