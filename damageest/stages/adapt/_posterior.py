@@ -8,8 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
+from damageest.geometry.duplicates import group_integers
+from damageest.geometry.voxels import number_cubes
 from damageest.stages.adapt._choose import Trial, cut_patches
-from damageest.stages.adapt._field import Body, Equations, match, weigh, weigh_points, weigh_roughness, weigh_strain
+from damageest.stages.adapt._field import (
+    Body,
+    Equations,
+    Match,
+    match,
+    weigh,
+    weigh_points,
+    weigh_roughness,
+    weigh_strain,
+)
 
 MODES = 24
 """Independent errors that are kept."""
@@ -18,6 +29,8 @@ PRIOR = 0.002
 BEYOND = 0.004
 """Strain of the metal beyond the skin that is seen, as one standard deviation: that of a bend about an axis which is
 some way from the middle of the section."""
+SMALL, FEWEST = 25.0, 4
+"""Patches along the part's diagonal by which it is asked what is left, and the least weight of their points."""
 ASKED = 1500
 """Places on the skin by which the largest errors are chosen."""
 
@@ -31,8 +44,9 @@ def find_modes(
 
     The posterior of a Gaussian prior on the strain, with the points' error as large as the means of patches show it;
     what the metal may be strained by beyond the skin that is seen, which grows with the distance from it; and the
-    difference to the next freer field that was tried, since the truth may be as free as that. ``beyond`` (J,V,3):
-    what other parts of the type say about skin that is not seen, in place of a strain.
+    difference to the next freer field that was tried, since the truth may be as free as that; and what the field leaves
+    of intact skin. ``beyond`` (J,V,3): what other parts of the type say about skin that is not seen, in place of a
+    strain.
     """
     field, places = chosen.field, skin.vertices
     last = max(tolerance, 3 * body.noise)
@@ -55,13 +69,28 @@ def find_modes(
     if beyond is None:
         seen, spacing = found.material[np.abs(found.distance) < tolerance], find_spacing(body, points)
         beyond = BEYOND * go_beyond(places, seen, spacing)[None]
-    modes = np.concatenate([modes, beyond])
+    left = measure_left(found, weights, body) * skin.vertex_normals
+    modes = np.concatenate([modes, beyond, left[None]])
     at = [one.freedom for one in trials].index(chosen.freedom) + 1
     alike = [one for one in trials[at:] if one.freedom.stretches == chosen.freedom.stretches]
     freer = alike[0] if alike else None
     if freer is None:
         return np.asarray(modes)
     return np.concatenate([modes, (freer.field.displace(places) - field.displace(places))[None]])
+
+
+def measure_left(found: Match, weights: Floats, body: Body) -> float:
+    """How far small patches of intact skin lie off the field, beyond what noise explains (rms): it is not followed
+    there, and may be as far off where the skin is gone, to one side."""
+    _, number = number_cubes(found.points, body.mesh.diagonal / SMALL)
+    _, patch, _ = group_integers(number)
+    total = np.bincount(patch, weights)
+    kept = total > FEWEST
+    if not kept.any():
+        return 0.0
+    mean = np.bincount(patch, weights * found.distance)[kept] / total[kept]
+    by_noise = body.noise**2 * np.bincount(patch, weights**2)[kept] / total[kept] ** 2
+    return float(np.sqrt(max(float(np.average(mean**2 - by_noise, weights=total[kept])), 0.0)))
 
 
 def go_beyond(places: Floats, seen: Floats, spacing: float) -> Floats:

@@ -152,34 +152,42 @@ class Smooth(Adapt):
         chosen = scaled if explains_more(scaled.score.both, rigid.score.both)[0] else rigid
         trials, grows = [rigid, scaled], chosen is scaled
 
-        def take(freedom: Freedom) -> None:
-            """Tries a freer field, and takes it where held-out patches bear it out."""
+        def take(freedom: Freedom, base: Trial) -> None:
+            """Tries a freer field, and takes it where held-out patches bear it out, also against a ``base``."""
             nonlocal chosen
             trials.append(attempt(freedom, zero, scales))
-            chosen = trials[-1] if is_better(trials[-1].score, chosen.score) else chosen
+            better = explains_more(trials[-1].score.both, chosen.score.both)[0]
+            chosen = trials[-1] if better and is_better(trials[-1].score, base.score) else chosen
 
-        take(Freedom(BENT, grows=grows))
+        take(Freedom(BENT, grows=grows), chosen)
         if chosen is trials[-1] and not grows:
-            take(Freedom(BENT))
+            take(Freedom(BENT), chosen)
             grows = chosen is trials[-1]
+        bent = chosen
         freest = attempt(Freedom(STRAINED[-1], grows, stretches=True), zero, scales)
-        if is_better(freest.score, chosen.score):
+        if is_better(freest.score, bent.score):
             for bound in STRAINED:
-                take(Freedom(bound, grows))
-            chosen = freest if is_better(freest.score, chosen.score) else chosen
+                take(Freedom(bound, grows), bent)
+            chosen = freest if explains_more(freest.score.both, chosen.score.both)[0] else chosen
         trials.append(freest)
         if np.median(chosen.score.both) > LEFT * body.noise**2:  # as a taper of a thin part, which is of wear's kind
-            take(Freedom(LOOSEST, grows))
-            take(Freedom(LOOSEST, grows, stretches=True))
-        is_rough = np.median(chosen.score.both) > LEFT * body.noise**2
-        for cells in self.lattice if is_rough else ():
+            take(Freedom(LOOSEST, grows), bent)
+            take(Freedom(LOOSEST, grows, stretches=True), bent)
+        for cells in self.lattice:
             finer = replace(body, inside=body.inside[::2], basis=replace(body.basis, cells=cells))
-            start = chosen.field.to_basis(finer.basis, np.concatenate([body.inside, body.mesh.vertices]))
+            everywhere = np.concatenate([body.inside, body.mesh.vertices])
             # waves are no polynomial: the best one may be none, and lie far off
             is_near = chosen.freedom.bound >= LOOSE
-            freedom = chosen.freedom if is_near else Freedom(STRAINED[-1], grows)
-            trials.append(attempt(replace(freedom, cells=cells), start, [last] * ROUNDS if is_near else scales, finer))
-            chosen = trials[-1] if is_better(trials[-1].score, chosen.score) else chosen
+            first = chosen.freedom if is_near else Freedom(STRAINED[-1], grows)
+            for freedom in (first, Freedom(LOOSEST, grows, stretches=True)):
+                if np.median(chosen.score.both) <= LEFT * body.noise**2:
+                    break
+                begin = chosen.field.to_basis(finer.basis, everywhere)
+                trials.append(
+                    attempt(replace(freedom, cells=cells), begin, [last] * ROUNDS if is_near else scales, finer)
+                )
+                better = explains_more(trials[-1].score.both, chosen.score.both)[0]
+                chosen = trials[-1] if better and is_better(trials[-1].score, bent.score) else chosen
         if chosen is rigid:
             return trials, chosen
         body = replace(body, basis=chosen.field.basis)
