@@ -11,16 +11,14 @@ from pydantic import Field as Option
 
 from damageest.artefacts import AdaptedPart, Floats, Mesh, Part, Scan, fit_displacement
 from damageest.errors import InputError, StageError
-from damageest.geometry.distance import is_inside, signed_distance
-from damageest.geometry.neighbourhoods import pick_one_per_cube
-from damageest.geometry.refinement import cut_into_cells
 from damageest.geometry.transforms import move_points
 from damageest.io.forms import identify_part
 from damageest.stages import JobPaths
 from damageest.stages.adapt import Adapt
-from damageest.stages.adapt._basis import Basis
-from damageest.stages.adapt._choose import SHARE, Score, Trial, cross_validate, cut_patches, explains_more, is_better
-from damageest.stages.adapt._field import STIFF, Body, Field, Freedom, fit, match, weigh
+from damageest.stages.adapt._body import prepare, thin
+from damageest.stages.adapt._choose import SHARE, Score, Trial
+from damageest.stages.adapt._climb import BENT, RIGID, WIDEST, choose_scales, climb, score
+from damageest.stages.adapt._field import Body, Field, fit, match, weigh
 from damageest.stages.adapt._mesh import deform_part, find_motion, refine, require_injective
 from damageest.stages.adapt._other import (
     describe_hidden,
@@ -36,30 +34,10 @@ from damageest.stages.adapt._words import describe
 
 FEWEST = 200
 """Points that a field is fitted to at least."""
-FINE = 25.0
-"""Edges along the part's diagonal of the triangles that points are matched with."""
-PLACES = 500
-"""Places in the metal where the strain is asked for."""
-ROUNDS, LAST, HELD = 8, 10, 6
-"""Rounds from the widest robust scale to the narrowest, more at the narrowest at most, and those of a fit to half of
-the patches."""
-WIDEST = 12.0
-"""Widest robust scale, in tolerances."""
-BENT = 0.001
-"""Strain beyond that of a bend or a twist, of a field that does nothing else."""
-RIGID, SCALED = Freedom(STIFF, grows=False, bends=False), Freedom(STIFF, bends=False)
-STRAINED = (0.006, 0.03)
-"""Strains beyond that of a bend or a twist that freer fields may have, in the order in which they are tried."""
-LOOSEST = 0.1
-"""The same where those leave much."""
-LOOSE = 0.006
-"""Strain from which a lattice is tried too."""
 AVERAGED = 16
 """Neighbours whose deviations are averaged, so that noise is not taken for form."""
 SEEN = 4000
 """Places that tell which skin was seen, about."""
-LEFT = 1.15
-"""What a polynomial has to leave in half of the patches for it, in mean squares of the noise."""
 
 
 class Smooth(Adapt):
@@ -108,7 +86,7 @@ class Smooth(Adapt):
             start = start_from(forms, part, points, body, choose_scales(points, body, tolerance), tolerance)
         if start and start.used.is_used and (adapted := self._go_on(start, part, centre, points, body, tolerance)):
             return adapted
-        trials, chosen = self._climb(points, body, part.diagonal, tolerance)
+        trials, chosen = climb(points, body, part.diagonal, tolerance, self.lattice)
         if chosen is trials[0]:
             return None
         adapted = self._finish(part, centre, points, body, trials, chosen, tolerance)
@@ -126,7 +104,7 @@ class Smooth(Adapt):
         shape = replace(fine, vertices=start.field.move(fine.vertices - centre) + centre)
         own, moved = prepare(shape, centre, tolerance, body.noise), move_points(points, start.motion)
         held = start.find_held(len(points))
-        trials, chosen = self._climb(np.concatenate([moved, held]), own, part.diagonal, tolerance)
+        trials, chosen = climb(np.concatenate([moved, held]), own, part.diagonal, tolerance, self.lattice)
         # the points that hold the field where no skin is left are no part of the scan
         after = score(chosen.field, chosen.freedom, moved, own, part.diagonal, tolerance)
         rigid = fit(Field.zero(body.basis), points[::2], body, RIGID, choose_scales(points, body, tolerance))
@@ -134,64 +112,6 @@ class Smooth(Adapt):
         if after.both.mean() > (1 - SHARE) * before.both.mean():
             return None
         return self._finish(part, centre, moved, own, trials, chosen, tolerance, start, (before, after))
-
-    def _climb(self, points: Floats, body: Body, diagonal: float, tolerance: float) -> tuple[list[Trial], Trial]:
-        """The fields that were tried on half of the points, and the one that held-out patches bear out."""
-        half, zero = points[::2], Field.zero(body.basis)
-        scales = choose_scales(half, body, tolerance)
-        last = scales[-1]
-        patch, held = cut_patches(half, diagonal)
-
-        def attempt(freedom: Freedom, start: Field, scales: list[float], body: Body = body) -> Trial:
-            field = fit(start, half, body, freedom, scales)
-            score = cross_validate(field, half, body, freedom, last, HELD, patch, held)
-            return Trial(field, freedom, score)
-
-        rigid, scaled = attempt(RIGID, zero, scales), attempt(SCALED, zero, scales)
-        # nothing is strained by a scale, and shrinking leaves no metal outside
-        chosen = scaled if explains_more(scaled.score.both, rigid.score.both)[0] else rigid
-        trials, grows = [rigid, scaled], chosen is scaled
-
-        def take(freedom: Freedom, base: Trial) -> None:
-            """Tries a freer field, and takes it where held-out patches bear it out, also against a ``base``."""
-            nonlocal chosen
-            trials.append(attempt(freedom, zero, scales))
-            better = explains_more(trials[-1].score.both, chosen.score.both)[0]
-            chosen = trials[-1] if better and is_better(trials[-1].score, base.score) else chosen
-
-        take(Freedom(BENT, grows=grows), chosen)
-        if chosen is trials[-1] and not grows:
-            take(Freedom(BENT), chosen)
-            grows = chosen is trials[-1]
-        bent = chosen
-        freest = attempt(Freedom(STRAINED[-1], grows, stretches=True), zero, scales)
-        if is_better(freest.score, bent.score):
-            for bound in STRAINED:
-                take(Freedom(bound, grows), bent)
-            chosen = freest if explains_more(freest.score.both, chosen.score.both)[0] else chosen
-        trials.append(freest)
-        if np.median(chosen.score.both) > LEFT * body.noise**2:  # as a taper of a thin part, which is of wear's kind
-            take(Freedom(LOOSEST, grows), bent)
-            take(Freedom(LOOSEST, grows, stretches=True), bent)
-        for cells in self.lattice:
-            finer = replace(body, inside=body.inside[::2], basis=replace(body.basis, cells=cells))
-            everywhere = np.concatenate([body.inside, body.mesh.vertices])
-            # waves are no polynomial: the best one may be none, and lie far off
-            is_near = chosen.freedom.bound >= LOOSE
-            first = chosen.freedom if is_near else Freedom(STRAINED[-1], grows)
-            for freedom in (first, Freedom(LOOSEST, grows, stretches=True)):
-                if np.median(chosen.score.both) <= LEFT * body.noise**2:
-                    break
-                begin = chosen.field.to_basis(finer.basis, everywhere)
-                trials.append(
-                    attempt(replace(freedom, cells=cells), begin, [last] * ROUNDS if is_near else scales, finer)
-                )
-                better = explains_more(trials[-1].score.both, chosen.score.both)[0]
-                chosen = trials[-1] if better and is_better(trials[-1].score, bent.score) else chosen
-        if chosen is rigid:
-            return trials, chosen
-        body = replace(body, basis=chosen.field.basis)
-        return trials, replace(chosen, field=fit(chosen.field, points, body, chosen.freedom, [last] * LAST))
 
     def _finish(
         self, part: Part, centre: Floats, points: Floats, body: Body, trials: list[Trial], chosen: Trial,
@@ -294,23 +214,6 @@ def _compare(body: Body, trials: list[Trial], chosen: Trial, tolerance: float, u
     return notes
 
 
-def choose_scales(points: Floats, body: Body, tolerance: float) -> list[float]:
-    """The robust scales of a fit to points (N,3), from the widest to the narrowest, which comes more than once."""
-    distance = np.abs(match(Field.zero(body.basis), points, body).distance)
-    last = max(tolerance, 3 * body.noise)
-    first = float(np.clip(3 * np.quantile(distance, 0.9), last, WIDEST * tolerance))
-    return [*np.geomspace(first, last, ROUNDS), *[last] * LAST]
-
-
-def score(
-    field: Field, freedom: Freedom, points: Floats, body: Body, diagonal: float, tolerance: float
-) -> Score:  # fmt: skip
-    """How well a field of some freedom explains held-out patches of half of the points (N,3)."""
-    half, body = points[::2], replace(body, basis=field.basis)
-    last = max(tolerance, 3 * body.noise)
-    return cross_validate(field, half, body, freedom, last, HELD, *cut_patches(half, diagonal))
-
-
 def average(places: Floats, values: Floats, asked: Floats) -> Floats:
     """(M,) the means of values (N,) at the nearest of their places (N,3) to those asked for (M,3)."""
     from scipy.spatial import cKDTree
@@ -325,28 +228,3 @@ def about(T: Floats, centre: Floats) -> Floats:
     shift = np.eye(4)
     shift[:3, 3] = centre
     return np.asarray(shift @ T @ np.linalg.inv(shift))
-
-
-def prepare(part: Part, centre: Floats, tolerance: float, noise: float) -> Body:
-    """What a polynomial field is fitted to the part by, about the centre."""
-    extent = np.ptp(part.bounds, axis=0)
-    size = float(extent.max()) / 2
-    fine, _ = cut_into_cells(Mesh(part.vertices - centre, part.faces), part.diagonal / FINE)
-    box = (spread_evenly(40 * PLACES) - 0.5) * extent
-    inside = box[is_inside(box, fine)]
-    inside = inside[:: max(1, len(inside) // PLACES)]
-    inside = inside if len(inside) > PLACES // 10 else fine.triangles.mean(axis=1)[:: max(1, len(fine.faces) // PLACES)]
-    return Body(fine, inside, tolerance / 4, noise, Basis(np.zeros(3), size, extent / 2 / size))
-
-
-def spread_evenly(count: int) -> Floats:
-    """(N,3) places in the unit cube whose means, over any box in it, are those of the box: an additive recurrence by
-    the root of x^4 = x + 1."""
-    root = 1.2207440846057596
-    return np.asarray((0.5 + np.arange(1, count + 1)[:, None] * root ** -np.arange(1.0, 4.0)) % 1)
-
-
-def thin(points: Floats, part: Part, count: int, reach: float) -> Floats:
-    """About ``count`` of the points (N,3) that lie within ``reach`` of the part's skin, evenly spread."""
-    kept = points[pick_one_per_cube(points, float(np.sqrt(part.area / count)))]
-    return kept[np.abs(signed_distance(kept, part)[0]) < reach]

@@ -10,10 +10,10 @@ import pytest
 from damageest.artefacts import Solid
 from damageest.checks.uncertainty import SiteError, combine_total
 from damageest.stages.adapt._basis import Basis
+from damageest.stages.adapt._body import spread_evenly
 from damageest.stages.adapt._choose import Score, Trial
 from damageest.stages.adapt._field import Field, Freedom
 from damageest.stages.adapt._other import find_other, find_thinned
-from damageest.stages.adapt.smooth import spread_evenly
 from tests import damaged_box
 from tests.stages.adapt.test_smooth import TOLERANCE, adapt
 
