@@ -38,34 +38,29 @@ BY_FORM = "another_part"
 
 @step(
     gives=("adapted", "part", "aligned", "pose", "samples", "warnings"),
-    reads=("part", "aligned", "pose", "samples", "tolerance", "unit", "views", "warnings", "adapter"),
+    reads=(
+        "part", "aligned", "pose", "refusal", "samples", "tolerance", "unit", "views", "warnings", "adapter"
+    ),
     calls=(Adapt, Align, Sample),
-)
+)  # fmt: skip
 def adapt_part(
     engine: Engine, state: JobState
 ) -> tuple[AdaptedPart | None, Part, Scan, Pose, Samples, Reasons]:  # fmt: skip
     """Calls `adapt`, unless the job takes the part as designed, and puts what it gives in the place of the part, with
-    the scan and its pose moved onto it, and samples on its skin."""
-    as_designed = (None, state.part, state.aligned, state.pose, state.samples, state.warnings)
-    stage = state.adapter
-    if Adapt not in engine.job.given:
-        if stage is None or not stage.deforms:
-            return as_designed
-        if stage.asks_first and not is_asked_for(state):
-            return as_designed
-    try:
-        called = engine.call(Adapt, state)
-    except StageError as error:
-        if stage is None or not stage.asks_first:
-            raise
-        failed = f"the part was not adapted: {error.message}; the result is that of the part as designed"
-        return *as_designed[:-1], (*state.warnings, *make_notes("adapt", (failed,)))
-    adapted: AdaptedPart | None = called.get(Adapt.gives)
-    if adapted is None:
-        return as_designed
+    the scan and its pose moved onto it, and samples on its skin. Raises the refusal of stage `align` where the adapted
+    part does not explain the scan either."""
+    as_designed = (None, state.part, state.aligned, state.pose, state.samples)
+    called, failed = call_adapt(engine, state)
+    if called is None or called.get(Adapt.gives) is None:
+        if state.refusal is not None:
+            raise state.refusal
+        return *as_designed, (*state.warnings, *make_notes("adapt", failed))
+    adapted: AdaptedPart = called.get(Adapt.gives)
     key = called.key(Adapt.gives)
     aligned = state.aligned.move(adapted.motion)
-    pose = fit_pose(state.pose, adapted.motion, aligned.points, adapted.part, state.tolerance)
+    pose, is_shown = fit_pose(state.pose, adapted.motion, aligned.points, adapted.part, state.tolerance)
+    if state.refusal is not None and not is_shown:
+        raise state.refusal
     moved = state.with_value(JobState.aligned, aligned, digest("aligned", key))
     moved = moved.with_value(JobState.part, adapted.part, digest("part", key))
     own = engine.make_silent()
@@ -76,6 +71,24 @@ def adapt_part(
     settled = {f"{doubt}" for doubt in state.pose.doubts} - {f"{doubt}" for doubt in pose.doubts}
     kept = [note for note in state.warnings if note.code != "align" or note.text not in settled]
     return adapted, adapted.part, aligned, pose, samples, (*kept, *make_notes("adapt", adapted.notes))
+
+
+def call_adapt(engine: Engine, state: JobState) -> tuple[JobState | None, tuple[str, ...]]:
+    """The state after `adapt`; None where it is not asked for, or fails where nobody asked for it by name, with a note
+    of why."""
+    stage = state.adapter
+    if Adapt in engine.job.given:
+        return engine.call(Adapt, state), ()
+    if stage is None or not stage.deforms:
+        return None, ()
+    if stage.asks_first and state.refusal is None and not is_asked_for(state):
+        return None, ()
+    try:
+        return engine.call(Adapt, state), ()
+    except StageError as error:
+        if not stage.asks_first:
+            raise
+        return None, (f"the part was not adapted: {error.message}; the result is that of the part as designed",)
 
 
 def is_asked_for(state: JobState) -> bool:
@@ -94,25 +107,25 @@ def doubt_anew(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pos
     has, where that agrees. Those of the part as designed may come from its form: it fits nowhere, so it fits as well
     moved a little."""
     some = points[:: max(1, len(points) // ASKED)]
-    moved = move_points(some, again.T_part_scan @ np.linalg.inv(pose.T_part_scan))
-    off = float(np.linalg.norm(moved - some, axis=1).max(initial=0.0))
-    if off > tolerance:
+    others = [] if again.alternatives is None else list(again.alternatives)  # of a symmetric part any may come first
+    apart = [move_points(some, T @ np.linalg.inv(pose.T_part_scan)) - some for T in (again.T_part_scan, *others)]
+    if min(float(np.linalg.norm(way, axis=1).max(initial=0.0)) for way in apart) > tolerance:
         return pose
     return replace(pose, doubts=again.doubts, free=again.free, notes=again.notes, is_held=again.is_held)
 
 
-def fit_pose(pose: Pose, motion: Floats, points: Floats, part: Part, tolerance: float) -> Pose:
-    """The pose of the aligned ``points`` (N,3) on the adapted part. That little of the scan lay on the part as designed
-    is no doubt where it lies on the adapted part."""
+def fit_pose(pose: Pose, motion: Floats, points: Floats, part: Part, tolerance: float) -> tuple[Pose, bool]:
+    """The pose of the aligned ``points`` (N,3) on the adapted part, and whether they show that part. That little of the
+    scan lay on the part as designed is then no doubt."""
     distance, _ = signed_distance(points[:: max(1, len(points) // ASKED)], part)
     on = np.abs(distance) <= tolerance
     near = max(int((distance < NEAR * part.diagonal).sum()), 1)
     doubts, notes = pose.doubts, pose.notes
-    if on.sum() >= AGREES * near:
+    is_shown = bool(on.sum() >= AGREES * near)
+    if is_shown:
         doubts = tuple(doubt for doubt in doubts if doubt.code != BY_FORM)
         settled = {f"{doubt}" for doubt in pose.doubts} - {f"{doubt}" for doubt in doubts}
         notes = tuple(note for note in notes if note not in settled)
     rms = float(np.sqrt((distance[on] ** 2).mean())) if on.any() else pose.rms
-    return replace(
-        pose, T_part_scan=motion @ pose.T_part_scan, rms=rms, inliers=float(on.mean()), doubts=doubts, notes=notes
-    )
+    moved = motion @ pose.T_part_scan
+    return replace(pose, T_part_scan=moved, rms=rms, inliers=float(on.mean()), doubts=doubts, notes=notes), is_shown

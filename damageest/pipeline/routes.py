@@ -9,6 +9,7 @@ test compares these lines with the code.
 from __future__ import annotations
 
 from damageest.pipeline.adapt import adapt_part
+from damageest.pipeline.alignment import align_scan
 from damageest.pipeline.collect import collect_result
 from damageest.pipeline.coverage import describe_coverage, inspect_skin
 from damageest.pipeline.deposits import make_deposits, separate_deposits
@@ -43,7 +44,6 @@ from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
 from damageest.pipeline.writing import describe_output, keep_form, show_result, write_output
-from damageest.stages.align import Align
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
 from damageest.stages.cluster import Cluster
@@ -65,7 +65,7 @@ ACQUIRE: Route = (
     measure_scan,  # scan, part -> noise, spacing, depth_step
     take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
     Sample,  # part, tolerance -> samples
-    Align,  # scan, part, samples, tolerance -> pose
+    align_scan,  # calls Align: adapter, tolerance, scan, part, samples -> pose, refusal
     place_scan,  # scan, pose -> aligned, noise, spacing
     note_pose,  # pose -> +warnings
     where_thinned(  # scan, reader
@@ -75,8 +75,8 @@ ACQUIRE: Route = (
     correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner
     #     -> views, pose, aligned, noise, spacing, tolerance
     correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader -> scan, pose, aligned, corrected_scale
-    adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, samples, tolerance, unit, views, warnings, adapter,
-    #     scan -> adapted, part, aligned, pose, samples, warnings
+    adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, refusal, samples, tolerance, unit, views, warnings,
+    #     adapter, scan -> adapted, part, aligned, pose, samples, warnings
     settle_tolerance,  # tolerance, asked_tolerance, part, aligned, noise -> tolerance, +warnings
     Segment,  # aligned, part, samples, tolerance -> deviation
     check_intact,  # deviation, tolerance, part, segmenter ->

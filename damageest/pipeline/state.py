@@ -189,8 +189,9 @@ class JobState(State):
     ``accept``, the stages whose options steps read (None where the job's route has none), and ``rules``, ``writers``,
     ``path_writers`` and ``conversions``.
     ``tolerance``: None until it is measured where the job says `auto`. ``depth_step``: of the scan's depth, 0 where it
-    is continuous. ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan,
-    which is ``part`` from then on; None: it is as designed. ``intact`` (K,3): its points on the nominal surface.
+    is continuous. ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a larger.
+    ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan, which is ``part`` from
+    then on; None: it is as designed. ``intact`` (K,3): its points on the nominal surface.
     ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the sites.
     ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written into,
     ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
@@ -220,6 +221,7 @@ class JobState(State):
     depth_step = Value[float]()
     samples = Value[Samples]()
     pose = Value[Pose]()
+    refusal = Value[StageError | None]()
     aligned = Value[Scan]()
     adapted = Value[AdaptedPart | None]()
     deviation = Value[Deviation]()

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 import damageest
 from damageest.artefacts import AdaptedPart, Part
@@ -76,3 +77,18 @@ def test_a_bent_part_is_adapted(tmp_path: Path) -> None:
     assert found.adapted is not None
     assert not found.sites
     assert np.isclose(found.adapted.amount, 1.0, rtol=0.2)
+
+
+def test_a_pose_that_is_refused_since_the_part_is_deformed_is_found(tmp_path: Path) -> None:
+    given, settings = scan([SPHERE], scale=1.0), ["align=register"]
+    with pytest.raises(StageError, match="lies on the part") as refused:
+        damageest.run(JOB, part=PART, scan=given, settings=[*settings, "adapt=none"])
+    found = damageest.run(JOB, part=PART, scan=given, settings=settings)
+    assert found.adapted is not None
+    assert [site.verdict.level for site in found.sites] == ["likely"]
+    assert found.truth is not None
+    rod = trimesh.creation.cylinder(14.0, 40.0)
+    other = Part(rod.vertices, rod.faces)
+    with pytest.raises(StageError) as again:
+        damageest.run(JOB, part=other, scan=given, settings=settings)
+    assert again.value.stage == refused.value.stage == "align"
