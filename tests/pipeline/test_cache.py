@@ -39,6 +39,7 @@ from damageest.artefacts import (
 from damageest.pipeline.cache import Cache, digest
 
 BOX = trimesh.creation.box((3, 2, 1))
+FIELD = DisplacementField(np.zeros(3), np.ones(3), np.arange(4 * 5 * 6 * 3).reshape(4, 5, 6, 3) / 7)
 SOLID = Solid(BOX.vertices + 1 / 3, BOX.faces)
 POINTS = np.random.default_rng(0).normal(size=(7, 3))
 TURN = np.array([[0.0, -1, 0, 1 / 3], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]])
@@ -109,9 +110,11 @@ ARTEFACTS: list[Any] = [
         210,
         0.5,
         ("bent",),
-        field=DisplacementField(np.zeros(3), np.ones(3), np.arange(4 * 5 * 6 * 3).reshape(4, 5, 6, 3) / 7),
+        field=FIELD,
         prior=PriorUse(3, 0.1, 0.3, True),
     ),
+    FIELD,
+    PriorUse(3, 0.1, 0.3, False),
     (0.25, 1e-300),
     None,
 ]
