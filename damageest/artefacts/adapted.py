@@ -61,6 +61,7 @@ class AdaptedPart(Checked):
     notes: tuple[str, ...] = ()
     other: Floats | None = None
     field: DisplacementField | None = None
+    hidden: float = 0.0
     held_out: tuple[float, float] = (0.0, 0.0)
     patches: int = 0
     seen: Floats | None = None
@@ -83,6 +84,7 @@ class AdaptedPart(Checked):
         "growth": (-0.5, 1.0),
         "functions": (0, MOST),
         "gain": (0.0, 1.0),
+        "hidden": (0.0, MOST),
         "held_out": (0.0, MOST),
         "patches": (0, MOST),
         "reach": (0.0, MOST),

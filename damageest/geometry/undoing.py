@@ -76,6 +76,8 @@ def _measure_off(vertices: Floats, moved: Floats, faces: Ints, move: Callable[[F
 def count_crossings(mesh: Mesh) -> int:
     """How many edges of a mesh cross one of its faces that they have no vertex in common with, within 1e-6 of its
     size: none where it does not intersect itself."""
+    if not len(mesh.faces):
+        return 0
     ends = np.sort(np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges = np.unique(ends, axis=0)
     found = RayCaster(mesh).find_crossings(mesh.vertices[edges[:, 0]], mesh.vertices[edges[:, 1]])

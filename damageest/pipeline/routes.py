@@ -120,7 +120,7 @@ CLOSE: Route = (
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     separate_deposits,  # found, tolerance -> found
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
-    sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance -> volume_95
+    sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted -> volume_95
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
     #     coverage, surplus, adapted, fitted, volume_95, conversions
     #     -> result

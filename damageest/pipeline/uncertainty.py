@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Flags, Ints, Part, Pose, Scan, Solid
+from damageest.artefacts import INTACT, AdaptedPart, Deviation, Flags, Ints, Part, Pose, Scan, Solid
 from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
@@ -68,24 +68,25 @@ def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
 @step(gives="volume_95")
 def sum_uncertainty(
     found: tuple[FoundSite, ...], failures: Failures, part: Part, pose: Pose, aligned: Scan, deviation: Deviation,
-    tolerance: float,
+    tolerance: float, adapted: AdaptedPart | None,
 ) -> Interval | None:  # fmt: skip
     """Gives the job the 95 % interval of its total volume.
 
     There is one where each accepted site has one, and no damage was left without a volume. Sites that are not accepted
-    make its high end larger: they may be damage, too. Where no site was found in a scan that could not show one, or in
-    a pose that is doubted, it is not known either.
+    make its high end larger: they may be damage, too, as may what an adapted part's field took for form. Where no site
+    was found in a scan that could not show one, or in a pose that is doubted, it is not known either.
     """
+    hidden = adapted.hidden if adapted else 0.0
     if not found:
         is_unknown = failures or pose.doubts or _may_hide_loss(part, aligned, deviation, tolerance)
-        return None if is_unknown else (0.0, measure_hidden_wear(part, pose))
+        return None if is_unknown else (0.0, measure_hidden_wear(part, pose) + hidden)
     lost = [error for error in failures if error.stage != Allowance.stage]
     taken = [site for site in found if site.accepted]
     errors = [site.error for site in taken if site.error is not None]
     if len(errors) != len(taken) or lost:
         return None
     # collect_result moves it to the volume of the union, which is the same but for overlaps
-    left = sum(_limit_doubtful(site) for site in found if not site.accepted)
+    left = hidden + sum(_limit_doubtful(site) for site in found if not site.accepted)
     total = combine_total(sum(site.damage.volume for site in taken), errors, left)
     is_open = any(site.uncertainty and site.uncertainty.is_open for site in taken)
     return (total[0], math.inf) if is_open else total

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from damageest.artefacts import Samples, Sites
+from damageest.artefacts import DisplacementField, Samples, Sites
 from damageest.geometry import (
     barycentric,
     bodies,
@@ -37,8 +37,10 @@ from damageest.geometry import (
     refinement,
     slivers,
     solids,
+    stiff_modes,
     touching,
     transforms,
+    undoing,
     units,
     vectors,
     views,
@@ -73,6 +75,9 @@ from tests.geometry.few_rows import (
     expect,
     surface,
 )
+
+STILL = DisplacementField(np.zeros(3), np.ones(3), np.zeros((4, 4, 4, 3)))
+"""A field that moves nothing."""
 
 CALLS: dict[str, Callable[[Rows], None]] = {
     "barycentric.find_barycentric": lambda r: expect(
@@ -116,6 +121,10 @@ CALLS: dict[str, Callable[[Rows], None]] = {
         (None,),
     ),
     "depth_steps.measure_depth_step": lambda r: expect(np.asarray(depth_steps.measure_depth_step(r.points)), ()),
+    "stiff_modes.name_modes": lambda r: expect(np.asarray(stiff_modes.name_modes(r.points, r.points)[1]), ()),
+    "undoing.undo": lambda r: expect(undoing.undo(STILL, r.points), (r.count, 3)),
+    "undoing.cut_to_follow": lambda r: expect(undoing.cut_to_follow(r.mesh, np.copy, 1.0)[0], (None, 3)),
+    "undoing.count_crossings": lambda r: expect(np.asarray(undoing.count_crossings(r.mesh)), ()),
     "distance.SurfaceTree": call_tree,
     "distance.closest_on_mesh": call_both(lambda points, mesh: distance.closest_on_mesh(points, mesh).distance),
     "distance.distance_to_mesh": call_both(distance.distance_to_mesh),
@@ -271,8 +280,17 @@ WITHOUT_ROWS: dict[str, str] = {
         "takes single values",
     ),
     **dict.fromkeys(
-        ("distance.Closest", "pieces.JoinedPieces", "pieces.Piece", "rays.Crossings", "views.View"), "is a result"
+        (
+            "distance.Closest", "families.Errors", "families.Family", "pieces.JoinedPieces", "pieces.Piece",
+            "rays.Crossings", "stiff_modes.StiffMode", "views.View",
+        ),
+        "is a result",
     ),
+    **dict.fromkeys(
+        ("families.build_family", "families.find_nearest_motion", "families.leave_one_out", "families.predict"),
+        "takes places that are spread over the skin of a part",
+    ),
+    "families.widen": "takes a number of parts",
 }  # fmt: skip
 """Why a public name takes no number of rows."""
 

@@ -52,8 +52,7 @@ def climb(
 @dataclass(eq=False)
 class _Ladder:
     """The trials so far on points (N,3), each in a ``patch`` (N,) of one of two halves (N,), ``held``, and the one that
-    is ``chosen``. ``grows``: whether the scale is free. ``bent``: the one that was chosen of those that do not strain
-    the metal; freer ones are compared with it as well, since what they follow beyond it may be wear."""
+    is ``chosen``. ``grows``: whether the scale is free."""
 
     points: Floats
     body: Body
@@ -63,7 +62,6 @@ class _Ladder:
     trials: list[Trial] = field(default_factory=list)
     grows: bool = False
     chosen: Trial = field(init=False)
-    bent: Trial = field(init=False)
 
     def climb_stiff(self) -> None:
         """A rigid part, a scaled one, a bent and twisted one."""
@@ -71,23 +69,22 @@ class _Ladder:
         # nothing is strained by a scale, and shrinking leaves no metal outside
         self.chosen = scaled if explains_more(scaled.score.both, rigid.score.both)[0] else rigid
         self.grows = self.chosen is scaled
-        self._take(self._attempt(Freedom(BENT, grows=self.grows)), self.chosen)
+        self._take(self._attempt(Freedom(BENT, grows=self.grows)))
         if self.chosen is self.trials[-1] and not self.grows:
-            self._take(self._attempt(Freedom(BENT)), self.chosen)
+            self._take(self._attempt(Freedom(BENT)))
             self.grows = self.chosen is self.trials[-1]
-        self.bent = self.chosen
 
     def climb_strained(self) -> None:
         """Polynomials that strain the metal, freer ones only where those before leave much."""
         freest = self._try(Freedom(STRAINED[-1], self.grows, stretches=True))
-        if is_better(freest.score, self.bent.score):
+        if is_better(freest.score, self.chosen.score):
             for bound in STRAINED:
-                self._take(self._attempt(Freedom(bound, self.grows)), self.bent)
-            self.chosen = freest if explains_more(freest.score.both, self.chosen.score.both)[0] else self.chosen
+                self._take(self._attempt(Freedom(bound, self.grows)))
+            self.chosen = freest if is_better(freest.score, self.chosen.score) else self.chosen
         self.trials.append(freest)
         if self._leaves_much():  # as a taper of a thin part, which is of wear's kind
-            self._take(self._attempt(Freedom(LOOSEST, self.grows)), self.bent)
-            self._take(self._attempt(Freedom(LOOSEST, self.grows, stretches=True)), self.bent)
+            self._take(self._attempt(Freedom(LOOSEST, self.grows)))
+            self._take(self._attempt(Freedom(LOOSEST, self.grows, stretches=True)))
 
     def climb_lattice(self, cells: int) -> None:
         """A lattice, where the polynomials leave much."""
@@ -100,15 +97,14 @@ class _Ladder:
             if not self._leaves_much():
                 return
             start = self.chosen.field.to_basis(finer.basis, np.concatenate([whole.inside, whole.mesh.vertices]))
-            self._take(self._attempt(replace(freedom, cells=cells), start, scales, finer), self.bent)
+            self._take(self._attempt(replace(freedom, cells=cells), start, scales, finer))
 
     def _leaves_much(self) -> bool:
         return bool(np.median(self.chosen.score.both) > LEFT * self.body.noise**2)
 
-    def _take(self, trial: Trial, base: Trial) -> None:
-        """Chooses a freer field where held-out patches bear it out, also against a stiffer one."""
-        better = explains_more(trial.score.both, self.chosen.score.both)[0]
-        self.chosen = trial if better and is_better(trial.score, base.score) else self.chosen
+    def _take(self, trial: Trial) -> None:
+        """Chooses a freer field where held-out patches bear it out."""
+        self.chosen = trial if is_better(trial.score, self.chosen.score) else self.chosen
 
     def _attempt(
         self, freedom: Freedom, start: Field | None = None, scales: list[float] | None = None, body: Body | None = None

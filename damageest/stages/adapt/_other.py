@@ -13,6 +13,8 @@ from damageest.stages.adapt._field import Field
 
 TOLD = 0.5
 """Depth, in tolerances, from which what another field would do to the skin is told."""
+OPEN = 1.5
+"""What a field leaves in half of the patches, in mean squares of the noise, from which another may be as right."""
 DECIDES = "unworn faces in align.datum, or a second part of its type, would decide"
 
 
@@ -24,16 +26,18 @@ class Thinned(NamedTuple):
     volume: float
 
 
-def find_other(trials: Sequence[Trial], chosen: Trial) -> tuple[Trial | None, bool]:
+def find_other(trials: Sequence[Trial], chosen: Trial, noise: float) -> tuple[Trial | None, bool]:
     """The field that explains the scan better than the chosen one and was not taken, since it follows what is inward;
-    and whether it also explains metal that stands out, though not for certain: then both are possible."""
+    and whether both are possible: it also explains metal that stands out, though not for certain, or the chosen one
+    leaves much."""
     better = [one for one in trials if one is not chosen and explains_more(one.score.both, chosen.score.both)[0]]
     if not better:
         return None, False
     best = min(better, key=lambda one: float(one.score.both.mean()))
     gained = float((chosen.score.both - best.score.both).mean())
     outside = float((chosen.score.outside - best.score.outside).mean())
-    return best, outside > BALANCE * gained
+    leaves_much = bool(np.median(chosen.score.both) > OPEN * noise**2)
+    return best, leaves_much or outside > BALANCE * gained
 
 
 def find_thinned(skin: Mesh, field: Field, other: Field, tolerance: float) -> Thinned:

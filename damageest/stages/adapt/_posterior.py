@@ -31,6 +31,8 @@ BEYOND = 0.004
 some way from the middle of the section."""
 SMALL, FEWEST = 25.0, 4
 """Patches along the part's diagonal by which it is asked what is left, and the least weight of their points."""
+RARE, WIDTH = 0.02, 2.33
+"""Share of patches that are worse than the worst that count, and that of a normal distribution in its deviations."""
 ASKED = 1500
 """Places on the skin by which the largest errors are chosen."""
 
@@ -80,8 +82,8 @@ def find_modes(
 
 
 def measure_left(found: Match, weights: Floats, body: Body) -> float:
-    """How far small patches of intact skin lie off the field, beyond what noise explains (rms): it is not followed
-    there, and may be as far off where the skin is gone, to one side."""
+    """How far the worst small patches of intact skin lie off the field, beyond what noise explains, as a standard
+    deviation: it is not followed there, may be as far off where the skin is gone, and sites are where it is."""
     _, number = number_cubes(found.points, body.mesh.diagonal / SMALL)
     _, patch, _ = group_integers(number)
     total = np.bincount(patch, weights)
@@ -90,7 +92,8 @@ def measure_left(found: Match, weights: Floats, body: Body) -> float:
         return 0.0
     mean = np.bincount(patch, weights * found.distance)[kept] / total[kept]
     by_noise = body.noise**2 * np.bincount(patch, weights**2)[kept] / total[kept] ** 2
-    return float(np.sqrt(max(float(np.average(mean**2 - by_noise, weights=total[kept])), 0.0)))
+    largest = float(np.quantile(mean**2 - WIDTH**2 * by_noise, 1 - RARE))
+    return float(np.sqrt(max(largest, 0.0))) / WIDTH
 
 
 def go_beyond(places: Floats, seen: Floats, spacing: float) -> Floats:

@@ -190,28 +190,33 @@ class Smooth(Adapt):
             prior=start.used if start else None,
             designed=identify_part(part),
         )
-        rival, is_open = find_other(trials, chosen)
+        rival, is_open = find_other(trials, chosen, body.noise)
         other = (rival.field.displace(begin(places)) - field.displace(begin(places))) if rival and is_open else None
         other = None if other is None else other @ turn.T
-        notes = (describe(adapted, tolerance), *_compare(body, trials, chosen, tolerance, part.unit))
+        compared, hidden = _compare(body, trials, chosen, tolerance, part.unit)
+        notes = (describe(adapted, tolerance), *compared)
         if start:
             notes = (*notes, describe_prior(start, tolerance, part.unit))
         if (unknown := measure_unknown(modes, adapted.part.vertex_normals)) > tolerance / 2:
             notes = (*notes, describe_unknown(unknown, tolerance, part.unit))
-        return replace(adapted, notes=notes, other=other)
+        return replace(adapted, notes=notes, other=other, hidden=hidden)
 
 
-def _compare(body: Body, trials: list[Trial], chosen: Trial, tolerance: float, unit: str) -> list[str]:
-    """What is said of skin that another field has elsewhere: loss that may be form, and form that may be loss."""
-    notes = []
-    rival, is_open = find_other(trials, chosen)
+def _compare(
+    body: Body, trials: list[Trial], chosen: Trial, tolerance: float, unit: str
+) -> tuple[list[str], float]:  # fmt: skip
+    """What is said of skin that another field has elsewhere: loss that may be form, and form that may be loss; and the
+    volume of the latter."""
+    notes, hidden = [], 0.0
+    rival, is_open = find_other(trials, chosen, body.noise)
     if rival and (thinned := find_thinned(body.mesh, chosen.field, rival.field, tolerance)).area:
         notes.append(describe_other(thinned, is_open, unit))
     if chosen.freedom.bound > BENT:
         stiff = min((one for one in trials if one.freedom.bound <= BENT), key=lambda one: float(one.score.both.mean()))
         if (thinned := find_thinned(body.mesh, stiff.field, chosen.field, tolerance)).area:
             notes.append(describe_hidden(thinned, unit))
-    return notes
+            hidden = thinned.volume
+    return notes, hidden
 
 
 def average(places: Floats, values: Floats, asked: Floats) -> Floats:

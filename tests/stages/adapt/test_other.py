@@ -26,15 +26,20 @@ def make_trial(both: float, outside: float) -> Trial:
 
 
 @pytest.mark.parametrize(
-    ("both", "outside", "found", "is_open"),
-    [(1.0, 1.0, True, False), (1.0, 0.5, True, True), (3.0, 1.0, False, False)],
-    ids=["only inward", "outward too", "no better"],
+    ("both", "outside", "noise", "found", "is_open"),
+    [
+        (1.0, 1.0, 2.0, True, False),
+        (1.0, 0.5, 2.0, True, True),
+        (3.0, 1.0, 2.0, False, False),
+        (1.0, 1.0, 1.0, True, True),
+    ],
+    ids=["only inward", "outward too", "no better", "the chosen one leaves much"],
 )
-def test_another_field_is_possible_only_where_metal_stands_out(
-    both: float, outside: float, found: bool, is_open: bool
+def test_another_field_is_possible_where_metal_stands_out_or_much_is_left(
+    both: float, outside: float, noise: float, found: bool, is_open: bool
 ) -> None:
     chosen, other = make_trial(3.0, 1.0), make_trial(both, outside)
-    rival, both_fit = find_other([chosen, other], chosen)
+    rival, both_fit = find_other([chosen, other], chosen, noise)
     assert (rival is not None) == found
     assert both_fit == is_open
 
