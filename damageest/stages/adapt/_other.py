@@ -13,7 +13,7 @@ from damageest.stages.adapt._field import Field
 
 TOLD = 0.5
 """Depth, in tolerances, from which what another field would do to the skin is told."""
-OPEN = 1.5
+OPEN = 2.5
 """What a field leaves in half of the patches, in mean squares of the noise, from which another may be as right."""
 DECIDES = "unworn faces in align.datum, or a second part of its type, would decide"
 
