@@ -9,7 +9,13 @@ from __future__ import annotations
 
 from damageest.artefacts.adapted import AdaptedPart, PriorUse
 from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
-from damageest.artefacts.displacement import DisplacementField, fit_displacement, fit_scattered
+from damageest.artefacts.displacement import (
+    DisplacementField,
+    evaluate_splines,
+    fit_displacement,
+    fit_scattered,
+    measure_roughness,
+)
 from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, EvidenceCause, Rims
 from damageest.artefacts.fields import ArtefactError
 from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
@@ -64,7 +70,9 @@ __all__ = [
     "Truth",
     "Unreached",
     "Vector",
+    "evaluate_splines",
     "fit_displacement",
     "fit_scattered",
+    "measure_roughness",
     "open_edges",
 ]

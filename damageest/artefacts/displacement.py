@@ -65,18 +65,31 @@ class DisplacementField(Checked):
 
     def _evaluate(self, places: Floats, axis: int, order: int) -> Floats:
         """(N,n) the functions of one coordinate, or their derivatives."""
-        from scipy.interpolate import BSpline
-
-        count = self.controls.shape[axis]
-        return np.asarray(BSpline(self._knots(axis), np.eye(count), DEGREE, extrapolate=True)(places[:, axis], order))
-
-    def _knots(self, axis: int) -> Floats:
-        spans = self.controls.shape[axis] - DEGREE
-        steps = np.arange(-DEGREE, spans + DEGREE + 1) / spans
-        return np.asarray(self.low[axis] + (self.high[axis] - self.low[axis]) * steps)
+        return evaluate_splines(places[:, axis], self.low[axis], self.high[axis], self.controls.shape[axis], order)
 
     def _sum(self, factors: list[Floats]) -> Floats:
         return np.asarray(np.einsum("ni,nj,nk,ijkc->nc", *factors, self.controls, optimize=True))
+
+
+def evaluate_splines(along: Floats, low: float, high: float, count: int, order: int) -> Floats:
+    """(N,count) the uniform cubic B-splines of a row of cells from ``low`` to ``high`` at coordinates (N,), or their
+    derivatives of an ``order``."""
+    from scipy.interpolate import BSpline
+
+    spans = count - DEGREE
+    knots = low + (high - low) * np.arange(-DEGREE, spans + DEGREE + 1) / spans
+    return np.asarray(BSpline(knots, np.eye(count), DEGREE, extrapolate=True)(along, order))
+
+
+def measure_roughness(shape: tuple[int, ...]) -> Floats:
+    """(M,M) the sum of the squared third differences of the coefficients of a lattice with so many along each axis."""
+    total = np.zeros((int(np.prod(shape)),) * 2)
+    for axis, count in enumerate(shape):
+        differences = np.diff(np.eye(count), n=DEGREE, axis=0)
+        squares = [np.eye(each) for each in shape]
+        squares[axis] = differences.T @ differences
+        total += np.kron(np.kron(squares[0], squares[1]), squares[2])
+    return total
 
 
 def fit_displacement(
@@ -107,11 +120,6 @@ def fit_scattered(
     field = DisplacementField(low, high, np.zeros((*shape, 3)))
     factors = [field._evaluate(places, axis, 0) for axis in range(3)]
     columns = np.einsum("ni,nj,nk->nijk", *factors).reshape(len(places), -1)
-    rough = 1e-6 * np.eye(columns.shape[1])
-    for axis in range(3):
-        squares = [np.eye(count) for count in shape]
-        differences = np.diff(np.eye(shape[axis]), n=DEGREE, axis=0)
-        squares[axis] = differences.T @ differences
-        rough += np.kron(np.kron(squares[0], squares[1]), squares[2])
+    rough = measure_roughness(shape) + 1e-6 * np.eye(columns.shape[1])
     found = np.linalg.solve(columns.T @ columns + smooth * len(places) * rough, columns.T @ displacement)
     return DisplacementField(low, high, found.reshape(*shape, 3))

@@ -171,10 +171,15 @@ def measure_adapt(
     fields = adapted.modes if adapted.other is None else np.concatenate([adapted.modes, adapted.other[None]])
     centres = np.concatenate([damage.triangles[skin].mean(axis=1), deepest.at[None]])
     normals = np.concatenate([damage.face_normals[skin], deepest.normal[None]])
-    _, face, place = closest_on_mesh(centres, adapted.part)
-    weights = find_barycentric(adapted.part.triangles[face], place)
-    moved = np.einsum("nc,jnck,nk->jn", weights, fields[:, adapted.part.faces[face]], normals)
+    moved = measure_shifts(adapted.part, fields, centres, normals)
     return np.asarray(moved[:, :-1] @ area[skin]), float(np.linalg.norm(moved[: len(adapted.modes), -1]))
+
+
+def measure_shifts(part: Part, fields: Floats, places: Floats, normals: Floats) -> Floats:
+    """How far displacements (J,V,3) of the part's vertices move its skin (J,N) at places (N,3), along normals (N,3)."""
+    _, face, at = closest_on_mesh(places, part)
+    corners = find_barycentric(part.triangles[face], at)
+    return np.asarray(np.einsum("nc,jnck,nk->jn", corners, fields[:, part.faces[face]], normals))
 
 
 def combine_site(error: SiteError) -> tuple[Interval, Interval]:

@@ -55,11 +55,10 @@ def _average(folders: list[Path], output: Path) -> int:
 def _deform(part: Part, mean: MeasuredForm) -> Part:
     from dataclasses import replace
 
-    from damageest.geometry.refinement import cut_into_cells
+    from damageest.geometry.refinement import cut_part
 
-    fine, origin = cut_into_cells(part, part.diagonal / FINE)
-    brep = None if part.faces_brep is None else part.faces_brep[origin]
-    return replace(part, vertices=mean.field.move(fine.vertices), faces=fine.faces, faces_brep=brep, cad_scale=0.0)
+    fine = cut_part(part, part.diagonal / FINE)
+    return replace(fine, vertices=mean.field.move(fine.vertices), cad_scale=0.0)
 
 
 def _read_part(folder: Path) -> Part:

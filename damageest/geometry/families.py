@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest.geometry.transforms import make_motions, move_points
+from damageest.geometry.transforms import find_nearest_motion, make_motions, move_points
 
 ROUNDS = 6
 """Rounds in which parts are placed on the mean and filled where they were not seen."""
@@ -59,7 +59,7 @@ def build_family(places: Floats, moved: Floats, seen: Flags, error: float) -> Fa
     modes = np.empty((0, *mean.shape))
     for _ in range(ROUNDS):
         for k in range(len(current)):
-            T = find_nearest_motion(current[k], mean, known[k])
+            T = find_nearest_motion(current[k], mean, known[k].astype(float))
             current[k] = move_points(current[k], T)
             if not known[k].all():
                 filled, _ = predict(mean, modes, current[k], known[k], error)
@@ -67,17 +67,6 @@ def build_family(places: Floats, moved: Floats, seen: Flags, error: float) -> Fa
         mean = np.asarray(current.mean(axis=0))
         modes = _find_modes(current, mean, places, error)
     return Family(places, current, seen, mean, modes, error)
-
-
-def find_nearest_motion(before: Floats, after: Floats, used: Flags) -> Floats:
-    """The rigid motion (4,4) that takes places (N,3) nearest to others, over those that are used (Kabsch 1976)."""
-    from scipy.spatial.transform import Rotation
-
-    one, two = before[used].mean(axis=0), after[used].mean(axis=0)
-    turn = Rotation.align_vectors(after[used] - two, before[used] - one)[0].as_matrix()
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = turn, two - turn @ one
-    return T
 
 
 def predict(

@@ -5,9 +5,11 @@ Mesh, points and edge lengths are in one unit, mesh and points in one frame.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Mesh
+from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.duplicates import find_members
 from damageest.isolation.memory import require_memory
@@ -80,6 +82,13 @@ def cut_into_cells(mesh: Mesh, edge: float, area: float = 0.0) -> tuple[Mesh, In
         vertices, faces, parent = bisect_faces(vertices, faces, np.flatnonzero(long))
         origin = origin[parent]
     return Mesh(vertices, faces), origin
+
+
+def cut_part(part: Part, edge: float) -> Part:
+    """The part with no edge longer than ``edge``, as `cut_into_cells` cuts it; its triangles keep their CAD faces."""
+    mesh, origin = cut_into_cells(part, edge)
+    brep = None if part.faces_brep is None else part.faces_brep[origin]
+    return replace(part, vertices=mesh.vertices, faces=mesh.faces, faces_brep=brep)
 
 
 def bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, Ints]:

@@ -49,6 +49,18 @@ def make_motions(twist: Floats) -> Floats:
     return T
 
 
+def find_nearest_motion(before: Floats, after: Floats, weights: Floats | None = None) -> Floats:
+    """The rigid motion (4,4) that takes places (N,3) nearest to others (N,3), by least squares with weights (N,), all
+    alike where there are none (Kabsch 1976). N is 3 or more."""
+    from scipy.spatial.transform import Rotation
+
+    one, two = np.average(before, axis=0, weights=weights), np.average(after, axis=0, weights=weights)
+    T = np.eye(4)
+    T[:3, :3] = Rotation.align_vectors(after - two, before - one, weights)[0].as_matrix()
+    T[:3, 3] = two - T[:3, :3] @ one
+    return T
+
+
 def move_mesh(mesh: M, T: Floats | None) -> M:
     """The mesh, of the same class, with its vertices mapped by a rigid ``T`` (4,4); the same mesh where T is None.
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from damageest.artefacts import ArtefactError, DisplacementField, Floats, Part, Scan, fit_scattered
 from damageest.errors import InputError
-from damageest.geometry.families import Family, build_family, find_nearest_motion
+from damageest.geometry.families import Family, build_family
 from damageest.geometry.sampling import sample_by_area
-from damageest.geometry.transforms import move_points
+from damageest.geometry.transforms import find_nearest_motion, move_points
 from damageest.io.digests import digest
 from damageest.io.files import check_file, file_sha256
 
@@ -177,7 +177,7 @@ def average_forms(forms: Sequence[MeasuredForm], part: Part) -> tuple[MeasuredFo
     centre = part.bounds.mean(axis=0)
     seen = family.count > 0
     used = seen if seen.any() else ~seen
-    mean = move_points(family.mean, find_nearest_motion(family.mean, family.places, used))
+    mean = move_points(family.mean, find_nearest_motion(family.mean, family.places, used.astype(float)))
     cells = np.max([form.field.cells for form in forms], axis=0).tolist()
     low, high = part.bounds
     field = fit_scattered(family.places + centre, mean - family.places, low, high, cells, SMOOTH)

@@ -21,11 +21,10 @@ from damageest.checks.uncertainty import (
     combine_site,
     combine_total,
     limit_beside,
+    measure_shifts,
     measure_site_error,
 )
 from damageest.findings import Fading, Interval, Uncertainty
-from damageest.geometry.barycentric import find_barycentric
-from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.form import measure_at_site
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
@@ -172,9 +171,7 @@ def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> tuple
     intact = state.aligned.points[state.deviation.label == INTACT]
     places, normals = damage.triangles[~inner].mean(axis=1), damage.face_normals[~inner]
     far = float(np.max(cKDTree(intact).query(places)[0])) if len(intact) else 0.0
-    _, face, at = closest_on_mesh(places, adapted.part)
-    corners = find_barycentric(adapted.part.triangles[face], at)
-    moved = np.einsum("nc,jnck,nk->jn", corners, adapted.modes[:, adapted.part.faces[face]], normals)
+    moved = measure_shifts(adapted.part, adapted.modes, places, normals)
     return far, float(np.sqrt((moved**2).sum(axis=0)).max(initial=0.0))
 
 

@@ -203,6 +203,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "refinement.refine_at": call_refine_at,
     "refinement.halve_edges": lambda r: expect(refinement.halve_edges(r.mesh, 5.0).faces, (None, 3)),
     "refinement.cut_into_cells": lambda r: expect(refinement.cut_into_cells(r.mesh, 5.0)[1], (None,)),
+    "refinement.cut_part": lambda r: expect(refinement.cut_part(PART, 5.0 + r.count).faces, (None, 3)),
     "refinement.bisect_faces": lambda r: expect(
         refinement.bisect_faces(r.mesh.vertices, r.mesh.faces, np.arange(len(r.mesh.faces))),
         (None, 3),
@@ -287,7 +288,7 @@ WITHOUT_ROWS: dict[str, str] = {
         "is a result",
     ),
     **dict.fromkeys(
-        ("families.build_family", "families.find_nearest_motion", "families.leave_one_out", "families.predict"),
+        ("families.build_family", "families.leave_one_out", "families.predict", "transforms.find_nearest_motion"),
         "takes places that are spread over the skin of a part",
     ),
     "families.widen": "takes a number of parts",

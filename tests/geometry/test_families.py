@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Floats
-from damageest.geometry.families import build_family, find_nearest_motion, leave_one_out, predict, widen
-from damageest.geometry.transforms import make_motions, move_points
+from damageest.geometry.families import build_family, leave_one_out, predict, widen
+from damageest.geometry.transforms import find_nearest_motion, make_motions, move_points
 
 RNG = np.random.default_rng(0)
 PLACES = RNG.uniform(-1, 1, (400, 3)) * (20, 10, 5)
@@ -90,4 +90,4 @@ def test_one_part_says_how_a_part_may_be_deformed() -> None:
 
 def test_the_nearest_motion() -> None:
     T = make_motions(np.array([[0.1, -0.2, 0.3, 1.0, 2.0, 3.0]]))[0]
-    assert np.allclose(find_nearest_motion(PLACES, move_points(PLACES, T), PLACES[:, 0] < 3), T)
+    assert np.allclose(find_nearest_motion(PLACES, move_points(PLACES, T), (PLACES[:, 0] < 3).astype(float)), T)

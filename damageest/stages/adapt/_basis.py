@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints
+from damageest.artefacts import Floats, Ints, evaluate_splines, measure_roughness
 
 DEGREE = 3
 
@@ -76,13 +76,7 @@ class Basis:
         """(M,M) the sum of the squared third differences of a lattice; 0 for a polynomial."""
         if not self.cells:
             return np.zeros((self.count, self.count))
-        total = np.zeros((self.count, self.count))
-        for axis, n in enumerate(self.shape):
-            differences = np.diff(np.eye(n), n=DEGREE, axis=0)
-            squares = [np.eye(m) for m in self.shape]
-            squares[axis] = differences.T @ differences
-            total += np.kron(np.kron(squares[0], squares[1]), squares[2])
-        return total
+        return measure_roughness(self.shape)
 
     def _along(self, places: Floats, axis: int, order: int) -> Floats:
         """(N,n) the functions of one coordinate, or their derivatives, in scaled coordinates."""
@@ -94,12 +88,8 @@ class Basis:
                 factor = float(np.prod(np.arange(power, power - order, -1))) if order else 1.0
                 columns[power] = factor * q ** (power - order)
             return np.stack(columns, axis=1)
-        from scipy.interpolate import BSpline
-
-        spans = n - DEGREE
         half = max(float(self.half[axis]), 1e-9)
-        knots = half * (2 * np.arange(-DEGREE, spans + DEGREE + 1) / spans - 1)
-        return np.asarray(BSpline(knots, np.eye(n), DEGREE, extrapolate=True)(q, nu=order))
+        return evaluate_splines(q, -half, half, n, order)
 
     def _multiply(self, factors: list[Floats]) -> Floats:
         """(N,M) the products of one function an axis that are used."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import ArtefactError, Floats, Part
 from damageest.errors import StageError
-from damageest.geometry.refinement import cut_into_cells
+from damageest.geometry.refinement import cut_part
 from damageest.stages.adapt._field import Field
 
 FOLLOWS = 0.1
@@ -21,27 +21,12 @@ part has no self-intersection that the part as designed does not have."""
 REMEDY = "adapt: none; or crop what is not the part from the scan"
 
 
-def find_motion(places: Floats, moved: Floats, weights: Floats) -> Floats:
-    """The rigid motion (4,4) nearest to that of places (N,3), by weighted least squares (Kabsch 1976)."""
-    share = weights / weights.sum()
-    before, after = share @ places, share @ moved
-    u, _, v = np.linalg.svd((moved - after).T @ ((places - before) * share[:, None]))
-    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = turn, after - turn @ before
-    return T
-
-
 def refine(part: Part, centre: Floats, tolerance: float, *fields: Field) -> tuple[Part, float]:
     """The part as designed with triangles that follow the fields, one after the other, and by how much they may not."""
     sharp = sum(bound_curvature(field, part.vertices - centre) for field in fields)
     edge = float(np.sqrt(8 * FOLLOWS * tolerance / max(sharp, 1e-300)))
     edge = max(edge, part.diagonal / FINEST)
-    mesh, origin = cut_into_cells(part, edge)
-    brep = None if part.faces_brep is None else part.faces_brep[origin]
-    return replace(part, vertices=mesh.vertices, faces=mesh.faces, faces_brep=brep), min(
-        edge, part.diagonal
-    ) ** 2 * sharp / 8
+    return cut_part(part, edge), min(edge, part.diagonal) ** 2 * sharp / 8
 
 
 def bound_curvature(field: Field, places: Floats) -> float:

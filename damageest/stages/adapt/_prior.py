@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Part, PriorUse, Scan
+from damageest.artefacts import Flags, Floats, Part, PriorUse, Scan, fit_scattered
 from damageest.errors import StageError
 from damageest.geometry.families import Errors, Family, leave_one_out, widen
 from damageest.geometry.transforms import make_motions, move_points
-from damageest.io.forms import PLACES, MeasuredForm, gather_family, read_form, require_type
+from damageest.io.forms import PLACES, SMALL, SMOOTH, MeasuredForm, gather_family, read_form, require_type
 from damageest.stages.adapt._basis import Basis
 from damageest.stages.adapt._choose import cut_patches
 from damageest.stages.adapt._field import Body, Field, match, weigh
@@ -20,8 +20,6 @@ from damageest.stages.adapt._posterior import BEYOND, find_spacing, go_beyond
 
 FEW = 3
 """Parts that have to show a place, for their spread to say how well it is known."""
-SMALL = 0.05
-"""Difference between parts that does not matter, in tolerances."""
 STRANGE = 0.3
 """What a part may have left on seen skin, in tolerances, and still be of the type, however alike the others are."""
 OUTSIDE = 3.0
@@ -34,8 +32,6 @@ KEPT = 40
 """Independent errors that are kept of many parts."""
 CELLS = 4
 """Cells, along the longest edge of the box, of the lattice that holds the form of the type, at least."""
-SMOOTH = 1e-6
-"""Weight of the third differences of a lattice that is fitted to places on skin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,9 +162,10 @@ def _find_distance(places: Floats, seen: Floats) -> Floats:
 
 def _fit_lattice(displacement: Floats, places: Floats, basis: Basis) -> Field:
     """The field that has this displacement (N,3) at places (N,3) on the skin, and goes on smoothly."""
-    columns = basis.evaluate(places)
-    square = columns.T @ columns + SMOOTH * len(places) * (basis.roughness + 1e-6 * np.eye(basis.count))
-    return Field(basis, np.asarray(np.linalg.solve(square, columns.T @ displacement)))
+    half = basis.half * basis.size
+    cells = basis.shape_of_cells
+    field = fit_scattered(places, displacement, basis.centre - half, basis.centre + half, cells, SMOOTH)
+    return Field(basis, field.controls.reshape(-1, 3))
 
 
 def _place(

@@ -11,7 +11,7 @@ from pydantic import Field as Option
 
 from damageest.artefacts import AdaptedPart, Floats, Mesh, Part, Scan, fit_displacement
 from damageest.errors import InputError, StageError
-from damageest.geometry.transforms import move_points
+from damageest.geometry.transforms import find_nearest_motion, move_points
 from damageest.io.forms import identify_part
 from damageest.stages import JobPaths
 from damageest.stages.adapt import Adapt
@@ -19,7 +19,7 @@ from damageest.stages.adapt._body import prepare, thin
 from damageest.stages.adapt._choose import SHARE, Score, Trial
 from damageest.stages.adapt._climb import BENT, RIGID, WIDEST, choose_scales, climb, score
 from damageest.stages.adapt._field import Body, Field, fit, match, weigh
-from damageest.stages.adapt._mesh import deform_part, find_motion, refine, require_injective
+from damageest.stages.adapt._mesh import deform_part, refine, require_injective
 from damageest.stages.adapt._other import (
     describe_hidden,
     describe_other,
@@ -124,7 +124,7 @@ class Smooth(Adapt):
         found = match(field, points, body)
         weights = weigh(found, tolerance, body.noise) * (np.abs(found.distance) < 2 * tolerance)
         seen = start.field.undo(found.material) if start else found.material
-        motion = find_motion(seen, field.move(found.material), weights)
+        motion = find_nearest_motion(seen, field.move(found.material), weights)
         turn = motion[:3, :3].T
 
         def begin(at: Floats) -> Floats:
@@ -140,18 +140,19 @@ class Smooth(Adapt):
             require_injective(start.field, np.eye(3), first, float(np.linalg.norm(skin - first, axis=1).max()))
         fine, error = refine(part, centre, tolerance, *([start.field] if start else []), field)
         places = fine.vertices - centre
-        moved = undo(field.move(begin(places)))
+        begun = begin(places)
+        moved = undo(field.move(begun))
         intact = weights > 0
         beyond, shown = None, points
         if start:
             at = seen[np.abs(found.distance) < tolerance]
-            own = None if chosen.freedom == RIGID else field.displace(begin(places))
+            own = None if chosen.freedom == RIGID else field.displace(begun)
             left = average(found.material[intact], found.distance[intact], found.material[intact][::8])
-            off = float(np.sqrt((left**2).mean())) * Mesh(begin(places), fine.faces).vertex_normals
+            off = float(np.sqrt((left**2).mean())) * Mesh(begun, fine.faces).vertex_normals
             beyond = start.go_beyond(places, at, find_spacing(body, points), own, off)
             # how far the others miss an end is in `beyond`: the field that is fitted beside is held there
             shown = np.concatenate([points, start.find_held(len(points))])
-        modes = find_modes(chosen, trials, shown, body, Mesh(begin(places), fine.faces), tolerance, beyond) @ turn.T
+        modes = find_modes(chosen, trials, shown, body, Mesh(begun, fine.faces), tolerance, beyond) @ turn.T
         back = np.eye(4)
         back[:3, :3] = turn
         back[:3, 3] = centre - turn @ (centre + motion[:3, 3])
@@ -186,14 +187,13 @@ class Smooth(Adapt):
             patches=len(after.both),
             seen=seen[told] + centre,
             left=average(found.material[intact], found.distance[intact], found.material[told]),
-            reach=find_spacing(body, points[: max(SEEN, 1)]),
+            reach=find_spacing(body, points[:SEEN]),
             prior=start.used if start else None,
             designed=identify_part(part),
         )
         rival, is_open = find_other(trials, chosen, body.noise)
-        other = (rival.field.displace(begin(places)) - field.displace(begin(places))) if rival and is_open else None
-        other = None if other is None else other @ turn.T
-        compared, hidden = _compare(body, trials, chosen, tolerance, part.unit)
+        other = (rival.field.displace(begun) - field.displace(begun)) @ turn.T if rival and is_open else None
+        compared, hidden = _compare(body, trials, chosen, rival, is_open, tolerance, part.unit)
         notes = (describe(adapted, tolerance), *compared)
         if start:
             notes = (*notes, describe_prior(start, tolerance, part.unit))
@@ -203,12 +203,11 @@ class Smooth(Adapt):
 
 
 def _compare(
-    body: Body, trials: list[Trial], chosen: Trial, tolerance: float, unit: str
+    body: Body, trials: list[Trial], chosen: Trial, rival: Trial | None, is_open: bool, tolerance: float, unit: str
 ) -> tuple[list[str], float]:  # fmt: skip
     """What is said of skin that another field has elsewhere: loss that may be form, and form that may be loss; and the
     volume of the latter."""
     notes, hidden = [], 0.0
-    rival, is_open = find_other(trials, chosen, body.noise)
     if rival and (thinned := find_thinned(body.mesh, chosen.field, rival.field, tolerance)).area:
         notes.append(describe_other(thinned, is_open, unit))
     if chosen.freedom.bound > BENT:

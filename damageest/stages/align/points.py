@@ -10,7 +10,7 @@ from pydantic import Field as Option
 
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
-from damageest.geometry.transforms import move_points
+from damageest.geometry.transforms import find_nearest_motion, move_points
 from damageest.stages.align import Align
 from damageest.stages.align._datum import NO_DATUM, Datum
 
@@ -68,13 +68,7 @@ class Points(Align):
 def fit_pairs(pairs: Floats) -> tuple[Floats, Floats]:
     """The rigid pose (4,4) that takes the first points of pairs (N,2,3) closest to the second ones (Kabsch 1976), and
     the distance (N,) that each pair keeps."""
-    from scipy.spatial.transform import Rotation
-
-    middle = pairs.mean(axis=0)
-    centred = pairs - middle
-    T = np.eye(4)
-    T[:3, :3] = Rotation.align_vectors(centred[:, 1], centred[:, 0])[0].as_matrix()
-    T[:3, 3] = middle[1] - T[:3, :3] @ middle[0]
+    T = find_nearest_motion(pairs[:, 0], pairs[:, 1])
     return T, np.linalg.norm(move_points(pairs[:, 0], T) - pairs[:, 1], axis=1)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh
-from damageest.geometry.refinement import cut_into_cells
+from damageest.geometry.refinement import cut_part
 
 ROUNDS = 20
 FINE = 40.0
@@ -28,7 +28,7 @@ def fit_plainly(part: Part, points: Floats) -> Part:
         q = (places - centre) / size
         return np.asarray(np.prod(q[:, None, :] ** powers, axis=2))
 
-    mesh, origin = cut_into_cells(part, part.diagonal / FINE)
+    mesh = cut_part(part, part.diagonal / FINE)
     used, moved = points[:: max(1, len(points) // USED)], mesh.vertices
     for _ in range(ROUNDS):
         now = Mesh(moved, mesh.faces)
@@ -39,5 +39,4 @@ def fit_plainly(part: Part, points: Floats) -> Part:
         target = np.einsum("ij,ij->i", normal, used - at)
         found = np.linalg.lstsq(rows, target, rcond=1e-8)[0]
         moved = mesh.vertices + evaluate(mesh.vertices) @ found.reshape(-1, 3)
-    brep = None if part.faces_brep is None else part.faces_brep[origin]
-    return replace(part, vertices=moved, faces=mesh.faces, faces_brep=brep, cad_scale=0.0)
+    return replace(mesh, vertices=moved, cad_scale=0.0)

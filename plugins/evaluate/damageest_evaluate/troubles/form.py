@@ -10,28 +10,13 @@ from damageest.artefacts import Floats, Mesh, Solid
 from damageest.stages.scan.deformation import Deformation, deform
 from damageest_evaluate.troubles.scanner import make_wavy
 from damageest_evaluate.troubles.scene import Scanning, TroubleScene
+from damageest_evaluate.troubles.shape import scale_scan, scale_scene
 from damageest_evaluate.troubles.ways import Trouble, TroubleWay
 
 
-def scale_part(case: Scanning) -> TroubleScene:
-    """The scan of an undamaged part is ``amount`` times as large as it should be."""
-    return _scale(case, case.part, None)
-
-
 def scale_damaged(case: Scanning) -> TroubleScene:
-    """As `scale_part`, with a chip."""
-    return _scale(case, *case.damage("chip"))
-
-
-def _scale(case: Scanning, left: Mesh, damage: Solid | None) -> TroubleScene:
-    scene = case.scan(left, damage)
-    centre = case.part.bounds.mean(axis=0)
-    scanners = None if scene.scanners is None else centre + case.amount * (scene.scanners - centre)
-
-    def deform(at: Floats) -> Floats:
-        return np.asarray(centre + case.amount * (at - centre))
-
-    return replace(scene, points=deform(scene.points), scanners=scanners, deform=deform)
+    """As `scale_scan`, with a chip."""
+    return scale_scene(case, *case.damage("chip"))
 
 
 def bend(case: Scanning) -> TroubleScene:
@@ -83,7 +68,7 @@ def misplace_and_dent(case: Scanning) -> TroubleScene:
 
 FORM_TROUBLES: dict[str, Trouble] = {
     "form: scaled": Trouble(
-        scale_part,
+        scale_scan,
         (
             TroubleWay("plate", "unknown", 8, amount=0.998),
             TroubleWay("coupling", "known", 0, False, 1.002),

@@ -7,19 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh
+from damageest.artefacts import Floats, Mesh, Solid
 from damageest_evaluate.troubles.scene import Scanning, TroubleScene
 
 
 def scale_scan(case: Scanning) -> TroubleScene:
     """The scan of an undamaged part is ``amount`` times as large as it should be."""
-    scene = case.scan(case.part, None)
+    return scale_scene(case, case.part, None)
+
+
+def scale_scene(case: Scanning, left: Mesh, damage: Solid | None) -> TroubleScene:
+    """The scan of what is ``left`` of a part is ``amount`` times as large as it should be."""
+    scene = case.scan(left, damage)
     centre = case.part.bounds.mean(axis=0)
-    scanners = None if scene.scanners is None else centre + case.amount * (scene.scanners - centre)
 
     def deform(at: Floats) -> Floats:
         return np.asarray(centre + case.amount * (at - centre))
 
+    scanners = None if scene.scanners is None else deform(scene.scanners)
     return replace(scene, points=deform(scene.points), scanners=scanners, deform=deform)
 
 
