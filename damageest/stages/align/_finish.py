@@ -11,6 +11,7 @@ from damageest.errors import StageError
 from damageest.geometry.transforms import make_motions
 from damageest.stages.align._check_worn import MOST_OUTSIDE, measure_outside, measure_wear
 from damageest.stages.align._datum import DatumSkin
+from damageest.stages.align._explain import explain
 from damageest.stages.align._fine import Fit
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._free import MIN_MOVED as APART
@@ -20,8 +21,9 @@ from damageest.stages.align._patches import Patches, measure_patches
 from damageest.stages.align._words import describe_open, to_free_motion
 
 FORM_ERRORS = (0.03, 0.06, 0.12, 0.25)
-"""Standard deviations, in tolerances, that errors of form and scanner give the mean of a patch; the first one that
-explains the scan is taken."""
+"""Standard deviations, in tolerances, that errors of form and scanner give the mean of a patch."""
+LARGE = (0.35, 0.5)
+"""The same where nothing can be said of wear any more."""
 MIN_MOVED = 0.1
 """Movement of the skin, in tolerances, below which the pose stays as the robust fit found it."""
 MOST_MOVED = 0.98
@@ -128,17 +130,28 @@ def _describe(frame: Frame, fitted: Fit, found: _Found, tolerance: float, unit: 
 
 
 def _search(patches: Patches, datum: Flags | None, noise: float, tolerance: float, rng: np.random.Generator) -> _Found:
-    """Searches with the smallest errors of form with which nothing lies outside."""
+    """Searches with errors of form of several sizes. Of those with which nothing lies outside, the one counts that
+    explains the patches best: wear and large errors both leave skin inside, but errors leave as much outside."""
     weighted = patches
     if datum is not None:
         weighted = replace(patches, weight=np.where(datum, patches.weight, patches.weight / DATUM_WEIGHT))
+    here = [explain(patches, patches.offset, error * tolerance, noise, tolerance) for error in (*FORM_ERRORS, *LARGE)]
+    found: list[tuple[float, _Found]] = []
     for error in FORM_ERRORS:
         band = measure_bands(patches, noise, error * tolerance)
-        found = search_motions(weighted, band, APART * tolerance, rng)
-        offset = patches.move(found.motions[:1])[0]
+        searched = search_motions(weighted, band, APART * tolerance, rng)
+        offset = patches.move(searched.motions[:1])[0]
         outside = measure_outside(patches, offset, band, tolerance)
         contact = float(patches.weight[np.abs(offset) < band].sum() / patches.weight.sum())
         explains = outside < MOST_OUTSIDE and contact > MIN_CONTACT
-        if explains or datum is not None:
-            break
-    return _Found(patches, band, found.motions, float(found.score[0]) - found.start, explains)
+        one = _Found(patches, band, searched.motions, float(searched.score[0]) - searched.start, explains)
+        found.append((explain(patches, offset, error * tolerance, noise, tolerance), one))
+        if datum is not None:
+            return one
+    best = max(range(len(found)), key=lambda k: (found[k][1].explains, found[k][0]))
+    if max(here) < found[best][0]:
+        return found[best][1]
+    size = int(np.argmax(here))
+    if size >= len(FORM_ERRORS):
+        return replace(found[-1][1], explains=False)
+    return replace(found[size][1], gain=0.0)
