@@ -224,3 +224,34 @@ class Uncertainty:
     def is_open(self) -> bool:
         """Whether nothing that was seen limits how large the loss may be."""
         return self.volume_95 is not None and math.isinf(self.volume_95[1])
+
+
+@dataclass(frozen=True)
+class NoiseLevel:
+    """The ``noise`` of points whose ``of`` (`incidence` in degrees, or `distance` from the scanner) lies between
+    ``low`` and ``high``."""
+
+    of: Literal["incidence", "distance"]
+    low: float
+    high: float
+    noise: float
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """The errors of the sensor on intact skin, in the job's unit.
+
+    ``noise``: standard deviation of single points; ``correlated``: of errors that neighbouring points share, over a
+    region of ``alike`` across. ``depth_step``: 0 where the depth is continuous. ``stray``: share of the points that lie
+    off the skin and belong to no site and no surplus. A loss that is shallower than ``least_depth`` or narrower than
+    ``least_width`` cannot be seen. ``levels``: noise by incidence and by distance, where scanner positions are known.
+    """
+
+    noise: float
+    correlated: float
+    alike: float
+    depth_step: float
+    stray: float
+    least_depth: float
+    least_width: float
+    levels: tuple[NoiseLevel, ...] = ()

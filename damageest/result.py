@@ -25,7 +25,7 @@ from damageest.artefacts import (
     Surface,
 )
 from damageest.errors import InputError
-from damageest.findings import Coverage, Fading, Interval, ModelFit, Surplus, Uncertainty, Verdict
+from damageest.findings import Coverage, Fading, Interval, ModelFit, Sensor, Surplus, Uncertainty, Verdict
 from damageest.geometry.transforms import invert_pose
 from damageest.io.conversions import as_manifold, as_trimesh
 
@@ -148,6 +148,7 @@ class Result:
     surplus: tuple[Surplus, ...] = ()
     fit: ModelFit | None = None
     adapted: AdaptedPart | None = None
+    sensor: Sensor | None = None
     volume_95: Interval | None = None
     conversions: Mapping[str, Conversion] = field(default_factory=dict, repr=False)
 

@@ -19,7 +19,7 @@ LEAST_TOLERANCE = 1e-6
 AUTO_STEPS = 1.5
 """Least lambda over the step of the scan's depth where the job says auto; a point is off by up to half a step."""
 
-RAISE = 1.5
+RAISE = 1.12
 """How many times larger the tolerance has to become before auto raises it after the alignment."""
 
 NEAR_PART = 0.03

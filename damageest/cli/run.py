@@ -19,7 +19,7 @@ from damageest.isolation.limits import STAGE_SECONDS, Limits, limit_this_process
 from damageest.isolation.notes import note_job
 
 if TYPE_CHECKING:
-    from damageest.findings import Surplus
+    from damageest.findings import Sensor, Surplus
     from damageest.result import Result
 
 
@@ -27,6 +27,8 @@ Show = Callable[[str], None]
 """Prints one line."""
 MOST_UNSEEN = 5
 """Unseen regions that are printed; result.json has all."""
+MOST_NOTES = 8
+"""Lines of notes that are printed, those first that change a decision; result.json and report.html have all."""
 MOST_SURPLUS = 3
 """Surpluses that are printed each by itself, largest first; result.json has all."""
 UNSEEN_WHY = {
@@ -160,7 +162,11 @@ def _list_notes(result: Result) -> list[str]:
             verb = "is" if len(one.sites) == 1 else "are"
             notes.append(f"{one.names} {verb} {level}: {one.reason}")
     told = [(site.id, note) for site in result.sites for note in site.warnings]
-    return notes + [f"{one.names}: {one.reason}" for one in join_reasons(told)]
+    notes += [f"{one.names}: {one.reason}" for one in join_reasons(told)]
+    if len(notes) > MOST_NOTES:
+        more = len(notes) - MOST_NOTES + 1
+        notes = [*notes[: MOST_NOTES - 1], f"{more} more notes are in result.json and report.html"]
+    return notes
 
 
 def _on_seen(result: Result) -> str:
@@ -185,6 +191,17 @@ def _print_coverage(result: Result, show: Show) -> None:
         )
     if more := coverage.unseen[MOST_UNSEEN:]:
         show(f"unseen: {len(more)} smaller regions, {sum(one.area for one in more):.4g} {unit}²")
+
+
+def _describe_sensor(sensor: Sensor, unit: str) -> str:
+    """The smallest loss that the scan can show, and why."""
+    why = [f"noise {sensor.noise:.3g}"]
+    if sensor.correlated > sensor.noise / 4:
+        why.append(f"errors of {sensor.correlated:.3g} that regions of about {sensor.alike:.2g} share")
+    if sensor.depth_step:
+        why.append(f"depth in steps of {sensor.depth_step:.3g}")
+    least = f"{sensor.least_depth:.3g} {unit} or narrower than {sensor.least_width:.2g} {unit}"
+    return f"losses shallower than {least} cannot be seen in this scan ({', '.join(why)})"
 
 
 def _report_failure(error: Exception, source: str, as_json: bool, debug: bool) -> int:
@@ -238,6 +255,8 @@ def _print_table(result: Result, target: Path) -> None:
             most = f"{result.volume_95[1]:.4g} {unit}³"
             show(f"the pose is free: wear of up to {most} over a whole face would not show; see align.datum")
     _print_coverage(result, show)
+    if result.sensor is not None:
+        show(_describe_sensor(result.sensor, unit))
     if result.fit is not None and result.fit.model == "ok":  # otherwise it is among the notes
         show(f"fit: {result.fit.words}")
     for text in _list_surplus(result.surplus, unit):

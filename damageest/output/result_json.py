@@ -33,6 +33,26 @@ class PartReport(JsonModel):
     notes: list[str] = Field(description="what was repaired or converted when the part was read")
 
 
+class NoiseLevelReport(JsonModel):
+    of: Literal["incidence", "distance"] = Field(description="incidence in degrees, or distance from the scanner")
+    low: float
+    high: float
+    noise: float
+
+
+class SensorReport(JsonModel):
+    """The errors of the sensor, measured on intact skin."""
+
+    noise: float = Field(description="standard deviation of single points")
+    correlated: float = Field(description="standard deviation of errors that neighbouring points share")
+    alike: float = Field(description="width of the regions that share them")
+    depth_step: float = Field(description="0 where the depth is continuous")
+    stray: float = Field(description="share of the points that lie off the skin and belong to no site and no surplus")
+    least_depth: float = Field(description="shallower losses cannot be seen in this scan")
+    least_width: float = Field(description="narrower losses cannot be seen in this scan")
+    levels: list[NoiseLevelReport] = Field(description="empty where no scanner position is known")
+
+
 class ScanReport(JsonModel):
     paths: list[str]
     points: int
@@ -92,6 +112,7 @@ class Report(JsonModel):
     tolerance: float
     part: PartReport
     scan: ScanReport
+    sensor: SensorReport | None = Field(description="null where nothing was measured")
     alignment: AlignmentReport
     deviation: DeviationReport
     coverage: CoverageReport | None

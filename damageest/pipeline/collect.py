@@ -22,7 +22,7 @@ from damageest.rules.notes import make_notes, rank_notes
     gives="result",
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
-        "warnings", "coverage", "surplus", "adapted", "fitted", "volume_95", "conversions",
+        "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "conversions",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -67,6 +67,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         surplus=state.surplus,
         adapted=state.adapted,
         fit=None if state.fitted is None else state.fitted.fit,
+        sensor=state.sensor,
         conversions=state.conversions,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )

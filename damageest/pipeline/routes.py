@@ -32,6 +32,7 @@ from damageest.pipeline.prepare import (
     take_tolerance,
 )
 from damageest.pipeline.selections import check_selections
+from damageest.pipeline.sensor import fold_hidden, measure_sensor
 from damageest.pipeline.sites import (
     gather_sites,
     number_sites,
@@ -111,18 +112,20 @@ CLOSE: Route = (
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
     gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner -> facts
-    measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, tolerance,
-    #     unit -> found
+    measure_sensor,  # part, aligned, deviation, sites, facts, depth_step, tolerance -> pose_error, noise_map, sensor
+    measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
+    #     noise_map, tolerance, unit -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit
     #     -> found
+    fold_hidden,  # found, sensor, accept, deviation, tolerance, unit -> found, folded, +warnings
     question_fit,  # fitted, surplus, found, pose, aligned, adapted, deviation, skin, unit, tolerance, warnings
     #     -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     separate_deposits,  # found, tolerance -> found
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
-    sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted -> volume_95
+    sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted, folded -> volume_95
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
-    #     coverage, surplus, adapted, fitted, volume_95, conversions
+    #     coverage, surplus, adapted, fitted, sensor, volume_95, conversions
     #     -> result
 )
 WRITE: Route = (

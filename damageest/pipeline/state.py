@@ -37,10 +37,12 @@ from damageest.checks.beyond_points import BeyondPoints
 from damageest.checks.coverage import SkinView
 from damageest.checks.free_pose import Dependence
 from damageest.checks.model_fit import FittedModel
+from damageest.checks.pose_error import PoseError
+from damageest.checks.sensor import NoiseMap
 from damageest.checks.uncertainty import SiteError
 from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
-from damageest.findings import Coverage, Interval, Surplus, Uncertainty, Verdict
+from damageest.findings import Coverage, Interval, Sensor, Surplus, Uncertainty, Verdict
 from damageest.job.model import Accept, SiteChoice
 from damageest.pipeline.cache import digest
 from damageest.result import Conversion, Result
@@ -233,6 +235,10 @@ class JobState(State):
     fitted = Value[FittedModel | None]()
     coverage = Value[Coverage]()
     facts = Value[ScanFacts]()
+    pose_error = Value[PoseError]()
+    noise_map = Value[NoiseMap]()
+    sensor = Value[Sensor]()
+    folded = Value[float]()
     surplus = Value[tuple[Surplus, ...]]()
     volume_95 = Value[Interval | None]()
     enclosures = Value[Enclosures]()

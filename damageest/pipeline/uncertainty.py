@@ -13,7 +13,7 @@ from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
 from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
-from damageest.checks.pose_error import PoseError, measure_pose_error
+from damageest.checks.pose_error import PoseError
 from damageest.checks.scan_quality import describe_few
 from damageest.checks.uncertainty import (
     WIDTH,
@@ -51,6 +51,8 @@ BESIDE = 2.0
         "facts",
         "fitted",
         "pose",
+        "pose_error",
+        "noise_map",
         "tolerance",
         "unit",
     ),
@@ -59,15 +61,14 @@ def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
     """Gives each site the 95 % intervals of its volume and depth, with all causes that have a size."""
     if not state.found:
         return state.found
-    pose = measure_pose_error(state.part, state.aligned, state.deviation, state.tolerance)
     taken = _TakenSkin(state, state.found)
-    return tuple(_measure_site(state, site, taken, pose) for site in state.found)
+    return tuple(_measure_site(state, site, taken, state.pose_error) for site in state.found)
 
 
 @step(gives="volume_95")
 def sum_uncertainty(
     found: tuple[FoundSite, ...], failures: Failures, part: Part, pose: Pose, aligned: Scan, deviation: Deviation,
-    tolerance: float, adapted: AdaptedPart | None,
+    tolerance: float, adapted: AdaptedPart | None, folded: float,
 ) -> Interval | None:  # fmt: skip
     """Gives the job the 95 % interval of its total volume.
 
@@ -75,7 +76,7 @@ def sum_uncertainty(
     make its high end larger: they may be damage, too, as may what an adapted part's field took for form. Where no site
     was found in a scan that could not show one, or in a pose that is doubted, it is not known either.
     """
-    hidden = adapted.hidden if adapted else 0.0
+    hidden = (adapted.hidden if adapted else 0.0) + folded
     if not found:
         is_unknown = failures or pose.doubts or _may_hide_loss(part, aligned, deviation, tolerance)
         return None if is_unknown else (0.0, measure_hidden_wear(part, pose) + hidden)
@@ -115,6 +116,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts, beyond,
         free=state.pose.free, adapted=state.adapted,
         form=measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH,
+        noise=state.noise_map.at(site.damage.bounds, 2 * max(state.tolerance, state.aligned.spacing)),
     )  # fmt: skip
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))

@@ -26,8 +26,9 @@ LOOSEST = 0.1
 NEAR = 0.006
 """Strain of a polynomial from which a lattice starts near it. Waves are no polynomial: the best one may be none, and
 the skin far off."""
-LEFT = 1.15
-"""What a polynomial has to leave in half of the patches for freer fields, in mean squares of the noise."""
+LEFT, SMALL = 1.15, 0.15
+"""What a polynomial has to leave in half of the patches for freer fields: mean squares of the noise, and more by what
+is not small, in tolerances. Errors that regions of a scan share are no form."""
 
 
 def climb(
@@ -36,7 +37,7 @@ def climb(
     """The fields that were tried on half of the points (N,3), and the one that held-out patches bear out, fitted to all
     of them. ``lattice``: cells along the longest edge of the box of the lattices that may be tried."""
     half = points[::2]
-    ladder = _Ladder(half, body, choose_scales(half, body, tolerance), *cut_patches(half, diagonal))
+    ladder = _Ladder(half, body, choose_scales(half, body, tolerance), *cut_patches(half, diagonal), tolerance)
     ladder.climb_stiff()
     ladder.climb_strained()
     for cells in lattice:
@@ -59,6 +60,7 @@ class _Ladder:
     scales: list[float]
     patch: Ints
     held: Flags
+    tolerance: float
     trials: list[Trial] = field(default_factory=list)
     grows: bool = False
     chosen: Trial = field(init=False)
@@ -100,7 +102,8 @@ class _Ladder:
             self._take(self._attempt(replace(freedom, cells=cells), start, scales, finer))
 
     def _leaves_much(self) -> bool:
-        return bool(np.median(self.chosen.score.both) > LEFT * self.body.noise**2)
+        small = LEFT * self.body.noise**2 + (SMALL * self.tolerance) ** 2
+        return bool(np.median(self.chosen.score.both) > small)
 
     def _take(self, trial: Trial) -> None:
         """Chooses a freer field where held-out patches bear it out."""

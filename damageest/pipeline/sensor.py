@@ -1,0 +1,58 @@
+"""Steps about the errors of the sensor: how large they are, and which sites they explain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Part, Reason, Scan, Sites
+from damageest.checks.pose_error import PoseError, measure_pose_error
+from damageest.checks.sensor import NoiseMap, describe_sensor, map_noise
+from damageest.checks.uncertainty import combine_site
+from damageest.findings import Sensor
+from damageest.pipeline.state import FoundSite, JobState, Reasons
+from damageest.pipeline.steps import step
+from damageest.rules import ScanFacts
+
+HIDES = 1.2
+"""How many times larger than the tolerance the least depth that can be seen has to be, for shallower sites that are
+doubtful to be no sites."""
+
+
+@step(gives=("pose_error", "noise_map", "sensor"))
+def measure_sensor(
+    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, facts: ScanFacts, depth_step: float, tolerance: float
+) -> tuple[PoseError, NoiseMap, Sensor]:
+    """Measures noise and systematic errors of the intact skin, and what they hide."""
+    pose = measure_pose_error(part, aligned, deviation, tolerance)
+    noise_map, levels = map_noise(part, aligned, deviation)
+    stray = (deviation.label == OUTLIER) | ((deviation.label == DAMAGE) & (sites.label == 0))
+    share = float(stray.mean()) if len(stray) else 0.0
+    sensor = describe_sensor(noise_map, levels, aligned, pose, facts.systematic, depth_step, tolerance, share)
+    return pose, noise_map, sensor
+
+
+@step(gives=("found", "folded", "warnings"), reads=("found", "sensor", "accept", "deviation", "tolerance", "unit"))
+def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]:
+    """Takes doubtful sites that are shallower than what the scan can show for what they are: errors of the sensor. How
+    much they hold at most stays in the interval of the total. Sites that the job accepts by number stay."""
+    found, sensor, accept, unit = state.found, state.sensor, state.accept, state.unit
+    if sensor.least_depth < HIDES * state.tolerance or not isinstance(accept, str) or accept == "all":
+        return found, 0.0, ()
+    depths = {site.number: float(-state.deviation.distance[site.members].min(initial=0.0)) for site in found}
+    folded = [
+        site for site in found if site.verdict.level == "doubtful" and 0 < depths[site.number] < sensor.least_depth
+    ]
+    if not folded:
+        return found, 0.0, ()
+    kept = tuple(site for site in found if site not in folded)
+    volume = sum(combine_site(site.error)[0][1] if site.error else site.damage.volume for site in folded)
+    deepest = max(depths[site.number] for site in folded)
+    many = f"{len(folded)} places are" if len(folded) > 1 else "1 place is"
+    text = (
+        f"{many} below the skin by up to {deepest:.3g} {unit}, which errors of this scan explain: its points deviate "
+        f"by {np.hypot(sensor.noise, sensor.correlated):.3g} {unit} on intact skin, so that losses below "
+        f"{sensor.least_depth:.3g} {unit} cannot be seen in it; they are no sites, and their {volume:.4g} {unit}³ are "
+        "in the high end of the total"
+    )
+    remedy = f"tolerance: {sensor.least_depth:.2g}, or a scan with smaller errors"
+    return kept, volume, [Reason("below_noise", text, amount=volume, unit=f"{unit}³", remedy=remedy)]

@@ -1,0 +1,91 @@
+"""The errors of the sensor, as a run measures them, and what it makes of places that they explain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from damageest_evaluate.parts import PARTS
+
+import damageest
+from damageest.artefacts import Part, Scan
+from damageest.result import Result
+from damageest.stages.scan.simulate import Simulate
+
+UNIT = PARTS["ribbed_plate"]().diagonal / 250
+"""A millimetre of a part that is 250 mm across."""
+
+
+def scan_by_camera(part: Part, seed: int = 0, **options: object) -> Scan:
+    """As a depth camera: errors that regions share, steps of the depth."""
+    settings = {
+        "points": 20_000, "scanners": [[300 * UNIT, 180 * UNIT, 480 * UNIT]], "noise": 0.5 * UNIT,
+        "depth_step": UNIT, "waviness": 0.6 * UNIT, "wavelength": 40 * UNIT, "max_incidence": 70, "seed": seed,
+        "positions_known": False, **options,
+    }  # fmt: skip
+    return Simulate.model_validate(settings).run("mm", part)
+
+
+def run(part: Part, scan: Scan, tolerance: object = "auto", **job: object) -> Result:
+    return damageest.run({"version": 1, "tolerance": tolerance, "align": "icp", **job}, part=part, scan=scan)
+
+
+def test_errors_of_a_clean_scan_are_its_noise() -> None:
+    part = PARTS["ribbed_plate"]()
+    scan = Simulate(points=30_000, noise=0.05, scanners=6).run("mm", part)
+    sensor = run(part, scan, 0.2).sensor
+    assert sensor is not None
+    assert sensor.noise == pytest.approx(0.05, rel=0.1)
+    assert sensor.correlated < 0.02
+    assert sensor.least_depth == pytest.approx(0.2, rel=0.15)
+    assert all(one.noise == pytest.approx(0.05, rel=0.6) for one in sensor.levels)
+    assert {one.of for one in sensor.levels} == {"incidence", "distance"}
+
+
+def test_errors_that_regions_share_are_told_from_noise() -> None:
+    part = PARTS["ribbed_plate"]()
+    sensor = run(part, scan_by_camera(part)).sensor
+    assert sensor is not None
+    assert sensor.noise == pytest.approx(0.57 * UNIT, rel=0.15)
+    assert 0.3 * UNIT < sensor.correlated < 0.9 * UNIT
+    assert sensor.depth_step == pytest.approx(UNIT, rel=0.05) or not sensor.depth_step
+    assert sensor.least_depth > 2.3 * UNIT
+
+
+@pytest.mark.parametrize("name", ["lever", "ribbed_plate"])
+def test_an_undamaged_part_has_no_site_in_a_scan_by_a_depth_camera(name: str) -> None:
+    """They had sites of up to 17,547 mm³, likely."""
+    part = PARTS[name]()
+    result = run(part, scan_by_camera(part, seed=2))
+    assert [site.verdict.level for site in result.sites if site.accepted] == []
+    assert len(result.sites) <= 1
+
+
+def test_places_below_a_tolerance_that_the_sensor_does_not_allow_are_no_sites() -> None:
+    """They stay in the total's high end, and are named in one line."""
+    part = PARTS["lever"]()
+    scan = scan_by_camera(part, seed=1)
+    result = run(part, scan, 1.5 * UNIT)
+    folded = [note for note in result.warnings if note.code == "below_noise"]
+    assert result.sensor is not None
+    assert result.sensor.least_depth > 2 * UNIT
+    doubtful = [site for site in result.sites if site.verdict.level == "doubtful"]
+    assert all(site.max_depth >= result.sensor.least_depth for site in doubtful)
+    assert len(folded) == 1
+    assert folded[0].amount
+    assert result.volume_95 is None or result.volume_95[1] >= folded[0].amount
+    shown = run(part, scan, 1.5 * UNIT, accept="all")
+    assert len(shown.sites) > len(result.sites)
+
+
+def test_a_loss_deeper_than_the_errors_is_found() -> None:
+    part = PARTS["block"]()
+    top = part.bounds[1]
+    tool = {"tool": "sphere", "centre": [float(top[0]), float(top[1]), float(top[2])], "radius": 14.0}
+    scan = scan_by_camera(part, damage=[tool], scanners=[[150, 120, 180], [150, -60, 160]])
+    result = run(part, scan)
+    assert result.sites
+    assert result.truth is not None
+    assert result.sites[0].volume_95 is not None
+    low, high = result.sites[0].volume_95
+    assert low <= result.truth[0] <= high
+    assert np.isfinite(low)
