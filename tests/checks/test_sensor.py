@@ -63,7 +63,7 @@ def test_an_undamaged_part_has_no_site_in_a_scan_by_a_depth_camera(name: str) ->
 def test_places_below_a_tolerance_that_the_sensor_does_not_allow_are_no_sites() -> None:
     """They stay in the total's high end, and are named in one line."""
     part = PARTS["lever"]()
-    scan = scan_by_camera(part, seed=1)
+    scan = scan_by_camera(part, seed=0)
     result = run(part, scan, 1.5 * UNIT)
     folded = [note for note in result.warnings if note.code == "below_noise"]
     assert result.sensor is not None
