@@ -148,21 +148,6 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
     return status
 
 
-def _list_notes(result: Result) -> list[str]:
-    """The notes on the run and on its sites: each reason once, with the sites that have it."""
-    from damageest.rules.notes import fold_notes, join_reasons
-
-    notes = [str(note) for note in fold_notes(result.warnings)]
-    for level in ("doubtful", "likely", "proven"):
-        chosen = [site for site in result.sites if site.verdict.level == level]
-        told = [(site.id, reason) for site in chosen for reason in site.verdict.reasons]
-        for one in join_reasons(told):
-            verb = "is" if len(one.sites) == 1 else "are"
-            notes.append(f"{one.names} {verb} {level}: {one.reason}")
-    told = [(site.id, note) for site in result.sites for note in site.warnings]
-    return notes + [f"{one.names}: {one.reason}" for one in join_reasons(told)]
-
-
 def _on_seen(result: Result) -> str:
     """Where the scan shows a part of the skin only, the share that a statement about all of it is limited to."""
     coverage = result.coverage
@@ -206,6 +191,7 @@ def _print_table(result: Result, target: Path) -> None:
     from rich.text import Text
 
     from damageest.findings import describe_interval
+    from damageest.rules.notes import list_notes
 
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
 
@@ -244,7 +230,7 @@ def _print_table(result: Result, target: Path) -> None:
         show(text)
     for text in result.failures:
         show(f" {text}", "failed:", "red")
-    for text in _list_notes(result):
+    for text in list_notes(result):
         show(f" {text}", "note:", "yellow")
     show(f"written to {target}")
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from damageest.artefacts import Reason
+
+if TYPE_CHECKING:
+    from damageest.result import Result
 
 
 @dataclass(frozen=True)
@@ -94,3 +98,16 @@ def join_reasons(reasons: Iterable[tuple[int, Reason]]) -> tuple[SiteReason, ...
     for number, reason in reasons:
         found.setdefault(reason, []).append(number)
     return tuple(SiteReason(tuple(numbers), reason) for reason, numbers in found.items())
+
+
+def list_notes(result: Result) -> list[str]:
+    """The notes on the run and on its sites, as a run prints them: each reason once, with the sites that have it."""
+    notes = [str(note) for note in fold_notes(result.warnings)]
+    for level in ("doubtful", "likely", "proven"):
+        chosen = [site for site in result.sites if site.verdict.level == level]
+        told = [(site.id, reason) for site in chosen for reason in site.verdict.reasons]
+        for one in join_reasons(told):
+            verb = "is" if len(one.sites) == 1 else "are"
+            notes.append(f"{one.names} {verb} {level}: {one.reason}")
+    told = [(site.id, note) for site in result.sites for note in site.warnings]
+    return notes + [f"{one.names}: {one.reason}" for one in join_reasons(told)]

@@ -199,7 +199,8 @@ class Simulate(ReadScan):
             view = np.concatenate([view, rng.integers(max(1, len(scanners)), size=outlier_count)])[order]
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
-        inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
+        # a scan of another scale is right where the part's middle is
+        inverse[:3, 3] = -self.scale * pose[:3, :3].T @ pose[:3, 3] - (self.scale - 1) * part.bounds.mean(axis=0)
         if not np.array_equal(pose, np.eye(4)):
             points, scanners = (at @ pose[:3, :3].T + pose[:3, 3] for at in (points, scanners))
         if self.depth_step and self.scanners is None:

@@ -166,6 +166,16 @@ def test_a_shared_waviness_is_the_same_in_all_views(cuboid: Part) -> None:
     assert compare(False) > 0.1
 
 
+def test_the_true_pose_of_a_scan_of_another_scale_holds_at_the_middle_of_the_part() -> None:
+    part = PARTS["blade"]()
+    right, wrong = (simulate(part, scale=scale, pose="random") for scale in (1.0, 1.01))
+    assert right.truth is not None
+    assert wrong.truth is not None
+    points, larger = (scan.move(scan.truth.T_part_scan).points for scan in (right, wrong) if scan.truth is not None)
+    middle = part.bounds.mean(axis=0)
+    assert np.allclose(larger - middle, 1.01 * (points - middle))
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
