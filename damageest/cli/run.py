@@ -27,8 +27,6 @@ Show = Callable[[str], None]
 """Prints one line."""
 MOST_UNSEEN = 5
 """Unseen regions that are printed; result.json has all."""
-MOST_NOTES = 8
-"""Lines of notes that are printed, those first that change a decision; result.json and report.html have all."""
 MOST_SURPLUS = 3
 """Surpluses that are printed each by itself, largest first; result.json has all."""
 UNSEEN_WHY = {
@@ -150,25 +148,6 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
     return status
 
 
-def _list_notes(result: Result) -> list[str]:
-    """The notes on the run and on its sites: each reason once, with the sites that have it."""
-    from damageest.rules.notes import fold_notes, join_reasons
-
-    notes = [str(note) for note in fold_notes(result.warnings)]
-    for level in ("doubtful", "likely", "proven"):
-        chosen = [site for site in result.sites if site.verdict.level == level]
-        told = [(site.id, reason) for site in chosen for reason in site.verdict.reasons]
-        for one in join_reasons(told):
-            verb = "is" if len(one.sites) == 1 else "are"
-            notes.append(f"{one.names} {verb} {level}: {one.reason}")
-    told = [(site.id, note) for site in result.sites for note in site.warnings]
-    notes += [f"{one.names}: {one.reason}" for one in join_reasons(told)]
-    if len(notes) > MOST_NOTES:
-        more = len(notes) - MOST_NOTES + 1
-        notes = [*notes[: MOST_NOTES - 1], f"{more} more notes are in result.json and report.html"]
-    return notes
-
-
 def _on_seen(result: Result) -> str:
     """Where the scan shows a part of the skin only, the share that a statement about all of it is limited to."""
     coverage = result.coverage
@@ -223,6 +202,7 @@ def _print_table(result: Result, target: Path) -> None:
     from rich.text import Text
 
     from damageest.findings import describe_interval
+    from damageest.rules.notes import list_notes
 
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
 
@@ -263,7 +243,7 @@ def _print_table(result: Result, target: Path) -> None:
         show(text)
     for text in result.failures:
         show(f" {text}", "failed:", "red")
-    for text in _list_notes(result):
+    for text in list_notes(result):
         show(f" {text}", "note:", "yellow")
     show(f"written to {target}")
 

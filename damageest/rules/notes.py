@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from damageest.artefacts import Reason
+
+if TYPE_CHECKING:
+    from damageest.result import Result
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,8 @@ RUN_CODES: dict[str, RunCode] = {
     "report": RunCode("the report failed, and the run went on without it", 1),
 }
 """Codes of the notes of a run. Those of sites are the codes of rules, or of the stage that gave a note."""
+MOST_PRINTED = 8
+"""Lines of notes that a run prints, those first that change a decision; result.json and report.html have all."""
 FOLDED = 3
 """Notes of one code from which they become one line."""
 
@@ -95,3 +101,20 @@ def join_reasons(reasons: Iterable[tuple[int, Reason]]) -> tuple[SiteReason, ...
     for number, reason in reasons:
         found.setdefault(reason, []).append(number)
     return tuple(SiteReason(tuple(numbers), reason) for reason, numbers in found.items())
+
+
+def list_notes(result: Result) -> list[str]:
+    """The notes on the run and on its sites, as a run prints them: each reason once, with the sites that have it."""
+    notes = [str(note) for note in fold_notes(result.warnings)]
+    for level in ("doubtful", "likely", "proven"):
+        chosen = [site for site in result.sites if site.verdict.level == level]
+        told = [(site.id, reason) for site in chosen for reason in site.verdict.reasons]
+        for one in join_reasons(told):
+            verb = "is" if len(one.sites) == 1 else "are"
+            notes.append(f"{one.names} {verb} {level}: {one.reason}")
+    told = [(site.id, note) for site in result.sites for note in site.warnings]
+    notes += [f"{one.names}: {one.reason}" for one in join_reasons(told)]
+    if len(notes) > MOST_PRINTED:
+        more = len(notes) - MOST_PRINTED + 1
+        notes = [*notes[: MOST_PRINTED - 1], f"{more} more notes are in result.json and report.html"]
+    return notes

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Mesh
+from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.vectors import normalise
 
 
@@ -37,3 +40,14 @@ class RandomField:
         for wave, phase, height in zip(self.waves, self.phases, self.heights, strict=True):
             total += height * np.cos(points @ wave + phase)
         return np.clip(total, -2.5, 2.5)
+
+
+def choose_patches(mesh: Mesh, share: float, size: float, seed: int) -> Callable[[Floats], NDArray[np.bool_]] | None:
+    """A function of points (N,3) that says which lie in patches, about ``size`` across, which cover this share of the
+    surface; None where that is 0."""
+    if not share:
+        return None
+    field = RandomField.build(2 * size, 1, seed, waves=16)  # half a wavelength is above the mean
+    places = sample_by_area(mesh, 20_000, np.random.default_rng([8807, seed]))[0]
+    least = float(np.quantile(field.evaluate(places), 1 - share))
+    return lambda points: field.evaluate(points) > least

@@ -26,12 +26,35 @@ to a background."""
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Points (N,3), the face (N,) and the scanner (N,) of each, and ``step``: the angle between rays, in radians."""
+    """Points (N,3), the face (N,) and the scanner (N,) of each, ``facing`` (N,): the cosine of its incidence angle, and
+    ``step``: the angle between rays, in radians."""
 
     points: Floats
     face: Ints
     view: Ints
+    facing: Floats
     step: float
+
+
+@dataclass(frozen=True, eq=False)
+class Stripes:
+    """Planes of light through the scanner, ``gap`` apart at ``centre`` (3,), on which all points lie."""
+
+    gap: float
+    centre: Floats
+    seed: int
+
+    def move_rays(self, position: Floats, number: int, points: Floats) -> Floats:
+        """The rays (N,3), unit, from ``position`` (3,) of scanner ``number`` to points (N,3), each turned into the
+        nearest plane. The planes have a random direction in each view."""
+        axis = normalise(self.centre - position)
+        across = np.random.default_rng([6367, self.seed, number]).normal(size=3)
+        across = normalise(across - across @ axis * axis)
+        way = points - position
+        way = way / (way @ axis)[:, None]
+        step = self.gap / float(np.linalg.norm(self.centre - position))
+        place = way @ across
+        return normalise(way + (step * np.round(place / step) - place)[:, None] * across)
 
 
 def spread_scanners(count: int, centre: Floats, distance: float, rng: np.random.Generator) -> Floats:
@@ -64,20 +87,22 @@ def sample_views(
     max_incidence: float,
     rng: np.random.Generator,
     keep: Keep | None = None,
+    stripes: Stripes | None = None,
 ) -> Seen:
     """``count`` points of a mesh that scanners (V,3) see, on ``faces`` (F,) only, in random order.
 
     Every scanner has the same angular step, so that the density of a view's points falls with the cosine of the
     incidence angle over the squared distance. Each triangle is projected on a plane across the ray to its centre; a
-    random point there, accepted with the cubed cosine of its angle to that ray, is random by solid angle. A point is
-    seen where the incidence angle is below ``max_incidence`` degrees and nothing is in front of it. Raises StageError
-    where a scanner stands on the surface, and where nothing is seen.
+    random point there, accepted with the cubed cosine of its angle to that ray, is random by solid angle. With
+    ``stripes`` its ray is turned into the nearest plane of light. A point is seen where the incidence angle is below
+    ``max_incidence`` degrees and nothing is in front of it. Raises StageError where a scanner stands on the surface,
+    and where nothing is seen.
     """
     caster = RayCaster(mesh)
     views = [_Projection.build(mesh, faces, position) for position in scanners]
     total = np.array([view.sums[-1] if len(view.sums) else 0.0 for view in views])
     steep = np.cos(np.radians(max_incidence))
-    parts: list[tuple[Floats, Ints, Ints]] = []
+    parts: list[tuple[Floats, Ints, Ints, Floats]] = []
     have, tried = 0, 0
     while have < count and total.sum() > 0:
         wanted = int(np.clip(1.2 * (count - have) * (tried / max(have, 1) if have else 2), 1000, 2_000_000))
@@ -85,13 +110,15 @@ def sample_views(
             if not size:
                 continue
             points, face, facing = views[number].draw(int(size), rng)
+            if stripes is not None:
+                points, face, facing = _hit_stripes(mesh, faces, caster, scanners[number], number, stripes, points)
             chosen = facing > steep
             if keep is not None:
                 chosen &= rng.random(len(points)) < keep(points)
-            points, face = points[chosen], face[chosen]
+            points, face, facing = points[chosen], face[chosen], facing[chosen]
             chosen = find_visible(caster, scanners[number], points, face, 1e-5 * mesh.diagonal)
-            points, face = points[chosen], face[chosen]
-            parts.append((points, face, np.full(len(points), number)))
+            points, face, facing = points[chosen], face[chosen], facing[chosen]
+            parts.append((points, face, np.full(len(points), number), facing))
             have += len(points)
         tried += wanted
         if have < 1e-4 * tried:
@@ -102,8 +129,26 @@ def sample_views(
             remedy="move the scanners, raise `max_incidence`, or make `unseen` smaller",
         )
     chosen = rng.permutation(have)[:count]
-    points, face, view = (np.concatenate([part[k] for part in parts])[chosen] for k in range(3))
-    return Seen(points, face, view, float(np.sqrt(total.sum() * (have / tried) / count)))
+    points, face, view, facing = (np.concatenate([part[k] for part in parts])[chosen] for k in range(4))
+    return Seen(points, face, view, facing, float(np.sqrt(total.sum() * (have / tried) / count)))
+
+
+def _hit_stripes(
+    mesh: Mesh,
+    faces: NDArray[np.bool_],
+    caster: RayCaster,
+    position: Floats,
+    number: int,
+    stripes: Stripes,
+    points: Floats,
+) -> tuple[Floats, Ints, Floats]:
+    """Where the rays to points (N,3) meet the mesh when they are turned into the planes of light: places (M,3), faces
+    (M,) and cosines of incidence (M,)."""
+    ray = stripes.move_rays(position, number, points)
+    distance, face = caster.find_first(np.broadcast_to(position, ray.shape), ray)
+    hit = (face >= 0) & faces[face]
+    ray, face = ray[hit], face[hit]
+    return position + distance[hit, None] * ray, face, -np.einsum("ij,ij->i", mesh.face_normals[face], ray)
 
 
 def find_mixed(mesh: Mesh, scanners: Floats, seen: Seen, count: int, rng: np.random.Generator) -> tuple[Floats, Ints]:

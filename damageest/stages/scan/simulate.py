@@ -2,51 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 from pydantic import types as kinds
 
-from damageest.artefacts import Floats, Ints, Part, Scan, Truth
+from damageest.artefacts import Floats, Ints, Mesh, Part, Scan, Truth
 from damageest.geometry.units import canonical_unit
-from damageest.geometry.vectors import normalise
-from damageest.options import Options
-from damageest.stages.scan import ReadScan, _errors, _random_field, _views
+from damageest.stages.scan import ReadScan, _errors
+from damageest.stages.scan._draw import Draw, Drawing, UnseenRegion, draw_points
+from damageest.stages.scan._random_field import choose_patches
 from damageest.stages.scan._scene import DetachedPiece, Scene, Table, build_scene
 from damageest.stages.scan.deformation import Deformation, deform, deform_solid
-from damageest.stages.scan.scanner import sample_seen
-from damageest.stages.scan.tools import AnyTool, Direction, RigidMatrix, SolidTool, Vector
-
-
-class UnseenRegion(Options):
-    """A region of the surface that the virtual scanner does not see."""
-
-    model_config = ConfigDict(defer_build=True)
-    direction: Direction = Field(description="direction in the part's frame; its length does not matter")
-    angle: float = Field(
-        60.0,
-        gt=0,
-        le=180,
-        description="no points where the angle between outward normal and `direction` is smaller than this, in degrees",
-    )
-    beyond: Vector | None = Field(
-        None,
-        description="instead of `angle`: no points beyond the plane through this point with `direction` as its normal",
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Draw:
-    """Points (N,3) without errors, ``toward`` (N,3): the unit vector along which depth errors move each, ``view`` (N,)
-    the number of its scanner of ``scanners`` (V,3)."""
-
-    points: Floats
-    toward: Floats
-    view: Ints
-    scanners: Floats
-    notes: tuple[str, ...] = ()
+from damageest.stages.scan.tools import AnyTool, RigidMatrix, SolidTool, Vector
 
 
 class Simulate(ReadScan):
@@ -91,6 +61,26 @@ class Simulate(ReadScan):
         description="standard deviation of the noise along each axis, in the job's unit; default: 0.0005 of the part's "
         "diagonal",
     )
+    noise_along: Literal["axes", "ray"] = Field(
+        "axes", description="`ray`: noise only along the ray from the scanner; without `scanners` along the normal"
+    )
+    noise_growth: float = Field(
+        0.0,
+        ge=0,
+        le=4,
+        description="with `scanners`: power of the distance with which `noise` grows; 2: triangulation and stereo",
+    )
+    noise_slant: float = Field(
+        0.0,
+        ge=0,
+        le=4,
+        description="with `scanners`: power of 1 / cosine of the angle between ray and normal with which `noise` grows",
+    )
+    reference_distance: kinds.PositiveFloat | None = Field(
+        None,
+        description="distance from the scanner at which `noise` and `depth_step` hold where they grow, in the job's "
+        "unit; default: that of the part's middle",
+    )
     waviness: float = Field(
         0.0,
         ge=0,
@@ -100,11 +90,27 @@ class Simulate(ReadScan):
     wavelength: kinds.PositiveFloat | None = Field(
         None, description="wavelength of `waviness`, in the job's unit; default: a fifth of the part's diagonal"
     )
+    waviness_shared: bool = Field(
+        False, description="whether `waviness` is the same in all views, as where they were computed together"
+    )
     depth_step: float = Field(
         0.0,
         ge=0,
         description="step to which the distance from the scanner is rounded, in the job's unit; without `scanners`: "
         "of the z coordinate in the scanner's frame; 0: no rounding",
+    )
+    depth_growth: float = Field(
+        0.0,
+        ge=0,
+        le=4,
+        description="with `scanners`: power of the distance with which `depth_step` grows; 2: a stereo camera, whose "
+        "step is z² times the step of its disparity over focal length and baseline",
+    )
+    stripes: float = Field(
+        0.0,
+        ge=0,
+        description="with `scanners`: distance between the lines of a laser-line scanner at the part's middle, in the "
+        "job's unit: all points lie on them; 0: no lines",
     )
     mixed: float = Field(
         0.0,
@@ -112,6 +118,26 @@ class Simulate(ReadScan):
         lt=1,
         description="with `scanners`: share of points that are mixed pixels, between foreground and background at the "
         "edge of a surface that is in front of another",
+    )
+    sheets: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="share of the skin, in patches, where every second point lies on a second sheet `sheet_offset` off",
+    )
+    sheet_offset: float = Field(
+        0.0,
+        description="how far the sheets of `sheets` are from the skin, towards the scanner, in the job's unit; without "
+        "`scanners` outward; below 0: behind the skin",
+        allow_inf_nan=False,
+    )
+    patches: float = Field(
+        0.0, ge=0, lt=1, description="share of the skin, in patches, without points, as where it has no texture"
+    )
+    patch_size: kinds.PositiveFloat | None = Field(
+        None,
+        description="how far the patches of `patches` and `sheets` reach, about, in the job's unit; default: a tenth "
+        "of the part's diagonal",
     )
     misplaced: float = Field(
         0.0,
@@ -137,9 +163,12 @@ class Simulate(ReadScan):
     @model_validator(mode="after")
     def _check_scanners(self) -> Self:
         if self.scanners is None:
-            for name in ("mixed", "misplaced"):
+            for name in ("mixed", "misplaced", "stripes", "noise_growth", "noise_slant", "depth_growth"):
                 if getattr(self, name):
                     raise ValueError(f"{name}: needs `scanners`")
+        for name, other in (("sheets", "sheet_offset"), ("depth_growth", "depth_step")):
+            if getattr(self, name) and not getattr(self, other):
+                raise ValueError(f"{name}: needs `{other}`")
         if self.deform and (self.surroundings or self.table):
             raise ValueError("deform: is not possible with surroundings or a table, which would be deformed as well")
         if (
@@ -161,7 +190,7 @@ class Simulate(ReadScan):
         draw = self._draw(scene, part, self.points - outlier_count, rng)
         if self.deform:
             draw = replace(draw, points=deform(draw.points, self.deform, part))
-        points, view, scanners = self._add_errors(draw, part, sigma, rng)
+        points, view, scanners = self._add_errors(draw, part, scene.body, sigma, rng)
         if outlier_count:
             margin = 0.1 * (part.bounds[1] - part.bounds[0])
             outliers = rng.uniform(part.bounds[0] - margin, part.bounds[1] + margin, (outlier_count, 3))
@@ -170,7 +199,8 @@ class Simulate(ReadScan):
             view = np.concatenate([view, rng.integers(max(1, len(scanners)), size=outlier_count)])[order]
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
-        inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
+        # a scan of another scale is right where the part's middle is
+        inverse[:3, 3] = -self.scale * pose[:3, :3].T @ pose[:3, 3] - (self.scale - 1) * part.bounds.mean(axis=0)
         if not np.array_equal(pose, np.eye(4)):
             points, scanners = (at @ pose[:3, :3].T + pose[:3, 3] for at in (points, scanners))
         if self.depth_step and self.scanners is None:
@@ -191,63 +221,46 @@ class Simulate(ReadScan):
             view=view.astype(np.int32) if known else None,
         )
 
-    def _draw(self, scene: Scene, part: Part, count: int, rng: np.random.Generator) -> _Draw:
+    def _draw(self, scene: Scene, part: Part, count: int, rng: np.random.Generator) -> Draw:
         """Points without errors, in the part's frame."""
-        normal = scene.body.face_normals
-        faces = ~scene.bare
-        planes = []
-        for item in self.unseen:
-            toward = np.array(item.direction) / np.linalg.norm(item.direction)
-            if item.beyond is None:
-                faces &= normal @ toward < np.cos(np.radians(item.angle))
-            else:
-                planes.append((toward, float(toward @ item.beyond)))
-        field = _random_field.RandomField.build(part.diagonal / 2, 1, self.seed, waves=8)
-
-        def weigh(points: Floats) -> Floats:
-            weights = np.exp(self.density * field.evaluate(points)) if self.density else np.ones(len(points))
-            for toward, height in planes:
-                weights[points @ toward > height] = 0
-            return weights
-
-        uneven = bool(self.density or planes)
-        if self.scanners is None:
-            spare = 2.5 if self.density else 1.0
-            points, face = sample_seen(scene.body, faces, count, rng, weigh if uneven else None, spare)
-            return _Draw(points, normal[face], np.zeros(len(points), np.int64), np.empty((0, 3)))
-        if isinstance(self.scanners, int):
-            scanners = _views.spread_scanners(self.scanners, part.bounds.mean(axis=0), 3 * part.diagonal, rng)
-        else:
-            scanners = np.array(self.scanners, dtype=np.float64)
-        highest = np.exp(2.5 * self.density)
-        keep = (lambda points: weigh(points) / highest) if uneven else None
-        seen = _views.sample_views(scene.body, faces, scanners, count, self.max_incidence, rng, keep)
-        points, view, notes = seen.points, seen.view, []
-        if mixed_count := round(self.mixed * self.points):
-            mixed, owner = _views.find_mixed(scene.body, scanners, seen, mixed_count, rng)
-            points = np.concatenate([points[len(mixed) :], mixed])
-            view = np.concatenate([view[len(mixed) :], owner])
-            if not len(mixed):
-                notes.append("no mixed pixels: no surface is in front of another")
-        way = scanners[view] - points
-        used, view = np.unique(view, return_inverse=True)
-        if len(used) < len(scanners):  # a view without points is no view
-            blind = sorted(set(range(len(scanners))) - set(used.tolist()))
-            notes.append(f"no points from scanner {', '.join(str(number + 1) for number in blind)}")
-            scanners = scanners[used]
-        return _Draw(points, normalise(way), view, scanners, tuple(notes))
+        how = Drawing(
+            scanners=self.scanners if isinstance(self.scanners, int | None) else np.array(self.scanners, np.float64),
+            max_incidence=self.max_incidence,
+            unseen=self.unseen,
+            density=self.density,
+            patches=self.patches,
+            patch_size=self.patch_size or part.diagonal / 10,
+            stripes=self.stripes,
+            mixed=round(self.mixed * self.points),
+            seed=self.seed,
+        )
+        return draw_points(scene, part, how, count, rng)
 
     def _add_errors(
-        self, draw: _Draw, part: Part, sigma: float, rng: np.random.Generator
+        self, draw: Draw, part: Part, body: Mesh, sigma: float, rng: np.random.Generator
     ) -> tuple[Floats, Ints, Floats]:
         """Points, view and scanners with the errors that do not depend on the scanner's frame."""
         points, view, scanners = draw.points, draw.view, draw.scanners
         if self.waviness:
             wavelength = self.wavelength or part.diagonal / 5
-            points = _errors.add_waviness(points, draw.toward, view, self.waviness, wavelength, self.seed)
-        points = points + (rng.normal(scale=sigma, size=points.shape) if sigma else 0.0)
+            field = np.zeros_like(view) if self.waviness_shared else view
+            points = _errors.add_waviness(points, draw.toward, field, self.waviness, wavelength, self.seed)
+        if self.sheets:
+            doubled = choose_patches(body, self.sheets, self.patch_size or part.diagonal / 10, self.seed + 900_001)
+            assert doubled is not None
+            points = _errors.add_sheet(points, draw.toward, doubled(draw.points), self.sheet_offset, rng)
+        reach = np.empty(0)
+        spread: Floats | float = sigma
+        if len(scanners):
+            middle = np.linalg.norm(scanners - part.bounds.mean(axis=0), axis=1)[view]
+            reach = np.full(len(view), self.reference_distance) if self.reference_distance else middle
+            if self.noise_growth or self.noise_slant:
+                share = np.linalg.norm(draw.points - scanners[view], axis=1) / reach
+                spread = _errors.grow(sigma, share, self.noise_growth, draw.facing, self.noise_slant)
+        if sigma:
+            points = _errors.add_noise(points, spread, draw.toward if self.noise_along == "ray" else None, rng)
         if self.depth_step and len(scanners):
-            points = _errors.quantise_depth(points, scanners[view], self.depth_step)
+            points = _errors.quantise_depth(points, scanners[view], self.depth_step, self.depth_growth, reach)
         if self.misplaced:
             centre = part.bounds.mean(axis=0)
             points, scanners = _errors.misplace_views(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -36,3 +38,27 @@ def run_counted(
         typer.echo(f"[{count}/{len(cases)}] {describe(row)}", err=True)
 
     return run_all(cases, out / name if out else None, workers, timeout, print_row, scheduler)
+
+
+def parse_numbers(option: str, text: str) -> list[int]:
+    """The whole numbers in ``text``; raises InputError for anything else."""
+    from damageest.errors import InputError
+
+    try:
+        values = [int(word) for word in split_words(text)]
+    except ValueError:
+        values = [-1]
+    if any(value < 0 for value in values):
+        raise InputError(f"{option}: '{text}' is not valid; give whole numbers separated by commas, as 0,1,2")
+    return values or ([0] if option == "--seeds" else [])
+
+
+def format_command() -> str:
+    """The command line, without the options that name output files."""
+    words, output_options = sys.argv[1:], ("--out", "--write", "--marks")
+    kept = [
+        word
+        for before, word in zip(["", *words], words, strict=False)
+        if before not in output_options and word.partition("=")[0] not in output_options
+    ]
+    return shlex.join(["damageest", *kept])

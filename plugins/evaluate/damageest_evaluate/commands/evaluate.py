@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from damageest_evaluate.commands import adapt, honesty, path, speed, steady
+from damageest_evaluate.commands import adapt, honesty, path, realistic, speed, steady
+from damageest_evaluate.commands._counted import format_command
 from damageest_evaluate.commands.intervals import run_intervals
 
 if TYPE_CHECKING:
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
 app = typer.Typer(no_args_is_help=True, help="Measure accuracy and cost against known truth.")
 app.command("adapt")(adapt.command)
 app.command("honesty")(honesty.command)
+app.command("realistic")(realistic.command)
 app.command("steady")(steady.command)
 app.command("speed")(speed.command)
 app.command("path")(path.command)
@@ -168,7 +168,7 @@ def suite_command(
             raise InputError(
                 "--intervals: varies noise and density itself; leave out --vary, --against, --set, --noise and --points"
             )
-        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, _format_command(), scheduler)
+        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, format_command(), scheduler)
         return
     if out:
         out.mkdir(parents=True, exist_ok=True)
@@ -187,7 +187,7 @@ def suite_command(
     if write:
         write.write_text(
             replace_between_marks(
-                write, make_readme_tables(rows, first + list(collect_axes(rows)), "mm", _format_command()), marks
+                write, make_readme_tables(rows, first + list(collect_axes(rows)), "mm", format_command()), marks
             ),
             encoding="utf-8",
         )
@@ -216,21 +216,10 @@ def _write_report(rows: list[dict[str, Any]], first: list[str], unit: str, out: 
 
     typer.echo("\n" + format_tables(rows, [*first, *collect_axes(rows)], unit))
     if out:
-        write_files(rows, unit, out, _format_command())
+        write_files(rows, unit, out, format_command())
         paths = draw_plots(rows, unit, out) if plots else []
         names = ", ".join(sorted({path.stem for path in paths}))
         typer.echo(f"written to {out}" + (f", with plots: {names}" if paths else ""))
-
-
-def _format_command() -> str:
-    """The command line, without the options that name output files."""
-    words, output_options = sys.argv[1:], ("--out", "--write", "--marks")
-    kept = [
-        word
-        for before, word in zip(["", *words], words, strict=False)
-        if before not in output_options and word.partition("=")[0] not in output_options
-    ]
-    return shlex.join(["damageest", *kept])
 
 
 @app.command("matrix")

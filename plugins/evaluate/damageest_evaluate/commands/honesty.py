@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -40,7 +38,7 @@ def command(
     interval, and the site is not doubtful.
     """
     from damageest.registry import Registry
-    from damageest_evaluate.commands._counted import run_counted, split_words
+    from damageest_evaluate.commands._counted import format_command, parse_numbers, run_counted, split_words
     from damageest_evaluate.job import fingerprint_code
     from damageest_evaluate.readme import replace_between_marks
     from damageest_evaluate.troubles.report import describe_case, format_trouble_row, make_trouble_tables
@@ -66,37 +64,12 @@ def command(
         return f"{row['number']} {format_trouble_row(row)}"
 
     rows = run_counted(cases, out, "honesty.jsonl", workers, timeout, describe, scheduler)
-    text = make_trouble_tables(rows, _format_command())
+    text = make_trouble_tables(rows, format_command())
     typer.echo("\n" + text)
     if out:
         (out / "honesty.md").write_text(text + "\n", encoding="utf-8")
     if write:
         write.write_text(
-            replace_between_marks(write, make_trouble_tables(rows, _format_command(), False), "honesty"),
+            replace_between_marks(write, make_trouble_tables(rows, format_command(), False), "honesty"),
             encoding="utf-8",
         )
-
-
-def parse_numbers(option: str, text: str) -> list[int]:
-    """The whole numbers in ``text``; raises InputError for anything else."""
-    from damageest.errors import InputError
-    from damageest_evaluate.commands._counted import split_words
-
-    try:
-        values = [int(word) for word in split_words(text)]
-    except ValueError:
-        values = [-1]
-    if any(value < 0 for value in values):
-        raise InputError(f"{option}: '{text}' is not valid; give whole numbers separated by commas, as 0,1,2")
-    return values or ([0] if option == "--seeds" else [])
-
-
-def _format_command() -> str:
-    """The command line, without the options that name output files."""
-    words = sys.argv[1:]
-    kept = [
-        word
-        for before, word in zip(["", *words], words, strict=False)
-        if before not in ("--out", "--write") and word.partition("=")[0] not in ("--out", "--write")
-    ]
-    return shlex.join(["damageest", *kept])

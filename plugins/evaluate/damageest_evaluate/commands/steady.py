@@ -21,7 +21,7 @@ def command(
     larger. The sites of the first run are looked for in the others.
     """
     from damageest.registry import Registry
-    from damageest_evaluate.commands.honesty import parse_numbers
+    from damageest_evaluate.commands._counted import parse_numbers
     from damageest_evaluate.job import fingerprint_code
     from damageest_evaluate.readme import format_markdown
     from damageest_evaluate.rows import run_all

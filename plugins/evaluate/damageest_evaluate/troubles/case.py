@@ -138,18 +138,18 @@ def run_case(case: TroubleCase) -> dict[str, Any]:
     except (StageError, InputError) as error:
         message = " ".join(str(error).split())
         row["seconds"] = time.perf_counter() - start
-        return row | _describe_judgement(judge_error(message)) | {"iou": None, "error": message}
+        return row | describe_judgement(judge_error(message)) | {"iou": None, "error": message}
     except DamageestError as error:  # the job of the evaluation itself is at fault
         raise RuntimeError(f"the job of case {case.number} is not valid: {error}") from error
     row["seconds"], row["cpu_seconds"] = time.perf_counter() - start, cpu_seconds() - cpu_start
     row["step_seconds"] = row["cpu_seconds"] - clock.stage_seconds
     row |= _describe_result(result, scene)
     state = TrueState(scene.part, scene.damage, pose if scene.has_pose else None, scanning.tolerance, scene.deform)
-    row |= _describe_judgement(judge(result, state))
+    row |= describe_judgement(judge(result, state))
     return {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in row.items()}
 
 
-def _describe_judgement(judgement: Judgement) -> dict[str, Any]:
+def describe_judgement(judgement: Judgement) -> dict[str, Any]:
     """The fields of a row that come from the judgement; an open end of an interval is None."""
     groups = [vars(one) | {"high": one.high if math.isfinite(one.high) else None} for one in judgement.groups]
     return vars(judgement) | {"groups": groups}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -239,15 +239,19 @@ def find_motion(part: Part, found: Pose, true: Floats, tolerance: float) -> Floa
     over the part's surface), if need be after motions that the result calls free, between their ends. On a symmetric
     part the true pose has to be among the alternatives, or, where the symmetry is continuous, a note has to name it.
     """
+    return next((motion for error, motion in list_pose_errors(part, found, true) if error < 2 * tolerance), None)
+
+
+def list_pose_errors(part: Part, found: Pose, true: Floats) -> Iterator[tuple[float, Floats]]:
+    """What the found pose is off by, rms over the part's surface, and the motion (4,4) of the part onto itself with
+    which it is so: without one, with each alternative of the result, and, where it names a symmetry, with any."""
     residual, path = measure_pose_error(part, found.T_part_scan, true)
-    if min(path, _measure_left(part, found, found.T_part_scan, true)) < 2 * tolerance:
-        return np.eye(4)
+    yield min(path, _measure_left(part, found, found.T_part_scan, true)), np.eye(4)
     for other in () if found.alternatives is None else found.alternatives:
-        if min(measure_pose_error(part, other, true)[1], _measure_left(part, found, other, true)) < 2 * tolerance:
-            return np.asarray(found.T_part_scan @ np.linalg.inv(other))
-    if residual < 2 * tolerance and any("symmetry" in note for note in found.notes):
-        return np.asarray(found.T_part_scan @ np.linalg.inv(true))
-    return None
+        left = min(measure_pose_error(part, other, true)[1], _measure_left(part, found, other, true))
+        yield left, np.asarray(found.T_part_scan @ np.linalg.inv(other))
+    if any("symmetry" in note for note in found.notes):
+        yield residual, np.asarray(found.T_part_scan @ np.linalg.inv(true))
 
 
 def _follow(

@@ -26,8 +26,8 @@ def make_trouble_cases(
     A kind's name may be shortened to its beginning. Raises InputError for an unknown kind or part, and if no case is
     left.
     """
-    chosen = _choose("--kinds", kinds, tuple(TROUBLES))
-    names = _choose("--parts", parts, NAMES)
+    chosen = choose_names("--kinds", kinds, tuple(TROUBLES))
+    names = choose_names("--parts", parts, NAMES)
     cases, number = [], 0
     for kind, trouble in TROUBLES.items():
         for way in trouble.ways:
@@ -43,7 +43,7 @@ def make_trouble_cases(
     return cases
 
 
-def _choose(option: str, given: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
+def choose_names(option: str, given: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
     """The names that are given, each in full or as the beginning of one or more names; all if none is given."""
     found: list[str] = []
     for word in given:
