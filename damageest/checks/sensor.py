@@ -1,10 +1,9 @@
-"""The errors of the sensor, measured on intact skin: noise by place, errors that neighbouring points share, steps of
+"""The errors of the sensor, measured on intact skin: noise, errors that neighbouring points share, steps of
 the depth; and the smallest loss that such a scan can show."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
@@ -19,8 +18,8 @@ from damageest.geometry.voxels import number_faced_cubes
 
 EDGE = 4.0
 """Edge of a patch in spacings: about sixteen points on a face."""
-FEWEST_POINTS, FEWEST_PATCHES = 8, 4
-"""Points of a patch, and patches at a place, for its noise to be measured."""
+FEWEST_POINTS = 8
+"""Points of a patch, for its noise to be measured."""
 MOST_POINTS = 200_000
 """Intact points that are used."""
 INCIDENCES = (0.0, 30.0, 50.0, 65.0, 90.0)
@@ -29,53 +28,28 @@ DISTANCES = 3
 """Ranges of the distance from the scanner whose noise is told apart."""
 FEWEST_OF_LEVEL = 200
 """Points of a range, for its noise to be told."""
-LARGER = 1.3
-"""How many times larger than that of the whole scan the noise of a place has to be to count."""
 NEEDED = 10
 """Points that have to lie deeper than the tolerance beside each other for a site, as stage cluster asks for."""
 
 
-@dataclass(frozen=True, eq=False)
-class NoiseMap:
-    """``noise`` (P,): standard deviation of the points of patches of intact skin about their mean, at ``places`` (P,3);
-    ``usual``: that of the whole scan."""
-
-    places: Floats
-    noise: Floats
-    usual: float
-
-    def at(self, bounds: Floats, reach: float) -> float:
-        """The noise of the skin within ``reach`` of a box (2,3): that of the whole scan where it is no larger."""
-        near = ((self.places > bounds[0] - reach) & (self.places < bounds[1] + reach)).all(axis=1)
-        if near.sum() < FEWEST_PATCHES:
-            return self.usual
-        local = float(np.sqrt(np.median(self.noise[near] ** 2)))
-        return local if local > LARGER * self.usual else self.usual
-
-
-def map_noise(part: Part, aligned: Scan, deviation: Deviation) -> tuple[NoiseMap, tuple[NoiseLevel, ...]]:
-    """The noise by place; and by distance from the scanner and incidence, where its positions are known."""
+def measure_levels(part: Part, aligned: Scan, deviation: Deviation) -> tuple[NoiseLevel, ...]:
+    """The noise of intact skin by incidence and by distance from the scanner; none where no position is known."""
     index = np.flatnonzero(deviation.label == INTACT)
     index = index[:: max(1, -(-len(index) // MOST_POINTS))]
-    none = NoiseMap(np.empty((0, 3)), np.empty(0), aligned.noise)
-    if len(index) < FEWEST_POINTS or not aligned.spacing:
-        return none, ()
+    if aligned.viewpoints is None or len(index) < FEWEST_OF_LEVEL or not aligned.spacing:
+        return ()
     normals = part.face_normals[deviation.face[index]]
     points, distance = aligned.points[index], deviation.distance[index]
     edge = EDGE * aligned.spacing * float(np.sqrt(max(1.0, len(aligned.points) / MOST_POINTS)))
     _, group, count = group_integers(number_faced_cubes(points, normals, edge)[1])
     mean = np.bincount(group, weights=distance) / count
     off = (distance - mean[group]) ** 2 * (count / np.maximum(count - 1, 1))[group]
-    enough = count >= FEWEST_POINTS
-    places = np.stack([np.bincount(group, weights=column) / count for column in points.T], axis=1)
-    noise = np.sqrt(np.bincount(group, weights=off) / count)
-    used = enough[group]
-    levels = _list_levels(aligned, index[used], normals[used], off[used])
-    return NoiseMap(places[enough], noise[enough], aligned.noise), levels
+    used = (count >= FEWEST_POINTS)[group]
+    return _list_levels(aligned, index[used], normals[used], off[used])
 
 
 def describe_sensor(
-    noise_map: NoiseMap, levels: Sequence[NoiseLevel], aligned: Scan, pose: PoseError, systematic: float,
+    levels: Sequence[NoiseLevel], aligned: Scan, pose: PoseError, systematic: float,
     depth_step: float, tolerance: float, stray: float,
 ) -> Sensor:  # fmt: skip
     """What the intact skin says about the sensor.

@@ -98,7 +98,7 @@ class SiteError:
 def measure_site_error(
     damage: Solid, inner: Flags, part: Part, aligned: Scan, members: Floats, evidence: Evidence, pose: PoseError,
     scan: ScanFacts, beyond: BeyondPoints, form: float = 0.0, free: Sequence[FreeMotion] = (),
-    adapted: AdaptedPart | None = None, noise: float | None = None,
+    adapted: AdaptedPart | None = None,
 ) -> SiteError | None:  # fmt: skip
     """The errors of one site; None where no scan point lies on its inner surface.
 
@@ -110,11 +110,9 @@ def measure_site_error(
         form: standard deviation by which the skin deviates systematically, in the job's unit, as a fit of the model
             gives it; where it is less than what the intact skin shows, the latter counts.
         free: motions that the scan does not exclude.
-        noise: of the points at the site; None: that of the whole scan.
     """
     tolerance = scan.tolerance
-    noise = aligned.noise if noise is None else noise
-    surface = measure_inner_surface(damage, inner, members, noise, aligned.spacing, tolerance)
+    surface = measure_inner_surface(damage, inner, members, aligned.noise, aligned.spacing, tolerance)
     if surface is None or inner.all():
         return None
     area = np.linalg.norm(damage.cross, axis=1) / 2
@@ -135,7 +133,7 @@ def measure_site_error(
     if adapted is not None and adapted.growth:  # of the part, or of the scan's scale: then the loss is of another size
         rates = np.append(rates, damage.volume * ((1 + adapted.growth) ** -3 - 1))
     beside = by_pose**2 + bent_depth**2 + max(form, systematic) ** 2 + part.tessellation_error**2 / 3
-    by_point = float(np.sqrt(noise**2 + beside))
+    by_point = float(np.sqrt(aligned.noise**2 + beside))
     return SiteError(
         volume=damage.volume,
         noise=surface.noise,

@@ -112,12 +112,12 @@ CLOSE: Route = (
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
     gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner -> facts
-    measure_sensor,  # part, aligned, deviation, sites, facts, depth_step, tolerance -> pose_error, noise_map, sensor
+    measure_sensor,  # part, aligned, deviation, sites, facts, depth_step, tolerance -> pose_error, sensor
     measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
-    #     noise_map, tolerance, unit -> found
+    #     tolerance, unit -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit
     #     -> found
-    fold_hidden,  # found, sensor, accept, deviation, tolerance, unit -> found, folded, +warnings
+    fold_hidden,  # found, sensor, facts, accept, deviation, tolerance, unit -> found, folded, +warnings
     question_fit,  # fitted, surplus, found, pose, aligned, adapted, deviation, skin, unit, tolerance, warnings
     #     -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures

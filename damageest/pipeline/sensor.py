@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Part, Reason, Scan, Sites
 from damageest.checks.pose_error import PoseError, measure_pose_error
-from damageest.checks.sensor import NoiseMap, describe_sensor, map_noise
+from damageest.checks.sensor import describe_sensor, measure_levels
 from damageest.checks.uncertainty import combine_site
 from damageest.findings import Sensor
 from damageest.pipeline.state import FoundSite, JobState, Reasons
@@ -18,25 +18,29 @@ HIDES = 1.2
 doubtful to be no sites."""
 
 
-@step(gives=("pose_error", "noise_map", "sensor"))
+@step(gives=("pose_error", "sensor"))
 def measure_sensor(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, facts: ScanFacts, depth_step: float, tolerance: float
-) -> tuple[PoseError, NoiseMap, Sensor]:
+) -> tuple[PoseError, Sensor]:
     """Measures noise and systematic errors of the intact skin, and what they hide."""
     pose = measure_pose_error(part, aligned, deviation, tolerance)
-    noise_map, levels = map_noise(part, aligned, deviation)
+    levels = measure_levels(part, aligned, deviation)
     stray = (deviation.label == OUTLIER) | ((deviation.label == DAMAGE) & (sites.label == 0))
     share = float(stray.mean()) if len(stray) else 0.0
-    sensor = describe_sensor(noise_map, levels, aligned, pose, facts.systematic, depth_step, tolerance, share)
-    return pose, noise_map, sensor
+    sensor = describe_sensor(levels, aligned, pose, facts.systematic, depth_step, tolerance, share)
+    return pose, sensor
 
 
-@step(gives=("found", "folded", "warnings"), reads=("found", "sensor", "accept", "deviation", "tolerance", "unit"))
+@step(
+    gives=("found", "folded", "warnings"),
+    reads=("found", "sensor", "facts", "accept", "deviation", "tolerance", "unit"),
+)
 def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]:
     """Takes doubtful sites that are shallower than what the scan can show for what they are: errors of the sensor. How
     much they hold at most stays in the interval of the total. Sites that the job accepts by number stay."""
     found, sensor, accept, unit = state.found, state.sensor, state.accept, state.unit
-    if sensor.least_depth < HIDES * state.tolerance or not isinstance(accept, str) or accept == "all":
+    is_open = state.facts.is_fitted  # a pose that was given, or is held by unworn skin, makes no such errors
+    if not is_open or sensor.least_depth < HIDES * state.tolerance or not isinstance(accept, str) or accept == "all":
         return found, 0.0, ()
     depths = {site.number: float(-state.deviation.distance[site.members].min(initial=0.0)) for site in found}
     folded = [

@@ -38,7 +38,6 @@ from damageest.checks.coverage import SkinView
 from damageest.checks.free_pose import Dependence
 from damageest.checks.model_fit import FittedModel
 from damageest.checks.pose_error import PoseError
-from damageest.checks.sensor import NoiseMap
 from damageest.checks.uncertainty import SiteError
 from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
@@ -236,7 +235,6 @@ class JobState(State):
     coverage = Value[Coverage]()
     facts = Value[ScanFacts]()
     pose_error = Value[PoseError]()
-    noise_map = Value[NoiseMap]()
     sensor = Value[Sensor]()
     folded = Value[float]()
     surplus = Value[tuple[Surplus, ...]]()

@@ -52,7 +52,6 @@ BESIDE = 2.0
         "fitted",
         "pose",
         "pose_error",
-        "noise_map",
         "tolerance",
         "unit",
     ),
@@ -116,7 +115,6 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts, beyond,
         free=state.pose.free, adapted=state.adapted,
         form=measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH,
-        noise=state.noise_map.at(site.damage.bounds, 2 * max(state.tolerance, state.aligned.spacing)),
     )  # fmt: skip
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))
