@@ -33,14 +33,14 @@ def measure_sensor(
 
 @step(
     gives=("found", "folded", "warnings"),
-    reads=("found", "sensor", "facts", "accept", "deviation", "tolerance", "unit"),
+    reads=("found", "sensor", "aligner", "accept", "deviation", "tolerance", "unit"),
 )
 def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]:
     """Takes doubtful sites that are shallower than what the scan can show for what they are: errors of the sensor. How
     much they hold at most stays in the interval of the total. Sites that the job accepts by number stay."""
     found, sensor, accept, unit = state.found, state.sensor, state.accept, state.unit
-    is_open = state.facts.is_fitted  # a pose that was given, or is held by unworn skin, makes no such errors
-    if not is_open or sensor.least_depth < HIDES * state.tolerance or not isinstance(accept, str) or accept == "all":
+    is_given = getattr(state.aligner, "use", "none") == "none"  # its error is not the sensor's
+    if is_given or sensor.least_depth < HIDES * state.tolerance or not isinstance(accept, str) or accept == "all":
         return found, 0.0, ()
     depths = {site.number: float(-state.deviation.distance[site.members].min(initial=0.0)) for site in found}
     folded = [
