@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Floats, Ints, Part, Scan
+from damageest.artefacts import INTACT, Deviation, Floats, Part, Scan
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scan_quality import AUTO_STEPS, AUTO_TOLERANCE
 from damageest.findings import NoiseLevel, Sensor
@@ -33,19 +33,22 @@ NEEDED = 10
 
 
 def measure_levels(part: Part, aligned: Scan, deviation: Deviation) -> tuple[NoiseLevel, ...]:
-    """The noise of intact skin by incidence and by distance from the scanner; none where no position is known."""
+    """The noise of intact skin by incidence and by distance from the scanner, of points whose scanner position is
+    known."""
+    if aligned.viewpoints is None or aligned.view is None or not aligned.spacing:
+        return ()
     index = np.flatnonzero(deviation.label == INTACT)
     index = index[:: max(1, -(-len(index) // MOST_POINTS))]
-    if aligned.viewpoints is None or len(index) < FEWEST_OF_LEVEL or not aligned.spacing:
-        return ()
-    normals = part.face_normals[deviation.face[index]]
-    points, distance = aligned.points[index], deviation.distance[index]
+    normals, distance = part.face_normals[deviation.face[index]], deviation.distance[index]
     edge = EDGE * aligned.spacing * float(np.sqrt(max(1.0, len(aligned.points) / MOST_POINTS)))
-    _, group, count = group_integers(number_faced_cubes(points, normals, edge)[1])
+    _, group, count = group_integers(number_faced_cubes(aligned.points[index], normals, edge)[1])
     mean = np.bincount(group, weights=distance) / count
-    off = (distance - mean[group]) ** 2 * (count / np.maximum(count - 1, 1))[group]
-    used = (count >= FEWEST_POINTS)[group]
-    return _list_levels(aligned, index[used], normals[used], off[used])
+    square = (distance - mean[group]) ** 2 * (count / np.maximum(count - 1, 1))[group]
+    told = (count >= FEWEST_POINTS)[group] & (aligned.view[index] >= 0)
+    if told.sum() < FEWEST_OF_LEVEL:
+        return ()
+    ray = aligned.viewpoints[aligned.view[index[told]]] - aligned.points[index[told]]
+    return _list_levels(ray, normals[told], square[told])
 
 
 def describe_sensor(
@@ -74,26 +77,19 @@ def describe_sensor(
     )
 
 
-def _list_levels(aligned: Scan, index: Ints, normals: Floats, off: Floats) -> tuple[NoiseLevel, ...]:
-    """The noise by incidence and by distance of intact points whose scanner position is known. ``off`` (N,): squares
-    of the deviations from the mean of a patch."""
-    if aligned.viewpoints is None or aligned.view is None:
-        return ()
-    known = aligned.view[index] >= 0
-    index, normals, off = index[known], normals[known], off[known]
-    if len(index) < FEWEST_OF_LEVEL:
-        return ()
-    ray = aligned.viewpoints[aligned.view[index]] - aligned.points[index]
+def _list_levels(ray: Floats, normals: Floats, square: Floats) -> tuple[NoiseLevel, ...]:
+    """The noise of points by incidence and by distance. ``ray`` (N,3): from each to its scanner; ``square`` (N,): of
+    its deviation from the mean of its patch."""
     distance = np.linalg.norm(ray, axis=1)
     cosine = np.einsum("ij,ij->i", ray, normals) / np.maximum(distance, 1e-300)
     angle = np.degrees(np.arccos(np.clip(cosine, 0, 1)))
     ends = tuple(np.linspace(distance.min(), distance.max(), DISTANCES + 1).tolist())
+    ranges: tuple[tuple[Literal["incidence", "distance"], Floats, tuple[float, ...]], ...]
+    ranges = (("incidence", angle, INCIDENCES), ("distance", distance, ends))
     found = []
-    told: tuple[tuple[Literal["incidence", "distance"], Floats, tuple[float, ...]], ...]
-    told = (("incidence", angle, INCIDENCES), ("distance", distance, ends))
-    for name, value, limits in told:
+    for of, value, limits in ranges:
         for low, high in pairwise(limits):
             inside = (value >= low) & (value <= high)
             if inside.sum() >= FEWEST_OF_LEVEL:
-                found.append(NoiseLevel(name, float(low), float(high), float(np.sqrt(off[inside].mean()))))
+                found.append(NoiseLevel(of, low, high, float(np.sqrt(square[inside].mean()))))
     return tuple(found)

@@ -202,7 +202,7 @@ def _print_table(result: Result, target: Path) -> None:
     from rich.text import Text
 
     from damageest.findings import describe_interval
-    from damageest.rules.notes import list_notes
+    from damageest.rules.notes import cap_notes, list_notes
 
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
 
@@ -231,7 +231,7 @@ def _print_table(result: Result, target: Path) -> None:
     elif not result.failures:
         depth = f"{result.tolerance:.4g} {unit}"
         show(f"no damage deeper than the tolerance of {depth} was found{_on_seen(result)}")
-        if result.volume_95 and result.volume_95[1] > 0:
+        if result.pose.free and result.volume_95 and result.volume_95[1] > 0:
             most = f"{result.volume_95[1]:.4g} {unit}³"
             show(f"the pose is free: wear of up to {most} over a whole face would not show; see align.datum")
     _print_coverage(result, show)
@@ -243,7 +243,7 @@ def _print_table(result: Result, target: Path) -> None:
         show(text)
     for text in result.failures:
         show(f" {text}", "failed:", "red")
-    for text in list_notes(result):
+    for text in cap_notes(list_notes(result)):
         show(f" {text}", "note:", "yellow")
     show(f"written to {target}")
 

@@ -99,7 +99,7 @@ def _describe_site(found: FoundSite, part: Part, deviation: Deviation) -> Site:
         path=path,
         method=found.method,
         evidence=evidence,
-        max_depth=max(float(-deviation.distance[members].min(initial=0.0)), 0.0),
+        max_depth=found.measure_depth(deviation),
         warnings=warnings,
     )
 

@@ -7,10 +7,10 @@ import numpy as np
 from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Part, Reason, Scan, Sites
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.sensor import describe_sensor, measure_levels
-from damageest.checks.uncertainty import combine_site
 from damageest.findings import Sensor
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
+from damageest.pipeline.uncertainty import limit_doubtful
 from damageest.rules import ScanFacts
 
 HIDES = 1.2
@@ -42,16 +42,17 @@ def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]
     is_given = getattr(state.aligner, "use", "none") == "none"  # its error is not the sensor's
     if is_given or sensor.least_depth < HIDES * state.tolerance or not isinstance(accept, str) or accept == "all":
         return found, 0.0, ()
-    depths = {site.number: float(-state.deviation.distance[site.members].min(initial=0.0)) for site in found}
-    folded = [
-        site for site in found if site.verdict.level == "doubtful" and 0 < depths[site.number] < sensor.least_depth
-    ]
-    if not folded:
+    depths = {
+        site.number: depth
+        for site in found
+        if site.verdict.level == "doubtful" and 0 < (depth := site.measure_depth(state.deviation)) < sensor.least_depth
+    }
+    if not depths:
         return found, 0.0, ()
-    kept = tuple(site for site in found if site not in folded)
-    volume = sum(combine_site(site.error)[0][1] if site.error else site.damage.volume for site in folded)
-    deepest = max(depths[site.number] for site in folded)
-    many = f"{len(folded)} places are" if len(folded) > 1 else "1 place is"
+    kept = tuple(site for site in found if site.number not in depths)
+    volume = sum(limit_doubtful(site) for site in found if site.number in depths)
+    deepest = max(depths.values())
+    many = f"{len(depths)} places are" if len(depths) > 1 else "1 place is"
     text = (
         f"{many} below the skin by up to {deepest:.3g} {unit}, which errors of this scan explain: its points deviate "
         f"by {np.hypot(sensor.noise, sensor.correlated):.3g} {unit} on intact skin, so that losses below "

@@ -181,6 +181,10 @@ class FoundSite(_SiteState):
     built = Value[Solid | None]()
     path = Value[DepositPath | None]()
 
+    def measure_depth(self, deviation: Deviation) -> float:
+        """The largest depth of its scan points below the skin; 0 without any."""
+        return max(float(-deviation.distance[self.members].min(initial=0.0)), 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class JobState(State):

@@ -85,13 +85,13 @@ def sum_uncertainty(
     if len(errors) != len(taken) or lost:
         return None
     # collect_result moves it to the volume of the union, which is the same but for overlaps
-    left = hidden + sum(_limit_doubtful(site) for site in found if not site.accepted)
+    left = hidden + sum(limit_doubtful(site) for site in found if not site.accepted)
     total = combine_total(sum(site.damage.volume for site in taken), errors, left)
     is_open = any(site.uncertainty and site.uncertainty.is_open for site in taken)
     return (total[0], math.inf) if is_open else total
 
 
-def _limit_doubtful(site: FoundSite) -> float:
+def limit_doubtful(site: FoundSite) -> float:
     """How large the loss of a site that is not accepted may be: the high end of its interval without what opens it.
     What contradicts the site does not open the total."""
     return combine_site(site.error)[0][1] if site.error else site.damage.volume

@@ -104,7 +104,8 @@ def join_reasons(reasons: Iterable[tuple[int, Reason]]) -> tuple[SiteReason, ...
 
 
 def list_notes(result: Result) -> list[str]:
-    """The notes on the run and on its sites, as a run prints them: each reason once, with the sites that have it."""
+    """The notes on the run and on its sites, in the order in which a run prints them: each reason once, with the sites
+    that have it."""
     notes = [str(note) for note in fold_notes(result.warnings)]
     for level in ("doubtful", "likely", "proven"):
         chosen = [site for site in result.sites if site.verdict.level == level]
@@ -113,8 +114,12 @@ def list_notes(result: Result) -> list[str]:
             verb = "is" if len(one.sites) == 1 else "are"
             notes.append(f"{one.names} {verb} {level}: {one.reason}")
     told = [(site.id, note) for site in result.sites for note in site.warnings]
-    notes += [f"{one.names}: {one.reason}" for one in join_reasons(told)]
-    if len(notes) > MOST_PRINTED:
-        more = len(notes) - MOST_PRINTED + 1
-        notes = [*notes[: MOST_PRINTED - 1], f"{more} more notes are in result.json and report.html"]
-    return notes
+    return notes + [f"{one.names}: {one.reason}" for one in join_reasons(told)]
+
+
+def cap_notes(notes: Sequence[str]) -> list[str]:
+    """At most `MOST_PRINTED` lines: the first notes, and the number of the others."""
+    if len(notes) <= MOST_PRINTED:
+        return list(notes)
+    more = len(notes) - MOST_PRINTED + 1
+    return [*notes[: MOST_PRINTED - 1], f"{more} more notes are in result.json and report.html"]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
+
 from damageest.artefacts import Reason
-from damageest.rules.notes import RUN_CODES, fold_notes, join_reasons, rank_notes
+from damageest.rules.notes import MOST_PRINTED, RUN_CODES, cap_notes, fold_notes, join_reasons, rank_notes
 
 
 def test_what_changes_a_decision_comes_first_and_nothing_twice() -> None:
@@ -32,3 +34,17 @@ def test_a_reason_of_several_sites_is_told_once() -> None:
     assert [(one.sites, one.reason) for one in joined] == [((1, 2, 5), pose), ((2,), own)]
     assert joined[0].names == "sites 1, 2, 5"
     assert joined[1].names == "site 2"
+
+
+@pytest.mark.parametrize("count", [0, 1, MOST_PRINTED])
+def test_few_notes_are_all_printed(count: int) -> None:
+    notes = [f"note {number}" for number in range(count)]
+    assert cap_notes(notes) == notes
+
+
+def test_of_many_the_first_are_printed_and_the_others_counted() -> None:
+    notes = [f"note {number}" for number in range(MOST_PRINTED + 5)]
+    printed = cap_notes(notes)
+    assert len(printed) == MOST_PRINTED
+    assert printed[:-1] == notes[: MOST_PRINTED - 1]
+    assert printed[-1].startswith("6 more notes")

@@ -132,26 +132,32 @@ def _describe(frame: Frame, fitted: Fit, found: _Found, tolerance: float, unit: 
 def _search(patches: Patches, datum: Flags | None, noise: float, tolerance: float, rng: np.random.Generator) -> _Found:
     """Searches with errors of form of several sizes. Of those with which nothing lies outside, the one counts that
     explains the patches best: wear and large errors both leave skin inside, but errors leave as much outside."""
-    weighted = patches
     if datum is not None:
         weighted = replace(patches, weight=np.where(datum, patches.weight, patches.weight / DATUM_WEIGHT))
-    here = [explain(patches, patches.offset, error * tolerance, noise, tolerance) for error in (*FORM_ERRORS, *LARGE)]
-    found: list[tuple[float, _Found]] = []
-    for error in FORM_ERRORS:
-        band = measure_bands(patches, noise, error * tolerance)
-        searched = search_motions(weighted, band, APART * tolerance, rng)
-        offset = patches.move(searched.motions[:1])[0]
-        outside = measure_outside(patches, offset, band, tolerance)
-        contact = float(patches.weight[np.abs(offset) < band].sum() / patches.weight.sum())
-        explains = outside < MOST_OUTSIDE and contact > MIN_CONTACT
-        one = _Found(patches, band, searched.motions, float(searched.score[0]) - searched.start, explains)
-        found.append((explain(patches, offset, error * tolerance, noise, tolerance), one))
-        if datum is not None:
-            return one
-    best = max(range(len(found)), key=lambda k: (found[k][1].explains, found[k][0]))
-    if max(here) < found[best][0]:
-        return found[best][1]
+        return _search_with(weighted, patches, FORM_ERRORS[0], noise, tolerance, rng)
+    found = [_search_with(patches, patches, error, noise, tolerance, rng) for error in FORM_ERRORS]
+
+    def weigh(offset: Floats, error: float) -> float:
+        return explain(patches, offset, error * tolerance, noise, tolerance)
+
+    moved = [weigh(patches.move(one.motions[:1])[0], error) for one, error in zip(found, FORM_ERRORS, strict=True)]
+    here = [weigh(patches.offset, error) for error in (*FORM_ERRORS, *LARGE)]
+    best = max(range(len(found)), key=lambda k: (found[k].explains, moved[k]))
+    if max(here) < moved[best]:
+        return found[best]
     size = int(np.argmax(here))
-    if size >= len(FORM_ERRORS):
-        return replace(found[-1][1], explains=False)
-    return replace(found[size][1], gain=0.0)
+    return replace(found[size], gain=0.0) if size < len(found) else replace(found[-1], explains=False)
+
+
+def _search_with(
+    weighted: Patches, patches: Patches, error: float, noise: float, tolerance: float, rng: np.random.Generator
+) -> _Found:
+    """The best motion where errors of form have a standard deviation of ``error``, in tolerances. ``weighted``: the
+    patches with the weights by which motions are searched."""
+    band = measure_bands(patches, noise, error * tolerance)
+    searched = search_motions(weighted, band, APART * tolerance, rng)
+    offset = patches.move(searched.motions[:1])[0]
+    outside = measure_outside(patches, offset, band, tolerance)
+    contact = float(patches.weight[np.abs(offset) < band].sum() / patches.weight.sum())
+    explains = outside < MOST_OUTSIDE and contact > MIN_CONTACT
+    return _Found(patches, band, searched.motions, float(searched.score[0]) - searched.start, explains)

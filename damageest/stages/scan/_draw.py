@@ -112,7 +112,9 @@ def _make_weights(
     if not (how.density or planes or how.patches):
         return None
     field = _random_field.RandomField.build(part.diagonal / 2, 1, how.seed, waves=8)
-    bare = _random_field.choose_patches(body, how.patches, how.patch_size, how.seed + 500_009)
+    bare = None
+    if how.patches:
+        bare = _random_field.choose_patches(body, how.patches, how.patch_size, how.seed + 500_009)
 
     def weigh(points: Floats) -> Floats:
         weights = np.exp(how.density * field.evaluate(points)) if how.density else np.ones(len(points))

@@ -42,11 +42,9 @@ class RandomField:
         return np.clip(total, -2.5, 2.5)
 
 
-def choose_patches(mesh: Mesh, share: float, size: float, seed: int) -> Callable[[Floats], NDArray[np.bool_]] | None:
+def choose_patches(mesh: Mesh, share: float, size: float, seed: int) -> Callable[[Floats], NDArray[np.bool_]]:
     """A function of points (N,3) that says which lie in patches, about ``size`` across, which cover this share of the
-    surface; None where that is 0."""
-    if not share:
-        return None
+    surface."""
     field = RandomField.build(2 * size, 1, seed, waves=16)  # half a wavelength is above the mean
     places = sample_by_area(mesh, 20_000, np.random.default_rng([8807, seed]))[0]
     least = float(np.quantile(field.evaluate(places), 1 - share))

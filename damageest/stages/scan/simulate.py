@@ -247,7 +247,6 @@ class Simulate(ReadScan):
             points = _errors.add_waviness(points, draw.toward, field, self.waviness, wavelength, self.seed)
         if self.sheets:
             doubled = choose_patches(body, self.sheets, self.patch_size or part.diagonal / 10, self.seed + 900_001)
-            assert doubled is not None
             points = _errors.add_sheet(points, draw.toward, doubled(draw.points), self.sheet_offset, rng)
         reach = np.empty(0)
         spread: Floats | float = sigma

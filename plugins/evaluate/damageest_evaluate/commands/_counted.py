@@ -40,6 +40,19 @@ def run_counted(
     return run_all(cases, out / name if out else None, workers, timeout, print_row, scheduler)
 
 
+def show_report(make: Callable[[bool], str], name: str, out: Path | None, write: Path | None) -> None:
+    """Prints a report, writes it to ``out``/``name``.md, and between the marks ``name`` of the file ``write``, there
+    without its legend. ``make`` makes it, with a legend or without."""
+    from damageest_evaluate.readme import replace_between_marks
+
+    text = make(True)
+    typer.echo("\n" + text)
+    if out:
+        (out / f"{name}.md").write_text(text + "\n", encoding="utf-8")
+    if write:
+        write.write_text(replace_between_marks(write, make(False), name), encoding="utf-8")
+
+
 def parse_numbers(option: str, text: str) -> list[int]:
     """The whole numbers in ``text``; raises InputError for anything else."""
     from damageest.errors import InputError

@@ -38,7 +38,13 @@ def command(
     interval, and the site is not doubtful.
     """
     from damageest.registry import Registry
-    from damageest_evaluate.commands._counted import format_command, parse_numbers, run_counted, split_words
+    from damageest_evaluate.commands._counted import (
+        format_command,
+        parse_numbers,
+        run_counted,
+        show_report,
+        split_words,
+    )
     from damageest_evaluate.job import fingerprint_code
     from damageest_evaluate.readme import replace_between_marks
     from damageest_evaluate.troubles.report import describe_case, format_trouble_row, make_trouble_tables
@@ -64,12 +70,4 @@ def command(
         return f"{row['number']} {format_trouble_row(row)}"
 
     rows = run_counted(cases, out, "honesty.jsonl", workers, timeout, describe, scheduler)
-    text = make_trouble_tables(rows, format_command())
-    typer.echo("\n" + text)
-    if out:
-        (out / "honesty.md").write_text(text + "\n", encoding="utf-8")
-    if write:
-        write.write_text(
-            replace_between_marks(write, make_trouble_tables(rows, format_command(), False), "honesty"),
-            encoding="utf-8",
-        )
+    show_report(lambda legend: make_trouble_tables(rows, format_command(), legend), "honesty", out, write)

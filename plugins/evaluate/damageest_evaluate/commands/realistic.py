@@ -32,7 +32,13 @@ def command(
     12 views. The job knows the part and the unit: the pose is unknown and the tolerance is auto.
     """
     from damageest.registry import Registry
-    from damageest_evaluate.commands._counted import format_command, parse_numbers, run_counted, split_words
+    from damageest_evaluate.commands._counted import (
+        format_command,
+        parse_numbers,
+        run_counted,
+        show_report,
+        split_words,
+    )
     from damageest_evaluate.job import fingerprint_code
     from damageest_evaluate.readme import replace_between_marks
     from damageest_evaluate.realistic.report import describe_case, format_realistic_row, make_realistic_report
@@ -48,10 +54,4 @@ def command(
             typer.echo(f"{item.number} {describe_case(item.make_blank_row())}")
         return
     rows = run_counted(cases, out, "realistic.jsonl", workers, timeout, format_realistic_row)
-    text = make_realistic_report(rows, format_command())
-    typer.echo("\n" + text)
-    if out:
-        (out / "realistic.md").write_text(text + "\n", encoding="utf-8")
-    if write:
-        short = make_realistic_report(rows, format_command(), False)
-        write.write_text(replace_between_marks(write, short, "realistic"), encoding="utf-8")
+    show_report(lambda legend: make_realistic_report(rows, format_command(), legend), "realistic", out, write)

@@ -9,6 +9,7 @@ import numpy as np
 
 from damageest_evaluate.processes import Row
 from damageest_evaluate.readme import describe_measurement, format_markdown
+from damageest_evaluate.troubles.report import is_held, list_groups
 
 HEAD = (
     "sensor", "cases", "right", "inside", "doubted", "refused", "silent", "held", "pose, steps", "pose within 1",
@@ -18,9 +19,9 @@ LEGEND = (
     "right, inside, silent: as in the suite of honesty; doubted, refused: how what is wrong is said. held: groups of "
     "accepted sites whose interval holds the truth, of all. pose: error in resolutions of the sensor (standard "
     "deviation of one point), median, and within one of them, of all runs with a result. undamaged: cases without a "
-    "loss; no site: those without any site; false: those with an accepted one. notes: lines of notes of a run, median "
-    "and most. time: processor time in multiples of a clean scan's of the same part with as many points, median and "
-    "most"
+    "loss; no site: those without any site; false: those with an accepted one. notes: of a run, also those that it "
+    "does not print, median and most. time: processor time in multiples of a clean scan's of the same part with as "
+    "many points, median and most"
 )
 MOST_NOTES = 8
 MOST_TIME = 2.0
@@ -37,8 +38,7 @@ def make_realistic_table(rows: Sequence[Row]) -> str:
 def _count(rows: Sequence[Row]) -> list[str]:
     outcomes = [row["outcome"] for row in rows]
     said = [row for row in rows if row["outcome"] == "said"]
-    taken = [group for row in rows for group in row["groups"] if group["accepted"]]
-    held = sum(group["low"] <= group["truth"] <= _open(group["high"]) for group in taken)
+    taken = list_groups(rows)
     steps = [row["pose_error"] / row["resolution"] for row in rows if row["pose_error"] is not None]
     whole = [row for row in rows if not row["damaged"]]
     quiet = sum(not row["sites"] and not row["refused"] and not row["error"] for row in whole)
@@ -51,7 +51,7 @@ def _count(rows: Sequence[Row]) -> list[str]:
         str(sum(not row["refused"] for row in said)),
         str(sum(row["refused"] for row in said)),
         str(outcomes.count("silent")),
-        f"{held} of {len(taken)}",
+        f"{sum(map(is_held, taken))} of {len(taken)}",
         _tell(steps, "{:.2f}"),
         f"{sum(value <= 1 for value in steps)} of {len(steps)}",
         str(len(whole)),
@@ -62,10 +62,6 @@ def _count(rows: Sequence[Row]) -> list[str]:
         _tell(times, "{:.1f}"),
         f"{max(times, default=0.0):.1f}",
     ]
-
-
-def _open(high: float | None) -> float:
-    return float("inf") if high is None else high
 
 
 def _tell(values: Sequence[float], form: str) -> str:
