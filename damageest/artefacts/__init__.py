@@ -8,7 +8,7 @@ after `align` is in the part's. ``T_part_scan`` takes a point from the scanner's
 from __future__ import annotations
 
 from damageest.artefacts.adapted import AdaptedPart, PriorUse
-from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
+from damageest.artefacts.arrays import Bytes, Flags, Floats, Ints, Singles, Vector
 from damageest.artefacts.displacement import (
     DisplacementField,
     evaluate_splines,
@@ -43,6 +43,7 @@ __all__ = [
     "AdaptedPart",
     "ArtefactError",
     "BeadFill",
+    "Bytes",
     "Deposit",
     "DepositPath",
     "Deviation",
@@ -64,6 +65,7 @@ __all__ = [
     "Rims",
     "Samples",
     "Scan",
+    "Singles",
     "Sites",
     "Solid",
     "Surface",

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts.arrays import Flags, Floats, Ints, Vector
+from damageest.artefacts.arrays import Bytes, Flags, Floats, Ints, Singles, Vector
 from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
 from damageest.artefacts.meshes import Solid
 from damageest.artefacts.reasons import Reason
@@ -62,7 +62,9 @@ class Scan(Checked):
     to the nearest neighbours that a reconstructed surface has to bridge; both 0 until measured. ``viewpoints`` (V,3):
     where the scanner stood for each view, in the frame of the points; ``view`` (N,): the number of each point's view,
     -1 where its scanner position is not known. Both None where no position is known. ``total``: number of points in
-    the files where only some of them are here, else 0.
+    the files where only some of them are here, else 0. ``colours`` (N,3) from 0 to 255, and ``confidence`` (N,) on the
+    scale of the files, as the scanner's program wrote them; None where no file has them. Beside files with, the points
+    of a file without are grey, and their confidence is no number. ``warnings``: what the reader doubts.
     """
 
     points: Floats
@@ -76,11 +78,16 @@ class Scan(Checked):
     viewpoints: Floats | None = None
     view: NDArray[np.int32] | None = None
     total: int = 0
+    colours: Bytes | None = None
+    confidence: Singles | None = None
+    warnings: tuple[Reason, ...] = ()
     _dtypes: ClassVar[dict[str, Any]] = {
         "points": np.float64,
         "normals": np.float64,
         "viewpoints": np.float64,
         "view": np.int32,
+        "colours": np.uint8,
+        "confidence": np.float32,
     }
     _ranges: ClassVar[dict[str, Range]] = {"noise": (0.0, MOST), "spacing": (0.0, MOST), "total": (0, MOST)}
 
@@ -89,6 +96,10 @@ class Scan(Checked):
         require_shape("points", self.points, "N", 3)
         if self.normals is not None:
             require_shape("normals", self.normals, len(self.points), 3)
+        if self.colours is not None:
+            require_shape("colours", self.colours, len(self.points), 3)
+        if self.confidence is not None:
+            require_shape("confidence", self.confidence, len(self.points))
         if (self.viewpoints is None) != (self.view is None):
             raise ArtefactError("viewpoints and view: give both or none")
         if self.viewpoints is not None and self.view is not None:
@@ -108,10 +119,9 @@ class Scan(Checked):
 
     def take(self, index: Ints | Flags) -> Scan:
         """The scan with some of its points: their numbers (M,), or whether each is taken (N,)."""
-        normals = None if self.normals is None else self.normals[index]
-        return replace(
-            self, points=self.points[index], normals=normals, view=None if self.view is None else self.view[index]
-        )
+        names = ("points", "normals", "view", "colours", "confidence")
+        given = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return replace(self, **{name: value[index] for name, value in given.items()})
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
     file, if it is not a mesh in the format of its suffix, or if it is truncated.
     """
     suffix = check_file(path, MESH_SUFFIXES, "a mesh")
-    require_memory_for(path)
+    require_memory_for([path])
     if suffix == ".stl":
         vertices, faces = _read_stl(path)
         return vertices, faces, None

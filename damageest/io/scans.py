@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Floats, Ints, Scan, Vector
+from damageest.artefacts import Bytes, Floats, Ints, Scan, Singles, Vector
 from damageest.errors import InputError
 from damageest.geometry.duplicates import find_duplicates
 from damageest.geometry.units import FARTHEST, canonical_unit, unit_factor
-from damageest.io.points import read_points
+from damageest.io.file_memory import require_memory_for
+from damageest.io.points import PointFile, read_points
+from damageest.io.scan_notes import ConfidenceCount, UnitNotes
+
+GREY = 128
+"""Colour of the points of a file without colours, beside files with."""
 
 
 def make_scan(
@@ -24,12 +30,15 @@ def make_scan(
     paths: tuple[str, ...] = (),
     notes: tuple[str, ...] = (),
     viewpoints: Floats | None = None,
-    view: Ints | None = None,
+    view: Ints | NDArray[np.int32] | None = None,
+    colours: Bytes | None = None,
+    confidence: Singles | None = None,
 ) -> Scan:
     """A scan from points (N,3) in ``unit`` and optional normals (N,3).
 
     ``viewpoints`` (V,3): scanner positions, in the unit and the frame of the points; ``view`` (N,): the number of each
-    point's position, -1 where it is not known. ``viewpoints`` alone: one position (1,3) for all points.
+    point's position, -1 where it is not known. ``viewpoints`` alone: one position (1,3) for all points. ``colours``
+    (N,3) and ``confidence`` (N,) are kept as they are.
 
     Points that are not finite or farther than 1e12 from the origin, and duplicates, are removed; the scan's notes give
     their numbers. Normals are scaled to
@@ -46,7 +55,10 @@ def make_scan(
                 f"{name}: normals need the shape of the points, {points.shape}, but have the shape {normals.shape}"
             )
     viewpoints, numbers = _check_views(name, len(points), viewpoints, view)
-    scan = Scan(points, normals, canonical_unit(unit), paths, viewpoints=viewpoints, view=numbers)
+    scan = Scan(
+        points, normals, canonical_unit(unit), paths, viewpoints=viewpoints, view=numbers, colours=colours,
+        confidence=confidence,
+    )  # fmt: skip
     finite = np.asarray(np.isfinite(points).all(axis=1))
     if not finite.all():
         notes = (*notes, f"removed {int((~finite).sum())} points with coordinates that are not finite")
@@ -72,7 +84,7 @@ def make_scan(
 
 
 def _check_views(
-    name: str, count: int, viewpoints: Floats | None, view: Ints | None
+    name: str, count: int, viewpoints: Floats | None, view: Ints | NDArray[np.int32] | None
 ) -> tuple[Floats | None, NDArray[np.int32] | None]:
     """Scanner positions and their numbers in the types of a scan. Raises InputError where they do not fit."""
     if viewpoints is None:
@@ -98,49 +110,76 @@ def read_scan(
     source: str | None = None,
     columns: str | None = None,
     viewpoints: Sequence[Vector | None] | None = None,
+    min_confidence: float | None = None,
 ) -> Scan:
     """The points of one file, or of several files in the same frame, in ``unit``.
 
-    ``source``: unit of the lengths in the files; None: the unit that each file states (E57, PTX: m), else ``unit``.
-    ``columns``: names of the columns of a text file. ``viewpoints``: for each file where its scanner stood, in the unit
-    and the frame of the file; None: where the file itself says, if it does. Raises InputError if a file cannot be read
-    or has no points.
+    ``source``: unit of the lengths in the files; None: the unit that each file states, by its header or the standard of
+    its format, else ``unit``. ``columns``: names of the columns of a text file. ``viewpoints``: for each file where its
+    scanner stood, in the unit and the frame of the file; None: where the file itself says, if it does.
+    ``min_confidence``: points of a lower confidence are left out. Raises InputError if a file cannot be read or has no
+    points, and where there is a ``min_confidence`` and no confidence.
     """
     if not paths:
         raise InputError("scan: no file is given")
-    clouds = [read_points(path, columns) for path in paths]
+    require_memory_for(paths)
     notes: list[str] = []
-    scaled = []
+    units, confidence = UnitNotes(source, unit), ConfidenceCount(min_confidence)
+    clouds: list[PointFile] = []
     positions: list[Floats] = []
     views: list[Ints] = []
-    for cloud, path, given_viewpoint in zip(clouds, paths, viewpoints or [None] * len(paths), strict=True):
+    for path, given in zip(paths, viewpoints or [None] * len(paths), strict=True):
+        cloud = read_points(path, columns)
         notes.extend(f"{path.name}: {note}" if len(paths) > 1 else note for note in cloud.notes)
-        own = canonical_unit(source or cloud.unit or unit)
-        points = np.asarray(cloud.points, dtype=np.float64)
-        factor = unit_factor(own, unit)
+        factor = unit_factor(units.settle(path, cloud.unit, cloud.unit_said), unit)
         at, view = cloud.viewpoints, cloud.view
-        if given_viewpoint is not None:
-            at, view = np.array([given_viewpoint], dtype=np.float64), np.zeros(len(points), np.int64)
+        if given is not None:
+            at, view = np.array([given], dtype=np.float64), np.zeros(len(cloud.points), np.int64)
         if at is None or view is None:
-            views.append(np.full(len(points), -1))
+            view = np.full(len(cloud.points), -1)
         else:
-            views.append(np.where(view >= 0, view + sum(map(len, positions)), -1))
+            view = np.where(view >= 0, view + sum(map(len, positions)), -1)
             positions.append(at * factor)
-        if own != canonical_unit(unit):
-            notes.append(f"{path.name}: converted from {own} to {canonical_unit(unit)}")
-            points = points * factor
-        scaled.append(points)
-    given = [cloud.normals for cloud in clouds if cloud.normals is not None]
-    normals = np.concatenate(given) if len(given) == len(clouds) else None
-    if given and normals is None:
+        cloud = replace(cloud, points=np.asarray(cloud.points, dtype=np.float64))
+        if factor != 1:
+            cloud = replace(cloud, points=cloud.points * factor)
+        keep = confidence.choose(cloud.confidence, len(cloud.points))
+        clouds.append(cloud if keep is None else cloud.take(keep))
+        views.append(view if keep is None else view[keep])
+    confidence.require(paths)
+    given_normals = [cloud.normals for cloud in clouds if cloud.normals is not None]
+    normals = _join(given_normals) if len(given_normals) == len(clouds) else None
+    if given_normals and normals is None:
         notes.append("only some of the files have normals; no normals are used")
-    whole = scaled[0] if len(scaled) == 1 else np.concatenate(scaled)
-    return make_scan(
-        whole,
+    colours = join_some([cloud.colours for cloud in clouds], [(len(cloud.points), 3) for cloud in clouds], GREY)
+    if colours is not None and (grey := sum(cloud.colours is None for cloud in clouds)):
+        notes.append(f"{grey} of {len(clouds)} files have no colours; their points are grey")
+    sizes = [(len(cloud.points),) for cloud in clouds]
+    single = join_some([cloud.confidence for cloud in clouds], sizes, np.nan)
+    points = _join([cloud.points for cloud in clouds])
+    del clouds
+    scan = make_scan(
+        points,
         normals,
         unit,
         paths=tuple(map(str, paths)),
-        notes=tuple(notes),
+        notes=(*notes, *units.notes(), *confidence.notes()),
         viewpoints=np.concatenate(positions) if positions else None,
         view=np.concatenate(views) if positions else None,
+        colours=colours,
+        confidence=single,
     )
+    return replace(scan, warnings=(*units.warnings(), *confidence.warnings()))
+
+
+def join_some(arrays: Sequence[NDArray[Any] | None], shapes: Sequence[tuple[int, ...]], lacking: float) -> Any:
+    """The arrays one after the other, with ``lacking`` in place of those that are None; None where all are."""
+    known = next((array for array in arrays if array is not None), None)
+    if known is None:
+        return None
+    pairs = zip(arrays, shapes, strict=True)
+    return _join([np.full(shape, lacking, known.dtype) if array is None else array for array, shape in pairs])
+
+
+def _join(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)

@@ -29,6 +29,12 @@ COMPARED = 20_000
 """Points that the tolerance is chosen from after the alignment."""
 
 
+@step(gives="warnings")
+def note_scan(scan: Scan) -> Reasons:
+    """Takes over what the reader says about the scan."""
+    return scan.warnings
+
+
 @step(gives="scan")
 def crop_scan(scan: Scan, reader: ReadScan | None) -> Scan:
     """Removes the points that the job's crops remove. Raises InputError where no point is left."""
@@ -141,7 +147,7 @@ def inspect_inputs(job: Job, registry: Registry) -> tuple[Part, Scan, float, lis
     """Part, measured scan, a tolerance for them, and what is doubtful; for a new job."""
     part, scan = read_inputs(job, registry)
     wrong = (diagnose_scale(scan.points, part.vertices, part.unit), diagnose_size(part.vertices, part.unit))
-    doubts = [Reason("unit", text) for text in wrong if text]
+    doubts = [*scan.warnings, *(Reason("unit", text) for text in wrong if text)]
     noise, spacing, step = _measure(scan)
     scan = replace(scan, noise=noise, spacing=spacing)
     tolerance, more = choose_tolerance(None, scan, part, step)

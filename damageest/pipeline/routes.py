@@ -26,6 +26,7 @@ from damageest.pipeline.prepare import (
     gather_intact,
     measure_scan,
     note_pose,
+    note_scan,
     place_scan,
     set_far_aside,
     settle_tolerance,
@@ -61,6 +62,7 @@ ACQUIRE: Route = (
     ReadPart,  # unit, tolerance -> part
     check_selections,  # part ->
     ReadScan,  # unit, part -> scan
+    note_scan,  # scan -> +warnings
     crop_scan,  # scan, reader -> scan
     set_far_aside,  # scan, part -> scan, +warnings
     measure_scan,  # scan, part -> noise, spacing, depth_step

@@ -10,10 +10,10 @@ Add a file of tests in tests/io: a good file, a truncated one, one without point
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from damageest.artefacts import Floats, Ints
+from damageest.artefacts import Bytes, Flags, Floats, Ints, Singles
 from damageest.errors import InputError
 from damageest.io.file_memory import require_memory_for
 from damageest.io.files import check_file, raise_environment_fault, shorten_error
@@ -24,6 +24,8 @@ class PointFile:
     """The content of one file.
 
     ``points`` (N,3), which may be not finite; ``normals`` (N,3) or None; ``unit`` if the file states one, else None.
+    ``unit_said``: the line of the file that states it; empty where the standard of the format does.
+    ``colours`` (N,3), 0 to 255, or None; ``confidence`` (N,) of each point, on the file's own scale, or None.
     ``viewpoints`` (V,3): scanner positions in the frame of the points; ``view`` (N,): the number of each point's
     position, -1 where it is not known. Both None where the file has none.
     """
@@ -34,6 +36,15 @@ class PointFile:
     notes: tuple[str, ...] = ()
     viewpoints: Floats | None = None
     view: Ints | None = None
+    colours: Bytes | None = None
+    confidence: Singles | None = None
+    unit_said: str = ""
+
+    def take(self, keep: Flags) -> PointFile:
+        """The file with some of its points: whether each (N,) is taken."""
+        names = ("points", "normals", "view", "colours", "confidence")
+        given = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return replace(self, **{name: value[keep] for name, value in given.items()})
 
 
 class FormatError(ValueError):
@@ -52,6 +63,12 @@ READERS = {
     ".stl": "mesh",
     ".obj": "mesh",
     ".off": "mesh",
+    ".3mf": "mesh",
+    ".glb": "gltf",
+    ".gltf": "gltf",
+    ".vtk": "vtk",
+    ".vtp": "vtk",
+    ".vtu": "vtk",
     ".las": "las",
     ".laz": "las",
     ".e57": "e57",
@@ -63,7 +80,7 @@ READERS = {
 def read_points(path: Path, columns: str | None = None) -> PointFile:
     """The points of one file. Raises InputError, which names the file, if it cannot be read or has no points."""
     suffix = check_file(path, tuple(READERS), "a scan")
-    require_memory_for(path)
+    require_memory_for([path])
     module = importlib.import_module(f"{__name__}.{READERS[suffix]}")
     try:
         cloud: PointFile = module.read(path, columns)

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Bytes, Floats
 from damageest.io.points import FormatError, PointFile
+from damageest.io.points.attributes import scale_colours
 
 MOST_POINTS_PER_BYTE = 8
 """Coordinates are packed in bits; a point takes at least one."""
@@ -30,6 +31,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     normals: list[Floats | None] = []
     positions: list[Floats] = []
     known: list[bool] = []
+    colours: list[Bytes | None] = []
     posed = False
     with pye57.E57(str(path)) as file:
         for index in range(file.scan_count):
@@ -37,16 +39,17 @@ def read(path: Path, columns: str | None = None) -> PointFile:
             if not 0 <= header.point_count <= MOST_POINTS_PER_BYTE * path.stat().st_size:
                 raise FormatError(f"the file is too small for the {header.point_count} points of scan {index + 1}")
             raw = file.read_scan_raw(index)
-            points, normal = read_scan(header, raw, index)
+            points, normal, colour = read_scan(header, raw, index)
             pieces.append(points)
             normals.append(normal)
+            colours.append(colour)
             pose = read_pose(header)
             positions.append(pose[:3, 3])
             known.append("sphericalRange" in raw or is_range_image(raw))
             posed |= not np.array_equal(pose, np.eye(4))
     if not pieces:
         raise FormatError("the E57 file has no scans")
-    whole = [n for n in normals if n is not None]
+    whole, coloured = [n for n in normals if n is not None], [c for c in colours if c is not None]
     notes = (f"{len(pieces)} scans in one E57 file",) if len(pieces) > 1 else ()
     numbers = np.where(np.array(known) | posed, np.arange(len(pieces)), -1)
     return PointFile(
@@ -56,6 +59,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         notes=notes,
         viewpoints=np.array(positions) if (numbers >= 0).any() else None,
         view=np.repeat(numbers, [len(piece) for piece in pieces]) if (numbers >= 0).any() else None,
+        colours=np.concatenate(coloured) if len(coloured) == len(colours) else None,
     )
 
 
@@ -93,7 +97,8 @@ def is_range_image(raw: dict[str, Any]) -> bool:
     return all(name in raw and np.ptp(raw[name]) > 0 for name in ("rowIndex", "columnIndex"))
 
 
-def read_scan(header: Any, raw: dict[str, Any], index: int) -> tuple[Floats, Floats | None]:
+def read_scan(header: Any, raw: dict[str, Any], index: int) -> tuple[Floats, Floats | None, Bytes | None]:
+    """Points (N,3) in the frame of the file, normals (N,3) and colours (N,3), without points marked as invalid."""
     if "cartesianX" in raw:
         points = np.column_stack([raw[f"cartesian{axis}"] for axis in "XYZ"]).astype(np.float64)
         state = raw.get("cartesianInvalidState")
@@ -108,13 +113,28 @@ def read_scan(header: Any, raw: dict[str, Any], index: int) -> tuple[Floats, Flo
         raise FormatError(f"scan {index + 1} of the E57 file has neither Cartesian nor spherical coordinates")
     names = [f"nor:normal{axis}" for axis in "XYZ"]
     normals = np.column_stack([raw[n] for n in names]).astype(np.float64) if all(n in raw for n in names) else None
+    colours = _read_colours(header, raw)
     if state is not None:
         valid = np.asarray(state) == 0
         points = points[valid]
         normals = None if normals is None else normals[valid]
+        colours = None if colours is None else colours[valid]
     if header.has_pose():
         pose = read_pose(header)
         R = pose[:3, :3]
         points = points @ R.T + pose[:3, 3]
         normals = None if normals is None else normals @ R.T
-    return points, normals
+    return points, normals, colours
+
+
+def _read_colours(header: Any, raw: dict[str, Any]) -> Bytes | None:
+    """Colours (N,3) on the scale that the scan's colour limits give; without limits, by their values."""
+    names = [f"color{name}" for name in ("Red", "Green", "Blue")]
+    if not all(name in raw for name in names):
+        return None
+    try:
+        largest = max(float(header["colorLimits"][f"{name}Maximum"].value()) for name in names)
+    except Exception:  # of the library, where there are no limits, or others
+        largest = None
+    values = np.column_stack([raw[name] for name in names])
+    return scale_colours(values, largest if largest and np.isfinite(largest) and largest > 0 else None)

@@ -6,11 +6,13 @@ import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from damageest.artefacts import Bytes
 from damageest.io.points import FormatError, PointFile
+from damageest.io.points.attributes import scale_colours
 
 if TYPE_CHECKING:
     from laspy import LasReader
@@ -27,7 +29,15 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     points = np.column_stack([np.asarray(las.x), np.asarray(las.y), np.asarray(las.z)])
     if len(points) < count:
         raise FormatError(f"the file is truncated: it has {len(points)} of {count} points")
-    return PointFile(points)
+    return PointFile(points, colours=read_colours(las))
+
+
+def read_colours(las: Any) -> Bytes | None:
+    """Colours (N,3) of points, None where their format has none. They have 16 bits by the standard; programs that write
+    8 bits into them are known by their values."""
+    if "red" not in las.point_format.dimension_names:
+        return None
+    return scale_colours(np.column_stack([np.asarray(las.red), np.asarray(las.green), np.asarray(las.blue)]))
 
 
 @contextmanager

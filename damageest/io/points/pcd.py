@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Bytes, Floats
 from damageest.io.points import FormatError, PointFile
+from damageest.io.points.attributes import find_confidence, find_unit
 from damageest.io.points.text import parse_numbers
 
 _KEYS = ("VERSION", "FIELDS", "COLUMNS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
 
 
-def _read_header(data: bytes) -> tuple[dict[str, list[str]], int]:
+def _read_header(data: bytes) -> tuple[dict[str, list[str]], list[str], int]:
+    """The lines by their first word, the comments, and the position of the data."""
     head: dict[str, list[str]] = {}
+    comments: list[str] = []
     at = 0
     while "DATA" not in head:
         end = data.find(b"\n", at)
@@ -23,11 +27,12 @@ def _read_header(data: bytes) -> tuple[dict[str, list[str]], int]:
         words = data[at:end].decode("latin-1").split()
         at = end + 1
         if not words or words[0].startswith("#"):
+            comments.append(" ".join(words))
             continue
         if words[0].upper() not in _KEYS:
             raise FormatError(f"not a PCD file: its header has a line '{words[0][:40]}'")
         head[words[0].upper()] = words[1:]
-    return head, at
+    return head, comments, at
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
@@ -37,7 +42,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     VIEWPOINT, 0 0 0 1 0 0 0, is found in files of any origin: then the position is not known.
     """
     data = path.read_bytes()
-    head, start = _read_header(data)
+    head, comments, start = _read_header(data)
     try:
         names = head.get("FIELDS") or head["COLUMNS"]
         sizes = [int(s) for s in head["SIZE"]]
@@ -83,6 +88,8 @@ def read(path: Path, columns: str | None = None) -> PointFile:
 
     wanted = ("normal_x", "normal_y", "normal_z")
     xyz = stack("x", "y", "z")
+    confidence, packed = find_confidence(names), next((name for name in ("rgb", "rgba") if name in names), None)
+    unit, said = find_unit(comments)
     position, notes = _find_viewpoint(head, xyz)
     return PointFile(
         xyz,
@@ -90,7 +97,18 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         notes=notes,
         viewpoints=None if position is None else position[None],
         view=None if position is None else np.zeros(len(xyz), np.int64),
+        colours=None if packed is None else _unpack_colours(column(packed), kinds[names.index(packed)]),
+        confidence=None if confidence is None else column(confidence).astype(np.float32),
+        unit=unit,
+        unit_said=said,
     )
+
+
+def _unpack_colours(values: Any, kind: str) -> Bytes:
+    """Colours (N,3) from the field rgb, whose four bytes are blue, green, red and transparency, also where it is called
+    a floating-point number."""
+    single = np.ascontiguousarray(values, np.float32 if kind == "f" else np.uint32)
+    return (single.view(np.uint32)[:, None] >> np.array([16, 8, 0], np.uint32) & 255).astype(np.uint8)
 
 
 def _find_viewpoint(head: dict[str, list[str]], points: Floats) -> tuple[Floats | None, tuple[str, ...]]:

@@ -1,14 +1,21 @@
-"""PLY, text or binary with either byte order. Other properties than x, y, z and the normal are ignored."""
+"""PLY, text or binary with either byte order: points, normals, colours and confidence of the vertices.
+
+It is read in blocks, so that no more than the result and one block is in memory.
+"""
 
 from __future__ import annotations
 
+import mmap
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
-from damageest.artefacts import Floats
 from damageest.io.points import FormatError, PointFile
+from damageest.io.points.attributes import find_colours, find_confidence, find_unit, scale_colours
 from damageest.io.points.text import parse_numbers
 
 TYPES = {
@@ -16,36 +23,87 @@ TYPES = {
     **{"float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2"},
     **{"int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8"},
 }
+LONGEST_HEADER = 1 << 20
+"""Bytes of a header at most."""
+ROWS = 1 << 20
+"""Vertices of a block."""
+TEXT = 1 << 24
+"""Bytes of text that are parsed at once."""
+
+Columns = Mapping[str, Any] | NDArray[np.void]
+"""Columns (N,) of a block by the names of the properties."""
 
 
 @dataclass
-class _Element:
+class Element:
+    """An element of the header: the properties (name, type), and its lists: the position among the properties, the type
+    of the count, and that of the items."""
+
     name: str
     count: int
     properties: list[tuple[str, str]] = field(default_factory=list)
-    lists: list[tuple[int, str, str]] = field(
-        default_factory=list
-    )  # (position among the properties, type of the count, type of the items)
+    lists: list[tuple[int, str, str]] = field(default_factory=list)
 
 
-def read_header(data: bytes) -> tuple[str, list[_Element], int]:
-    """The name of the format, the elements, and the position of the first byte after the header."""
+@dataclass(frozen=True)
+class Header:
+    """The name of the format, the elements, the comments, and the position of the first byte after the header."""
+
+    form: str
+    elements: list[Element]
+    comments: tuple[str, ...]
+    end: int
+
+    @property
+    def order(self) -> str:
+        """The byte order, as numpy names it."""
+        return ">" if self.form == "binary_big_endian" else "<"
+
+    @property
+    def vertex(self) -> Element:
+        """The element 'vertex'. Raises FormatError where there is none, or none with coordinates."""
+        vertex = next((one for one in self.elements if one.name == "vertex"), None)
+        if vertex is None:
+            raise FormatError("the PLY file has no element 'vertex'")
+        names = [name for name, _ in vertex.properties]
+        if not {"x", "y", "z"} <= set(names):
+            raise FormatError(
+                f"the vertices of the PLY file have no x, y, z; their properties are: {', '.join(names) or 'none'}"
+            )
+        if vertex.lists:
+            raise FormatError("the vertices of the PLY file have list properties, which are not supported")
+        return vertex
+
+    @property
+    def before(self) -> list[Element]:
+        """The elements in front of the vertices."""
+        names = [one.name for one in self.elements]
+        return self.elements[: names.index("vertex")]
+
+
+def read_header(path: Path) -> Header:
+    """The header of a file. Raises FormatError where it is not valid."""
+    with path.open("rb") as stream:
+        data = stream.read(LONGEST_HEADER)
     if not data.startswith(b"ply"):
         raise FormatError("not a PLY file: it does not start with 'ply'")
     end = data.find(b"end_header")
     newline = data.find(b"\n", end)
     if end < 0 or newline < 0:
         raise FormatError("the PLY header has no end_header; the file may be truncated")
-    form, elements = "", list[_Element]()
+    form, elements, comments = "", list[Element](), list[str]()
     for line in data[:end].decode("latin-1").splitlines()[1:]:
         words = line.split()
-        if not words or words[0] in ("comment", "obj_info"):
+        if not words:
+            continue
+        if words[0] in ("comment", "obj_info"):
+            comments.append(line.strip().partition(" ")[2])
             continue
         try:
             if words[0] == "format":
                 form = words[1]
             elif words[0] == "element":
-                elements.append(_Element(words[1], int(words[2])))
+                elements.append(Element(words[1], int(words[2])))
             elif words[0] == "property" and words[1] == "list":
                 elements[-1].lists.append((len(elements[-1].properties), TYPES[words[2]], TYPES[words[3]]))
             elif words[0] == "property":
@@ -56,89 +114,140 @@ def read_header(data: bytes) -> tuple[str, list[_Element], int]:
             raise FormatError(f"a line of the PLY header is not valid: '{line.strip()[:60]}'") from None
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
         raise FormatError(f"the PLY format '{form}' is unknown")
-    return form, elements, newline + 1
+    return Header(form, elements, tuple(comments), newline + 1)
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """The properties x, y, z and, if present, nx, ny, nz of the element 'vertex'."""
-    data = path.read_bytes()
-    form, elements, start = read_header(data)
-    order = [e.name for e in elements]
-    if "vertex" not in order:
-        raise FormatError("the PLY file has no element 'vertex'")
-    vertex = elements[order.index("vertex")]
-    names = [name for name, _ in vertex.properties]
-    if not {"x", "y", "z"} <= set(names):
-        raise FormatError(
-            f"the vertices of the PLY file have no x, y, z; their properties are: {', '.join(names) or 'none'}"
-        )
-    if vertex.lists:
-        raise FormatError("the vertices of the PLY file have list properties, which are not supported")
-    before = elements[: order.index("vertex")]
-    read_body = _read_text if form == "ascii" else _read_binary
-    found = read_body(data, start, before, vertex, ">" if form == "binary_big_endian" else "<")
+    """Points and, where the vertices have them, normals, colours and confidence."""
+    header = read_header(path)
+    count, at = header.vertex.count, 0
+    whole: dict[str, Any] = {}
+    for block in read_blocks(path, header):
+        piece = make_points(block, header)
+        for name in ARRAYS:
+            if (value := getattr(piece, name)) is not None:
+                whole.setdefault(name, np.empty((count, *value.shape[1:]), value.dtype))[at : at + len(value)] = value
+        at += len(piece.points)
+    unit, said = find_unit(header.comments)
+    return PointFile(**{"points": np.empty((0, 3)), **whole}, unit=unit, unit_said=said)
 
-    def stack(*which: str) -> Floats:
-        out = np.empty((vertex.count, 3))
+
+ARRAYS = ("points", "normals", "colours", "confidence")
+"""What a block of vertices gives."""
+
+
+def make_points(block: Columns, header: Header) -> PointFile:
+    """Points, normals, colours and confidence of a block of vertices, without the unit."""
+    kinds = dict(header.vertex.properties)
+
+    def stack(which: Sequence[str], dtype: Any = np.float64) -> Any:
+        out = np.empty((len(block[which[0]]), len(which)), dtype)
         for k, name in enumerate(which):
-            out[:, k] = found[name]
+            out[:, k] = block[name]
         return out
 
-    normals = stack("nx", "ny", "nz") if {"nx", "ny", "nz"} <= set(names) else None
-    return PointFile(stack("x", "y", "z"), normals)
+    colours, confidence = find_colours(kinds), find_confidence(kinds)
+    found = None
+    if colours is not None:
+        kind = np.dtype(kinds[colours[0]])
+        whole = kind.kind in "iu"
+        largest = float(np.iinfo(kind).max) if whole and kind.itemsize <= 2 else None
+        found = scale_colours(stack(colours, kind if whole else np.float64), largest)
+    return PointFile(
+        stack("xyz"),
+        stack(("nx", "ny", "nz")) if {"nx", "ny", "nz"} <= set(kinds) else None,
+        colours=found,
+        confidence=None if confidence is None else np.asarray(block[confidence], np.float32),
+    )
 
 
-def make_dtype(element: _Element, order: str) -> np.dtype[np.void]:
+def make_dtype(element: Element, order: str) -> np.dtype[np.void]:
+    """The record of one item of an element without lists."""
     try:
         return np.dtype([(name, order + kind) for name, kind in element.properties])
     except ValueError:
         raise FormatError("two properties of the PLY file have the same name") from None
 
 
-def _read_binary(
-    data: bytes, start: int, before: list[_Element], vertex: _Element, order: str
-) -> np.ndarray[tuple[int], np.dtype[np.void]]:
-    for element in before:
+def read_blocks(path: Path, header: Header, rows: int = ROWS) -> Iterator[Columns]:
+    """The vertices block by block, ``rows`` at most in a binary file. Raises FormatError where the file has fewer than
+    its header says."""
+    with path.open("rb") as stream:
+        size = path.stat().st_size
+        yield from (
+            _read_text(stream, size, header) if header.form == "ascii" else _read_binary(stream, size, header, rows)
+        )
+
+
+def _read_binary(stream: BinaryIO, size: int, header: Header, rows: int) -> Iterator[Columns]:
+    start, count = _find_vertices(stream, size, header), header.vertex.count
+    kind = make_dtype(header.vertex, header.order)
+    have = (size - start) // kind.itemsize
+    if not 0 <= count <= have:
+        raise FormatError(f"the PLY file is truncated: it has {max(have, 0)} of {count} vertices")
+    stream.seek(start)
+    for first in range(0, count, rows):
+        yield np.fromfile(stream, kind, min(rows, count - first))
+
+
+def _find_vertices(stream: BinaryIO, size: int, header: Header) -> int:
+    """The position of the first vertex in a binary file."""
+    start, way = header.end, "little" if header.order == "<" else "big"
+    for element in header.before:
         if not element.lists:
-            start += element.count * make_dtype(element, order).itemsize
+            start += element.count * make_dtype(element, header.order).itemsize
         elif element.properties or len(element.lists) > 1:
             raise FormatError(
                 f"the PLY element '{element.name}' before the vertices has lists and values, which is not supported"
             )
         else:
             _, counter, item = element.lists[0]
-            size, width = np.dtype(counter).itemsize, np.dtype(item).itemsize
-            way = "little" if order == "<" else "big"
-            for _ in range(element.count):
-                if start + size > len(data):
-                    raise FormatError("the PLY file is truncated")
-                start += size + width * int.from_bytes(data[start : start + size], way)  # type: ignore[arg-type]
-    kind = make_dtype(vertex, order)
-    have = (len(data) - start) // kind.itemsize
-    if vertex.count < 0 or have < vertex.count:
-        raise FormatError(f"the PLY file is truncated: it has {max(have, 0)} of {vertex.count} vertices")
-    return np.frombuffer(data, kind, vertex.count, start)
+            length, width = np.dtype(counter).itemsize, np.dtype(item).itemsize
+            with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+                for _ in range(element.count):
+                    if start + length > size:
+                        raise FormatError("the PLY file is truncated")
+                    items = int.from_bytes(data[start : start + length], way)  # type: ignore[arg-type]
+                    start += length + width * items
+    return start
 
 
-def _read_text(data: bytes, start: int, before: list[_Element], vertex: _Element, order: str) -> dict[str, Floats]:
-    skip = sum(e.count for e in before)
-    for _ in range(skip):
-        start = data.find(b"\n", start) + 1
-        if not start:
+def _read_text(stream: BinaryIO, size: int, header: Header) -> Iterator[Columns]:
+    names = [name for name, _ in header.vertex.properties]
+    width, left = len(names), header.vertex.count
+    stream.seek(header.end)
+    for _ in range(sum(one.count for one in header.before)):
+        if not stream.readline():
             raise FormatError("the PLY file is truncated")
-    width, wanted = len(vertex.properties), vertex.count
-    if wanted * width * 2 > len(data) - start + 1:
-        raise FormatError(f"the PLY file is truncated: it is too small for the {wanted} vertices in its header")
-    rest = data[start:]
-    if vertex is not None and rest.count(b"\n") > wanted:  # faces follow: keep the lines of the vertices only
-        rest = _take_lines(rest, wanted)
-    values = parse_numbers(rest)
-    if len(values) < wanted * width:
-        raise FormatError(f"the PLY file is truncated: it has {len(values) // width} of {wanted} vertices")
-    table = values[: wanted * width].reshape(wanted, width)
-    return {name: table[:, k] for k, (name, _) in enumerate(vertex.properties)}
+    if left * width * 2 > size - stream.tell() + 1:
+        raise FormatError(f"the PLY file is truncated: it is too small for the {left} vertices in its header")
+    lines, rest, values = left, b"", np.empty(0)
+    while left > 0:
+        data = stream.read(TEXT)
+        text, rest = _cut(rest + data, bool(data))
+        if (ends := text.count(b"\n")) > lines:  # faces follow
+            text = _take_lines(text, lines)
+        lines -= ends
+        values = np.concatenate([values, parse_numbers(text)]) if text.strip() else values
+        rows = min(len(values) // width, left)
+        if rows:
+            table, values = values[: rows * width].reshape(rows, width), values[rows * width :]
+            left -= rows
+            yield {name: table[:, k] for k, name in enumerate(names)}
+        if left and (not data or lines < 0):
+            count = header.vertex.count
+            raise FormatError(f"the PLY file is truncated: it has {count - left} of {count} vertices")
+
+
+def _cut(text: bytes, more: bool) -> tuple[bytes, bytes]:
+    """The text up to the last end of a line, or of a word, and the rest; all of it where there is no more."""
+    if not more:
+        return text, b""
+    at = max(text.rfind(b"\n"), -1)
+    at = at if at >= 0 else max(text.rfind(b" "), text.rfind(b"\t"))
+    return text[: at + 1], text[at + 1 :]
 
 
 def _take_lines(data: bytes, count: int) -> bytes:
     ends = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n"))
-    return data[: int(ends[count - 1]) + 1] if count else b""
+    return data[: int(ends[count - 1]) + 1] if count > 0 else b""

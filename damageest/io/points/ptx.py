@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Bytes, Floats
 from damageest.io.points import FormatError, PointFile
+from damageest.io.points.attributes import scale_colours
 from damageest.io.points.text import parse_numbers
 
 _HEAD = 10
@@ -28,6 +29,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     positions: list[Floats] = []
     numbers: list[int] = []
     notes: list[str] = []
+    colours: list[Bytes | None] = []
     while at < len(lines):
         count, position, transform = _read_head(lines[at : at + _HEAD], len(points) + 1)
         rows = lines[at + _HEAD : at + _HEAD + count]
@@ -35,7 +37,9 @@ def read(path: Path, columns: str | None = None) -> PointFile:
             raise FormatError(f"the PTX file is truncated: scan {len(points) + 1} has {len(rows)} of {count} points")
         at += _HEAD + count
         table = _read_rows(rows, len(points) + 1)
-        table = table[table.any(axis=1)]
+        table = table[table[:, :3].any(axis=1)]
+        colours.append(scale_colours(table[:, 4:7], 255) if table.shape[1] >= 7 else None)
+        table = table[:, :3]
         placed = table @ transform[:3, :3] + transform[3, :3]
         reach = np.abs(placed - transform[3, :3]).max(initial=1e-9)
         is_known = bool(np.linalg.norm(position - transform[3, :3]) < 1e-3 * reach)
@@ -51,12 +55,14 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     if len(points) > 1:
         notes.append(f"{len(points)} scans in one PTX file")
     some = any(number >= 0 for number in numbers)
+    known = [colour for colour in colours if colour is not None]
     return PointFile(
         np.concatenate(points),
         unit="m",
         notes=tuple(notes),
         viewpoints=np.array(positions) if some else None,
         view=np.repeat(numbers, [len(piece) for piece in points]) if some else None,
+        colours=np.concatenate(known) if len(known) == len(colours) else None,
     )
 
 
@@ -85,4 +91,4 @@ def _read_rows(rows: list[bytes], number: int) -> Floats:
         raise FormatError(
             f"not all points of scan {number} of the PTX file have the same number of columns, at least 3"
         )
-    return values.reshape(-1, width)[:, :3]
+    return values.reshape(-1, width)

@@ -1,4 +1,4 @@
-"""Point files read in pieces, for scans that do not fit into memory: binary PLY, NPY, LAS, LAZ, E57.
+"""Point files read in pieces, for scans that do not fit into memory: PLY, NPY, LAS, LAZ, E57.
 
 A piece is what `read_points` gives of the same points, without normals.
 """
@@ -6,7 +6,7 @@ A piece is what `read_points` gives of the same points, without normals.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from damageest.artefacts import Floats
 from damageest.errors import InputError
 from damageest.io.files import raise_environment_fault, shorten_error
 from damageest.io.points import FormatError, PointFile
+from damageest.io.points.attributes import find_unit
 
 PIECE = 1 << 20
 """Points of a piece at most."""
@@ -77,27 +78,23 @@ def _open_npy(path: Path) -> PointStream | None:
 
 
 def _open_ply(path: Path) -> PointStream | None:
-    from damageest.io.points.ply import make_dtype, read_header
+    from damageest.io.points.ply import make_points, read_blocks, read_header
 
-    with path.open("rb") as stream:
-        form, elements, begin = read_header(stream.read(1 << 16))
-    vertex = elements[0] if elements else None
-    if form == "ascii" or vertex is None or vertex.name != "vertex" or vertex.lists:
-        return None
-    kind = make_dtype(vertex, ">" if form == "binary_big_endian" else "<")
-    if not {"x", "y", "z"} <= set(kind.names or ()):
-        return None
-    _check_size(path, begin, vertex.count, kind.itemsize)
+    header = read_header(path)
+    vertex = header.vertex
+    if header.form != "ascii":
+        _check_size(path, header.end, vertex.count, sum(np.dtype(kind).itemsize for _, kind in vertex.properties))
+    unit, said = find_unit(header.comments)
 
     def start() -> Iterator[PointFile]:
-        for rows in _slice(path, begin, vertex.count, kind):
-            yield PointFile(np.stack([rows[axis].astype(np.float64) for axis in "xyz"], axis=1))
+        for block in read_blocks(path, header, PIECE):
+            yield replace(make_points(block, header), normals=None, unit=unit, unit_said=said)
 
     return PointStream(path, vertex.count, start)
 
 
 def _open_las(path: Path) -> PointStream | None:
-    from damageest.io.points.las import open_las
+    from damageest.io.points.las import open_las, read_colours
 
     with open_las(path) as reader:
         count = int(reader.header.point_count)
@@ -105,7 +102,8 @@ def _open_las(path: Path) -> PointStream | None:
     def start() -> Iterator[PointFile]:
         with open_las(path) as reader:
             for piece in reader.chunk_iterator(PIECE):
-                yield PointFile(np.column_stack([np.asarray(piece.x), np.asarray(piece.y), np.asarray(piece.z)]))
+                points = np.column_stack([np.asarray(piece.x), np.asarray(piece.y), np.asarray(piece.z)])
+                yield PointFile(points, colours=read_colours(piece))
 
     return PointStream(path, count, start)
 
@@ -142,9 +140,9 @@ def _read_e57(path: Path) -> Iterator[PointFile]:
             while got := reader.read():
                 raw = {name: values[:got] for name, values in data.items()}
                 known = known if known is not None else posed or "sphericalRange" in raw or is_range_image(raw)
-                points, _ = read_scan(header, raw, index)
+                points, _, colours = read_scan(header, raw, index)
                 view = np.full(len(points), index if known else -1)
-                yield PointFile(points, unit="m", viewpoints=positions, view=view)
+                yield PointFile(points, unit="m", viewpoints=positions, view=view, colours=colours)
             reader.close()
 
 

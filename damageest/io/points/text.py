@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import re
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.io.points import FormatError, PointFile
+from damageest.io.points.attributes import CONFIDENCE, find_unit, scale_colours
 
 _NAMES = {
     "x": "x", "y": "y", "z": "z", "nx": "nx", "ny": "ny", "nz": "nz",
     "normal_x": "nx", "normal_y": "ny", "normal_z": "nz", "normalx": "nx", "normaly": "ny", "normalz": "nz",
     "x_coordinate": "x", "y_coordinate": "y", "z_coordinate": "z",
+    **dict.fromkeys(CONFIDENCE, "confidence"),
+    "red": "red", "green": "green", "blue": "blue", "r": "red", "g": "green", "b": "blue",
 }  # fmt: skip
+_COLOUR = ("red", "green", "blue")
 _NUMBER = re.compile(rb"^[+-]?(\d+\.?\d*([eEdD][+-]?\d+)?|\.\d+([eEdD][+-]?\d+)?|nan|inf(inity)?)$", re.IGNORECASE)
 
 
@@ -35,13 +40,15 @@ def parse_numbers(data: bytes) -> Floats:
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """Points from the columns x, y, z (and nx, ny, nz), identified by ``columns``, the header, or their number."""
+    """Points from the columns x, y, z, and those of normals, colours and confidence, identified by ``columns``, the
+    header, or, but for colours and confidence, their number."""
     data = path.read_bytes()
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         data = data.decode("utf-16", errors="replace").encode("latin-1", errors="replace")
     data = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"\0" in data[:4096]:
         raise FormatError("not a text file: it has binary data")
+    unit, said = find_unit(_list_head(data[:4096].decode("latin-1")))
     if b"#" in data or b"//" in data:
         head = re.search(rb"^\s*(?:#|//)+(.*)$", data[:4096], re.MULTILINE)
         names = _find_names(head.group(1)) if head and columns is None else None
@@ -60,7 +67,22 @@ def read(path: Path, columns: str | None = None) -> PointFile:
     if len(values) != width * lines:
         raise FormatError(_describe_ragged(data, width))
     table = values.reshape(-1, width)
-    return _select_columns(table, columns.replace(",", " ").split() if columns else names)
+    given = [_NAMES.get(word.lower(), word) for word in columns.replace(",", " ").split()] if columns else names
+    return replace(_select_columns(table, given), unit=unit, unit_said=said)
+
+
+def _list_head(text: str) -> list[str]:
+    """The comments and the line of names in front of the first row, with the unit of a column in words."""
+    lines: list[str] = []
+    for line in text.split("\n"):
+        words = re.split(r"[\s,;]+", line.strip())
+        if words[0] and all(_NUMBER.match(word.encode("latin-1", "replace")) for word in words if word):
+            if len(words) > 1:  # not the number of points
+                break
+            continue
+        column = re.search(r"\bx\b\s*[\[(]\s*([a-zµ]+)\s*[\])]", line, re.IGNORECASE)
+        lines.append(f"x in units: {column.group(1)}" if column else line)
+    return lines
 
 
 def _find_names(line: bytes) -> list[str] | None:
@@ -118,7 +140,13 @@ def _select_columns(table: Floats, names: list[str] | None) -> PointFile:
         if len(names) > width:
             raise FormatError(f"{len(names)} columns are named, but the rows have {width} columns")
         normals = [names.index(n) for n in ("nx", "ny", "nz")] if {"nx", "ny", "nz"} <= set(names) else None
-        return PointFile(table[:, [names.index(n) for n in "xyz"]], None if normals is None else table[:, normals])
+        colours = [names.index(n) for n in _COLOUR] if set(_COLOUR) <= set(names) else None
+        return PointFile(
+            table[:, [names.index(n) for n in "xyz"]],
+            None if normals is None else table[:, normals],
+            colours=None if colours is None else scale_colours(table[:, colours]),
+            confidence=table[:, names.index("confidence")].astype(np.float32) if "confidence" in names else None,
+        )
     if width < 3:
         raise FormatError(f"the rows have {width} columns; a point needs three: x y z")
     for start in (3, width - 3):  # normals, not colours: the length is 1

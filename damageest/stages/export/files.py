@@ -35,6 +35,7 @@ UNDAMAGED, DAMAGE, DEPOSIT, DOUBTFUL = (150, 155, 165), (215, 50, 40), (40, 130,
 SURPLUS = (150, 90, 190)
 FEW = 20_000
 """Triangles of a solid of several sites up to which its sheets are moved apart where they touch."""
+COLOUR = ("red", "green", "blue")
 LABELLED = np.array([UNDAMAGED, DAMAGE, SURPLUS, (90, 90, 90)], np.uint8)
 """Colour of a scan point by its label: intact, damage, added, outlier."""
 
@@ -71,6 +72,11 @@ class Files(Export):
         ge=0,
         description="largest distance by which facets of STEP solids may deviate, to make fewer of them, in the job's "
         "unit; default: a quarter of the tolerance",
+    )
+    point_colours: Literal["label", "scan"] = Field(
+        "label",
+        description="red, green and blue in scan.ply: by label (the colours of the scan are scan_red, scan_green, "
+        "scan_blue), or those of the scan, where it has some",
     )
     spline: Annotated[bool, AfterValidator(check_spline_writer)] = Field(
         False,
@@ -203,7 +209,8 @@ class Files(Export):
             path = _make_folder(folder, f"{place}{group}/site-{site.id}.ply")
             write_ply(path, move_mesh(site.surface, T))
             done.append(ExportedFiles((path.relative_to(folder).as_posix(),)))
-        done.append(_write_scan(result, result.aligned if T is None else result.scan, folder, f"{place}scan.ply"))
+        scan = result.aligned if T is None else result.scan
+        done.append(_write_scan(result, scan, folder, f"{place}scan.ply", self.point_colours))
         if result.coverage is not None:
             done.append(write_coverage(result.coverage, T, folder, place))
         return done
@@ -301,7 +308,8 @@ def _make_folder(folder: Path, name: str) -> Path:
     return folder / name
 
 
-def _write_scan(result: Result, scan: Scan, folder: Path, name: str) -> ExportedFiles:
+def _write_scan(result: Result, scan: Scan, folder: Path, name: str, point_colours: str) -> ExportedFiles:
+    """Writes the points with what was found of each, and with what the scanner's program wrote of it."""
     x, y, z = scan.points.T
     columns = {
         "x": x,
@@ -310,7 +318,15 @@ def _write_scan(result: Result, scan: Scan, folder: Path, name: str) -> Exported
         "distance": result.deviation.distance.astype(np.float32),
         "label": result.deviation.label.astype(np.uint8),
         "site": result.site_label.astype(np.int32),
-        **dict(zip(("red", "green", "blue"), LABELLED[result.deviation.label].T, strict=True)),
     }
+    labelled = dict(zip(COLOUR, LABELLED[result.deviation.label].T, strict=True))
+    if scan.colours is None:
+        columns |= labelled
+    elif point_colours == "scan":
+        columns |= dict(zip(COLOUR, scan.colours.T, strict=True))
+    else:
+        columns |= {**labelled, **{f"scan_{name}": scan.colours[:, k] for k, name in enumerate(COLOUR)}}
+    if scan.confidence is not None:
+        columns["confidence"] = scan.confidence
     write_points(_make_folder(folder, name), columns)
     return ExportedFiles((name,))

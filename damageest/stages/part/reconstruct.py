@@ -75,7 +75,7 @@ class PartFromScan(ReadPart):
         )
         return Part(
             vertices, faces, unit, ", ".join(map(str, paths)), digest, tessellation_error=error,
-            notes=(*scan.notes, note, *openings),
+            notes=(*scan.notes, *map(str, scan.warnings), note, *openings),
         )  # fmt: skip
 
     def _build_surface(self, points: Floats, noise: float, spacing: float) -> tuple[Floats, Ints, float, float]:

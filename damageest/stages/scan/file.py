@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
+from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, field_serializer, model_validator
 
-from damageest.artefacts import Scan
+from damageest.artefacts import Reason, Scan
+from damageest.errors import InputError
 from damageest.geometry.units import UnitOption
 from damageest.io.large_scans import LargeScan, open_large_scan
 from damageest.io.points import READERS
+from damageest.io.scan_folders import list_patches, name_files
 from damageest.io.scans import read_scan
 from damageest.options import Options
 from damageest.stages import JobPath
@@ -38,21 +41,26 @@ Entry = Annotated[
 
 
 class ScanFile(ReadScan):
-    """Reads a scan from one file, or from several views in one frame: point clouds or meshed scans."""
+    """Reads a scan from one file, from several views in one frame, or from a folder of them: points or meshes."""
 
     use: Literal["file"] = "file"
     reads: ClassVar[tuple[str, ...]] = tuple(READERS)
     path: Annotated[
         Annotated[JobPath, Tag("one file")] | Annotated[tuple[Entry, ...], Tag("several files")],
         Discriminator(lambda value: "several files" if isinstance(value, (list, tuple)) else "one file"),
-    ] = Field(description="the file, or a list of files in one frame, relative to the job's folder")
+    ] = Field(
+        description="the file, a list of files in one frame, or a folder whose files are the patches of one scan, "
+        "relative to the job's folder"
+    )
     viewpoint: Vector | None = Field(
         None,
         description="where the scanner stood for all points of a single file: [x, y, z] in the file's unit and frame; "
         "default: what the file says",
     )
     unit: UnitOption | None = Field(
-        None, description="unit of the files' lengths; default: the file's own (E57, PTX: m), else the job's `units`"
+        None,
+        description="unit of the files' lengths; default: the file's own (E57, PTX, glTF: m; others as their header "
+        "says), else the job's `units`",
     )
     columns: str | None = Field(
         None,
@@ -65,6 +73,11 @@ class ScanFile(ReadScan):
         "best; default: a wrong scale is named and not corrected",
     )
 
+    min_confidence: FiniteFloat | None = Field(
+        None,
+        description="points of a lower confidence (property or column confidence or quality) are set aside, on the "
+        "scale of the file; default: none is",
+    )
     most_points: int = Field(
         10_000_000,
         ge=0,
@@ -78,14 +91,50 @@ class ScanFile(ReadScan):
             raise ValueError("viewpoint: is for a single file; of several, give each as {path: ..., viewpoint: ...}")
         return self
 
+    @field_serializer("path", mode="wrap")
+    def _list_path(self, value: Any, handler: Any) -> Any:
+        """The path with the files of a folder in its place, which are what is read."""
+        entries = [value] if isinstance(value, Path) else value
+        if not any(_find_path(entry).is_dir() for entry in entries):
+            return handler(value)
+        try:
+            return tuple(file.path if file.viewpoint is None else file.model_dump() for file in self._list_files())
+        except InputError:
+            return handler(value)
+
+    def leave_out(self, folder: Path) -> Self:
+        """The same. Raises InputError for a folder of patches that the run writes its own files into."""
+        entries = [self.path] if isinstance(self.path, Path) else self.path
+        for path in map(_find_path, entries):
+            if path.is_dir() and folder.resolve() == path.resolve():
+                raise InputError(
+                    f"scan: the folder {path} is the one that this run writes to; put the patches into a folder of "
+                    "their own"
+                )
+        return self
+
     def run(self, unit: str) -> Scan:
         """The points in ``unit``, the job's. Raises InputError for a file that cannot be read or has no points."""
         if large := self._open_large(unit):
-            return large.thin(self.most_points)
+            return self._note_folders(large.thin(self.most_points))
         files = self._list_files()
-        return read_scan(
-            [file.path for file in files], unit, self.unit, self.columns, [file.viewpoint for file in files]
-        )
+        paths, places = [file.path for file in files], [file.viewpoint for file in files]
+        return self._note_folders(read_scan(paths, unit, self.unit, self.columns, places, self.min_confidence))
+
+    def _note_folders(self, scan: Scan) -> Scan:
+        """The scan with notes of the files of each folder that were read, and warnings of those that were not."""
+        entries = [self.path] if isinstance(self.path, Path) else self.path
+        for folder in (path for path in map(_find_path, entries) if path.is_dir()):
+            patches, others = list_patches(folder)
+            note = f"the folder {folder.name} has {len(patches)} patches: {name_files(patches)}"
+            scan = replace(scan, notes=(*scan.notes, note))
+            if others:
+                text = (
+                    f"{len(others)} files of the folder {folder.name} were not read, since scans have other formats: "
+                    f"{name_files(others)}"
+                )
+                scan = replace(scan, warnings=(*scan.warnings, Reason("files_not_read", text, amount=len(others))))
+        return scan
 
     def read_pieces(self, unit: str) -> Iterator[Scan]:
         large = self._open_large(unit)
@@ -96,9 +145,29 @@ class ScanFile(ReadScan):
             return None
         files = self._list_files()
         places = [file.viewpoint for file in files]
-        return open_large_scan([file.path for file in files], unit, self.unit, places, self.most_points)
+        return open_large_scan(
+            [file.path for file in files], unit, self.unit, places, self.most_points, self.min_confidence
+        )
 
     def _list_files(self) -> list[ViewFile]:
+        """The files, those of folders among them, with the positions of their scanners."""
         if isinstance(self.path, Path):
-            return [ViewFile(path=self.path, viewpoint=self.viewpoint)]
-        return [item if isinstance(item, ViewFile) else ViewFile(path=item) for item in self.path]
+            entries = [ViewFile(path=self.path, viewpoint=self.viewpoint)]
+        else:
+            entries = [item if isinstance(item, ViewFile) else ViewFile(path=item) for item in self.path]
+        files: list[ViewFile] = []
+        for entry in entries:
+            if not entry.path.is_dir():
+                files.append(entry)
+                continue
+            if entry.viewpoint is not None:
+                raise InputError(
+                    f"{entry.path}: viewpoint is of one view, and a folder has several; give each file as "
+                    "{path: ..., viewpoint: ...}"
+                )
+            files += [ViewFile(path=path) for path in list_patches(entry.path)[0]]
+        return files
+
+
+def _find_path(entry: Path | ViewFile) -> Path:
+    return entry if isinstance(entry, Path) else entry.path
