@@ -69,16 +69,22 @@ def find_duplicates(points: Floats) -> tuple[Ints, Ints]:
     Sorts one 64-bit hash per point, which is much faster than sorting rows. Points with equal hashes are compared in
     full.
     """
-    bits = (np.ascontiguousarray(points, dtype=np.float64) + 0.0).view(np.uint64)  # + 0.0 turns -0 into 0
+    points = np.asarray(points, dtype=np.float64)
     mixed = np.zeros(len(points), np.uint64)
     with np.errstate(over="ignore"):
-        for column, odd in zip(bits.T, (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9), strict=True):
-            mixed = (mixed ^ (column >> np.uint64(29)) ^ column) * np.uint64(odd)
+        for place, odd in zip(points.T, (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9), strict=True):
+            column = (place + 0.0).view(np.uint64)  # + 0.0 turns -0 into 0; one column a time, to save memory
+            mixed ^= column
+            column >>= np.uint64(29)
+            mixed ^= column
+            mixed *= np.uint64(odd)
             mixed ^= mixed >> np.uint64(32)
     ordered = np.sort(mixed)
     if not (ordered[1:] == ordered[:-1]).any():
         every = np.arange(len(points))
         return every, every
+    del ordered
+    bits = (np.ascontiguousarray(points) + 0.0).view(np.uint64)
     order = np.argsort(mixed, kind="stable")
     same = (mixed[order][1:] == mixed[order][:-1]) & (bits[order][1:] == bits[order][:-1]).all(1)
     # copies of two distinct points with equal hashes may alternate in the order: then the rows themselves are sorted

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from damageest.artefacts import Flags, Floats, Ints, Scan, Vector
+from damageest.artefacts import Flags, Floats, Scan, Vector
 from damageest.geometry.units import FARTHEST, canonical_unit, unit_factor
 from damageest.io.points.streams import PointStream, open_stream
 from damageest.io.scan_notes import ConfidenceCount, UnitNotes
@@ -83,7 +84,7 @@ class JoinedViews:
 
     def __init__(self) -> None:
         self._pieces: list[Scan] = []
-        self._views: list[Ints] = []
+        self._views: list[NDArray[np.int32]] = []
         self._lots: list[Floats] = []
         self._share = 1.0
         self._numbers: dict[bytes, int] = {}
@@ -106,10 +107,10 @@ class JoinedViews:
             self._views = [values[keep] for values, keep in zip(self._views, kept, strict=True)]
             self._lots = [values[keep] for values, keep in zip(self._lots, kept, strict=True)]
 
-    def _number_views(self, piece: Scan) -> Ints:
+    def _number_views(self, piece: Scan) -> NDArray[np.int32]:
         """The number (N,) of each point's view in the whole; -1 where its position is not known."""
         if piece.viewpoints is None or piece.view is None:
-            return np.full(len(piece.points), -1)
+            return np.full(len(piece.points), -1, np.int32)
         own = []
         for place in piece.viewpoints:
             key = place.tobytes()
@@ -117,19 +118,20 @@ class JoinedViews:
                 self._numbers[key] = len(self._places)
                 self._places.append(place)
             own.append(self._numbers[key])
-        return np.array([*own, -1])[piece.view]
+        return np.array([*own, -1], np.int32)[piece.view]
 
     def take(self) -> Scan:
-        """The points; their viewpoints and views are None where none is known."""
-        pieces = self._pieces
+        """The points; their viewpoints and views are None where none is known. They are held no longer."""
+        pieces, views = self._pieces, self._views
+        self._pieces, self._views, self._lots = [], [], []
         points = np.concatenate([piece.points for piece in pieces]) if pieces else np.empty((0, 3))
-        view = np.concatenate(self._views) if pieces else np.empty(0, np.int64)
+        view = np.concatenate(views) if pieces else np.empty(0, np.int32)
         known = bool((view >= 0).any())
         sizes = [len(piece.points) for piece in pieces]
         return Scan(
             points,
             viewpoints=np.array(self._places) if known else None,
-            view=view.astype(np.int32) if known else None,
+            view=view if known else None,
             colours=join_some([piece.colours for piece in pieces], [(n, 3) for n in sizes], GREY),
             confidence=join_some([piece.confidence for piece in pieces], [(n,) for n in sizes], np.nan),
         )

@@ -63,7 +63,7 @@ def make_scan(
     if not finite.all():
         notes = (*notes, f"removed {int((~finite).sum())} points with coordinates that are not finite")
         scan = scan.take(finite)
-    near = np.asarray((np.abs(scan.points) <= FARTHEST).all(axis=1))
+    near = np.asarray(((scan.points <= FARTHEST) & (scan.points >= -FARTHEST)).all(axis=1))
     if not near.all():
         notes = (*notes, f"removed {int((~near).sum())} points with coordinates above {FARTHEST:g}, which no scan has")
         scan = scan.take(near)
@@ -94,14 +94,12 @@ def _check_views(
     viewpoints = np.asarray(viewpoints, dtype=np.float64)
     if viewpoints.ndim != 2 or viewpoints.shape[1] != 3 or not (np.abs(viewpoints) <= FARTHEST).all():
         raise InputError(f"{name}: viewpoints need the shape (V,3), and coordinates up to {FARTHEST:g}")
-    if view is None:
-        if len(viewpoints) != 1:
-            raise InputError(f"{name}: {len(viewpoints)} viewpoints need a view: the number of each point's viewpoint")
-        view = np.zeros(count, np.int64)
-    view = np.asarray(view)
-    if view.shape != (count,) or (count and not -1 <= view.min() <= view.max() < len(viewpoints)):
+    if view is None and len(viewpoints) != 1:
+        raise InputError(f"{name}: {len(viewpoints)} viewpoints need a view: the number of each point's viewpoint")
+    numbers: NDArray[Any] = np.zeros(count, np.int32) if view is None else np.asarray(view)
+    if numbers.shape != (count,) or (count and not -1 <= numbers.min() <= numbers.max() < len(viewpoints)):
         raise InputError(f"{name}: view needs the shape ({count},) and numbers from -1 to {len(viewpoints) - 1}")
-    return viewpoints, view.astype(np.int32)
+    return viewpoints, numbers.astype(np.int32)
 
 
 def read_scan(
