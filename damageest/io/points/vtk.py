@@ -14,6 +14,7 @@ from damageest.geometry.units import canonical_unit
 from damageest.io.points import FormatError, PointFile
 from damageest.io.points.attributes import find_confidence, find_unit
 from damageest.io.points.mesh import NOTE
+from damageest.isolation import ProcessError, call_isolated
 
 UNIT_NAMES = ("unit", "units", "lengthunit", "lengthunits")
 """Names of field data with the unit of lengths, without '_' and spaces, in small letters."""
@@ -23,8 +24,18 @@ _LINE = re.compile(rb"^[A-Za-z_][!-~]{0,99}(?: +[!-~]{1,40}){1,4}[ \r]*$", re.MU
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """The points, those on the outside alone of a mesh of solid cells, with normals, colours and confidence."""
+    """The points, those on the outside alone of a mesh of solid cells, with normals, colours and confidence.
+
+    VTK reads in a process of its own, since damaged files crash it.
+    """
     _check_numbers(path)
+    try:
+        return call_isolated(_read, {"path": path}, worker="vtk", show=False)
+    except ProcessError as error:
+        raise FormatError(f"the file is damaged, or too large: VTK, which reads it, {error.message}") from None
+
+
+def _read(path: Path) -> PointFile:
     import pyvista
 
     with pyvista.VtkErrorCatcher(raise_errors=False, send_to_logging=False) as caught:
@@ -34,12 +45,12 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         raise FormatError(f"the VTK file is truncated or not valid ({told[:120]})")
     if not isinstance(data, (pyvista.PolyData, pyvista.UnstructuredGrid, pyvista.StructuredGrid)):
         raise FormatError(f"holds a {type(data).__name__}, not points or a mesh")
-    notes = (NOTE,) if data.n_cells and _find_dimension(data) > 0 else ()
+    notes = (NOTE,) if _find_dimension(data) > 0 else ()
     if _find_dimension(data) > 2:
         data = _find_outside(data)
         notes = ("the file is a mesh of solid cells; the vertices on its outside are used as the scan's points",)
-    points = np.asarray(data.points, np.float64).reshape(-1, 3)
-    arrays = {name: np.asarray(data.point_data[name]) for name in data.point_data.keys()}  # noqa: SIM118
+    points = np.array(data.points, np.float64).reshape(-1, 3)
+    arrays = {name: np.array(data.point_data[name]) for name in data.point_data.keys()}  # noqa: SIM118
     confidence = find_confidence(name for name, values in arrays.items() if values.ndim == 1)
     normals = next((v for n, v in arrays.items() if n.lower() == "normals" and v.shape == points.shape), None)
     unit, said = _find_unit(path, data)
