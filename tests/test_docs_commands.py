@@ -83,7 +83,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(ROOT / "jobs" / "parts" / "block.stl", folder / "parts")
     for name in ("part.step", "parts/gear.step"):
         shutil.copy(ROOT / "jobs" / "parts" / "gear.step", folder / name)
-    for name in ("scan.ply", "view-1.ply", "view-2.ply", "scans/block_wedge.ply", "scans/gear.ply"):
+    for name in ("scan.ply", "view-1.ply", "view-2.ply", "scans/block_wedge.ply", "scans/gear.ply", "patches/1.ply"):
+        (folder / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / "jobs" / "scans" / "block_wedge.ply", folder / name)
     return folder
 

@@ -208,8 +208,9 @@ class _Check:
             first = first.get("path", "")
             if not isinstance(first, str) or not first:
                 return None  # its own check says what is missing
-        if key == ReadScan.stage and resolve_path(Path(str(first)), self.folder).is_dir():
-            return None  # of patches, which `file` reads
+        place = resolve_path(Path(str(first)), self.folder)
+        if key == ReadScan.stage and (place.is_dir() or (not place.suffix and not place.exists())):
+            return None  # a folder of patches, which `file` reads, or one that is not there
         suffix = Path(str(first)).suffix.lower()
         readers = [item for item in self.registry.of(key) if suffix in item.cls.reads]
         package = bundled.SUFFIXES.get(suffix) if key == ReadPart.stage else None

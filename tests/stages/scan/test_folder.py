@@ -81,6 +81,8 @@ def test_folders_that_are_no_scan(tmp_path: Path) -> None:
     trimesh.creation.box(damaged_box.SIZE).export(tmp_path / "box.stl")
     with pytest.raises(JobError, match="without a file that can be read as a scan"):
         damageest.run(job)
+    with pytest.raises(JobError, match="misspelt: there is no such file"):
+        damageest.run(job | {"scan": str(tmp_path / "misspelt")})
     np.savetxt(tmp_path / "patches/a.xyz", np.eye(3))
     trimesh.creation.box(damaged_box.SIZE).export(tmp_path / "patches/box.stl")
     with pytest.raises(JobError, match="is the part, and among the files of the scan"):
