@@ -8,7 +8,7 @@ from typing import overload
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Deviation, Floats, Ints, Part, Pose, Reason, Scan
+from damageest.artefacts import AdaptedPart, Deviation, Flags, Floats, Ints, Part, Pose, Reason, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.fit_doubts import find_fit_doubts
 from damageest.checks.form_words import describe_fit
@@ -17,6 +17,7 @@ from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import ViewFits, fit_views
 from damageest.findings import Surplus
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.neighbourhoods import find_nearby
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.pipeline.state import FoundSite, Reasons
 from damageest.pipeline.steps import step
@@ -85,18 +86,31 @@ def _make_rigid(T: Floats) -> Floats:
 
 @step(gives=("fitted", "warnings"))
 def fit_model(
-    part: Part, aligned: Scan, adapted: AdaptedPart | None, deviation: Deviation, tolerance: float, unit: str,
-    views: ViewFits | None, corrected_scale: float,
+    part: Part, aligned: Scan, adapted: AdaptedPart | None, deviation: Deviation, surplus: tuple[Surplus, ...],
+    tolerance: float, unit: str, views: ViewFits | None, corrected_scale: float,
 ) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
-    """Measures how well the part as designed explains the intact skin, and warns where it does not."""
+    """Measures how well the part as designed explains the intact skin, and warns where it does not. Surroundings are
+    left out: a table ends at the part's lower edges as skin that is bent away does."""
+    own = _leave_surroundings_out(aligned, surplus, tolerance)
     found = measure_fit(
-        part, aligned.points, deviation.distance, aligned.noise, tolerance, unit, views, corrected_scale
+        part, aligned.points[own], deviation.distance[own], aligned.noise, tolerance, unit, views, corrected_scale
     )
     found = _tell_adapted(found, adapted)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
     if found is not None and told:
         return found, [Reason("model_fit", found.fit.words, amount=found.fit.amount, unit=unit)]
     return found, ()
+
+
+def _leave_surroundings_out(aligned: Scan, surplus: tuple[Surplus, ...], tolerance: float) -> Flags:
+    """Which points (N,) are neither surroundings nor beside them, where the skin cannot be told from them."""
+    own = np.ones(len(aligned.points), bool)
+    outside = [item.points for item in surplus if item.kind == "surroundings"]
+    if outside:
+        own[np.concatenate(outside)] = False
+        near = find_nearby(aligned.points, aligned.points[~own], 2 * tolerance + aligned.spacing)
+        own[near] = False
+    return own
 
 
 @overload

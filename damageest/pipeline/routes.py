@@ -84,10 +84,11 @@ ACQUIRE: Route = (
     Segment,  # aligned, part, samples, tolerance -> deviation
     check_intact,  # deviation, tolerance, part, segmenter ->
     inspect_skin,  # part, aligned, deviation, tolerance -> skin, deviation
-    fit_model,  # part, aligned, adapted, deviation, tolerance, unit, views, corrected_scale -> fitted, +warnings
     Cluster,  # aligned, deviation, tolerance -> sites
     find_surplus,  # calls Cluster, EncloseAll: unit, aligned, deviation, tolerance, part, sites, samples
     #     -> surplus, deviation, +warnings
+    fit_model,  # part, aligned, adapted, deviation, surplus, tolerance, unit, views, corrected_scale
+    #     -> fitted, +warnings
     gather_intact,  # aligned, deviation, sites -> intact, +warnings
 )
 BY_SITE: Route = (
