@@ -208,9 +208,8 @@ class _Check:
             first = first.get("path", "")
             if not isinstance(first, str) or not first:
                 return None  # its own check says what is missing
-        place = resolve_path(Path(str(first)), self.folder)
-        if key == ReadScan.stage and (place.is_dir() or (not place.suffix and not place.exists())):
-            return None  # a folder of patches, which `file` reads, or one that is not there
+        if key == ReadScan.stage and self.is_folder(str(first)):
+            return None
         suffix = Path(str(first)).suffix.lower()
         readers = [item for item in self.registry.of(key) if suffix in item.cls.reads]
         package = bundled.SUFFIXES.get(suffix) if key == ReadPart.stage else None
@@ -220,6 +219,14 @@ class _Check:
             valid = sorted({s for item in self.registry.of(key) for s in item.cls.reads})
             self.add_fault(f"no reader for '{suffix}' files; valid are: {', '.join(valid)}", key, "path")
         return readers[0].name if readers else None
+
+    def is_folder(self, text: str) -> bool:
+        """Whether a path is a folder of patches, which `file` reads, or may be meant as one that is not there."""
+        try:
+            place = resolve_path(Path(text), self.folder)
+            return place.is_dir() or (not place.suffix and not place.exists())
+        except (OSError, ValueError):  # of a name that the system cannot have: its own check says so
+            return False
 
     def find_route(self, method: str, chosen: Mapping[Contract, Chosen]) -> tuple[list[Contract], str]:
         """The contracts that the job's route needs, and the method in full: `auto` is `surface` where the job names one
