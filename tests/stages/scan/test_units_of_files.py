@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -30,16 +31,18 @@ def write_vtp(path: Path) -> None:
 
 
 def write_3mf(path: Path) -> None:
-    import lib3mf
-
-    model = lib3mf.get_wrapper().CreateModel()
-    model.SetUnit(lib3mf.ModelUnit.Inch)
-    mesh = model.AddMeshObject()
+    """A box of 1 x 2 x 3 inches."""
     box = trimesh.creation.box((1.0, 2, 3))
-    place = [lib3mf.Position(tuple(map(float, p))) for p in box.vertices]
-    mesh.SetGeometry(place, [lib3mf.Triangle(tuple(map(int, f))) for f in box.faces])
-    model.AddBuildItem(mesh, lib3mf.get_wrapper().GetIdentityTransform())
-    model.QueryWriter("3mf").WriteToFile(str(path))
+    corners = "".join('<vertex x="{}" y="{}" z="{}"/>'.format(*p) for p in box.vertices)
+    faces = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*f) for f in box.faces)
+    model = (
+        '<?xml version="1.0" encoding="UTF-8"?><model unit="inch" xml:lang="en-US" '
+        'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources><object id="1" type="model">'
+        f"<mesh><vertices>{corners}</vertices><triangles>{faces}</triangles></mesh></object></resources>"
+        '<build><item objectid="1"/></build></model>'
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
 
 
 INCHES: dict[str, Any] = {
