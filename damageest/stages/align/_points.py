@@ -15,6 +15,15 @@ from damageest.geometry.voxels import measure_bounds
 MAX_DENSE = 120_000
 """Number of scan points that density and normals are measured on; more only cost time."""
 
+NEIGHBOURS = 64
+"""Number of points that a normal is fitted to, at most, where the noise does not ask for more."""
+
+MAX_NEIGHBOURS = 512
+"""The same where it does: fewer, in a dense scan, would all lie within the noise and show no plane."""
+
+MAX_RADIUS = 0.05
+"""Largest distance in diagonals of the part of the points that a normal is fitted to."""
+
 
 @dataclass(frozen=True)
 class OrientedPoints:
@@ -77,8 +86,15 @@ def orient_scan(
     weights = np.where(reach < 5 * typical, np.minimum(reach, 2.5 * typical) ** 2, 0.0)
 
     chosen = draw_evenly(dense, weights, wanted, rng)
-    radius = float(np.clip(max(8 * noise, 2.5 * typical), 0.006, 0.03))
-    near = np.asarray(tree.query(dense[chosen], k=min(64, len(every)), distance_upper_bound=radius, workers=-1)[1])
+    radius = float(np.clip(2.5 * typical, 0.006, 0.03))
+    count_near = NEIGHBOURS
+    if 8 * noise > radius:
+        radius = float(min(8 * noise, MAX_RADIUS))
+        # so many points lie within the radius, as far as the noise leaves them near the surface
+        count_near = int(np.clip(9 * (radius / max(typical, 1e-300)) ** 2, NEIGHBOURS, MAX_NEIGHBOURS))
+    near = np.asarray(
+        tree.query(dense[chosen], k=min(count_near, len(every)), distance_upper_bound=radius, workers=-1)[1]
+    )
     there = near < len(every)
     around = every[np.minimum(near, len(every) - 1)] - dense[chosen][:, None]
     count = np.maximum(there.sum(1), 1)[:, None]
