@@ -33,6 +33,7 @@ from damageest.artefacts.scans import (
     Scan,
     Sites,
     Truth,
+    take_points,
 )
 
 __all__ = [
@@ -77,4 +78,5 @@ __all__ = [
     "fit_scattered",
     "measure_roughness",
     "open_edges",
+    "take_points",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,11 @@ INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
 """Labels of a scan point: on the nominal surface; on an inner damage surface; outside the part by more than the
 tolerance (weld bead, dirt, fixture); deviating, but in no site (noise)."""
 
+
+OF_POINTS = ("points", "normals", "view", "colours", "confidence")
+"""Fields of a scan, or of a file of points, with a row for each point."""
+
+P = TypeVar("P")
 
 RIGID = 1e-6
 """Largest error of a pose's numbers, of the rotation and of the last row."""
@@ -34,6 +39,12 @@ def require_rigid(name: str, poses: Floats) -> None:
             raise ArtefactError(f"{name}: not rigid: its upper left 3x3 has scale or shear")
         if (np.linalg.det(turn) < 0).any():
             raise ArtefactError(f"{name}: not rigid: its upper left 3x3 mirrors (its determinant is -1)")
+
+
+def take_points(of: P, index: Ints | Flags) -> P:
+    """A scan, or a file of points, with some of its points: their numbers (M,), or whether each is taken (N,)."""
+    given = {name: value for name in OF_POINTS if (value := getattr(of, name)) is not None}
+    return replace(of, **{name: value[index] for name, value in given.items()})  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,9 +130,7 @@ class Scan(Checked):
 
     def take(self, index: Ints | Flags) -> Scan:
         """The scan with some of its points: their numbers (M,), or whether each is taken (N,)."""
-        names = ("points", "normals", "view", "colours", "confidence")
-        given = {name: value for name in names if (value := getattr(self, name)) is not None}
-        return replace(self, **{name: value[index] for name, value in given.items()})
+        return take_points(self, index)
 
 
 @dataclass(frozen=True, eq=False)

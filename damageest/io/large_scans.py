@@ -13,7 +13,7 @@ from damageest.artefacts import Flags, Floats, Scan, Vector
 from damageest.geometry.units import FARTHEST, canonical_unit, unit_factor
 from damageest.io.points.streams import PointStream, open_stream
 from damageest.io.scan_notes import ConfidenceCount, UnitNotes
-from damageest.io.scans import GREY, join_some, make_scan
+from damageest.io.scans import join_attributes, make_scan
 
 LEAST_BYTES = 2
 """Bytes of a point in a file at least; a file too small for the points that are kept is not looked into."""
@@ -127,13 +127,13 @@ class JoinedViews:
         points = np.concatenate([piece.points for piece in pieces]) if pieces else np.empty((0, 3))
         view = np.concatenate(views) if pieces else np.empty(0, np.int32)
         known = bool((view >= 0).any())
-        sizes = [len(piece.points) for piece in pieces]
+        colours, confidence = join_attributes(pieces)
         return Scan(
             points,
             viewpoints=np.array(self._places) if known else None,
             view=view if known else None,
-            colours=join_some([piece.colours for piece in pieces], [(n, 3) for n in sizes], GREY),
-            confidence=join_some([piece.confidence for piece in pieces], [(n,) for n in sizes], np.nan),
+            colours=colours,
+            confidence=confidence,
         )
 
 

@@ -149,11 +149,9 @@ def read_scan(
     normals = _join(given_normals) if len(given_normals) == len(clouds) else None
     if given_normals and normals is None:
         notes.append("only some of the files have normals; no normals are used")
-    colours = join_some([cloud.colours for cloud in clouds], [(len(cloud.points), 3) for cloud in clouds], GREY)
+    colours, single = join_attributes(clouds)
     if colours is not None and (grey := sum(cloud.colours is None for cloud in clouds)):
         notes.append(f"{grey} of {len(clouds)} files have no colours; their points are grey")
-    sizes = [(len(cloud.points),) for cloud in clouds]
-    single = join_some([cloud.confidence for cloud in clouds], sizes, np.nan)
     points = _join([cloud.points for cloud in clouds])
     del clouds
     scan = make_scan(
@@ -170,7 +168,17 @@ def read_scan(
     return replace(scan, warnings=(*units.warnings(), *confidence.warnings()))
 
 
-def join_some(arrays: Sequence[NDArray[Any] | None], shapes: Sequence[tuple[int, ...]], lacking: float) -> Any:
+def join_attributes(pieces: Sequence[PointFile | Scan]) -> tuple[Bytes | None, Singles | None]:
+    """Colours (N,3) and confidence (N,) of all points, one piece after the other; None where no piece has them. Points
+    of a piece without are grey, and their confidence is no number."""
+    sizes = [len(piece.points) for piece in pieces]
+    return (
+        _join_some([piece.colours for piece in pieces], [(size, 3) for size in sizes], GREY),
+        _join_some([piece.confidence for piece in pieces], [(size,) for size in sizes], np.nan),
+    )
+
+
+def _join_some(arrays: Sequence[NDArray[Any] | None], shapes: Sequence[tuple[int, ...]], lacking: float) -> Any:
     """The arrays one after the other, with ``lacking`` in place of those that are None; None where all are."""
     known = next((array for array in arrays if array is not None), None)
     if known is None:

@@ -10,10 +10,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from damageest.errors import Fault, InputError, JobError, PluginError, clean_message, suggest
+from damageest.errors import Fault, JobError, PluginError, clean_message, suggest
 from damageest.io.files import describe_no_file, resolve_path, working_folder
-from damageest.io.scan_folders import list_patches
 from damageest.job import yamlfile
+from damageest.job.folders import describe_no_patches, describe_part_among, may_be_patches
 from damageest.job.model import Header, Job, find_paths
 from damageest.job.wording import describe_fault
 from damageest.registry import bundled
@@ -106,7 +106,8 @@ class _Check:
         contracts, method = self.find_route(method, chosen)
         pairs = {c: chosen.get(c) or self.find_default(c, method) for c in contracts if c not in self.given}
         stages = {c: self.check_stage(pair[0], pair[1]) for c, pair in pairs.items() if pair}
-        self.check_patches(stages.get(ReadPart), stages.get(ReadScan))
+        if among := describe_part_among(stages.get(ReadPart), stages.get(ReadScan)):
+            self.add_fault(among, ReadScan.stage, "path")
         if header and not header.output and (header.name or stem) in (".", ".."):
             self.add_fault("'.' and '..' do not name a folder for the output; give another name, or  output", "name")
         if self.faults or header is None:
@@ -148,16 +149,6 @@ class _Check:
             old = self.tree.get(keys[0], {})
             old = old if isinstance(old, dict) else _spell_out(keys[0], old, self.registry)
             self.tree[keys[0]] = {**old, keys[1]: value}
-
-    def check_patches(self, part: Stage | None, scan: Stage | None) -> None:
-        """Notes a fault where the part's own file is among several files of the scan, as in a folder of both."""
-        if part is None or scan is None:
-            return
-        own = {path for _, path in find_paths(part.model_dump())}
-        views = [path for _, path in find_paths(scan.model_dump())]
-        if len(views) > 1 and (both := own & set(views)):
-            text = f"{min(both)}: is the part, and among the files of the scan; put those into a folder of their own"
-            self.add_fault(text, ReadScan.stage, "path")
 
     def check_header(self) -> Header | None:
         values = {key: value for key, value in self.tree.items() if key in Header.model_fields}
@@ -208,7 +199,7 @@ class _Check:
             first = first.get("path", "")
             if not isinstance(first, str) or not first:
                 return None  # its own check says what is missing
-        if key == ReadScan.stage and self.is_folder(str(first)):
+        if key == ReadScan.stage and may_be_patches(str(first), self.folder):
             return None
         suffix = Path(str(first)).suffix.lower()
         readers = [item for item in self.registry.of(key) if suffix in item.cls.reads]
@@ -219,14 +210,6 @@ class _Check:
             valid = sorted({s for item in self.registry.of(key) for s in item.cls.reads})
             self.add_fault(f"no reader for '{suffix}' files; valid are: {', '.join(valid)}", key, "path")
         return readers[0].name if readers else None
-
-    def is_folder(self, text: str) -> bool:
-        """Whether a path is a folder of patches, which `file` reads, or may be meant as one that is not there."""
-        try:
-            place = resolve_path(Path(text), self.folder)
-            return place.is_dir() or (not place.suffix and not place.exists())
-        except (OSError, ValueError):  # of a name that the system cannot have: its own check says so
-            return False
 
     def find_route(self, method: str, chosen: Mapping[Contract, Chosen]) -> tuple[list[Contract], str]:
         """The contracts that the job's route needs, and the method in full: `auto` is `surface` where the job names one
@@ -293,19 +276,10 @@ class _Check:
         for place, path in find_paths(stage.model_dump()):
             wrong = describe_no_file(path)
             if key == ReadScan.stage and path.is_dir():
-                wrong = _describe_folder(path)
+                wrong = describe_no_patches(path)
             if wrong:
                 self.add_fault(f"{str(path)[-250:]}: {wrong}", key, *place)
         return stage
-
-
-def _describe_folder(folder: Path) -> str:
-    """Why a folder is no scan; what it has is read as patches otherwise."""
-    try:
-        list_patches(folder)
-    except InputError as error:
-        return str(error).removeprefix(f"{folder}: ")
-    return "is a folder, not a file"
 
 
 def _spell_out(key: str, value: str | list[Any], registry: Registry) -> dict[str, Any]:

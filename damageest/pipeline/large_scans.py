@@ -19,7 +19,7 @@ from damageest.geometry.distance_by_cells import signed_distance_by_cells
 from damageest.geometry.duplicates import list_distinct
 from damageest.geometry.transforms import move_points
 from damageest.io.large_scans import JoinedViews
-from damageest.io.scans import GREY, join_some, make_scan
+from damageest.io.scans import join_attributes, make_scan
 from damageest.pipeline.engine import AnyStep, Branch, Engine, follow
 from damageest.pipeline.state import JobState
 from damageest.pipeline.steps import step
@@ -139,12 +139,11 @@ def _gather(read: Callable[[], Iterator[Scan]], place: _Place, most: int, scan: 
     note = f"{told}, and {near} near damage"
     if scan.view is not None:
         view = np.concatenate([scan.view, np.full(len(points), -1) if view is None else view])
-    sizes = [len(scan.points), len(points)]
+    colours, confidence = join_attributes([scan, added])
     more = make_scan(  # which removes the points that were among the thinned ones already
         np.concatenate([scan.points, points]), None, scan.unit, paths=scan.paths, viewpoints=scan.viewpoints,
         view=None if scan.view is None else view,
-        colours=join_some([scan.colours, added.colours], [(size, 3) for size in sizes], GREY),
-        confidence=join_some([scan.confidence, added.confidence], [(size,) for size in sizes], np.nan),
+        colours=colours, confidence=confidence,
     )  # fmt: skip
     spacing = scan.spacing * float(np.sqrt(min(most / count, 1.0) * len(scan.points) / scan.total))
     return replace(

@@ -10,10 +10,10 @@ Add a file of tests in tests/io: a good file, a truncated one, one without point
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-from damageest.artefacts import Bytes, Flags, Floats, Ints, Singles
+from damageest.artefacts import Bytes, Flags, Floats, Ints, Singles, take_points
 from damageest.errors import InputError
 from damageest.io.file_memory import require_memory_for
 from damageest.io.files import check_file, raise_environment_fault, shorten_error
@@ -42,9 +42,7 @@ class PointFile:
 
     def take(self, keep: Flags) -> PointFile:
         """The file with some of its points: whether each (N,) is taken."""
-        names = ("points", "normals", "view", "colours", "confidence")
-        given = {name: value for name in names if (value := getattr(self, name)) is not None}
-        return replace(self, **{name: value[keep] for name, value in given.items()})
+        return take_points(self, keep)
 
 
 class FormatError(ValueError):

@@ -46,16 +46,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
 
 def _read_json(path: Path) -> Any:
     """The description of the scene. Raises FormatError where there is none."""
-    data = path.read_bytes()
-    if path.suffix.lower() == ".glb":
-        if len(data) < 20 or data[:4] != b"glTF":
-            raise FormatError("not a GLB file: it does not start with 'glTF'")
-        version, length, first, kind = struct.unpack_from("<IIII", data, 4)
-        if version != 2:
-            raise FormatError(f"glTF {version} is not read; export glTF 2.0")
-        if length > len(data) or kind != 0x4E4F534A or 20 + first > len(data):
-            raise FormatError(f"the GLB file is truncated: it has {len(data)} of {length} bytes")
-        data = data[20 : 20 + first]
+    data = _read_first_chunk(path) if path.suffix.lower() == ".glb" else path.read_bytes()
     try:
         content = json.loads(data)
     except (ValueError, RecursionError):
@@ -63,6 +54,21 @@ def _read_json(path: Path) -> Any:
     if not isinstance(content, dict) or not isinstance(content.get("asset"), dict):
         raise FormatError("not a glTF file: it has no asset")
     return content
+
+
+def _read_first_chunk(path: Path) -> bytes:
+    """The description in a GLB file, without the data that follow it."""
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        head = stream.read(20)
+        if len(head) < 20 or head[:4] != b"glTF":
+            raise FormatError("not a GLB file: it does not start with 'glTF'")
+        version, length, first, kind = struct.unpack_from("<IIII", head, 4)
+        if version != 2:
+            raise FormatError(f"glTF {version} is not read; export glTF 2.0")
+        if length > size or kind != 0x4E4F534A or 20 + first > size:
+            raise FormatError(f"the GLB file is truncated: it has {size} of {length} bytes")
+        return stream.read(first)
 
 
 def _check(content: dict[str, Any], size: int) -> None:

@@ -1,4 +1,4 @@
-"""Scans stored as meshes: the vertices of STL, OBJ, OFF, 3MF, glTF and VTK files.
+"""Scans stored as meshes: the vertices of STL, OBJ, OFF and 3MF files.
 
 Triangles are not used, so holes, edges of three triangles and wrong turns do not matter.
 """

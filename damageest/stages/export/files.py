@@ -12,17 +12,19 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from damageest.artefacts import Floats, Scan, Solid
+from damageest.artefacts import Floats, Solid
 from damageest.geometry.simplification import simplify_within
 from damageest.geometry.touching import ROUNDS, separate_touching
 from damageest.geometry.transforms import invert_pose, move_mesh, move_points
-from damageest.io.meshes import write_ply, write_points
+from damageest.io.meshes import write_ply
 from damageest.stages import JobPath
 from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathWriter, Writer
+from damageest.stages.export._colours import DAMAGE, DEPOSIT, DOUBTFUL, SURPLUS, UNDAMAGED
 from damageest.stages.export._coverage import write_coverage
 from damageest.stages.export._nominal import map_to_nominal
 from damageest.stages.export._options import Formats, PathFormats, check_spline_writer
 from damageest.stages.export._paths import write_paths
+from damageest.stages.export._scan_points import PointColours, write_scan
 
 if TYPE_CHECKING:
     from damageest.result import Result
@@ -31,13 +33,8 @@ SCAN, NOMINAL = "scan_frame/", "nominal_frame/"
 """Folders of the files in the scan's frame, and of those on the part as designed."""
 PLACES = {"part": ("",), "scan": (SCAN,), "both": ("", SCAN), "nominal": (NOMINAL,), "all": ("", SCAN, NOMINAL)}
 """Folders by the frame that is asked for."""
-UNDAMAGED, DAMAGE, DEPOSIT, DOUBTFUL = (150, 155, 165), (215, 50, 40), (40, 130, 205), (225, 165, 40)
-SURPLUS = (150, 90, 190)
 FEW = 20_000
 """Triangles of a solid of several sites up to which its sheets are moved apart where they touch."""
-COLOUR = ("red", "green", "blue")
-LABELLED = np.array([UNDAMAGED, DAMAGE, SURPLUS, (90, 90, 90)], np.uint8)
-"""Colour of a scan point by its label: intact, damage, added, outlier."""
 
 
 class Files(Export):
@@ -73,7 +70,7 @@ class Files(Export):
         description="largest distance by which facets of STEP solids may deviate, to make fewer of them, in the job's "
         "unit; default: a quarter of the tolerance",
     )
-    point_colours: Literal["label", "scan"] = Field(
+    point_colours: PointColours = Field(
         "label",
         description="red, green and blue in scan.ply: by label (the colours of the scan are scan_red, scan_green, "
         "scan_blue), or those of the scan, where it has some",
@@ -210,7 +207,7 @@ class Files(Export):
             write_ply(path, move_mesh(site.surface, T))
             done.append(ExportedFiles((path.relative_to(folder).as_posix(),)))
         scan = result.aligned if T is None else result.scan
-        done.append(_write_scan(result, scan, folder, f"{place}scan.ply", self.point_colours))
+        done.append(write_scan(result, scan, folder, f"{place}scan.ply", self.point_colours))
         if result.coverage is not None:
             done.append(write_coverage(result.coverage, T, folder, place))
         return done
@@ -306,27 +303,3 @@ def _make_folder(folder: Path, name: str) -> Path:
     """The path of a file ``name`` in ``folder``, with its parent folders made."""
     (folder / name).parent.mkdir(parents=True, exist_ok=True)
     return folder / name
-
-
-def _write_scan(result: Result, scan: Scan, folder: Path, name: str, point_colours: str) -> ExportedFiles:
-    """Writes the points with what was found of each, and with what the scanner's program wrote of it."""
-    x, y, z = scan.points.T
-    columns = {
-        "x": x,
-        "y": y,
-        "z": z,
-        "distance": result.deviation.distance.astype(np.float32),
-        "label": result.deviation.label.astype(np.uint8),
-        "site": result.site_label.astype(np.int32),
-    }
-    labelled = dict(zip(COLOUR, LABELLED[result.deviation.label].T, strict=True))
-    if scan.colours is None:
-        columns |= labelled
-    elif point_colours == "scan":
-        columns |= dict(zip(COLOUR, scan.colours.T, strict=True))
-    else:
-        columns |= {**labelled, **{f"scan_{name}": scan.colours[:, k] for k, name in enumerate(COLOUR)}}
-    if scan.confidence is not None:
-        columns["confidence"] = scan.confidence
-    write_points(_make_folder(folder, name), columns)
-    return ExportedFiles((name,))

@@ -94,8 +94,7 @@ class ScanFile(ReadScan):
     @field_serializer("path", mode="wrap")
     def _list_path(self, value: Any, handler: Any) -> Any:
         """The path with the files of a folder in its place, which are what is read."""
-        entries = [value] if isinstance(value, Path) else value
-        if not any(_find_path(entry).is_dir() for entry in entries):
+        if not self._list_folders():
             return handler(value)
         try:
             return tuple(file.path if file.viewpoint is None else file.model_dump() for file in self._list_files())
@@ -104,9 +103,8 @@ class ScanFile(ReadScan):
 
     def leave_out(self, folder: Path) -> Self:
         """The same. Raises InputError for a folder of patches that the run writes its own files into."""
-        entries = [self.path] if isinstance(self.path, Path) else self.path
-        for path in map(_find_path, entries):
-            if path.is_dir() and folder.resolve() == path.resolve():
+        for path in self._list_folders():
+            if folder.resolve() == path.resolve():
                 raise InputError(
                     f"scan: the folder {path} is the one that this run writes to; put the patches into a folder of "
                     "their own"
@@ -123,8 +121,7 @@ class ScanFile(ReadScan):
 
     def _note_folders(self, scan: Scan) -> Scan:
         """The scan with notes of the files of each folder that were read, and warnings of those that were not."""
-        entries = [self.path] if isinstance(self.path, Path) else self.path
-        for folder in (path for path in map(_find_path, entries) if path.is_dir()):
+        for folder in self._list_folders():
             patches, others = list_patches(folder)
             note = f"the folder {folder.name} has {len(patches)} patches: {name_files(patches)}"
             scan = replace(scan, notes=(*scan.notes, note))
@@ -151,12 +148,8 @@ class ScanFile(ReadScan):
 
     def _list_files(self) -> list[ViewFile]:
         """The files, those of folders among them, with the positions of their scanners."""
-        if isinstance(self.path, Path):
-            entries = [ViewFile(path=self.path, viewpoint=self.viewpoint)]
-        else:
-            entries = [item if isinstance(item, ViewFile) else ViewFile(path=item) for item in self.path]
         files: list[ViewFile] = []
-        for entry in entries:
+        for entry in self._list_entries():
             if not entry.path.is_dir():
                 files.append(entry)
                 continue
@@ -168,6 +161,11 @@ class ScanFile(ReadScan):
             files += [ViewFile(path=path) for path in list_patches(entry.path)[0]]
         return files
 
+    def _list_entries(self) -> list[ViewFile]:
+        """What the job names: files and folders."""
+        if isinstance(self.path, Path):
+            return [ViewFile(path=self.path, viewpoint=self.viewpoint)]
+        return [item if isinstance(item, ViewFile) else ViewFile(path=item) for item in self.path]
 
-def _find_path(entry: Path | ViewFile) -> Path:
-    return entry if isinstance(entry, Path) else entry.path
+    def _list_folders(self) -> list[Path]:
+        return [entry.path for entry in self._list_entries() if entry.path.is_dir()]

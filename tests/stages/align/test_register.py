@@ -37,6 +37,15 @@ def test_scans_with_fewer_points_than_the_comparisons_take(points: int) -> None:
     assert error(part, pose.T_part_scan, scan) < 1
 
 
+def test_a_dense_scan_whose_noise_is_larger_than_the_gaps_between_its_points() -> None:
+    """Its normals need more neighbours: the nearest 64 all lie within the noise, and show no plane."""
+    part = PARTS["lever"]()
+    scan = Simulate(points=60_000, noise=0.6, pose="random", seed=3).run("mm", part)
+    scan = replace(scan, noise=0.6)
+    pose = Register().run(scan, part, 4 * scan.noise)
+    assert error(part, pose.T_part_scan, scan) < 0.5
+
+
 @pytest.mark.parametrize("name", ["lever", pytest.param("block", marks=pytest.mark.slow)])
 def test_pose_with_a_third_unseen(name: str) -> None:
     part, scan = scene(name, seed=4, missing=0.05, unseen=0.33)

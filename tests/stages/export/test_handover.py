@@ -21,7 +21,8 @@ from damageest.job import load
 from damageest.output.result_json import build_report
 from damageest.registry import Registry
 from damageest.result import Result
-from damageest.stages.export.files import DAMAGE, DEPOSIT, UNDAMAGED, Files
+from damageest.stages.export._colours import DAMAGE, DEPOSIT, UNDAMAGED
+from damageest.stages.export.files import Files
 from tests.stages.export import results
 
 
