@@ -21,8 +21,10 @@ class WideLoss(Rule):
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if not scan.is_fitted or site.area <= WIDE * scan.seen_area or site.typical >= THIN * scan.tolerance:
             return
+        # a part that is worn all over shows no skin where its CAD has it
+        share = f"{site.area / scan.seen_area:.0%} of the skin" if scan.seen_area > 0 else "all skin"
         text = (
-            f"it covers {site.area / scan.seen_area:.0%} of the skin that the scan shows, {site.typical:.3g} "
-            f"{scan.unit} deep, and the pose was fitted to the scan: the loss may lie elsewhere"
+            f"it covers {share} that the scan shows, {site.typical:.3g} {scan.unit} deep, and the pose was fitted to "
+            "the scan: the loss may lie elsewhere"
         )
         yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)
