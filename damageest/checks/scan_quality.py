@@ -136,6 +136,23 @@ def raise_tolerance(tolerance: float, distance: Floats, part: Part, noise: float
     return needed, [Reason("tolerance_raised", text, amount=needed, unit=part.unit)]
 
 
+def require_tolerance(tolerance: float, distance: Floats, part: Part, noise: float) -> None:
+    """Raises InputError where the points scatter about the part by more than the tolerance, so that damage cannot be
+    told from noise.
+
+    ``distance`` (N,): signed, of points in a pose for the ``noise`` as it was measured without one.
+    """
+    scatter = measure_form_deviation(distance, max(NEAR_PART * part.diagonal, 8 * noise))
+    if scatter <= tolerance:
+        return
+    unit, noise = part.unit, min(scatter, noise)
+    least = AUTO_TOLERANCE * noise
+    raise InputError(
+        f"tolerance: the noise of the scan is {noise:.2g} {unit}, and the tolerance {tolerance:.3g} {unit}: damage "
+        f"cannot be told from noise; give at least {least:.2g} {unit}, or auto, or a scan with less noise"
+    )
+
+
 def require_intact(distance: Floats, tolerance: float, part: Part) -> None:
     """Raises StageError where few of the points near the part are intact: nothing shows then what is damage.
 

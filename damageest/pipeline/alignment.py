@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from damageest.artefacts import Pose
+from damageest.checks.scan_quality import AUTO_TOLERANCE, require_tolerance
 from damageest.errors import StageError
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.transforms import move_points
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState
 from damageest.pipeline.steps import step
@@ -12,13 +17,21 @@ from damageest.stages.align import Align
 
 COARSE = 4.0
 """How many tolerances a deformed part may lie off the part as designed, for its pose to be found."""
+MEASURED = 20_000
+"""Points, about, that the noise is measured with in the pose."""
 
 
-@step(gives=("pose", "refusal"), reads=("adapter", "tolerance"), calls=(Align,))
+@step(
+    gives=("pose", "refusal"),
+    reads=("adapter", "tolerance", "asked_tolerance", "noise", "part", "scan"),
+    calls=(Align,),
+)
 def align_scan(engine: Engine, state: JobState) -> tuple[Pose, StageError | None]:
     """Calls `align`. Where it refuses, and stage `adapt` may deform the part, it is called with a larger tolerance: too
     little of a deformed part lies on the part as designed. The refusal is then kept, and holds unless the adapted part
-    explains the scan."""
+    explains the scan. Raises InputError for a tolerance that is less than the noise."""
+    if state.asked_tolerance is not None and state.noise > state.tolerance:
+        check_noise(engine, state)
     try:
         pose: Pose = engine.call(Align, state).get(Align.gives)
         return pose, None
@@ -31,3 +44,19 @@ def align_scan(engine: Engine, state: JobState) -> tuple[Pose, StageError | None
         except StageError:
             raise refusal from None
         return pose, refusal
+
+
+def check_noise(engine: Engine, state: JobState) -> None:
+    """Raises InputError where the points scatter about the part by more than the tolerance. In such a tolerance no pose
+    is found, or all of the skin is damaged.
+
+    The noise as it was measured without a pose is too large where the skin curves within a few gaps. So the scatter is
+    measured in the pose that is found with a tolerance for that noise; where none is, nothing is decided here.
+    """
+    wide = AUTO_TOLERANCE * state.noise
+    with suppress(StageError):
+        pose: Pose = engine.call(Align, state.with_named("tolerance", wide, state.key("noise") + " wide")).get(
+            Align.gives
+        )
+        points = move_points(state.scan.points[:: max(1, len(state.scan.points) // MEASURED)], pose.T_part_scan)
+        require_tolerance(state.tolerance, signed_distance(points, state.part)[0], state.part, state.noise)

@@ -68,7 +68,7 @@ ACQUIRE: Route = (
     measure_scan,  # scan, part -> noise, spacing, depth_step
     take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
     Sample,  # part, tolerance -> samples
-    align_scan,  # calls Align: adapter, tolerance, scan, part, samples -> pose, refusal
+    align_scan,  # calls Align: adapter, tolerance, asked_tolerance, noise, part, scan, samples -> pose, refusal
     place_scan,  # scan, pose -> aligned, noise, spacing
     note_pose,  # pose -> +warnings
     where_thinned(  # scan, reader

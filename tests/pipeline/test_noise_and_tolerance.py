@@ -1,0 +1,29 @@
+"""A tolerance below the noise of the scan is refused with both figures; noise that only seems so large is not."""
+
+from __future__ import annotations
+
+import pytest
+from damageest_evaluate.parts import PARTS
+
+import damageest
+from damageest.errors import InputError
+from damageest.geometry.noise import measure_noise_and_spacing
+from damageest.stages.scan.simulate import Simulate
+
+
+@pytest.mark.parametrize("pose", ["known", "unknown"])
+def test_noise_of_three_tolerances_is_refused_with_the_tolerance_to_give(pose: str) -> None:
+    part = PARTS["lever"]()
+    scan = Simulate(points=60_000, noise=0.6, pose="identity" if pose == "known" else "random", seed=3).run("mm", part)
+    settings = ["tolerance=0.2"] + ["align=none"] * (pose == "known")
+    with pytest.raises(InputError, match=r"noise of the scan is 0\.(59|6|61) mm, .* 0\.2 mm: .* at least 2\.4 mm"):
+        damageest.run({"version": 1}, part=part, scan=scan, settings=settings)
+
+
+def test_points_too_far_apart_to_show_the_noise_are_not_refused() -> None:
+    """On bars a few gaps wide, noise without a pose comes out 400 times too large."""
+    part = PARTS["grille"]()
+    scan = Simulate(points=1500, noise=0.01, pose="random", seed=1).run("mm", part)
+    assert measure_noise_and_spacing(scan.points)[0] > 0.2
+    result = damageest.run({"version": 1}, part=part, scan=scan, settings=["tolerance=0.1", "allowance=none"])
+    assert not result.sites
