@@ -34,9 +34,11 @@ def clean_message(text: object, most: int = MOST_TEXT) -> str:
 
 
 class DamageestError(Exception):
-    """Base of all errors that damageest raises on purpose; its text is meant for the user."""
+    """Base of all errors that damageest raises on purpose; its text is meant for the user. ``topic``: the word by which
+    `damageest explain` says more about it; empty where it does not."""
 
     exit_status = 1
+    topic = ""
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,10 @@ class InputError(DamageestError):
 
     exit_status = 2
 
+    def __init__(self, message: object = "", topic: str = "") -> None:
+        self.topic = topic
+        super().__init__(message)
+
 
 class PluginError(DamageestError):
     """A stage implementation does not keep its contract, two packages provide the same name, or a plugin needs
@@ -91,16 +97,16 @@ class StageError(DamageestError):
     """A stage failed, or refused an input that is valid.
 
     Raise it with what is wrong and, as ``remedy``, what the user may try; ``method``: another method of the job that
-    may do it, which is added to the remedy. The engine adds stage and site; for points that are no site yet, a
-    description of their ``place``.
+    may do it, which is added to the remedy; ``topic``: of `damageest explain`. The engine adds stage and site; for
+    points that are no site yet, a description of their ``place``.
     """
 
     exit_status = 1
 
-    def __init__(self, message: str, remedy: str = "", method: str = "") -> None:
+    def __init__(self, message: str, remedy: str = "", method: str = "", topic: str = "") -> None:
         self.message, self.own_remedy, self.method = message, remedy, method
         self.remedy = ", or ".join(part for part in (remedy, f"method: {method}" if method else "") if part)
-        self.stage, self.use, self.site, self.place = "", "", 0, ""
+        self.stage, self.use, self.site, self.place, self.topic = "", "", 0, "", topic
         super().__init__(message)
 
     def __str__(self) -> str:

@@ -149,7 +149,8 @@ def require_tolerance(tolerance: float, distance: Floats, part: Part, noise: flo
     least = AUTO_TOLERANCE * noise
     raise InputError(
         f"tolerance: the noise of the scan is {noise:.2g} {unit}, and the tolerance {tolerance:.3g} {unit}: damage "
-        f"cannot be told from noise; give at least {least:.2g} {unit}, or auto, or a scan with less noise"
+        f"cannot be told from noise; give at least {least:.2g} {unit}, or auto, or a scan with less noise",
+        topic="noise",
     )
 
 
@@ -177,6 +178,7 @@ def require_intact(distance: Floats, tolerance: float, part: Part) -> None:
         f"{tolerance:.3g} {part.unit}; at least {MIN_INTACT:.0%} have to be: damage cannot be told from errors of scan "
         f"or pose{worn}",
         f"check the pose first; then a larger tolerance: 75 % of these points lie within {better:.2g} {part.unit}",
+        topic="noise",
     )
 
 

@@ -48,6 +48,7 @@ def _options(
 def _add_commands() -> None:
     from damageest.cli import (
         batch,
+        explain,
         faces,
         init,
         nominal,
@@ -61,7 +62,7 @@ def _add_commands() -> None:
         view,
     )
 
-    for module in (run, batch, view, picture, nominal, verify, validate, init, faces, stages, plugins, schema):
+    for module in (run, batch, view, picture, nominal, verify, validate, init, explain, faces, stages, plugins, schema):
         app.command(module.__name__.rsplit(".", 1)[1])(module.command)
 
 

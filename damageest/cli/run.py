@@ -192,6 +192,8 @@ def _report_failure(error: Exception, source: str, as_json: bool, debug: bool) -
     if debug:
         traceback.print_exception(error)
     say(f"error: {error}", err=True)
+    if topic := getattr(error, "topic", ""):
+        say(f"help: damageest explain {topic}", err=True)
     return status
 
 
@@ -202,6 +204,7 @@ def _print_table(result: Result, target: Path) -> None:
     from rich.text import Text
 
     from damageest.findings import describe_interval
+    from damageest.rules.advice import list_topics
     from damageest.rules.notes import cap_notes, list_notes
 
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
@@ -245,6 +248,8 @@ def _print_table(result: Result, target: Path) -> None:
         show(f" {text}", "failed:", "red")
     for text in cap_notes(list_notes(result)):
         show(f" {text}", "note:", "yellow")
+    if topics := list_topics(result):
+        show(f"help: damageest explain {' '.join(topics)}")
     show(f"written to {target}")
 
 

@@ -63,7 +63,7 @@ def set_far_aside(scan: Scan, part: Part) -> tuple[Scan, Reasons]:
 def measure_scan(scan: Scan, part: Part) -> tuple[float, float, float]:
     """Measures noise and spacing of the scan, and the step of its depth. Raises InputError for one of another size."""
     if wrong_size := diagnose_scale(scan.points, part.vertices, part.unit):
-        raise InputError(f"scan: {wrong_size}")
+        raise InputError(f"scan: {wrong_size}", topic="unit")
     return (scan.noise, scan.spacing, 0.0) if scan.noise else _measure(scan)
 
 

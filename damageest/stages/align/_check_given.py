@@ -66,11 +66,13 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
             f"turned by {turn:.2g} degrees, {fitted.on:.0%} would: the given pose is wrong by that "
             "much, or the part is bent or twisted, or the scale of the scan is wrong",
             "use align: icp, which corrects it, or give the right T_part_scan",
+            topic="pose",
         )
     if not given.is_acceptable:
         raise StageError(
             f"the scan does not lie on the part in the given pose: {given.describe()}",
             "give the right T_part_scan, or use align: register, which needs none; check unit and part as well",
+            topic="pose",
         )
     doubts = given.note_doubts()
     if given.beside > MIN_BESIDE and given.agreement < 1 - LEAST_OFF:  # metal outside: no damage puts it there

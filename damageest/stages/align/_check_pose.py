@@ -86,6 +86,7 @@ class PoseCheck:
             f"no pose found that explains the scan: in the best pose {self.describe()}; at least {MIN_ON_PART:.0%} "
             f"should lie on the part, and {MIN_AGREEMENT:.0%} of what is near it",
             remedy,
+            topic="pose",
         )
 
 

@@ -111,6 +111,7 @@ def _find_datum(frame: Frame, datum: DatumSkin, patches: Patches) -> Flags:
             f"the scan does not show the datum: {share:.1%} of its points near the part lie there, and "
             f"{MIN_DATUM:.1%} are needed",
             "name skin in align.datum that was scanned; `damageest faces` lists the CAD faces",
+            topic="wear",
         )
     return is_datum
 

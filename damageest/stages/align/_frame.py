@@ -52,11 +52,12 @@ class Frame:
             raise StageError(
                 f"the scan has {len(scan.points)} points; an alignment needs at least {MIN_POINTS}",
                 "give a denser scan; where the pose is known, give it to align: none",
+                topic="sparse",
             )
         if not np.isfinite(scan.points).all():
             raise StageError("the scan has points that are not finite", "remove these points from the file")
         if wrong := diagnose_scale(scan.points, part.vertices, part.unit):
-            raise StageError(wrong, "set the unit of scan or part, or crop the scan to the part")
+            raise StageError(wrong, "set the unit of scan or part, or crop the scan to the part", topic="unit")
         size, centre = part.diagonal, part.bounds.mean(0)
         middle = np.median(scan.points[:: max(1, len(scan.points) // 100_000)], axis=0)
         return cls(PartSurface(Mesh((part.vertices - centre) / size, part.faces)), size, centre, middle)

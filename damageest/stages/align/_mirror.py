@@ -201,6 +201,7 @@ def _build_error(check: PoseCheck, mirrored: PoseCheck) -> StageError:
             f"{mirrored.agreement:.0%} of it would if it were mirrored: it shows a mirrored part, another size, a "
             "bent one, or another part",
             "scan: {scale: auto} if the scale may be wrong; otherwise check which part was scanned",
+            topic="form",
         )
     return StageError(
         f"the scan is a mirror image of the part: {mirrored.agreement:.0%} of what it shows near the part would lie "

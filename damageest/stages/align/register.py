@@ -68,6 +68,7 @@ class Register(Align):
                 f"only {len(given.points)} places of the scan have a clear normal (at least {MIN_POINTS // 4} are "
                 "needed): it is too sparse or too noisy",
                 "give a denser scan; where the pose is known, give it to align: none",
+                topic="sparse",
             )
         prepared = prepare_part(target, self.seed)
         target, field = prepared.surface, prepared.grid

@@ -1,0 +1,179 @@
+"""What to do about a scan that is not as it should be, by topic: for `damageest explain` and docs/bad-scan.md.
+
+Each topic has a word that stays the same from version to version, and the codes of the reasons that belong to it. A
+refusal has the word of its topic as an attribute of the error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from damageest.rules.notes import RUN_CODES
+
+if TYPE_CHECKING:
+    from damageest.result import Result
+
+MOST_NAMED = 3
+"""Topics that the line at the end of a run names."""
+
+
+@dataclass(frozen=True)
+class Topic:
+    """``word`` names it, ``title`` is its heading on the page. ``codes``: of the reasons that belong to it. ``text``:
+    what to do, in plain words. ``job``: the lines of a job that do it; empty where none do."""
+
+    word: str
+    title: str
+    codes: tuple[str, ...]
+    text: str
+    job: str = ""
+
+
+TOPICS = (
+    Topic(
+        "unit",
+        "The unit is wrong",
+        ("unit",),
+        "Look up in the scanner's software in which unit it wrote the file, or measure one length of the part in "
+        "the scan. Give that unit for the scan, and not for the job, so that the results stay in the unit of the "
+        "CAD model.",
+        "scan: {path: scan.ply, unit: m}",
+    ),
+    Topic(
+        "surroundings",
+        "Other things are in the scan",
+        ("surroundings", "far_points"),
+        "Cut off the table, clamps, markers and powder that do not belong to the part, in the scanner's software or "
+        "in the job. Crops are in the scan's own frame. What touches the part cannot be told from added metal: cut "
+        "it off by hand. Powder on the skin makes the part larger by its thickness: spray thinly, or clean the "
+        "part.",
+        "scan:\n"
+        "  path: scan.ply\n"
+        "  crop:\n"
+        "    - {drop: above, point: [0, 0, -2], normal: [0, 0, -1]} # the table, below z = -2\n"
+        "    - {keep: largest piece, gap: 3}",
+    ),
+    Topic(
+        "pose",
+        "The pose is not certain",
+        ("align", "pose", "another_part", "other_poses", "pose_free", "mirrored", "given_pose"),
+        "Open report.html and see whether the scan lies on the part. Scan more of it: faces in three directions, "
+        "and what makes the part unsymmetric, as a keyway. On a symmetric part the volume is right in each pose, "
+        "but the machine has to use the same one. Where the pose is wrong, pick three or more pairs of points, each "
+        "first in the scan, then on the part; where the scan is in the part's frame already, take align: none.",
+        "align: {use: points, pairs: [[[1, 2, 3], [41, 2, 3]], [[1, 52, 3], [41, 52, 3]], [[1, 2, 63], [41, 2, 63]]]}",
+    ),
+    Topic(
+        "noise",
+        "The noise is large for the tolerance",
+        ("tolerance_small", "tolerance_raised", "below_noise", "depth_steps", "thin_walls", "scattered", "fading"),
+        "Take tolerance: auto, or a tolerance of four times the noise that the run prints. A shallower loss is not "
+        "in this scan, whatever the tolerance: scan from nearer, with more exposures, or with a better scanner. Do "
+        "not smooth the scan: that rounds the rims of the damage and hides the noise from the check.",
+        "tolerance: auto",
+    ),
+    Topic(
+        "sparse",
+        "The points are too few",
+        ("few_points", "sparse_scan", "beyond_points"),
+        "Export the scan at full resolution, as points or as a mesh that was not decimated: of a mesh only the "
+        "vertices are used. Three to five points should lie across the smallest damage that matters. Where only "
+        "some places are thin, scan these again and give all files as a list.",
+        "scan: {use: file, path: [view-1.ply, view-2.ply]}",
+    ),
+    Topic(
+        "unseen",
+        "The scan has holes and shadows",
+        ("inner_surface", "beside"),
+        "Open unseen.ply over the CAD model, turn the part, and scan these places, above all into the damage and "
+        "beside it. Give the position of the scanner for each view: rays then tell a place that was seen through "
+        "from one that was not seen. Do not fill holes in the scanner's software: a filled hole looks like metal "
+        "that is there.",
+        "scan:\n  - {path: view-1.ply, viewpoint: [0, -400, 350]}\n  - {path: view-2.ply, viewpoint: [0, 400, 350]}",
+    ),
+    Topic(
+        "views",
+        "The views do not fit together",
+        ("two_sheets", "one_motion"),
+        "Register the views to each other again. Or give each view as a file of its own, with the position of its "
+        "scanner: align: register then compares them and puts each view right that fixes its pose by itself. Views "
+        "that were merged into one file cannot be told apart. To find out which view is wrong, run each alone.",
+        "scan:\n"
+        "  - {path: view-1.ply, viewpoint: [0, -400, 350]}\n"
+        "  - {path: view-2.ply, viewpoint: [0, 400, 350]}\n"
+        "align: {use: register, fit_views: true}",
+    ),
+    Topic(
+        "stray",
+        "Points lie where nothing is",
+        ("speck", "low_confidence"),
+        "Remove stray points and points at the edges in the scanner's software, by its filter for outliers or for "
+        "edges. Where the file has a confidence for each point, those below a value can be set aside; compare with "
+        "a run without it, since points in a damage are often those of least confidence.",
+        "scan: {path: scan.ply, min_confidence: 0.3}",
+    ),
+    Topic(
+        "form",
+        "The part is bent, or the scan is scaled",
+        ("model_fit", "adapt"),
+        "Measure one length of the part and compare it with the scan. If the scan is wrong, correct its scale; if "
+        "the part is bent or twisted, adapt: auto, the default, bends the CAD model until it follows the intact "
+        "skin. Look at scan.ply by distance: what is left should be even noise, without bands.",
+        "scan: {path: scan.ply, scale: auto}\nadapt: auto",
+    ),
+    Topic(
+        "wear",
+        "A whole face is worn",
+        ("free_pose", "wide_loss"),
+        "Name faces that are not worn, as journals, a foot or end faces: only they fix the pose then. `damageest "
+        "faces` lists the faces of a STEP file. Where the pose is known, as from a fixture, give it instead.",
+        "align:\n  use: register\n  datum: [{facing: {direction: [0, 0, -1], angle: 5}}]",
+    ),
+    Topic(
+        "surplus",
+        "Metal or dirt lies on the part",
+        ("covered", "displaced", "displaced_piece", "surplus"),
+        "Remove the weld bead, spatter or dirt, and scan again, where it lies on a damage: what is lost under it "
+        "cannot be seen. A piece that was pushed aside is no loss: put it back, or accept the site to repair it as "
+        "if the piece were lost. Surplus elsewhere changes no volume.",
+        "accept: [1]",
+    ),
+    Topic(
+        "doubtful",
+        "A site is doubtful",
+        ("nothing", "wide_interval", "off_boundary", "intact_inside", "intact_over"),
+        "Read its reasons in the report and look at the place on the part. If the metal is missing there, accept "
+        "the site by its number; if it is not, drop it. A better scan of this place makes the interval narrower; a "
+        "larger tolerance makes shallow sites go away that are errors of the scan.",
+        "accept: [3, 5] # these doubtful sites beside the likely ones\nsites: {drop: [2]}",
+    ),
+)
+
+
+def find_topic(word: str) -> Topic | None:
+    """The topic of this word, or the one that a code belongs to; None where there is none."""
+    named = next((topic for topic in TOPICS if topic.word == word), None)
+    return named or next((topic for topic in TOPICS if word in topic.codes), None)
+
+
+def name_topics(codes: Iterable[str]) -> list[str]:
+    """The words of the topics of some codes, each once, at most `MOST_NAMED`, in the order of the codes."""
+    found = (find_topic(code) for code in codes)
+    return list(dict.fromkeys(topic.word for topic in found if topic))[:MOST_NAMED]
+
+
+def list_topics(result: Result) -> list[str]:
+    """The words of the topics that a run has doubts about: those of doubtful sites first, then of notes that may change
+    a decision, then of the other sites and notes."""
+    doubtful: list[str] = []
+    others: list[str] = []
+    for site in result.sites:
+        codes = doubtful if site.verdict.level == "doubtful" else others
+        codes += [reason.code for reason in site.verdict.reasons]
+    notes = [note.code for note in result.warnings]
+    if result.fit is not None and result.fit.model == "views disagree":  # the same code says that a part is bent
+        notes = ["two_sheets" if code == "model_fit" else code for code in notes]
+    first = [code for code in notes if code in RUN_CODES and RUN_CODES[code].rank == 0 or code == "two_sheets"]
+    return name_topics([*doubtful, *first, *others, *notes])
