@@ -142,7 +142,7 @@ TOPICS = (
     ),
     Topic(
         "doubtful",
-        "A site is doubtful",
+        "A site is doubtful, or its interval is wide",
         ("nothing", "wide_interval", "off_boundary", "intact_inside", "intact_over"),
         "Read its reasons in the report and look at the place on the part. If the metal is missing there, accept "
         "the site by its number; if it is not, drop it. A better scan of this place makes the interval narrower; a "
@@ -175,5 +175,5 @@ def list_topics(result: Result) -> list[str]:
     notes = [note.code for note in result.warnings]
     if result.fit is not None and result.fit.model == "views disagree":  # the same code says that a part is bent
         notes = ["two_sheets" if code == "model_fit" else code for code in notes]
-    first = [code for code in notes if code in RUN_CODES and RUN_CODES[code].rank == 0 or code == "two_sheets"]
+    first = [code for code in notes if (code in RUN_CODES and RUN_CODES[code].rank == 0) or code == "two_sheets"]
     return name_topics([*doubtful, *first, *others, *notes])
