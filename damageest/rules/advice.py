@@ -159,9 +159,10 @@ def find_topic(word: str) -> Topic | None:
 
 
 def name_topics(codes: Iterable[str]) -> list[str]:
-    """The words of the topics of some codes, each once, at most `MOST_NAMED`, in the order of the codes."""
-    found = (find_topic(code) for code in codes)
-    return list(dict.fromkeys(topic.word for topic in found if topic))[:MOST_NAMED]
+    """The words of the topics of some codes, each once, at most `MOST_NAMED`, in the order of the codes; that a site is
+    doubtful stands last, since the others say why."""
+    words = dict.fromkeys(topic.word for topic in map(find_topic, codes) if topic)
+    return sorted(words, key=lambda word: word == "doubtful")[:MOST_NAMED]
 
 
 def list_topics(result: Result) -> list[str]:

@@ -85,7 +85,7 @@ def add_body(plotter: pv.Plotter, mesh: Mesh | None, colour: str, opacity: float
     if mesh is None:
         return
     body = pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces).clean()
-    plotter.add_mesh(body, color=colour, opacity=opacity, ambient=0.4)
+    plotter.add_mesh(body, color=colour, opacity=opacity, ambient=0.2)
     if edges:
         lines = body.extract_feature_edges(30, boundary_edges=False, non_manifold_edges=False, manifold_edges=False)
         if lines.n_cells:
