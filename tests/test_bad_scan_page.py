@@ -1,0 +1,112 @@
+"""The page on bad scans shows what the program says: lines of its jobs, the words of `damageest explain`."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from damageest.cli import app
+from damageest.registry import builtins
+from damageest.registry.contracts import STAGES
+from damageest.rules.advice import TOPICS, Topic
+from damageest.rules.notes import RUN_CODES
+from damageest.rules.pose import POSE_CODES
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "bad-scan.md").read_text()
+JOBS = ROOT / "jobs" / "bad_scans"
+FAST = {"unit", "confidence", "mesh"}
+"""Jobs that take some seconds; the others are run by -m slow only."""
+QUOTED = re.findall(r"^`jobs/bad_scans/(\w+)\.yaml` says:\n\n```text\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
+STARTS = re.compile(r"\n(?=error: |note: |surplus |unseen: |tolerance: |fit: |losses |no damage )")
+"""Where a line of the program begins, in a block whose long lines are broken."""
+
+
+def mask(text: str) -> str:
+    """A text with one space between words and without figures; a list of several is as one."""
+    masked = re.sub(r"(?<![\w#])[-+±]?\d[\d.,]*(e[-+]?\d+)?", "#", " ".join(text.split()))
+    return re.sub(r"#(,? (and )?#)+", "#", masked)
+
+
+def find_section(topic: Topic) -> str:
+    return PAGE.partition(f"\n## {topic.title}\n")[2].partition("\n## ")[0]
+
+
+def run(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from damageest.cli import main; main()", "run", f"jobs/bad_scans/{name}.yaml"]
+    command += ["-o", str(folder / name)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[] if name in FAST else pytest.mark.slow) for name in sorted({one for one, _ in QUOTED})],
+)
+def test_the_lines_of_a_job_are_what_it_prints(name: str, tmp_path: Path) -> None:
+    done = run(name, tmp_path)
+    said = mask(done.stdout + done.stderr)
+    for block in (text for one, text in QUOTED if one == name):
+        for line in STARTS.split(block.strip()):
+            assert mask(line) in said, f"the run does not say: {line}"
+
+
+def test_each_job_is_quoted_and_each_picture_is_shown() -> None:
+    assert {name for name, _ in QUOTED} == {path.stem for path in JOBS.glob("*.yaml")}
+    shown = set(re.findall(r"\(images/(bad-scan-\w+\.png)\)", PAGE))
+    drawn = sorted((ROOT / "docs" / "images").glob("bad-scan-*.png"))
+    assert shown == {path.name for path in drawn}
+    for path in drawn:
+        assert path.stat().st_size < 60_000
+        with Image.open(path) as picture:
+            assert picture.width == 700
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.word)
+def test_its_section_has_the_words_of_the_command(topic: Topic) -> None:
+    section = find_section(topic)
+    assert f"`damageest explain {topic.word}`" in section
+    assert " ".join(topic.text.split()) in " ".join(section.split())
+    assert topic.job in section
+    told = CliRunner().invoke(app, ["explain", topic.word]).output
+    assert " ".join(topic.text.split()) in " ".join(told.split())
+    assert all(line in told for line in topic.job.splitlines())
+
+
+def test_each_code_of_a_topic_is_one_and_belongs_to_no_other() -> None:
+    codes = [code for topic in TOPICS for code in topic.codes]
+    known = {*(rule.code for rule in builtins.damageest_rules()), *RUN_CODES, *POSE_CODES, *STAGES}
+    assert set(codes) <= known
+    assert len(codes) == len(set(codes))
+    assert len({topic.word for topic in TOPICS}) == len(TOPICS)
+
+
+def test_every_rule_and_code_can_be_explained() -> None:
+    codes = [*(rule.code for rule in builtins.damageest_rules()), *RUN_CODES, *POSE_CODES]
+    done = CliRunner().invoke(app, ["explain", *codes])
+    assert done.exit_code == 0
+    for rule in builtins.damageest_rules():
+        assert rule.meaning in " ".join(done.output.split())
+
+
+def test_topics_are_listed_and_a_word_that_is_none_is_refused() -> None:
+    listed = CliRunner().invoke(app, ["explain"]).output
+    assert all(topic.word in listed and topic.title in listed for topic in TOPICS)
+    done = CliRunner().invoke(app, ["explain", "nois"])
+    assert "did you mean 'noise'?" in str(done.exception)
+
+
+def test_a_refusal_and_a_run_with_doubts_name_their_topics_in_one_line(tmp_path: Path) -> None:
+    refused = run("unit", tmp_path)
+    assert refused.returncode == 2
+    assert refused.stderr.splitlines()[-1] == "help: damageest explain unit"
+    doubted = run("mesh", tmp_path)
+    assert doubted.returncode == 0
+    assert [line for line in doubted.stdout.splitlines() if line.startswith("help: ")] == [
+        "help: damageest explain sparse"
+    ]
