@@ -32,12 +32,12 @@ def command(
     from damageest.rules.pose import POSE_CODES
 
     if not words:
-        for topic in TOPICS:
-            say(f"{topic.word:<14}{topic.title}")
+        for one in TOPICS:
+            say(f"{one.word:<14}{one.title}")
         return
     rules = {rule.code: rule for rule in Registry.discover().rules}
     meanings = {**POSE_CODES, **{code: one.meaning for code, one in RUN_CODES.items()}}
-    valid = [*(topic.word for topic in TOPICS), *rules, *meanings]
+    valid = [*(one.word for one in TOPICS), *rules, *meanings]
     if unknown := [word for word in words if word not in valid and not find_topic(word)]:
         text = "damageest schema reasons lists the codes, and damageest explain without a word the topics"
         raise JobError(
