@@ -114,6 +114,14 @@ class StageRecord:
     cached: bool
 
 
+@dataclass(frozen=True)
+class StepRecord:
+    """What a step between the stages took, without the stages that it called."""
+
+    step: str
+    seconds: float
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """Everything a run computed. Lengths in ``units``; meshes in the part's frame.
@@ -144,6 +152,7 @@ class Result:
     failures: tuple[str, ...]
     truth: Floats | None
     stages: tuple[StageRecord, ...] = ()
+    steps: tuple[StepRecord, ...] = ()
     coverage: Coverage | None = None
     surplus: tuple[Surplus, ...] = ()
     fit: ModelFit | None = None

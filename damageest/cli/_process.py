@@ -17,6 +17,8 @@ from damageest.isolation import supervise as watching
 from damageest.isolation.supervise import IS_POSSIBLE, end_like_fork, supervise
 
 LATE = "note: the work is done, but a thread of a plugin or a library went on; its process was ended\n"
+BEGAN = time.perf_counter() - time.process_time()
+"""About when this process began, on the clock of `time.perf_counter`: it has done nothing but work so far."""
 is_command = False
 """Whether this process runs the command line alone. In another program, such as one with tests, it must not fork."""
 

@@ -2,12 +2,14 @@
 
 On a terminal: a live line with the current stage, with a bar where it takes longer than a second, and a line for each
 finished stage. In a pipe: a line for each call of a stage, whose name is written when it begins, so that a crash or a
-hang shows where.
+hang shows where. What takes time between the stages has lines too, and the last line is the whole run: together they
+say where its time went.
 """
 
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +28,8 @@ SECONDS = {"sample": 0.3, "align": 4.0, "segment": 0.4, "cluster": 0.2, "enclose
 """About how long a stage takes for 100,000 scan points, on one core; measured on the example jobs."""
 LONG = 1.0
 """Seconds from which on a stage has a bar."""
+SHOWN = 0.05
+"""Seconds from which on what is no stage has a line of its own."""
 IDLE = {("allowance", "none"), ("path", "none"), ("report", "none")}
 """Stages with implementations that do nothing. They are not listed; result.json has them."""
 
@@ -57,7 +61,9 @@ class _Clock(ProgressColumn):
 class Progress:
     """Observes the stages through hooks and prints them, unless ``quiet``."""
 
-    def __init__(self, quiet: bool) -> None:
+    def __init__(self, quiet: bool, began: float | None = None) -> None:
+        """``began``: when the program was started, on the clock of `time.perf_counter`; its start has a line then."""
+        self.began = began
         self.console = Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
         self.live: Live | None = None
         self.points = self.sites = 0
@@ -72,6 +78,18 @@ class Progress:
         self.points = self.sites = 0
         self.finished, self.current = [], ""
         self.console.print(Text(clean_message(name), style="bold"))
+        first, self.listed = time.perf_counter() if self.began is None else self.began, 0.0
+        if self.began is not None:
+            self._print_line("start of the program", time.perf_counter() - self.began)
+            self.began = None  # of the first job alone
+        with self._show_live():
+            yield
+        whole = time.perf_counter() - first
+        self._print_line("rest", whole - self.listed)
+        self.console.print(f"  {'the whole run':<40} {whole:6.2f} s")
+
+    @contextmanager
+    def _show_live(self) -> Iterator[None]:
         if not self.console.is_terminal:
             yield
             return
@@ -122,10 +140,24 @@ class Progress:
         self.current = ""
         self._end_call("from an earlier run" if cached else f"{seconds:6.2f} s")
         self.seconds += seconds
+        self.listed += seconds
         self.cached += cached
         if self.live and not site:
             self._print_group()
             self._show(f"checks after {stage}", 0.0)
+
+    @hookimpl
+    def damageest_after_step(self, step: str, seconds: float) -> None:
+        if seconds >= SHOWN:
+            if self.live:
+                self._print_group()
+            self._print_line(step, seconds)
+
+    def _print_line(self, what: str, seconds: float) -> None:
+        """A line for what is no stage, where it took long enough."""
+        if seconds >= SHOWN:
+            self.listed += seconds
+            self.console.print(Text(f"  {what:<40} {seconds:6.2f} s"))
 
     def _show(self, text: str, usual: float) -> None:
         """Begins a new live line; ``usual``: about how many seconds it stays, 0 where that is not known."""

@@ -102,7 +102,7 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
     from damageest.registry import Registry
 
     limit_this_process(given.limits.memory)
-    progress = Progress(given.quiet)
+    progress = Progress(given.quiet, _process.BEGAN if _process.is_command else None)
     registry = Registry.discover([progress])
     status = 0
     loaded = []

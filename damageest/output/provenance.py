@@ -39,7 +39,7 @@ class ProvenanceReport(JsonModel):
     packages: dict[str, str] = Field(description="versions of the packages that provide stages, and of all they need")
     sources: dict[str, str] = Field(description="SHA-256 of the source code of the packages that provide stages")
     system: str = Field(description="system, processor and Python")
-    sha256: str = Field(description="of this file's content without this value and the stages")
+    sha256: str = Field(description="of this file's content without this value, the stages and the steps")
 
 
 def build_provenance(job: Job, folder: Path, target: Path) -> dict[str, Any]:
@@ -65,8 +65,10 @@ def describe_system() -> str:
 
 
 def seal(content: Mapping[str, Any]) -> str:
-    """SHA-256 of a result's content without this hash, and without the stages, whose seconds differ in each run."""
+    """SHA-256 of a result's content without this hash, and without stages and steps, whose seconds differ in each
+    run."""
     bare = {**content, "stages": [], "provenance": {**content["provenance"], "sha256": ""}}
+    bare.pop("steps", None)
     return hashlib.sha256(json.dumps(bare, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 

@@ -71,7 +71,7 @@ def find_differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> lis
 
 
 def _strip(content: Mapping[str, Any]) -> dict[str, Any]:
-    left = {key: value for key, value in content.items() if key not in ("stages", "provenance", "versions")}
+    left = {key: value for key, value in content.items() if key not in ("stages", "steps", "provenance", "versions")}
     left["part"] = {key: value for key, value in content["part"].items() if key != "path"}
     left["scan"] = {key: value for key, value in content["scan"].items() if key != "paths"}
     return left

@@ -63,6 +63,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         failures=tuple(str(error) for error in state.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance, state.adapted is not None),
         stages=tuple(engine.records),
+        steps=tuple(engine.steps),
         coverage=state.coverage,
         surplus=state.surplus,
         adapted=state.adapted,

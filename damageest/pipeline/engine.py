@@ -21,7 +21,7 @@ from damageest.pipeline.steps import GATHERED, Step
 from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.outputs import check_output
 from damageest.registry.registry import Registry
-from damageest.result import StageRecord
+from damageest.result import StageRecord, StepRecord
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
 from damageest.stages.enclose import Enclose, EncloseAll
@@ -38,13 +38,17 @@ OPTIONS: dict[str, Contract] = {
 }
 """The stages whose options steps read, by the names of these values."""
 
+LISTED = 0.005
+"""Seconds from which on a step is in the list of what took time."""
+
 S = TypeVar("S", JobState, Candidate, FoundSite)
 T = TypeVar("T")
 
 
 @dataclass
 class Engine:
-    """One run of a job. ``records`` grow as it goes; ``stems`` are the cache entries that it used. ``silent``: it
+    """One run of a job. ``records`` of stages and ``steps`` grow as it goes; ``stems`` are the cache entries that it
+    used. ``silent``: it
     calls stages on values that are not the job's own, and observers do not get these calls. ``limits``: of each stage,
     of memory for those that run in a process of their own."""
 
@@ -52,6 +56,7 @@ class Engine:
     registry: Registry
     cache: Cache | None = None
     records: list[StageRecord] = field(default_factory=list)
+    steps: list[StepRecord] = field(default_factory=list)
     stems: list[str] = field(default_factory=list)
     memo: dict[str, Any] = field(default_factory=dict)
     silent: bool = False
@@ -125,13 +130,17 @@ class Engine:
 
         Raises StageError where memory runs out in it.
         """
-        what = step.name.replace("_", " ").strip()
+        what, called, start = step.name.replace("_", " ").strip(), len(self.records), time.perf_counter()
         key = digest(step.name, [state.key(name) for name in step.takes], [self.describe(one) for one in step.calls])
         try:
             with at_work(what, self.limits.seconds):
                 _, given = self.remember(step.name, key, lambda: self._run(step, state), step.kept)
         except MemoryError:
             raise StageError(f"{what}: ran out of memory", MORE_MEMORY) from None
+        seconds = time.perf_counter() - start - sum(record.seconds for record in self.records[called:])
+        if seconds >= LISTED:
+            self.steps.append(StepRecord(step.name, round(seconds, 3)))
+            _tell(self.registry.hooks.hook.damageest_after_step, step=what, seconds=seconds)
         for name, value in step.name_values(given).items():
             earlier = ""
             if name in GATHERED:
@@ -241,7 +250,8 @@ def _tell(hook: Callable[..., Any], **what: Any) -> None:
     except BaseException as error:
         if is_interrupt(error):
             raise KeyboardInterrupt from error
-        text = f"a plugin that observes stage {what['stage']} failed: {type(error).__name__}: {clean_message(error)}"
+        of = f"stage {what['stage']}" if "stage" in what else f"step {what['step']}"
+        text = f"a plugin that observes {of} failed: {type(error).__name__}: {clean_message(error)}"
         warnings.warn(text, RuntimeWarning, stacklevel=2)
 
 

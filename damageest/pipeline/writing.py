@@ -51,7 +51,7 @@ def describe_output(
     """Adds to the result what the export says and all stages so far; gives the content of result.json and job.yaml."""
     if written.warnings:
         result = replace(result, warnings=rank_notes((*result.warnings, *make_notes("export", written.warnings))))
-    result = replace(result, stages=tuple(engine.records))
+    result = replace(result, stages=tuple(engine.records), steps=tuple(engine.steps))
     return result, describe_result(result, target, written), describe_job(engine.job, target)
 
 
@@ -64,7 +64,7 @@ def show_result(engine: Engine, state: JobState) -> tuple[Result, ExportedFiles]
     except StageError as error:
         warning = Reason("report", f"{error.args[0]} (the run went on without a report)")
         return replace(result, warnings=(*result.warnings, warning)), written
-    result = replace(result, stages=tuple(engine.records))
+    result = replace(result, stages=tuple(engine.records), steps=tuple(engine.steps))
     return result, replace(written, files=(*written.files, *done.files), notes=(*written.notes, *done.notes))
 
 

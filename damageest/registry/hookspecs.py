@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement: six that add, three that only observe.
+"""The hooks a plugin may implement: six that add, four that only observe.
 
 What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
 what they return is ignored.
@@ -70,3 +70,8 @@ def damageest_after_stage(stage: str, use: str, site: int, output: object, secon
 @hookspec
 def damageest_stage_failed(stage: str, use: str, site: int, error: Exception) -> None:
     """Called when a stage raised."""
+
+
+@hookspec
+def damageest_after_step(step: str, seconds: float) -> None:
+    """Called after a step between the stages that took 5 ms or more; ``seconds``: without those of stages it called."""

@@ -10,6 +10,7 @@ import select
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,23 @@ def test_an_interrupt_says_what_is_kept_and_leaves_nothing_hidden(tmp_path: Path
     again = subprocess.run([*MAIN, "run", str(job)], capture_output=True, text=True)
     assert again.returncode == 0, again.stderr
     assert again.stderr.count("from an earlier run") >= 6
+
+
+def test_the_lines_of_a_run_say_where_its_time_went(tmp_path: Path) -> None:
+    job = damaged_box.write(tmp_path)
+    begin = time.perf_counter()
+    done = subprocess.run([*MAIN, "run", "--no-cache", str(job)], capture_output=True, text=True)
+    wall = time.perf_counter() - begin
+    assert done.returncode == 0, done.stderr
+    lines = dict(re.findall(r"^  (\S.*?) +(\d+\.\d\d) s$", done.stderr, re.M))
+    whole = float(lines.pop("the whole run"))
+    assert 0.85 * wall < whole <= wall + 0.05
+    rest = float(lines.pop("rest", 0))
+    assert rest < 0.15 * whole
+    assert sum(map(float, lines.values())) + rest == pytest.approx(whole, abs=0.1)
+    assert float(lines["start of the program"]) > 0
+    content = json.loads((tmp_path / "out/job/result.json").read_text())
+    assert {one["step"] for one in content["steps"]} >= {"inspect_skin"}
 
 
 @needs_terminal()
