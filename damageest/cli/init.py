@@ -6,7 +6,7 @@ import json
 import os
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -31,7 +31,7 @@ def command(
     """Write a commented job file with values measured from part and scan."""
     from damageest.errors import Fault, JobError
     from damageest.job import load
-    from damageest.pipeline.prepare import inspect_inputs
+    from damageest.pipeline.prepare import inspect_inputs, keep_inputs
     from damageest.registry import Registry
 
     target = job or Path(f"{part.stem}.yaml")
@@ -40,8 +40,8 @@ def command(
             [Fault("the file exists already; overwrite it with --force, or name another file with --job")], str(target)
         )
     source = {"version": 1, "units": units, "part": str(part), "scan": str(scan)}
-    registry = Registry.discover()
-    solid, cloud, tolerance, doubts = inspect_inputs(load(source, registry), registry)
+    registry, read = Registry.discover(), dict[str, Any]()
+    solid, cloud, tolerance, doubts = inspect_inputs(load(source, registry), registry, read)
     cautions = list(map(str, doubts))
     if swapped := _find_swap(part, scan, solid, cloud):
         cautions = [swapped, *cautions]
@@ -53,6 +53,9 @@ def command(
     ]
     target.write_text("\n".join(lines) + "\n", encoding="utf-8")
     say(f"written to {target}; next: damageest run {target}")
+    made = load(target, registry)
+    if keep_inputs(made, registry, read):
+        say(f"part and scan are kept for it in {made.output / 'stages'}")
     for caution in cautions:
         say(f"caution: {caution}", err=True)
 

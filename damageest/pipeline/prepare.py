@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Pose, Reason, Scan, Sites
 from damageest.checks.scan_quality import check_walls, choose_tolerance, describe_few, raise_tolerance, require_intact
-from damageest.errors import InputError, StageError
+from damageest.errors import DamageestError, InputError, StageError
 from damageest.geometry.crops import crop_points
 from damageest.geometry.depth_steps import measure_depth_step
 from damageest.geometry.distance import signed_distance
@@ -15,10 +16,12 @@ from damageest.geometry.far_points import find_far
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.units import diagnose_scale, diagnose_size
 from damageest.job.model import Job
+from damageest.pipeline.cache import Cache
 from damageest.pipeline.engine import Engine, follow, start
 from damageest.pipeline.large_scans import check_crops
 from damageest.pipeline.state import Reasons
 from damageest.pipeline.steps import step
+from damageest.pipeline.workspace import is_in_use
 from damageest.registry.registry import Registry
 from damageest.rules.notes import make_notes
 from damageest.stages.part import ReadPart
@@ -136,19 +139,40 @@ def read_part(job: Job, registry: Registry) -> Part:
     return engine.call(ReadPart, start(engine)).part
 
 
-def read_inputs(job: Job, registry: Registry) -> tuple[Part, Scan]:
-    """The part and the scan of a job, as their stages read them."""
-    engine = Engine(job, registry)
+def read_inputs(job: Job, registry: Registry, memo: dict[str, Any] | None = None) -> tuple[Part, Scan]:
+    """The part and the scan of a job, as their stages read them; ``memo`` takes them by the keys of what was read."""
+    engine = Engine(job, registry, memo={} if memo is None else memo)
     state = follow((ReadPart, ReadScan, crop_scan, set_far_aside), engine, start(engine))
     return state.part, state.scan
 
 
-def inspect_inputs(job: Job, registry: Registry) -> tuple[Part, Scan, float, list[Reason]]:
-    """Part, measured scan, a tolerance for them, and what is doubtful; for a new job."""
-    part, scan = read_inputs(job, registry)
+def inspect_inputs(
+    job: Job, registry: Registry, memo: dict[str, Any] | None = None
+) -> tuple[Part, Scan, float, list[Reason]]:
+    """Part, measured scan, a tolerance for them, and what is doubtful; for a new job. ``memo``: as `read_inputs`."""
+    part, scan = read_inputs(job, registry, memo)
     wrong = (diagnose_scale(scan.points, part.vertices, part.unit), diagnose_size(part.vertices, part.unit))
     doubts = [*scan.warnings, *(Reason("unit", text) for text in wrong if text)]
     noise, spacing, step = _measure(scan)
     scan = replace(scan, noise=noise, spacing=spacing)
     tolerance, more = choose_tolerance(None, scan, part, step)
     return part, scan, tolerance, doubts + more + check_walls(tolerance, part)
+
+
+def keep_inputs(job: Job, registry: Registry, memo: dict[str, Any]) -> bool:
+    """Keeps part and scan in the output folder of a job as its first run will ask for them, and says whether it did.
+
+    ``memo``: what was read already. A part whose triangles depend on the tolerance is read again where the job's is
+    another. Nothing is kept where the output folder holds other files, is in use, or cannot be written to.
+    """
+    try:
+        if is_in_use(job.output):
+            return False
+        engine, cache = Engine(job, registry, memo=memo), Cache(job.output / "stages")
+        state = start(engine)
+        for contract in (ReadPart, ReadScan):
+            state = engine.call(contract, state)
+            cache.put(contract.stage, state.key(contract.gives), state.get(contract.gives))
+    except (DamageestError, OSError):  # the run says what is wrong
+        return False
+    return True

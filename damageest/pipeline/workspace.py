@@ -99,6 +99,13 @@ def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
                 _clean_up(target, hidden)
 
 
+def is_in_use(target: Path) -> bool:
+    """Whether a run is writing to an output folder, or was stopped there. Raises JobError for a folder that is not
+    damageest's."""
+    _refuse_other_folder(target)
+    return (target.parent / f".{target.name}.partial").exists() or (target / INSIDE).exists()
+
+
 def _clean_up(target: Path, hidden: Path) -> None:
     """Leaves the earlier output as it was, and of a run that did not finish the stages."""
     with contextlib.suppress(OSError):
