@@ -72,6 +72,8 @@ class Surplus:
     be closed; ``height``: its largest distance from the skin; ``area``: skin that it covers. ``kind``: `surplus`, as a
     weld bead or dirt; `displaced piece`, with losses of like size beside it; `surroundings`, as a fixture, a table or a
     second specimen. ``clusters``: the point clusters of the losses beside it. ``notes`` say what was recognised.
+    ``estimate``: of its volume, the skin that it covers times its mean height; no more than that is known of one that
+    is not closed. 0 for surroundings.
     """
 
     id: int
@@ -83,6 +85,7 @@ class Surplus:
     kind: Literal["surplus", "displaced piece", "surroundings"] = "surplus"
     clusters: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
+    estimate: float = 0.0
 
     @property
     def volume(self) -> float | None:

@@ -70,6 +70,7 @@ def describe_surplus(
             solid=None,
             height=float(deviation.distance[members].max()),
             area=patch.covered,
+            estimate=patch.covered * patch.mean,
         )
         found.append(_name_kind(surplus, patch, deviation, aligned, part, patches, tolerance))
     return tuple(found)
@@ -97,6 +98,7 @@ def join_surplus(items: Sequence[Surplus]) -> Surplus:
         kind="displaced piece" if "displaced piece" in kinds else "surplus",
         clusters=tuple(sorted({cluster for item in items for cluster in item.clusters})),
         notes=tuple(dict.fromkeys(note for item in items for note in item.notes)),
+        estimate=sum(item.estimate for item in items),
     )
 
 
@@ -145,7 +147,7 @@ def _name_kind(
             what = "it is a plane, like a table"
         elif _resembles(patch, part):
             what = "it has the size and the area of the part, and may be a second specimen of it"
-        return replace(surplus, kind="surroundings", notes=(what,))
+        return replace(surplus, kind="surroundings", notes=(what,), estimate=0.0)
     beside = {number: loss for number, loss in losses.items() if _is_beside(patch, loss, tolerance, aligned.spacing)}
     surplus = replace(surplus, clusters=tuple(beside))
     like: list[tuple[int, ...]] = [(number,) for number, loss in losses.items() if _is_alike(patch, [loss])]

@@ -28,7 +28,7 @@ Show = Callable[[str], None]
 MOST_UNSEEN = 5
 """Unseen regions that are printed; result.json has all."""
 MOST_SURPLUS = 3
-"""Surpluses that are printed each by itself, largest first; result.json has all."""
+"""Surpluses of a kind that are printed each by itself, largest first; result.json has all."""
 UNSEEN_WHY = {
     "hidden": "hidden by the part from every scanner position",
     "outside": "outside every view",
@@ -254,25 +254,32 @@ def _print_table(result: Result, target: Path) -> None:
 
 
 def _list_surplus(items: Sequence[Surplus], unit: str) -> list[str]:
-    """A line for each of the largest surpluses, and for those that a person has to decide about; the rest as one."""
-    small = [item for item in items if item.kind == "surplus"][MOST_SURPLUS:]
-    lines = [_describe_surplus(item, unit) for item in items if item not in small]
-    if not small:
-        return lines
-    closed = [item.volume for item in small if item.volume is not None]
-    volume = f"{sum(closed):.4g} {unit}³ together" if closed else "no closed volume"
-    open_ = (
-        f", {len(small) - len(closed)} of them without a closed volume" if closed and len(closed) < len(small) else ""
+    """A line for each of the largest of a kind, and one for the rest of them."""
+    kinds = {kind: [item for item in items if item.kind == kind] for kind in ("surplus", "displaced piece")}
+    small = {kind: some[MOST_SURPLUS:] for kind, some in kinds.items() if len(some) > MOST_SURPLUS}
+    folded = {item.id for some in small.values() for item in some}
+    lines = [_describe_surplus(item, unit) for item in items if item.id not in folded]
+    return [*lines, *(_fold_surplus(kind, some, unit) for kind, some in small.items())]
+
+
+def _fold_surplus(kind: str, items: Sequence[Surplus], unit: str) -> str:
+    """One line for many surpluses of a kind, with the volume of those that are closed and an estimate for the others."""
+    closed = [item.volume for item in items if item.volume is not None]
+    guessed = sum(item.estimate for item in items if item.volume is None)
+    volumes = [f"{sum(closed):.4g} {unit}³ together"] if closed else []
+    if left := len(items) - len(closed):
+        which = f"{left} of them without a closed volume" if closed else "no closed volume"
+        volumes.append(f"{which}, about {guessed:.2g} {unit}³ (an estimate: area times mean height)")
+    height, area = max(item.height for item in items), sum(item.area for item in items)
+    named = "" if kind == "surplus" else f" ({kind})"
+    return (
+        f"surplus{named}: {len(items)} smaller ones, {', '.join(volumes)}, up to {height:.4g} {unit} high, "
+        f"{area:.4g} {unit}²"
     )
-    height, area = max(item.height for item in small), sum(item.area for item in small)
-    return [
-        *lines,
-        f"surplus: {len(small)} smaller ones, {volume}{open_}, up to {height:.4g} {unit} high, {area:.4g} {unit}²",
-    ]
 
 
 def _describe_surplus(item: Surplus, unit: str) -> str:
-    volume = "no closed volume" if item.volume is None else f"{item.volume:.6g} {unit}³"
+    volume = f"about {item.estimate:.2g} {unit}³ (an estimate)" if item.volume is None else f"{item.volume:.6g} {unit}³"
     size = f"{item.height:.4g} {unit} high, {item.area:.4g} {unit}²"
     if item.kind == "surroundings":
         size = f"up to {item.height:.4g} {unit} from the part"

@@ -42,6 +42,7 @@ class SurplusReport(JsonModel):
     points: int
     share: float = Field(description="of the scan's points")
     volume: float | None = Field(description="null where it does not close, and for surroundings")
+    estimate: float = Field(description="of the volume: area times mean height; 0 for surroundings")
     height: float = Field(description="largest distance of its points from the nominal surface")
     area: float = Field(description="of the skin that it covers")
     centre: Vector = Field(description="of the bounds")

@@ -23,8 +23,11 @@ from damageest.stages.enclose import EncloseAll
 
 MARGIN = 80.0
 """Distance in tolerances between the surplus and the sides of the complement's box; more than an enclosure needs."""
-MOST_CLOSED = 40
-"""Number of surplus clusters, largest first, whose volume is computed."""
+MOST_CLOSED = 16
+"""Number of surplus clusters, largest first, whose volume is computed; of the others it is estimated."""
+FEW, FEW_SHARE = 30, 0.001
+"""Points, and share of the scan, below both of which a cluster is too small for a volume that is more than its estimate:
+at the edge of what was seen it may be joined with skin that was not."""
 MOST_SKIN = 0.5
 """Share of the part's skin from which surplus is an error of the pose, of the unit or of the tolerance."""
 EQUAL, EQUAL_TOUCHING = 1.35, 1.1
@@ -132,23 +135,33 @@ def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: S
     if sum(item.area for item in metal) > MOST_SKIN * turned.part.area:
         note = "surplus covers most of the part: check pose, unit and tolerance; its volume was not computed"
         return done + [replace(item, notes=(*item.notes, note)) for item in metal]
-    few = Sites(np.where(kept.label > MOST_CLOSED, 0, kept.label), min(kept.count, MOST_CLOSED))
+    order = sorted(range(1, len(metal) + 1), key=lambda number: -metal[number - 1].estimate)
+    order = [number for number in order if not _is_small(metal[number - 1])]
+    tried = order[:MOST_CLOSED]  # the numbers of the clusters that are closed, in the order of their own numbers below
+    renumbered = np.zeros(kept.count + 1, np.int32)
+    renumbered[tried] = np.arange(1, len(tried) + 1)
     reason, pieces = "no closed surface could be reconstructed through its points", []
     try:
-        pieces = _enclose(engine, turned, few)
+        pieces = _enclose(engine, turned, Sites(renumbered[kept.label], len(tried))) if tried else []
     except (DamageestError, ValueError) as error:
         reason = str(error)
     left = dict(enumerate(metal, 1))
     for piece in pieces:
-        item = join_surplus([metal[number - 1] for number in piece.clusters])
+        own = {tried[number - 1] for number in piece.clusters}
+        item = join_surplus([metal[number - 1] for number in sorted(own)])
         solid = close_surplus(item, piece.damage, turned.aligned, turned.part, turned.tolerance, turned.unit)
         if solid is not None:
             done.append(solid)
-            left = {number: other for number, other in left.items() if number not in piece.clusters}
+            left = {number: other for number, other in left.items() if number not in own}
     for number, item in left.items():
-        why = reason if number <= MOST_CLOSED else f"only the {MOST_CLOSED} largest are closed"
+        why = reason if number in tried else f"only the {MOST_CLOSED} largest are closed"
+        why = f"it has {len(item.points)} points" if _is_small(item) else why
         done.append(replace(item, notes=(*item.notes, f"its volume was not computed: {why}")))
     return done
+
+
+def _is_small(item: Surplus) -> bool:
+    return len(item.points) < FEW and item.share < FEW_SHARE
 
 
 def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces]:
@@ -171,5 +184,7 @@ def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces
 
 
 def _sort(items: Sequence[Surplus]) -> list[Surplus]:
-    """Largest volume first; then what has none, surroundings last."""
-    return sorted(items, key=lambda item: (item.kind == "surroundings", -(item.volume or 0.0), -item.share))
+    """Largest volume first; then what has none, by its estimate, surroundings last."""
+    return sorted(
+        items, key=lambda item: (item.kind == "surroundings", -(item.volume or 0.0), -item.estimate, -item.share)
+    )

@@ -42,14 +42,17 @@ def test_surplus_is_in_the_table_the_files_and_the_report(tmp_path: Path) -> Non
 
 
 def make_surplus(number: int, kind: str = "surplus") -> Surplus:
-    return Surplus(number, np.arange(3), 0.01, None, 0.1 * number, 2.0, kind)  # type: ignore[arg-type]
+    return Surplus(number, np.arange(3), 0.01, None, 0.1 * number, 2.0, kind, estimate=0.5)  # type: ignore[arg-type]
 
 
-def test_many_small_surpluses_are_one_line_and_what_a_person_decides_keeps_its_own() -> None:
+def test_many_small_surpluses_are_one_line_for_a_kind_with_an_estimate_of_their_volume() -> None:
     items = [*map(make_surplus, range(1, 13)), make_surplus(13, "displaced piece"), make_surplus(14, "surroundings")]
     lines = _list_surplus(items, "mm")
     assert len(lines) == MOST_SURPLUS + 3
     assert "9 smaller ones" in lines[-1]
     assert "1.2 mm high, 18 mm²" in lines[-1]
+    assert "no closed volume, about 4.5 mm³ (an estimate" in lines[-1]
     assert [f"surplus {number} (" in line for number, line in zip((13, 14), lines[-3:-1], strict=True)] == [True, True]
     assert len(_list_surplus(items[:3], "mm")) == 3
+    pieces = [make_surplus(number, "displaced piece") for number in range(20, 60)]
+    assert len(_list_surplus([*items, *pieces], "mm")) == 2 * MOST_SURPLUS + 3
