@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +17,10 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
-from damageest.geometry.voxels import measure_area
+from damageest.geometry.voxels import measure_area, measure_bounds
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 FAR, FAR_SHARE = 0.15, 0.25
 """Distance from the skin, as a share of the part's diagonal, that added metal hardly has; the share of a cluster's
@@ -46,6 +51,22 @@ class _Patch:
     area: float
     covered: float
     mean: float
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.points)
+
+    @cached_property
+    def feet_tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.feet)
+
+    @cached_property
+    def bounds(self) -> Floats:
+        return measure_bounds(self.points)
 
 
 def describe_surplus(
@@ -205,17 +226,26 @@ def _measure_extents(points: Floats) -> Floats:
 
 
 def _is_beside(patch: _Patch, loss: _Patch, tolerance: float, spacing: float) -> bool:
-    from scipy.spatial import cKDTree
+    reach = max(NEAR * tolerance, 3 * spacing)
+    if _measure_box_gap(loss.bounds, patch.bounds).max() > reach:  # no point of one is nearer to the other
+        return False
+    gap = np.asarray(patch.tree.query(loss.points, workers=2)[0])
+    return bool(gap.min() <= reach)
 
-    gap = np.asarray(cKDTree(patch.points).query(loss.points, workers=2)[0])
-    return bool(gap.min() <= max(NEAR * tolerance, 3 * spacing))
+
+def _measure_box_gap(first: Floats, second: Floats) -> Floats:
+    """(3,) how far two boxes (2,3) lie apart along each axis."""
+    return np.maximum(np.maximum(first[0] - second[1], second[0] - first[1]), 0.0)
 
 
 def _is_opposite(patch: _Patch, loss: _Patch) -> bool:
     """Whether a loss lies over against the surplus, on the other side of a wall."""
-    from scipy.spatial import cKDTree
-
-    return bool(np.median(cKDTree(patch.feet).query(loss.feet, workers=2)[0]) <= 0.5 * np.sqrt(patch.covered))
+    near = 0.5 * np.sqrt(patch.covered)
+    low, high = measure_bounds(patch.feet)
+    beyond = np.linalg.norm(np.maximum(np.maximum(low - loss.feet, loss.feet - high), 0.0), axis=1)
+    if np.median(beyond) > near:  # each is at least as far from the feet as from the box around them
+        return False
+    return bool(np.median(patch.feet_tree.query(loss.feet, workers=2)[0]) <= near)
 
 
 def _is_alike(patch: _Patch, losses: Sequence[_Patch]) -> bool:

@@ -263,7 +263,7 @@ def _list_surplus(items: Sequence[Surplus], unit: str) -> list[str]:
 
 
 def _fold_surplus(kind: str, items: Sequence[Surplus], unit: str) -> str:
-    """One line for many surpluses of a kind, with the volume of those that are closed and an estimate for the others."""
+    """One line for many surpluses of a kind, with the volume of those that are closed, and an estimate for others."""
     closed = [item.volume for item in items if item.volume is not None]
     guessed = sum(item.estimate for item in items if item.volume is None)
     volumes = [f"{sum(closed):.4g} {unit}³ together"] if closed else []

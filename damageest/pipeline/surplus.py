@@ -26,8 +26,8 @@ MARGIN = 80.0
 MOST_CLOSED = 16
 """Number of surplus clusters, largest first, whose volume is computed; of the others it is estimated."""
 FEW, FEW_SHARE = 30, 0.001
-"""Points, and share of the scan, below both of which a cluster is too small for a volume that is more than its estimate:
-at the edge of what was seen it may be joined with skin that was not."""
+"""Points, and share of the scan, below both of which a cluster is too small for more than an estimate of its volume: at
+the edge of what was seen it may be joined with skin that was not."""
 MOST_SKIN = 0.5
 """Share of the part's skin from which surplus is an error of the pose, of the unit or of the tolerance."""
 EQUAL, EQUAL_TOUCHING = 1.35, 1.1
