@@ -235,7 +235,7 @@ def _is_beside(patch: _Patch, loss: _Patch, tolerance: float, spacing: float) ->
 
 def _measure_box_gap(first: Floats, second: Floats) -> Floats:
     """(3,) how far two boxes (2,3) lie apart along each axis."""
-    return np.maximum(np.maximum(first[0] - second[1], second[0] - first[1]), 0.0)
+    return np.asarray(np.maximum(np.maximum(first[0] - second[1], second[0] - first[1]), 0.0))
 
 
 def _is_opposite(patch: _Patch, loss: _Patch) -> bool:

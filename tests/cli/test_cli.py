@@ -28,7 +28,8 @@ def test_run_prints_a_table_and_writes_the_folder(tmp_path: Path) -> None:
     assert "implicit" in done.stdout
     assert "proven" in done.stdout
     assert "the scan shows 100% of the skin" in done.stdout
-    assert [line.split(":")[0].strip() for line in done.stderr.splitlines()[1:3]] == ["part", "scan"]
+    stages = [line.split(":")[0].strip() for line in done.stderr.splitlines() if ":" in line]
+    assert stages[:2] == ["part", "scan"]
     written = {p.name for p in (tmp_path / "out/job").iterdir()}
     assert {
         "result.json",
@@ -95,6 +96,24 @@ def test_init_writes_a_job_that_runs(tmp_path: Path) -> None:
     refused = call("init", "box.stl", "scan.ply", "--job", "new.yaml", cwd=tmp_path)
     assert refused.returncode == 2
     assert "--force" in refused.stderr
+
+
+def test_the_first_run_takes_what_init_read(tmp_path: Path) -> None:
+    damaged_box.write(tmp_path)
+    assert call("init", "box.stl", "scan.ply", "--job", "new.yaml", cwd=tmp_path).returncode == 0
+    done = call("run", "new.yaml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    said = {line.split(":")[0].strip(): line for line in done.stderr.splitlines() if ":" in line}
+    assert all("from an earlier run" in said[stage] for stage in ("part", "scan"))
+    with (tmp_path / "scan.ply").open("ab") as stream:
+        stream.write(b"\n")  # another file: it is read again
+    again = call("run", "new.yaml", "-o", "other", cwd=tmp_path)
+    assert "from an earlier run" not in again.stderr
+    mine = tmp_path / "out/kept"
+    mine.mkdir()
+    (mine / "notes.txt").write_text("mine")
+    assert call("init", "box.stl", "scan.ply", "--job", "kept.yaml", cwd=tmp_path).returncode == 0
+    assert [path.name for path in mine.iterdir()] == ["notes.txt"]
 
 
 def test_stages_lists_everything_and_each_option() -> None:
