@@ -106,8 +106,10 @@ class PatchDeviation:
 @dataclass(frozen=True, eq=False)
 class ViewFit:
     """How one view lies against the part: ``shift`` (3,) of the part's centre and ``turn`` in degrees that would put it
-    right, in the part's frame; ``apart``: how far it lies from the other views where they overlap. ``is_determined``:
-    whether it fixes its pose by itself. ``is_corrected``: whether it was moved to its place."""
+    right, in the part's frame; ``apart``: how far it lies from the other views where they overlap; ``left``: the same
+    after the views were fitted. ``is_determined``: whether skin and overlap fix its pose, ``held``: how many of the six
+    motions they leave free, which are held. ``is_elsewhere``: whether it lies elsewhere than the others by more than
+    noise; ``is_corrected``: whether it was moved to its place."""
 
     number: int
     shift: Floats
@@ -116,6 +118,8 @@ class ViewFit:
     left: float
     is_determined: bool
     is_corrected: bool
+    held: int = 0
+    is_elsewhere: bool = False
 
 
 Deformed = Literal["bend", "twist", "shear", "stretch", "scale"]
@@ -133,7 +137,9 @@ class ModelFit:
     kinds and amounts: the largest displacement of the seen skin beyond the rigid motion nearest to it, with
     ``amount`` for all together and ``amount_error``. ``waviness``: standard deviation of what no form explains.
     ``corrected_scale``: the scale that was taken out of the scan, 1 where none was. ``words`` say it all. `open`: no
-    form was found, and something else speaks against the part as designed in this pose.
+    form was found, and something else speaks against the part as designed in this pose. ``views_from``: whether the
+    scan says which points are a view, or their order or two surfaces over the same skin do; ``views_hidden``: volume
+    that may be worn off where only the part shows how views were misplaced that were moved.
     """
 
     model: Literal["ok", "scaled", "deformed", "views disagree", "wavy", "open"]
@@ -150,6 +156,8 @@ class ModelFit:
     views: tuple[ViewFit, ...]
     waviness: float
     corrected_scale: float = 1.0
+    views_from: Literal["given", "order", "sheets"] = "given"
+    views_hidden: float = 0.0
 
     @property
     def name(self) -> str:

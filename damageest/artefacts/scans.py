@@ -18,11 +18,12 @@ INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
 tolerance (weld bead, dirt, fixture); deviating, but in no site (noise)."""
 
 
-OF_POINTS = ("points", "normals", "view", "colours", "confidence")
+OF_POINTS = ("points", "normals", "view", "cloud", "colours", "confidence")
 """Fields of a scan, or of a file of points, with a row for each point."""
 
 P = TypeVar("P")
 
+MOST_CLOUDS = 1 << 30
 RIGID = 1e-6
 """Largest error of a pose's numbers, of the rotation and of the last row."""
 
@@ -43,7 +44,7 @@ def require_rigid(name: str, poses: Floats) -> None:
 
 def take_points(of: P, index: Ints | Flags) -> P:
     """A scan, or a file of points, with some of its points: their numbers (M,), or whether each is taken (N,)."""
-    given = {name: value for name in OF_POINTS if (value := getattr(of, name)) is not None}
+    given = {name: value for name in OF_POINTS if (value := getattr(of, name, None)) is not None}
     return replace(of, **{name: value[index] for name, value in given.items()})  # type: ignore[type-var]
 
 
@@ -72,10 +73,12 @@ class Scan(Checked):
     ``noise`` is the measured standard deviation of the points off the local surface and ``spacing`` the median distance
     to the nearest neighbours that a reconstructed surface has to bridge; both 0 until measured. ``viewpoints`` (V,3):
     where the scanner stood for each view, in the frame of the points; ``view`` (N,): the number of each point's view,
-    -1 where its scanner position is not known. Both None where no position is known. ``total``: number of points in
-    the files where only some of them are here, else 0. ``colours`` (N,3) from 0 to 255, and ``confidence`` (N,) on the
-    scale of the files, as the scanner's program wrote them; None where no file has them. Beside files with, the points
-    of a file without are grey, and their confidence is no number. ``warnings``: what the reader doubts.
+    -1 where its scanner position is not known. Both None where no position is known. ``cloud`` (N,): the number of the
+    cloud that each point came with, as of its file: the points of one cloud do not move against each other, whether its
+    scanner position is known or not; -1 where that is not known. None: a view is a cloud. ``total``: number of points
+    in the files where only some of them are here, else 0. ``colours`` (N,3) from 0 to 255, and ``confidence`` (N,) on
+    the scale of the files, as the scanner's program wrote them; None where no file has them. Beside files with, the
+    points of a file without are grey, and their confidence is no number. ``warnings``: what the reader doubts.
     """
 
     points: Floats
@@ -92,6 +95,7 @@ class Scan(Checked):
     colours: Bytes | None = None
     confidence: Singles | None = None
     warnings: tuple[Reason, ...] = ()
+    cloud: NDArray[np.int32] | None = None
     _dtypes: ClassVar[dict[str, Any]] = {
         "points": np.float64,
         "normals": np.float64,
@@ -99,6 +103,7 @@ class Scan(Checked):
         "view": np.int32,
         "colours": np.uint8,
         "confidence": np.float32,
+        "cloud": np.int32,
     }
     _ranges: ClassVar[dict[str, Range]] = {"noise": (0.0, MOST), "spacing": (0.0, MOST), "total": (0, MOST)}
 
@@ -118,6 +123,9 @@ class Scan(Checked):
             require_finite("viewpoints", self.viewpoints)
             require_shape("view", self.view, len(self.points))
             require_index("view", self.view, len(self.viewpoints), "viewpoints", least=-1)
+        if self.cloud is not None:
+            require_shape("cloud", self.cloud, len(self.points))
+            require_index("cloud", self.cloud, MOST_CLOUDS, "clouds", least=-1)
 
     def move(self, T: Floats) -> Scan:
         """The same scan in another frame; T is 4x4, rigid."""

@@ -49,21 +49,29 @@ def _describe_deformation(fit: ModelFit, unit: str) -> str:
 def _describe_views(fit: ModelFit, unit: str) -> str:
     apart = max((view.apart for view in fit.views), default=0.0)
     moved = [_describe_view(view, unit) for view in fit.views if view.is_corrected]
-    left = [_describe_view(view, unit) for view in fit.views if not view.is_corrected and _is_elsewhere(view, apart)]
+    left = [_describe_view(view, unit) for view in fit.views if view.is_elsewhere and not view.is_corrected]
     open_ = [str(view.number + 1) for view in fit.views if not view.is_determined and view.left > 0.5 * apart]
     words = f"the views of the scan disagree by {apart:.3g} {unit} where they overlap"
+    words += {
+        "given": "",
+        "order": f" ({len(fit.views)} views, told by the order of the points)",
+        "sheets": " (two views, told by two surfaces over the same skin)",
+    }[fit.views_from]
     if moved:
         words += "; corrected: " + ", ".join(moved)
     if left:
         words += "; misplaced, and not corrected: " + ", ".join(left)
     if open_:
-        words += f"; these do not fix their pose by themselves, and were not moved: view {', '.join(open_)}"
+        words += f"; these do not fix their pose by themselves: view {', '.join(open_)}"
+    if fit.views_hidden:
+        words += (
+            f"; of what was corrected, {fit.views_hidden:.3g} {unit}³ may be wear instead, on skin that one view alone "
+            "shows"
+        )
     return words
 
 
-def _is_elsewhere(view: ViewFit, apart: float) -> bool:
-    return view.is_determined and float(np.linalg.norm(view.shift)) > 0.25 * apart
-
-
 def _describe_view(view: ViewFit, unit: str) -> str:
-    return f"view {view.number + 1} by {np.linalg.norm(view.shift):.3g} {unit} and {view.turn:.2g} degrees"
+    return f"view {view.number + 1} by {np.linalg.norm(view.shift):.3g} {unit} and {view.turn:.2g} degrees" + (
+        f" ({view.held} of six motions held)" if view.held else ""
+    )

@@ -106,6 +106,8 @@ def measure_fit(
         views=() if views is None else views.views,
         waviness=waviness,
         corrected_scale=corrected_scale,
+        views_from="given" if views is None else views.found_by,
+        views_hidden=0.0 if views is None else views.hidden,
     )
     return FittedModel(describe_fit(fit, unit, tolerance), form)
 

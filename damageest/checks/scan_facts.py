@@ -1,4 +1,4 @@
-"""What the whole scan says about errors that no site is to be blamed on: skin that deviates, views that differ."""
+"""What the whole scan says about errors that no site is to be blamed on, as skin that deviates."""
 
 from __future__ import annotations
 
@@ -10,18 +10,15 @@ from damageest.artefacts import ADDED, Deviation, Part, Pose, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.skin_cells import AVERAGED
 from damageest.checks.two_sheets import measure_sheets
+from damageest.checks.view_overlap import compare_views
 from damageest.findings import ModelFit, Surplus
-from damageest.geometry.voxels import measure_area, number_cubes
+from damageest.geometry.voxels import measure_area
 from damageest.rules import ScanFacts
 
-AGREE = 0.6
-"""Difference of the views, in tolerances, in four fifths of their overlap, up to which they agree."""
 FEWEST_OUTSIDE = 3
 """Points in a cube of skin that lies outside; fewer may be noise."""
-FEWEST_OF_VIEW = 4
-"""Points of a view in a cube, for its mean to be compared."""
 FEWEST_CELLS = 30
-"""Cells of the skin, or cubes of an overlap, below which nothing is said of their spread."""
+"""Cells of the skin below which nothing is said of their spread."""
 LAYER = 5.0
 """Height in tolerances up to which points outside count as skin that lies outside; higher ones are added metal."""
 
@@ -50,7 +47,7 @@ def gather_scan_facts(
         systematic=_measure_systematic(skin, aligned.noise),
         outward_area=area,
         outward_height=height,
-        between_views=_compare_views(aligned, deviation, skin.cells.edge, tolerance),
+        between_views=compare_views(aligned, deviation, skin.cells.edge, tolerance),
         sheets_share=sheets.share,
         sheets_apart=sheets.apart,
         pose=pose.doubts,
@@ -71,27 +68,3 @@ def _measure_systematic(skin: SkinView, noise: float) -> float:
     low, high = np.quantile(distance, [0.05, 0.95])
     spread = max(float(min(-low, high)), 0.0) / 1.645
     return float(np.sqrt(max(spread**2 - noise**2 / AVERAGED, 0.0)))
-
-
-def _compare_views(aligned: Scan, deviation: Deviation, edge: float, tolerance: float) -> float:
-    """How far the mean distances of the views differ in cubes that several views show; 0 where they agree."""
-    if aligned.view is None:
-        return 0.0
-    used = np.flatnonzero((aligned.view >= 0) & (np.abs(deviation.distance) < LAYER * tolerance))
-    if not len(used):
-        return 0.0
-    cube = np.unique(number_cubes(aligned.points[used], edge)[1], return_inverse=True)[1]
-    pair, group, count = np.unique(
-        cube * (int(aligned.view.max()) + 1) + aligned.view[used], return_inverse=True, return_counts=True
-    )
-    mean = np.bincount(group, weights=deviation.distance[used]) / count
-    many = count >= FEWEST_OF_VIEW
-    owner, mean = pair[many] // (int(aligned.view.max()) + 1), mean[many]
-    low, high = np.full(int(cube.max()) + 1, np.inf), np.full(int(cube.max()) + 1, -np.inf)
-    np.minimum.at(low, owner, mean)
-    np.maximum.at(high, owner, mean)
-    shared = np.bincount(owner, minlength=len(low)) > 1
-    if shared.sum() < FEWEST_CELLS:
-        return 0.0
-    apart = (high - low)[shared]
-    return float(np.quantile(apart, 0.98)) if float(np.quantile(apart, 0.8)) > AGREE * tolerance else 0.0

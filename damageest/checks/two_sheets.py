@@ -48,6 +48,16 @@ class Sheets(NamedTuple):
     apart: float = 0.0
 
 
+class SheetPlaces(NamedTuple):
+    """Where a scan shows two surfaces: the points ``places`` (K,), how deep the ``upper`` surface lies there (K,), and
+    how far ``below`` it the other lies (K,)."""
+
+    sheets: Sheets
+    places: Ints
+    upper: Floats
+    below: Floats
+
+
 def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members: Ints, tolerance: float) -> float:
     """Share of a site's points ``members`` (M,) where the scan shows another surface above them, on the skin.
 
@@ -68,14 +78,21 @@ def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members:
 
 def measure_sheets(aligned: Scan, deviation: Deviation, part: Part, tolerance: float) -> Sheets:
     """How much of the whole scan shows two surfaces, wherever they lie."""
+    return find_sheets(aligned, deviation, part, tolerance).sheets
+
+
+def find_sheets(aligned: Scan, deviation: Deviation, part: Part, tolerance: float) -> SheetPlaces:
+    """Where the whole scan shows two surfaces."""
     near = np.flatnonzero(np.abs(deviation.distance) < LAYER * tolerance)
+    nothing = np.empty(0)
     if len(near) < NEIGHBOURS:
-        return Sheets()
+        return SheetPlaces(Sheets(), near[:0], nothing, nothing)
     asked = np.random.default_rng(0).permutation(near)[:ALL_ASKED]
-    is_double, _, apart = _find_double(aligned, deviation, part, asked, near, tolerance)
+    is_double, upper, apart = _find_double(aligned, deviation, part, asked, near, tolerance)
     if not is_double.any():
-        return Sheets()
-    return Sheets(float(is_double.mean()), float(np.quantile(apart[is_double], 0.9)))
+        return SheetPlaces(Sheets(), near[:0], nothing, nothing)
+    sheets = Sheets(float(is_double.mean()), float(np.quantile(apart[is_double], 0.9)))
+    return SheetPlaces(sheets, asked[is_double], upper[is_double], apart[is_double])
 
 
 def _find_double(

@@ -2,125 +2,219 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Part, Scan
-from damageest.checks.form_fields import choose_frame
-from damageest.checks.form_fit import Form, Skin, find_feet, improve
+from damageest.artefacts import Deviation, Floats, Ints, Part, Scan
+from damageest.checks.form_fields import FieldFrame, choose_frame
+from damageest.checks.form_fit import Skin, make_motion
+from damageest.checks.view_joint import JointFit, fit_jointly
 from damageest.findings import ViewFit
+from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import pick_one_per_cube
 from damageest.geometry.transforms import move_points
 from damageest.geometry.voxels import number_faced_cubes
 
-COMPARED, FITTED = 30_000, 6_000
-"""Points that views are compared with, in all, and points of a view that it is fitted with."""
+COMPARED = 30_000
+"""Points that views are compared with, in all."""
 REACH = 12.0
 """Distance from the skin, in tolerances, up to which points are used."""
-WIDTHS = (8.0, 5.0, 3.0, 1.5, 0.7, 0.0)
-"""Widths of the kernel, in tolerances, one after the other."""
 NARROWEST, BY_NOISE = 0.3, 1.25
-"""The last width: the larger of these, in tolerances and in standard deviations of the noise."""
+"""The last width of the kernel: the larger of these, in tolerances and in standard deviations of the noise."""
 APART = 0.4
 """Difference of a view from the others, in tolerances, in a fifth of their overlap, from which they disagree."""
 FEWEST_OF_VIEW, FEWEST_SHARED = 4, 25
 """Points of a view in a cell, for its mean to be compared, and cells that it has to share with other views."""
 FEWEST_POINTS = 300
-"""Points near the part below which a view does not fix its pose."""
-SHOWN = 2e-3
-"""Mean square of the displacement along the normal, by a motion of size 1, from which the part shows the motion."""
-CERTAIN = 0.15
-"""Standard error of a view's pose, in tolerances at its worst point, up to which it is determined."""
+"""Points near the part below which a view is not fitted."""
+HELD = 0.5
+"""Motions of a view that are held, of six, up to which its pose is determined."""
 HEALED = 0.6
 """Share of the disagreement that may be left after the views are fitted."""
+KEPT = 0.5
+"""Share of what the motions explain that they have to explain where they were not fitted."""
+EXPLAINED = 2.5
+"""Depth of a point, in distances of its view from the others, up to which the view may be the cause."""
+FREE = 0.25
+"""Share of a shift of the skin along its normal, squared, that nothing shows, from which it is not known."""
+BETTER, ASKED = 0.7, 20_000
+"""Share of the points off the skin that may be left where views that two surfaces tell apart are moved, and points that
+are asked."""
+AMBIGUOUS = 0.5
+"""Motion outward, in tolerances, that only the part shows, from which skin that one view sees may be worn instead."""
+FoundBy = Literal["given", "order", "sheets"]
 
 
 @dataclass(frozen=True, eq=False)
 class ViewFits:
     """The views, each with ``moves`` (V,4,4): the motion that puts it right, in the part's frame. ``disagree``: whether
     they differ by more than noise explains. ``common`` (4,4): the motion of the view that most others lie with, which
-    is an error of the pose and not of views; shifts and turns of ``views`` are beyond it."""
+    is an error of the pose and not of views; shifts and turns of ``views`` are beyond it.
+
+    ``label`` (N,): the view of each point, -1 for a point of none. ``found_by``: whether the scan says which points
+    belong together (`given`), or their order or two surfaces over the same skin (`order`, `sheets`) do. ``hidden``:
+    volume of metal that may be worn off where views were moved as only the part shows. ``free`` (V,6,6): projection of
+    the motions of each view, in ``frame``, onto those that nothing shows."""
 
     views: tuple[ViewFit, ...]
     moves: Floats
     disagree: bool
     common: Floats
+    label: Ints
+    found_by: FoundBy = "given"
+    hidden: float = 0.0
+    free: Floats = field(default_factory=lambda: np.empty((0, 6, 6)))
+    frame: FieldFrame | None = None
 
     def apply(self, aligned: Scan) -> Scan:
         """The scan with corrected views: the corrected ones by their own motion, the others by the common one."""
-        assert aligned.view is not None
-        assert aligned.viewpoints is not None
-        points, scanners = aligned.points.copy(), aligned.viewpoints.copy()
-        for one in self.views:
-            move = self.moves[one.number] if one.is_corrected else self.common
-            own = aligned.view == one.number
+        points, every = aligned.points.copy(), np.ones(len(aligned.points), bool)
+        scanners = None if aligned.viewpoints is None else aligned.viewpoints.copy()
+        places = [(self.label == one.number, self.get_move(one)) for one in self.views]
+        for own, _ in places:
+            every &= ~own
+        for own, move in [(every, self.common), *places]:
             points[own] = move_points(points[own], move)
-            scanners[one.number] = move[:3, :3] @ scanners[one.number] + move[:3, 3]
-        other = aligned.view < 0
-        points[other] = move_points(points[other], self.common)
+            if scanners is not None and aligned.view is not None:
+                # a scanner moves with its view; where points of one scanner move in two ways, the last one counts
+                seen = np.unique(aligned.view[own])
+                seen = seen[seen >= 0]
+                assert aligned.viewpoints is not None
+                scanners[seen] = move_points(aligned.viewpoints[seen], move)
         return replace(aligned, points=points, viewpoints=scanners)
 
+    def find_explained(self, part: Part, aligned: Scan, deviation: Deviation, members: Ints, tolerance: float) -> float:
+        """Share of the points ``members`` (M,) of a site that a misplaced view explains: its own motion, which was not
+        made, brings them onto the skin; or nothing shows how far that view is off there, and it may be as far as they
+        are deep."""
+        if not self.disagree or not len(members):
+            return 0.0
+        depth, label = -deviation.distance[members], self.label[members]
+        explained = np.zeros(len(members), bool)
+        for one in self.views:
+            own = label == one.number
+            if not own.any():
+                continue
+            at, normals = aligned.points[members[own]], part.face_normals[deviation.face[members[own]]]
+            if one.is_elsewhere and not one.is_corrected:
+                back = move_points(at, self.moves[one.number])
+                explained[own] |= signed_distance(back, part)[0] > -tolerance
+            is_near = depth[own] < EXPLAINED * one.apart
+            if one.is_elsewhere and self.frame is not None:
+                rows = np.concatenate([np.cross((at - self.frame.centre) / self.frame.half, normals), normals], axis=1)
+                is_free = np.einsum("ni,ij,nj->n", rows, self.free[one.number], rows) > FREE
+                explained[own] |= is_free & is_near
+            if not one.is_corrected and one.left > APART * tolerance:
+                explained[own] |= depth[own] < EXPLAINED * one.left
+        return float(explained.mean())
 
-def fit_views(part: Part, aligned: Scan, tolerance: float, is_correcting: bool) -> ViewFits | None:
-    """Compares the views where they overlap, and where they disagree, fits each of them to the part by itself.
+    def get_move(self, view: ViewFit) -> Floats:
+        """The motion (4,4) of one view: its own where it is corrected."""
+        return np.asarray(self.moves[view.number] if view.is_corrected else self.common)
 
-    ``aligned``: the scan in the part's frame. ``is_correcting``: views that are determined by themselves and lie
-    elsewhere are corrected. None for a scan without views, or of a single one. A part that is bent or of another size
-    shows as such: its views agree where they overlap.
-    """
-    if aligned.view is None or aligned.viewpoints is None or len(aligned.viewpoints) < 2:
+
+def number_views(aligned: Scan) -> Ints | None:
+    """The number (N,) of the view of each point, -1 where it is not known; None for a scan that does not say it, or of
+    a single view."""
+    label = aligned.view if aligned.cloud is None else aligned.cloud
+    if label is None or len(label) == 0:
         return None
-    skin, count = Skin.build(part), len(aligned.viewpoints)
+    known = np.unique(label[label >= 0])
+    return np.asarray(label, np.int64) if len(known) > 1 else None
+
+
+def fit_views(
+    part: Part, aligned: Scan, tolerance: float, is_correcting: bool, label: Ints | None = None,
+    found_by: FoundBy = "given",
+) -> ViewFits | None:  # fmt: skip
+    """Compares the views where they overlap, and where they disagree, fits them to each other and to the part.
+
+    ``aligned``: the scan in the part's frame. ``is_correcting``: views that lie elsewhere are corrected, as far as the
+    skin that they show fixes their motions. ``label`` (N,): the view of each point, as `separate_views` found it; else
+    what the scan says. None for a scan of a single view. A part that is bent or of another size shows as such: its
+    views agree where they overlap.
+    """
+    label = number_views(aligned) if label is None else label
+    if label is None:
+        return None
+    skin, count = Skin.build(part), int(label.max()) + 1
     gap = float(np.sqrt(part.area / COMPARED))
-    index = [_draw(aligned, number, gap) for number in range(count)]
-    where = np.concatenate(index)
+    where = np.concatenate([_draw(aligned, label, number, gap) for number in range(count)])
     if len(where) < FEWEST_POINTS:
         return None
-    points, view = aligned.points[where], np.asarray(aligned.view[where], np.int64)
+    points, view = aligned.points[where], label[where]
     before = _compare(skin, points, view, count, gap, tolerance)
-    moves = np.tile(np.eye(4), (count, 1, 1))
+    agreed = ViewFits((), np.tile(np.eye(4), (count, 1, 1)), False, np.eye(4), label, found_by)
     known = np.nan_to_num(before)
     if not (known > APART * tolerance).any():
-        return ViewFits((), moves, False, np.eye(4))
+        return agreed
     frame = choose_frame(part, points)
-    determined = np.zeros(count, bool)
     width = max(NARROWEST * tolerance, BY_NOISE * aligned.noise)
-    shown = _find_shown(skin, Form.rigid(frame), points, gap, tolerance)
-    for number in range(count):
-        own = points[view == number]
-        form, determined[number] = _fit_one(skin, Form.rigid(frame), own, shown, gap, width, tolerance)
-        moves[number] = form.T if determined[number] else np.eye(4)
-    moved = points.copy()
-    for number in range(count):
-        own = view == number
-        moved[own] = points[own] @ moves[number, :3, :3].T + moves[number, :3, 3]
+    many = np.bincount(view, minlength=count) >= FEWEST_POINTS
+    used = many[view]
+    fit = fit_jointly(skin, frame, points[used], view[used], count, gap, width, REACH * tolerance, tolerance)
+    if fit is None:
+        return replace(agreed, views=_describe_unfitted(known), disagree=True)
+    moved = np.einsum("nij,nj->ni", fit.moves[view, :3, :3], points) + fit.moves[view, :3, 3]
     after = np.nan_to_num(_compare(skin, moved, view, count, gap, tolerance))
-    healed = float(after.max()) < max(HEALED * float(known.max()), APART * tolerance)
-    common = _choose_common(moves, determined, np.bincount(view, minlength=count), part.bounds) if healed else np.eye(4)
-    normals = skin.find_feet(moved)[2]
+    healed = float(after.max()) < max(HEALED * float(known.max()), APART * tolerance) and fit.kept > KEPT
     views = []
     for number in range(count):
-        own = view == number
-        at = move_points(points[own], common)
-        along = np.einsum("ij,ij->i", moved[own] - at, normals[own])
-        far = float(np.quantile(np.abs(along), 0.9)) if own.any() else 0.0
-        elsewhere = bool(healed and determined[number] and far > APART / 2 * tolerance)
-        shift, turn = _describe_motion(
-            moves[number] @ np.linalg.inv(common) if determined[number] else np.eye(4), frame.centre
-        )
+        beyond = fit.twists[number] - fit.common
+        far = _measure_far(fit, beyond, number)
+        elsewhere = bool(healed and many[number] and far > APART / 2 * tolerance)
+        turn = float(np.degrees(np.linalg.norm(beyond[:3]) / frame.half))
         views.append(
             ViewFit(
-                number, shift, turn, float(known[number]), float(after[number]), bool(determined[number]),
-                elsewhere and is_correcting,
+                number, beyond[3:], turn, float(known[number]), float(after[number]),
+                bool(many[number] and fit.held[number] < HELD), elsewhere and is_correcting, round(fit.held[number]),
+                elsewhere,
             )
         )  # fmt: skip
-    return ViewFits(tuple(views), moves, True, common)
+    hidden = sum(_measure_hidden(fit, view.number, gap, tolerance) for view in views if view.is_corrected)
+    common = make_motion(fit.common, frame) if healed else np.eye(4)
+    found = ViewFits(tuple(views), fit.moves, True, common, label, found_by, hidden, fit.free, frame)
+    if found_by == "sheets" and is_correcting and not _is_better(found, aligned, skin, tolerance):
+        kept = tuple(replace(view, is_corrected=False) for view in views)
+        return replace(found, views=kept, common=np.eye(4), hidden=0.0)
+    return found
 
 
-def _draw(aligned: Scan, number: int, gap: float) -> Ints:
+def _describe_unfitted(apart: Floats) -> tuple[ViewFit, ...]:
+    """Views that differ, and that show too little skin to be fitted."""
+    return tuple(ViewFit(k, np.zeros(3), 0.0, float(a), float(a), False, False, 6, False) for k, a in enumerate(apart))
+
+
+def _is_better(found: ViewFits, aligned: Scan, skin: Skin, tolerance: float) -> bool:
+    """Whether much more of the scan lies on the skin after the views are moved. Views that only two surfaces tell apart
+    may be told wrongly where just one of them is seen."""
+    some = np.linspace(0, len(aligned.points) - 1, min(ASKED, len(aligned.points))).astype(np.int64)
+    off = [
+        float((skin.find_feet(points[some])[0] > tolerance).mean())
+        for points in (aligned.points, found.apply(aligned).points)
+    ]
+    return off[1] < BETTER * off[0]
+
+
+def _measure_far(fit: JointFit, beyond: Floats, number: int) -> float:
+    """How far a motion (6,) moves the skin of a view along its normal, in nine tenths of it."""
+    own = fit.pairs.take(fit.pairs.view == number)
+    return float(np.quantile(np.abs(own.jacobian @ beyond), 0.9)) if len(own.view) else 0.0
+
+
+def _measure_hidden(fit: JointFit, number: int, gap: float, tolerance: float) -> float:
+    """Volume that would be lost if a view were moved only as its overlap with others shows: where no other view sees
+    the skin, and only the part says that it lies too deep."""
+    own = fit.pairs.take((fit.pairs.view == number) & ~fit.pairs.is_shared)
+    outward = own.jacobian @ (fit.twists[number] - fit.shown[number])
+    return float((outward * own.count)[outward > AMBIGUOUS * tolerance].sum() * gap**2)
+
+
+def _draw(aligned: Scan, label: Ints, number: int, gap: float) -> Ints:
     """Points of one view, spread evenly over what it shows."""
-    own = np.flatnonzero(aligned.view == number)
+    own = np.flatnonzero(label == number)
     return own[pick_one_per_cube(aligned.points[own], gap)] if len(own) else own
 
 
@@ -142,50 +236,3 @@ def _compare(skin: Skin, points: Floats, view: Ints, count: int, gap: float, tol
             difference = np.abs(mean[shared, number] - np.nanmedian(others[shared], axis=1))
             apart[number] = float(np.quantile(difference, 0.8))
     return apart
-
-
-def _fit_one(
-    skin: Skin, form: Form, points: Floats, shown: Floats, gap: float, width: float, tolerance: float
-) -> tuple[Form, bool]:
-    """The rigid motion of one view, and whether its points determine it."""
-    points = points[:: max(1, len(points) // FITTED)]
-    edge = 4 * gap
-    for wide in WIDTHS:
-        feet = find_feet(skin, form, points, edge, REACH * tolerance, tolerance)
-        if len(feet.points) < FEWEST_POINTS:
-            return form, False
-        for _ in range(2):
-            cells = feet.summarise(form)
-            if len(cells.count) < 12:
-                return form, False
-            form = improve(form, cells, max(wide * tolerance, width), tolerance)
-    worst = float(np.sqrt(np.linalg.eigvalsh(shown.T @ form.covariance @ shown)[-1]))
-    return form, worst < CERTAIN * tolerance
-
-
-def _find_shown(skin: Skin, form: Form, points: Floats, gap: float, tolerance: float) -> Floats:
-    """(6,S) the motions that the whole scan shows: a turn of a shaft about its axis is not among them."""
-    cells = find_feet(skin, form, points, 4 * gap, REACH * tolerance, tolerance).summarise(form)
-    weight = cells.count / cells.count.sum()
-    size, motions = np.linalg.eigh(cells.jacobian.T @ (cells.jacobian * weight[:, None]))
-    return np.asarray(motions[:, size > SHOWN])
-
-
-def _choose_common(moves: Floats, determined: Flags, count: Ints, bounds: Floats) -> Floats:
-    """The motion (4,4) of the view that lies nearest to the others: the median of the motions of determined views."""
-    if not determined.any():
-        return np.eye(4)
-    corner = np.array([[x, y, z] for x in bounds[:, 0] for y in bounds[:, 1] for z in bounds[:, 2]])
-    chosen = np.flatnonzero(determined)
-    ends = corner @ np.swapaxes(moves[chosen, :3, :3], 1, 2) + moves[chosen, None, :3, 3]
-    apart = np.linalg.norm(ends[:, None] - ends[None], axis=3).mean(axis=2)
-    return np.asarray(moves[chosen[int(np.argmin((apart * count[chosen]).sum(axis=1) - 1e-9 * count[chosen]))]])
-
-
-def _describe_motion(move: Floats, centre: Floats) -> tuple[Floats, float]:
-    """The shift (3,) of the part's centre by a motion (4,4), and its turn in degrees."""
-    from scipy.spatial.transform import Rotation
-
-    return move[:3, :3] @ centre + move[:3, 3] - centre, float(
-        np.degrees(Rotation.from_matrix(move[:3, :3]).magnitude())
-    )

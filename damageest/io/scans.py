@@ -33,12 +33,14 @@ def make_scan(
     view: Ints | NDArray[np.int32] | None = None,
     colours: Bytes | None = None,
     confidence: Singles | None = None,
+    cloud: Ints | None = None,
 ) -> Scan:
     """A scan from points (N,3) in ``unit`` and optional normals (N,3).
 
     ``viewpoints`` (V,3): scanner positions, in the unit and the frame of the points; ``view`` (N,): the number of each
     point's position, -1 where it is not known. ``viewpoints`` alone: one position (1,3) for all points. ``colours``
-    (N,3) and ``confidence`` (N,) are kept as they are.
+    (N,3) and ``confidence`` (N,) are kept as they are. ``cloud`` (N,): the number of the cloud that each point came
+    with, as of its file; -1 where it is not known.
 
     Points that are not finite or farther than 1e12 from the origin, and duplicates, are removed; the scan's notes give
     their numbers. Normals are scaled to
@@ -55,9 +57,12 @@ def make_scan(
                 f"{name}: normals need the shape of the points, {points.shape}, but have the shape {normals.shape}"
             )
     viewpoints, numbers = _check_views(name, len(points), viewpoints, view)
+    if cloud is not None and np.shape(cloud) != (len(points),):
+        raise InputError(f"{name}: cloud needs the shape ({len(points)},), but has the shape {np.shape(cloud)}")
+    own = None if cloud is None else np.asarray(cloud, np.int32)
     scan = Scan(
         points, normals, canonical_unit(unit), paths, viewpoints=viewpoints, view=numbers, colours=colours,
-        confidence=confidence,
+        confidence=confidence, cloud=own,
     )  # fmt: skip
     finite = np.asarray(np.isfinite(points).all(axis=1))
     if not finite.all():
@@ -164,6 +169,7 @@ def read_scan(
         view=np.concatenate(views) if positions else None,
         colours=colours,
         confidence=single,
+        cloud=number_clouds(views),
     )
     return replace(scan, warnings=(*units.warnings(), *confidence.warnings()))
 
@@ -189,3 +195,16 @@ def _join_some(arrays: Sequence[NDArray[Any] | None], shapes: Sequence[tuple[int
 
 def _join(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def number_clouds(views: Sequence[Ints]) -> Ints | None:
+    """The number (N,) of the cloud of each point of several files one after the other, from the view of each of a
+    file's points: each view of each file is a cloud. None for a single file, whose views say it all."""
+    if len(views) < 2:
+        return None
+    first, numbers = 0, []
+    for view in views:
+        known, own = np.unique(view, return_inverse=True)
+        numbers.append(first + own)
+        first += len(known)
+    return np.concatenate(numbers)

@@ -38,7 +38,8 @@ class ViewReport(JsonModel):
     turn: float = Field(description="in degrees, by which the view is corrected")
     apart: float = Field(description="how far it lies from the other views where they overlap")
     left: float = Field(description="the same after the views that fix their pose were corrected")
-    is_determined: bool = Field(description="whether its points fix its pose")
+    is_determined: bool = Field(description="whether its points and the overlap fix its pose")
+    held: int = Field(description="how many of the six motions they leave free; these were held")
     is_corrected: bool = Field(description="whether it was moved to its place")
 
 
@@ -53,6 +54,13 @@ class FitReport(JsonModel):
     amount: float = Field(description="largest displacement of the seen skin by the model; 0 where it is ok")
     amount_error: float = Field(description="its standard error")
     views: list[ViewReport] = Field(description="empty where the views agree or are not known")
+    views_from: Literal["given", "order", "sheets"] = Field(
+        description="what tells which points are a view: the scan; the order of the points, or two surfaces over the "
+        "same skin, which are looked for where the scan does not say it"
+    )
+    views_hidden: float = Field(
+        description="volume that may be worn off where only the part shows how corrected views were misplaced"
+    )
     waviness: float = Field(description="standard deviation of what no model explains, inside and outside alike")
 
 

@@ -15,6 +15,7 @@ from damageest.checks.form_words import describe_fit
 from damageest.checks.model_fit import FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import ViewFits, fit_views
+from damageest.checks.view_split import separate_views
 from damageest.findings import Surplus
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import find_nearby
@@ -33,9 +34,14 @@ def correct_views(
     part: Part, pose: Pose, aligned: Scan, noise: float, spacing: float, tolerance: float,
     asked_tolerance: float | None, aligner: Align | None,
 ) -> tuple[ViewFits | None, Pose, Scan, float, float, float]:  # fmt: skip
-    """Compares the views, and puts misplaced ones right where the alignment fits views: noise, spacing and a tolerance
-    `auto` are then measured again."""
-    views = fit_views(part, aligned, tolerance, getattr(aligner, "fit_views", False))
+    """Compares the views, also those that only the points tell apart, and puts misplaced ones right where the alignment
+    fits views: noise, spacing and a tolerance `auto` are then measured again."""
+    label, found_by = separate_views(part, aligned, tolerance) or (None, "given")
+    views = fit_views(part, aligned, tolerance, getattr(aligner, "fit_views", False), label, found_by)
+    if label is not None:
+        if views is None or not views.disagree:
+            return None, pose, aligned, noise, spacing, tolerance
+        aligned = replace(aligned, cloud=label.astype(np.int32))
     if views is not None and any(view.is_corrected for view in views.views):
         pose = replace(pose, T_part_scan=_make_rigid(views.common @ pose.T_part_scan))
         aligned = views.apply(aligned)
@@ -163,6 +169,7 @@ def measure_local(fitted: FittedModel, places: Floats, normals: Floats) -> float
     fit = fitted.fit
     by_form = float(np.quantile(np.abs(fitted.predict(places, normals)), 0.9))
     by_waves = 2 * fit.waviness if fit.model == "wavy" else 0.0
-    apart = [view.apart for view in fit.views if not view.is_corrected]
+    is_corrected = any(view.is_corrected for view in fit.views)
+    apart = [view.left if is_corrected else view.apart for view in fit.views]
     by_views = max(apart, default=0.0) if fit.model == "views disagree" else 0.0
     return max(by_form, by_waves, by_views)

@@ -118,15 +118,16 @@ CLOSE: Route = (
     measure_sensor,  # part, aligned, deviation, sites, facts, depth_step, tolerance -> pose_error, sensor
     measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
     #     tolerance, unit -> found
-    judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit
-    #     -> found
+    judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit,
+    #     views -> found
     fold_hidden,  # found, sensor, aligner, accept, deviation, tolerance, unit -> found, folded, +warnings
     question_fit,  # fitted, surplus, found, pose, aligned, adapted, deviation, skin, unit, tolerance, warnings
     #     -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     separate_deposits,  # found, tolerance -> found
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
-    sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted, folded -> volume_95
+    sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted, folded,
+    #     views -> volume_95
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
     #     coverage, surplus, adapted, fitted, sensor, volume_95, conversions
     #     -> result

@@ -24,6 +24,8 @@ from damageest.checks.uncertainty import (
     measure_shifts,
     measure_site_error,
 )
+from damageest.checks.view_fit import ViewFits
+from damageest.checks.view_overlap import compare_at_site
 from damageest.findings import Fading, Interval, Uncertainty
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.form import measure_at_site
@@ -67,15 +69,16 @@ def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
 @step(gives="volume_95")
 def sum_uncertainty(
     found: tuple[FoundSite, ...], failures: Failures, part: Part, pose: Pose, aligned: Scan, deviation: Deviation,
-    tolerance: float, adapted: AdaptedPart | None, folded: float,
+    tolerance: float, adapted: AdaptedPart | None, folded: float, views: ViewFits | None,
 ) -> Interval | None:  # fmt: skip
     """Gives the job the 95 % interval of its total volume.
 
     There is one where each accepted site has one, and no damage was left without a volume. Sites that are not accepted
-    make its high end larger: they may be damage, too, as may what an adapted part's field took for form. Where no site
+    make its high end larger: they may be damage, too, as may what an adapted part's field took for form, and what was
+    taken for a misplaced view. Where no site
     was found in a scan that could not show one, or in a pose that is doubted, it is not known either.
     """
-    hidden = (adapted.hidden if adapted else 0.0) + folded
+    hidden = (adapted.hidden if adapted else 0.0) + folded + (views.hidden if views else 0.0)
     if not found:
         is_unknown = failures or pose.doubts or _may_hide_loss(part, aligned, deviation, tolerance)
         return None if is_unknown else (0.0, measure_hidden_wear(part, pose) + hidden)
@@ -110,9 +113,11 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         state.tolerance, state.unit,
     )  # fmt: skip
     site = replace(site, beyond=beyond)
+    differ = WIDTH * compare_at_site(state.aligned, state.deviation, site.members, state.skin.cells.edge)
+    facts = replace(state.facts, between_views=max(state.facts.between_views, differ))
     # what the model fit gives is the 95 % bound of a deviation
     found = measure_site_error(
-        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, state.facts, beyond,
+        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, facts, beyond,
         free=state.pose.free, adapted=state.adapted,
         form=measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH,
     )  # fmt: skip

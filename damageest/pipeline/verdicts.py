@@ -31,7 +31,7 @@ from damageest.stages.align import Align
 
 BY_RAYS = 0.5
 """Share of a site's unseen skin that rays have to have passed through, for the loss to be proven by them."""
-JUDGED_BY = ("part", "aligned", "deviation", "skin", "coverage", "pose", "tolerance", "unit")
+JUDGED_BY = ("part", "aligned", "deviation", "skin", "coverage", "pose", "tolerance", "unit", "views")
 """What the facts of a site are gathered from."""
 
 
@@ -129,6 +129,9 @@ def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
             site.damage, state.part, state.coverage, 2 * max(state.tolerance, state.aligned.spacing)
         ),
         two_sheets=measure_two_sheets(state.aligned, state.deviation, state.part, site.members, state.tolerance),
+        misplaced=0.0
+        if state.views is None
+        else state.views.find_explained(state.part, state.aligned, state.deviation, site.members, state.tolerance),
         one_motion=is_one_motion(state.aligned, state.deviation, state.part, site.members, state.tolerance),
         other_poses=compare_other_poses(site.damage, state.part, state.pose, state.tolerance),
         free=tuple(

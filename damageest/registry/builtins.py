@@ -77,6 +77,7 @@ def damageest_rules() -> list[type[Rule]]:
     from damageest.rules.inner_surface import InnerSurface
     from damageest.rules.intact_inside import IntactInside
     from damageest.rules.intact_over import IntactOver
+    from damageest.rules.misplaced_view import MisplacedView
     from damageest.rules.nothing import Nothing
     from damageest.rules.off_boundary import OffBoundary
     from damageest.rules.one_motion import OneMotion
@@ -87,8 +88,9 @@ def damageest_rules() -> list[type[Rule]]:
     from damageest.rules.wide_loss import WideLoss
 
     return [
-        Nothing, PoseDoubt, Displaced, TwoSheets, OneMotion, Scattered, OffBoundary, IntactInside, IntactOver,
-        BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered, FreePoseRule, FewPoints, FadingOut, Terms,
+        Nothing, PoseDoubt, Displaced, TwoSheets, MisplacedView, OneMotion, Scattered, OffBoundary, IntactInside,
+        IntactOver, BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered, FreePoseRule, FewPoints, FadingOut,
+        Terms,
     ]  # fmt: skip
 
 

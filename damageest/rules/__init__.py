@@ -65,8 +65,9 @@ class SiteFacts:
     ``count``: its scan points; ``typical`` and ``deepest``: median and 95th percentile of their depth below the skin.
     ``evidence``: DV against scan. ``by_rays``: whether rays passed through the metal that it removes. ``rim_unseen``:
     share of its rim beside skin that the scan does not show. ``two_sheets``: share of its points where the scan shows
-    another surface above them, on the skin; ``one_motion``: whether one motion of them all explains it;
-    ``shifted``: the typical depth of the sites of the scan that it explains. ``shallow``: number of shallow sites.
+    another surface above them, on the skin; ``misplaced``: share of its points that a misplaced view explains
+    which was not moved; ``one_motion``: whether one motion of them all explains it; ``shifted``: the typical depth of
+    the sites of the scan that it explains. ``shallow``: number of shallow sites.
     ``other_poses``: share of its skin that is not skin in another pose that fits as well.
     ``free``: motions that the scan does not exclude. ``displaced``: numbers of the surplus as large as the loss.
     ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no scan point shows, and
@@ -85,6 +86,7 @@ class SiteFacts:
     by_rays: bool = False
     rim_unseen: float = 0.0
     two_sheets: float = 0.0
+    misplaced: float = 0.0
     one_motion: bool = False
     shifted: float = 0.0
     shallow: int = 0

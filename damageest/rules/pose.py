@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from damageest.artefacts import Reason
 from damageest.rules import Rule, ScanFacts, SiteFacts
@@ -10,6 +11,9 @@ from damageest.rules import Rule, ScanFacts, SiteFacts
 DIFFERS = 0.02
 """Share of the skin that a site removes which is not skin in another pose that fits as well, from which the pose
 decides which metal is lost."""
+EXPLAINED = 1.5
+"""Depth of a site, in the movement of the skin by a pose nearby that explains the whole scan, up to which that pose
+contradicts the site."""
 
 
 POSE_CODES = {
@@ -34,4 +38,6 @@ class PoseDoubt(Rule):
         for reason in scan.pose:
             if reason.code == "other_poses" and site.other_poses <= DIFFERS:
                 continue
+            if reason.code == "given_pose" and site.typical > EXPLAINED * (reason.amount or 0.0):
+                reason = replace(reason, effect="open")
             yield reason

@@ -115,5 +115,5 @@ def test_without_sites_nothing_is_lost_unless_the_pose_is_doubted() -> None:
     scan = Scan(points, noise=0.04, spacing=0.5)
     skin = Deviation(np.zeros(len(points)), np.zeros(len(points), int), np.zeros(len(points), np.uint8))
     other = Pose(np.eye(4), doubts=(Reason("other_poses", "two fit", "contradicts"),))
-    assert sum_uncertainty((), (), part, Pose(np.eye(4)), scan, skin, 0.16, None, 0.0) == (0.0, 0.0)
-    assert sum_uncertainty((), (), part, other, scan, skin, 0.16, None, 0.0) is None
+    assert sum_uncertainty((), (), part, Pose(np.eye(4)), scan, skin, 0.16, None, 0.0, None) == (0.0, 0.0)
+    assert sum_uncertainty((), (), part, other, scan, skin, 0.16, None, 0.0, None) is None

@@ -43,7 +43,7 @@ def make_facts(case: dict[str, Any]) -> tuple[SiteFacts, ScanFacts]:
     site["uncertainty"] = replace(SITE.uncertainty, **more)
     scan: dict[str, Any] = dict(case.get("scan", {}))
     if "pose" in case:
-        scan["pose"] = (Reason(case["pose"], "as align says", "contradicts"),)
+        scan["pose"] = (Reason(case["pose"], "as align says", "contradicts", case.get("amount")),)
     return replace(SITE, **site), replace(SCAN, **scan)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from damageest.artefacts import Floats, Part, Reason, Scan
+from damageest.artefacts import Effect, Floats, Part, Reason, Scan
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
 from damageest.stages.align._check_pose import check_pose
@@ -25,6 +25,9 @@ POINTS = 15_000
 
 SMALL_GAIN = 0.03
 """Share of the scan that lies on the part only in the pose nearby from which the given one is doubtful."""
+
+ALL = 0.98
+"""Share of the scan on the part in the pose nearby from which that pose explains all of it."""
 
 MIN_GAIN, MIN_BESIDE, LARGE_GAIN = 0.05, 0.02, 0.4
 """Shares of the scan that have to lie on the part in the pose nearby and not in the given one, for it to be refused:
@@ -83,6 +86,8 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
             f"in a pose that moves the part's surface by {moved:.3g} {part.unit}, {fitted.on:.0%} of the scan lies on "
             f"the part, in the given one {given.on:.0%}: wear or a wrong pose"
         )
-        # the pose was given, and wear explains it as well: it is told, and is no contradiction
-        doubts += (Reason("given_pose", text, "open", moved, part.unit, remedy="if it is the pose, use align: icp"),)
+        # the pose was given, and wear explains it as well: it is told. Where the pose nearby leaves nothing off the
+        # part, it contradicts sites that are no deeper than it moves the skin: in it, no metal is lost there
+        effect: Effect = "contradicts" if fitted.on > ALL else "open"
+        doubts += (Reason("given_pose", text, effect, moved, part.unit, remedy="if it is the pose, use align: icp"),)
     return doubts

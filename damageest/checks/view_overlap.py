@@ -1,0 +1,87 @@
+"""How far the views of a scan still differ where they overlap, in the whole scan and beside a site."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from damageest.artefacts import INTACT, Deviation, Floats, Ints, Scan
+from damageest.checks.view_fit import number_views
+from damageest.geometry.neighbourhoods import find_in_box
+from damageest.geometry.voxels import number_cubes
+
+AGREE = 0.6
+"""Difference of the views, in tolerances, in four fifths of their overlap, up to which they agree."""
+FEWEST_OF_VIEW = 4
+"""Points of a view in a cube, for its mean to be compared."""
+FEWEST_CUBES, FEWEST_BESIDE = 30, 6
+"""Cubes of an overlap below which nothing is said of the whole scan, and of a site."""
+LAYER = 5.0
+"""Distance from the skin, in tolerances, up to which views are compared."""
+BESIDE = 3.0
+"""Width of the skin beside a site that is looked at, in widths of a cube."""
+
+
+class _Means(NamedTuple):
+    """The means of the views in cubes, K of them: ``cube``, ``mean`` and ``points`` (K,), their number."""
+
+    cube: Ints
+    mean: Floats
+    points: Floats
+
+
+def compare_views(aligned: Scan, deviation: Deviation, edge: float, tolerance: float) -> float:
+    """How far the mean distances of the views differ in cubes of width ``edge`` that several views show; 0 where they
+    agree."""
+    view = number_views(aligned)
+    if view is None:
+        return 0.0
+    used = np.flatnonzero((view >= 0) & (np.abs(deviation.distance) < LAYER * tolerance))
+    means = _average(aligned.points[used], view[used], deviation.distance[used], edge)
+    if not len(means.cube):
+        return 0.0
+    low, high = np.full(int(means.cube.max()) + 1, np.inf), np.full(int(means.cube.max()) + 1, -np.inf)
+    np.minimum.at(low, means.cube, means.mean)
+    np.maximum.at(high, means.cube, means.mean)
+    shared = np.bincount(means.cube, minlength=len(low)) > 1
+    if shared.sum() < FEWEST_CUBES:
+        return 0.0
+    apart = (high - low)[shared]
+    return float(np.quantile(apart, 0.98)) if float(np.quantile(apart, 0.8)) > AGREE * tolerance else 0.0
+
+
+def compare_at_site(aligned: Scan, deviation: Deviation, members: Ints, edge: float) -> float:
+    """The standard deviation of a view against the others on intact skin beside the points ``members`` (M,) of a site,
+    beyond what noise explains; 0 where only one view shows it."""
+    view = number_views(aligned)
+    if view is None or not len(members):
+        return 0.0
+    margin, own = BESIDE * edge, aligned.points[members]
+    near = find_in_box(aligned.points, own.min(axis=0) - margin, own.max(axis=0) + margin)
+    near = near[(view[near] >= 0) & (deviation.label[near] == INTACT)]
+    means = _average(aligned.points[near], view[near], deviation.distance[near], edge)
+    if not len(means.cube):
+        return 0.0
+    cubes = np.bincount(means.cube)
+    shared = cubes[means.cube] > 1
+    if (cubes > 1).sum() < FEWEST_BESIDE:
+        return 0.0
+    cube, mean, count = means.cube[shared], means.mean[shared], means.points[shared]
+    number = cubes[cube]
+    middle = np.bincount(cube, mean) / np.maximum(np.bincount(cube), 1)
+    noise = deviation.distance[near].std()
+    found = ((mean - middle[cube]) ** 2 * number / (number - 1)).mean()
+    return float(np.sqrt(max(found - (min(noise, aligned.noise) ** 2 / count).mean(), 0.0)))
+
+
+def _average(points: Floats, view: Ints, distance: Floats, edge: float) -> _Means:
+    """The mean ``distance`` (N,) of points (N,3) of each view (N,) in each cube, where it has some."""
+    if not len(points):
+        return _Means(np.empty(0, np.int64), np.empty(0), np.empty(0))
+    cube = np.unique(number_cubes(points, edge)[1], return_inverse=True)[1]
+    count = int(view.max()) + 1
+    pair, group, size = np.unique(cube * count + view, return_inverse=True, return_counts=True)
+    mean = np.bincount(group, weights=distance) / size
+    many = size >= FEWEST_OF_VIEW
+    return _Means(pair[many] // count, mean[many], size[many].astype(np.float64))
