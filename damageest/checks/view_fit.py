@@ -25,6 +25,8 @@ NARROWEST, BY_NOISE = 0.3, 1.25
 """The last width of the kernel: the larger of these, in tolerances and in standard deviations of the noise."""
 APART = 0.4
 """Difference of a view from the others, in tolerances, in a fifth of their overlap, from which they disagree."""
+OF_NOISE = 0.8
+"""The same in noises, where these are large: means of a few points differ."""
 FEWEST_OF_VIEW, FEWEST_SHARED = 4, 25
 """Points of a view in a cell, for its mean to be compared, and cells that it has to share with other views."""
 FEWEST_POINTS = 300
@@ -37,6 +39,9 @@ KEPT = 0.5
 """Share of what the motions explain that they have to explain where they were not fitted."""
 EXPLAINED = 2.5
 """Depth of a point, in distances of its view from the others, up to which the view may be the cause."""
+COMMON = 0.75
+"""Motion of all views together, in the largest distance of a view from the others, from which it is not the pose that a
+misplaced view has pulled away: skin is worn, and the stage align has weighed that."""
 FREE = 0.25
 """Share of a shift of the skin along its normal, squared, that nothing shows, from which it is not known."""
 BETTER, ASKED = 0.7, 20_000
@@ -148,7 +153,8 @@ def fit_views(
     before = _compare(skin, points, view, count, gap, tolerance)
     agreed = ViewFits((), np.tile(np.eye(4), (count, 1, 1)), False, np.eye(4), label, found_by)
     known = np.nan_to_num(before)
-    if not (known > APART * tolerance).any():
+    least = max(APART * tolerance, OF_NOISE * aligned.noise)
+    if not (known > least).any():
         return agreed
     frame = choose_frame(part, points)
     width = max(NARROWEST * tolerance, BY_NOISE * aligned.noise)
@@ -157,14 +163,16 @@ def fit_views(
     fit = fit_jointly(skin, frame, points[used], view[used], count, gap, width, REACH * tolerance, tolerance)
     if fit is None:
         return replace(agreed, views=_describe_unfitted(known), disagree=True)
+    fit = _hold_doubtful(fit, np.where(many, known, 0.0), least)
     moved = np.einsum("nij,nj->ni", fit.moves[view, :3, :3], points) + fit.moves[view, :3, 3]
     after = np.nan_to_num(_compare(skin, moved, view, count, gap, tolerance))
-    healed = float(after.max()) < max(HEALED * float(known.max()), APART * tolerance) and fit.kept > KEPT
+    healed = float(after.max()) < max(HEALED * float(known.max()), least) and fit.kept > KEPT
+    healed &= _measure_far(fit, fit.common, None) < COMMON * float(known.max())
     views = []
     for number in range(count):
         beyond = fit.twists[number] - fit.common
         far = _measure_far(fit, beyond, number)
-        elsewhere = bool(healed and many[number] and far > APART / 2 * tolerance)
+        elsewhere = bool(healed and known[number] > least and many[number] and far > APART / 2 * tolerance)
         turn = float(np.degrees(np.linalg.norm(beyond[:3]) / frame.half))
         views.append(
             ViewFit(
@@ -198,9 +206,22 @@ def _is_better(found: ViewFits, aligned: Scan, skin: Skin, tolerance: float) -> 
     return off[1] < BETTER * off[0]
 
 
-def _measure_far(fit: JointFit, beyond: Floats, number: int) -> float:
-    """How far a motion (6,) moves the skin of a view along its normal, in nine tenths of it."""
-    own = fit.pairs.take(fit.pairs.view == number)
+def _hold_doubtful(fit: JointFit, apart: Floats, least: float) -> JointFit:
+    """The fit without motions that wear explains as well. A view that lies with the others where they overlap, not
+    ``apart`` (V,) by ``least``, is not moved against them; and one that only the part shows to be off by far more than
+    it lies apart is moved as the overlap shows: its skin may be worn."""
+    twists = fit.twists.copy()
+    for number in range(len(twists)):
+        if apart[number] <= least or _measure_far(fit, fit.shown[number] - fit.common, number) < least / 2:
+            twists[number] = fit.common
+        elif _measure_far(fit, fit.twists[number] - fit.shown[number], number) > EXPLAINED * apart[number]:
+            twists[number] = fit.shown[number]
+    return replace(fit, twists=twists)
+
+
+def _measure_far(fit: JointFit, beyond: Floats, number: int | None) -> float:
+    """How far a motion (6,) moves the skin of a view, or of all, along its normal, in nine tenths of it."""
+    own = fit.pairs if number is None else fit.pairs.take(fit.pairs.view == number)
     return float(np.quantile(np.abs(own.jacobian @ beyond), 0.9)) if len(own.view) else 0.0
 
 
