@@ -33,6 +33,10 @@ MOST_VIEWS = 12
 """Views that are told from each other."""
 FEWEST = 3
 """Points in a cell on each side, for it to be compared."""
+TRIED = 6
+"""Places between two views that are looked at, those that explain most."""
+SORTED = 0.3
+"""Correlation of the points' offsets with their places in the file, within cells, from which they were sorted."""
 EXPLAINED = 0.3
 """Share of the cost of what lies apart that one motion has to explain."""
 KEPT = 0.6
@@ -181,21 +185,36 @@ def _find_cut(points: _Points, low: int, high: int, width: float, tolerance: flo
     before = sums.cumsum(axis=2)
     patch = np.zeros(cells, np.int64)
     patch[cell] = points.patch[low:high]
-    best: tuple[float, int] | None = None
+    gains: list[tuple[float, int]] = []
     for k in range(1, BLOCKS):
         apart = _compare(before[:, :, k - 1], before[:, :, -1] - before[:, :, k - 1], patch)[0]
         if len(apart.apart) < FEWEST_SHARED:
             continue
         gain = apart.measure_cost(np.zeros(6), width) - apart.measure_cost(apart.fit(width, tolerance), width)
-        if best is None or gain > best[0]:
-            best = gain, k
-    if best is None:
-        return None
-    k = best[1]
-    apart, first, second = _compare(before[:, :, k - 1], before[:, :, -1] - before[:, :, k - 1], patch)
-    if not apart.is_rigid(apart.fit(width, tolerance), width, tolerance):
-        return None
-    return low + _refine_cut(points.offset[low:high], cell, block, k, first, second, width)
+        gains.append((gain, k))
+    for _, k in sorted(gains, reverse=True)[:TRIED]:
+        apart, first, second = _compare(before[:, :, k - 1], before[:, :, -1] - before[:, :, k - 1], patch)
+        if not apart.is_rigid(apart.fit(width, tolerance), width, tolerance):
+            return None
+        cut = _refine_cut(points.offset[low:high], cell, block, k, first, second, width)
+        if not _is_sorted(points.offset[low:high], cell, cut, np.isfinite(first), width):
+            return low + cut
+    return None
+
+
+def _is_sorted(offset: Floats, cell: Ints, cut: int, compared: Flags, width: float) -> bool:
+    """Whether the points of a cell lie in the order of their offsets, before or after a cut: as in a file whose points
+    are sorted along an axis, on a face across it. They lie apart since they were sorted."""
+    order = np.arange(len(offset), dtype=np.float64)
+    used = compared[cell]
+    group = group_integers(2 * cell[used] + (order[used] >= cut))[1]
+    count = np.bincount(group)
+    values = [np.clip(offset[used], -10 * width, 10 * width), order[used]]
+    left = [one - (np.bincount(group, one) / count)[group] for one in values]
+    # each cell counts by its own correlation: positions in the file differ by far more in some
+    product, squares = np.bincount(group, left[0] * left[1]), [np.bincount(group, one**2) for one in left]
+    each = product / np.sqrt(np.maximum(squares[0] * squares[1], 1e-300))
+    return bool(np.abs(np.average(each, weights=count * (count > FEWEST))) > SORTED)
 
 
 def _compare(first: Floats, second: Floats, patch: Ints) -> tuple[_Apart, Floats, Floats]:

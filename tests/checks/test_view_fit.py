@@ -75,3 +75,33 @@ def test_a_bent_part_is_no_misplaced_view() -> None:
 def test_a_scan_without_views_is_not_compared() -> None:
     scan = make_scan(np.eye(4))
     assert fit_views(get_part("rib_bracket"), Scan(scan.points, noise=NOISE), TOLERANCE, True) is None
+
+
+def test_wear_that_one_view_alone_shows_is_not_fitted_away() -> None:
+    """All of the top is worn, and only view 0 shows it: it lies with the others beside the top, and stays."""
+    part = get_part("rib_bracket")
+    points, normals = draw_skin("rib_bracket", 24_000)
+    facing = normals @ SCANNERS.T > 0.1
+    view = np.argmax(facing * np.random.default_rng(5).random(facing.shape), axis=1).astype(np.int32)
+    top = normals[:, 2] > 0.9
+    view[top] = 0
+    worn = add_noise(points - 3 * TOLERANCE * top[:, None] * np.array([0.0, 0.0, 1.0]))
+    for move in (np.eye(4), make_motion(0.4, 0.1)):
+        moved = worn @ move[:3, :3].T + move[:3, 3]
+        put = np.where((view == 1)[:, None], moved, worn)
+        scan = Scan(put, noise=NOISE, spacing=0.8, viewpoints=SCANNERS, view=view)
+        found = fit_views(part, scan, TOLERANCE, True)
+        assert found is not None
+        right = found.apply(scan).points
+        assert np.linalg.norm(right[top] - worn[top], axis=1).max() < 0.3 * TOLERANCE
+        if found.disagree:
+            assert 0 not in [one.number for one in found.views if one.is_corrected]
+
+
+def test_files_without_scanner_positions_are_views_as_well() -> None:
+    scan = make_scan(make_motion(0.8, 0.3))
+    found = fit_views(
+        get_part("rib_bracket"), Scan(scan.points, noise=NOISE, spacing=0.8, cloud=scan.view), TOLERANCE, True
+    )
+    assert found is not None
+    assert [one.number for one in found.views if one.is_corrected] == [1]
