@@ -29,6 +29,8 @@ ASKED, LEAST_POINTS = 40_000, 1000
 """Points that are asked, and points below which nothing is separated."""
 BLOCKS = 48
 """Shares of the order of the points, between which a view may end."""
+NEAR = 3
+"""Blocks before and after a cut in which its place is refined."""
 MOST_VIEWS = 12
 """Views that are told from each other."""
 FEWEST = 3
@@ -230,8 +232,8 @@ def _compare(first: Floats, second: Floats, patch: Ints) -> tuple[_Apart, Floats
 
 
 def _refine_cut(offset: Floats, cell: Ints, block: Ints, k: int, first: Floats, second: Floats, width: float) -> int:
-    """The place in the order, in the blocks beside a cut, before which points lie with the first view."""
-    near = np.flatnonzero((block >= k - 1) & (block <= k))
+    """The place in the order, in the blocks near a cut, before which points lie with the first view."""
+    near = np.flatnonzero((block >= k - NEAR) & (block < k + NEAR))
     better = np.minimum(np.abs(offset[near] - second[cell[near]]), 2 * width) - np.minimum(
         np.abs(offset[near] - first[cell[near]]), 2 * width
     )  # above 0: it lies with the first
