@@ -44,9 +44,6 @@ COMMON = 0.75
 misplaced view has pulled away: skin is worn, and the stage align has weighed that."""
 FREE = 0.25
 """Share of a shift of the skin along its normal, squared, that nothing shows, from which it is not known."""
-BETTER, ASKED = 0.7, 20_000
-"""Share of the points off the skin that may be left where views that two surfaces tell apart are moved, and points that
-are asked."""
 AMBIGUOUS = 0.5
 """Motion outward, in tolerances, that only the part shows, from which skin that one view sees may be worn instead."""
 FoundBy = Literal["given", "order", "sheets"]
@@ -138,12 +135,14 @@ def fit_views(
 
     ``aligned``: the scan in the part's frame. ``is_correcting``: views that lie elsewhere are corrected, as far as the
     skin that they show fixes their motions. ``label`` (N,): the view of each point, as `separate_views` found it; else
-    what the scan says. None for a scan of a single view. A part that is bent or of another size shows as such: its
-    views agree where they overlap.
+    what the scan says. Views that two surfaces tell apart are not corrected: where one of them alone shows the skin,
+    nothing says which it is. None for a scan of a single view. A part that is bent or of another size shows as such:
+    its views agree where they overlap.
     """
     label = number_views(aligned) if label is None else label
     if label is None:
         return None
+    is_correcting &= found_by != "sheets"
     skin, count = Skin.build(part), int(label.max()) + 1
     gap = float(np.sqrt(part.area / COMPARED))
     where = np.concatenate([_draw(aligned, label, number, gap) for number in range(count)])
@@ -183,27 +182,12 @@ def fit_views(
         )  # fmt: skip
     hidden = sum(_measure_hidden(fit, view.number, gap, tolerance) for view in views if view.is_corrected)
     common = make_motion(fit.common, frame) if healed else np.eye(4)
-    found = ViewFits(tuple(views), fit.moves, True, common, label, found_by, hidden, fit.free, frame)
-    if found_by == "sheets" and is_correcting and not _is_better(found, aligned, skin, tolerance):
-        kept = tuple(replace(view, is_corrected=False) for view in views)
-        return replace(found, views=kept, common=np.eye(4), hidden=0.0)
-    return found
+    return ViewFits(tuple(views), fit.moves, True, common, label, found_by, hidden, fit.free, frame)
 
 
 def _describe_unfitted(apart: Floats) -> tuple[ViewFit, ...]:
     """Views that differ, and that show too little skin to be fitted."""
     return tuple(ViewFit(k, np.zeros(3), 0.0, float(a), float(a), False, False, 6, False) for k, a in enumerate(apart))
-
-
-def _is_better(found: ViewFits, aligned: Scan, skin: Skin, tolerance: float) -> bool:
-    """Whether much more of the scan lies on the skin after the views are moved. Views that only two surfaces tell apart
-    may be told wrongly where just one of them is seen."""
-    some = np.linspace(0, len(aligned.points) - 1, min(ASKED, len(aligned.points))).astype(np.int64)
-    off = [
-        float((skin.find_feet(points[some])[0] > tolerance).mean())
-        for points in (aligned.points, found.apply(aligned).points)
-    ]
-    return off[1] < BETTER * off[0]
 
 
 def _hold_doubtful(fit: JointFit, apart: Floats, least: float) -> JointFit:

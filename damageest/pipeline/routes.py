@@ -120,7 +120,8 @@ CLOSE: Route = (
     #     tolerance, unit -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit,
     #     views -> found
-    fold_hidden,  # found, sensor, aligner, accept, deviation, tolerance, unit -> found, folded, +warnings
+    fold_hidden,  # found, sensor, facts, aligner, accept, aligned, deviation, tolerance, asked_tolerance, unit
+    #     -> found, folded, +warnings
     question_fit,  # fitted, surplus, found, pose, aligned, adapted, deviation, skin, unit, tolerance, warnings
     #     -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures

@@ -106,3 +106,19 @@ def test_a_misplaced_view_in_one_file_gives_no_accepted_site() -> None:
     assert moved.fit.views_from == "order"
     assert any(view.is_corrected for view in moved.fit.views)
     assert sum(site.damage.volume for site in moved.sites) < 0.1 * sum(site.damage.volume for site in left.sites)
+
+
+def test_views_that_two_surfaces_tell_apart_give_no_site_and_one_line() -> None:
+    """They are not moved, since one of them alone shows much of the skin: what it shows too deep is told, and stays in
+    the total's high end. A loss that is deeper is found."""
+    scan, _ = scan_part("lever", deepen(2.0), "shuffled")
+    job = {"version": 1, "tolerance": TOLERANCE, "report": "none"}
+    result = damageest.run(job, part=get_part("lever"), scan=Scan(scan.points))
+    assert not result.sites
+    assert result.fit is not None
+    assert result.fit.views_from == "sheets"
+    assert not any(view.is_corrected for view in result.fit.views)
+    (told,) = [note for note in result.warnings if note.code == "below_noise"]
+    assert "two surfaces" in told.text
+    assert told.amount
+    assert damageest.run(job | {"accept": "all"}, part=get_part("lever"), scan=Scan(scan.points)).sites
