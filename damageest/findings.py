@@ -249,6 +249,17 @@ class NoiseLevel:
 
 
 @dataclass(frozen=True)
+class Explained:
+    """Places below the skin that views which lie apart explain: how many, their number of ``points``, the ``volume``
+    that they hold at most, and the depth of the ``deepest`` point, in the job's unit."""
+
+    places: int = 0
+    points: int = 0
+    volume: float = 0.0
+    deepest: float = 0.0
+
+
+@dataclass(frozen=True)
 class Sensor:
     """The errors of the sensor on intact skin, in the job's unit.
 

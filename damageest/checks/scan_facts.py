@@ -9,7 +9,7 @@ import numpy as np
 from damageest.artefacts import ADDED, Deviation, Part, Pose, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.skin_cells import AVERAGED
-from damageest.checks.two_sheets import measure_sheets
+from damageest.checks.two_sheets import Sheets
 from damageest.checks.view_overlap import compare_views
 from damageest.findings import ModelFit, Surplus
 from damageest.geometry.voxels import measure_area
@@ -25,7 +25,7 @@ LAYER = 5.0
 
 def gather_scan_facts(
     skin: SkinView, part: Part, aligned: Scan, deviation: Deviation, surplus: Iterable[Surplus], pose: Pose,
-    fit: ModelFit | None, tolerance: float, unit: str, is_fitted: bool,
+    fit: ModelFit | None, tolerance: float, unit: str, is_fitted: bool, sheets: Sheets,
 ) -> ScanFacts:  # fmt: skip
     """Measures how far skin deviates that is not damaged. ``surplus``: higher one is left out, since it is metal."""
     layer = (deviation.label == ADDED) & (deviation.distance < LAYER * tolerance)
@@ -36,7 +36,6 @@ def gather_scan_facts(
     if layer.any():
         area = measure_area(aligned.points[layer], skin.cells.edge, FEWEST_OUTSIDE)
         height = float(np.quantile(deviation.distance[layer], 0.9))
-    sheets = measure_sheets(aligned, deviation, part, tolerance)
     return ScanFacts(
         tolerance=tolerance,
         spacing=aligned.spacing,

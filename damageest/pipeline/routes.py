@@ -33,7 +33,7 @@ from damageest.pipeline.prepare import (
     take_tolerance,
 )
 from damageest.pipeline.selections import check_selections
-from damageest.pipeline.sensor import fold_hidden, measure_sensor
+from damageest.pipeline.sensor import fold_hidden, measure_sensor, set_explained_aside
 from damageest.pipeline.sites import (
     gather_sites,
     number_sites,
@@ -89,6 +89,8 @@ ACQUIRE: Route = (
     #     -> surplus, deviation, +warnings
     fit_model,  # part, aligned, adapted, deviation, surplus, tolerance, unit, views, corrected_scale
     #     -> fitted, +warnings
+    set_explained_aside,  # part, aligned, deviation, sites, views, tolerance, aligner, accept
+    #     -> sites, sheets, explained
     gather_intact,  # aligned, deviation, sites -> intact, +warnings
 )
 BY_SITE: Route = (
@@ -114,14 +116,14 @@ CLOSE: Route = (
     choose_sites,  # found, choice, aligned, deviation, part, tolerance -> found, +warnings
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
-    gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner -> facts
-    measure_sensor,  # part, aligned, deviation, sites, facts, depth_step, tolerance -> pose_error, sensor
+    gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner, sheets -> facts
+    measure_sensor,  # part, aligned, deviation, sites, facts, explained, depth_step, tolerance -> pose_error, sensor
     measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
     #     tolerance, unit -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit,
     #     views -> found
-    fold_hidden,  # found, sensor, facts, aligner, accept, aligned, deviation, tolerance, asked_tolerance, unit
-    #     -> found, folded, +warnings
+    fold_hidden,  # found, sensor, explained, sheets, aligner, accept, aligned, deviation, tolerance, asked_tolerance,
+    #     unit -> found, folded, +warnings
     question_fit,  # fitted, surplus, found, pose, aligned, adapted, deviation, skin, unit, tolerance, warnings
     #     -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures

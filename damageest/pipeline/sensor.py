@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Part, Reason, Scan, Sites
+from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Ints, Part, Reason, Scan, Sites
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.sensor import describe_sensor, measure_levels
-from damageest.findings import Sensor
+from damageest.checks.two_sheets import FARTHEST, Sheets, measure_sheets, measure_two_sheets
+from damageest.findings import Explained, Sensor
+from damageest.job.model import Accept
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.pipeline.uncertainty import limit_doubtful
 from damageest.rules import ScanFacts
-from damageest.rules.two_sheets import OF_SCAN
+from damageest.rules.misplaced_view import AGAINST
+from damageest.rules.two_sheets import OF_SCAN, explains
+from damageest.stages.align import Align
 
 HIDES = 1.2
 """How many times larger than the tolerance the least depth that can be seen has to be, for shallower sites that are
@@ -27,50 +33,97 @@ UNSUPPORTED = {"intact_over", "intact_inside", "beyond_points", "off_boundary", 
 
 @step(gives=("pose_error", "sensor"))
 def measure_sensor(
-    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, facts: ScanFacts, depth_step: float, tolerance: float
-) -> tuple[PoseError, Sensor]:
+    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, facts: ScanFacts, explained: Explained,
+    depth_step: float, tolerance: float,
+) -> tuple[PoseError, Sensor]:  # fmt: skip
     """Measures noise and systematic errors of the intact skin, and what they hide."""
     pose = measure_pose_error(part, aligned, deviation, tolerance)
     levels = measure_levels(part, aligned, deviation)
     stray = (deviation.label == OUTLIER) | ((deviation.label == DAMAGE) & (sites.label == 0))
-    share = float(stray.mean()) if len(stray) else 0.0
+    share = (int(stray.sum()) - explained.points) / max(len(stray), 1)
     sensor = describe_sensor(levels, aligned, pose, facts.systematic, depth_step, tolerance, share)
     return pose, sensor
 
 
 @step(
+    gives=("sites", "sheets", "explained"),
+    reads=("part", "aligned", "deviation", "sites", "views", "tolerance", "aligner", "accept"),
+)
+def set_explained_aside(state: JobState) -> tuple[Sites, Sheets, Explained]:
+    """Looks for two surfaces over the same skin, and takes clusters of points that views which lie apart explain for no
+    sites: their verdict would be doubtful, whatever their volume is. What the job accepts by number stays."""
+    part, aligned, deviation, sites = state.part, state.aligned, state.deviation, state.sites
+    views, tolerance = state.views, state.tolerance
+    sheets = measure_sheets(aligned, deviation, part, tolerance)
+    is_apart = sheets.share > OF_SCAN or (views is not None and views.disagree)
+    if not is_apart or not _is_folding(state.aligner, state.accept):
+        return sites, sheets, Explained()
+    gone = []
+    for number in range(1, sites.count + 1):
+        members = sites.members(number)
+        depth = float(np.median(-deviation.distance[members])) if len(members) else np.inf
+        if depth < FARTHEST * tolerance and (
+            explains(measure_two_sheets(aligned, deviation, part, members, tolerance), depth, *sheets)
+            or (views is not None and views.find_explained(part, aligned, deviation, members, tolerance) > AGAINST)
+        ):
+            gone.append(number)
+    if not gone:
+        return sites, sheets, Explained()
+    members = np.flatnonzero(np.isin(sites.label, gone))
+    deepest = float(-deviation.distance[members].min())
+    volume = sum(limit_shown(aligned, deviation, sites.members(number)) for number in gone)
+    new = np.zeros(sites.count + 1, np.int32)
+    kept = np.setdiff1d(np.arange(1, sites.count + 1), gone)
+    new[kept] = np.arange(1, len(kept) + 1)
+    return (
+        replace(sites, label=new[sites.label], count=len(kept)),
+        sheets,
+        Explained(len(gone), len(members), volume, deepest),
+    )
+
+
+@step(
     gives=("found", "folded", "warnings"),
     reads=(
-        "found", "sensor", "facts", "aligner", "accept", "aligned", "deviation", "tolerance", "asked_tolerance", "unit"
+        "found", "sensor", "explained", "sheets", "aligner", "accept", "aligned", "deviation", "tolerance",
+        "asked_tolerance", "unit",
     ),
 )  # fmt: skip
 def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]:
-    """Takes doubtful sites that errors of the sensor, views that lie apart or a few stray points explain for what they
-    are. How much they hold at most stays in the interval of the total. Sites that the job accepts by number stay."""
-    found, accept, unit = state.found, state.accept, state.unit
-    # the error of a given pose is not the sensor's
-    if getattr(state.aligner, "use", "none") == "none" or not isinstance(accept, str) or accept == "all":
-        return found, 0.0, ()
-    causes = {site.number: cause for site in found if (cause := _explain(state, site))}
-    if not causes:
-        return found, 0.0, ()
-    explained = [site for site in found if site.number in causes]
-    volume = sum(_limit_explained(state, site) for site in explained)
-    deepest = max(site.measure_depth(state.deviation) for site in explained)
-    many = f"{len(causes)} places are" if len(causes) > 1 else "1 place is"
-    words = "; ".join(_describe_cause(state, cause) for cause in CAUSES if cause in causes.values())
-    text = (
-        f"{many} below the skin by up to {deepest:.3g} {unit}, which errors of this scan explain: {words}; they are no "
-        f"sites, and their {volume:.4g} {unit}³ are in the high end of the total"
+    """Takes doubtful sites that errors of the sensor or a few stray points explain for what they are, and names them
+    with those that views apart explain. How much they hold at most stays in the interval of the total."""
+    causes = {site.number: cause for site in state.found if (cause := _explain(state, site))}
+    count = len(causes) + state.explained.places
+    if not count:
+        return state.found, 0.0, ()
+    gone = [site for site in state.found if site.number in causes]
+    volume = state.explained.volume + sum(
+        min(limit_doubtful(site), limit_shown(state.aligned, state.deviation, site.members)) for site in gone
     )
-    remedy = {
-        "shallow": f"tolerance: {_choose_limit(state):.2g}, or a scan with smaller errors",
-        "views": "register the views to each other again",
-        "stray": "scan these places more densely",
-    }
-    kept = tuple(site for site in found if site.number not in causes)
-    first = next(cause for cause in CAUSES if cause in causes.values())
-    return kept, volume, [Reason("below_noise", text, amount=volume, unit=f"{unit}³", remedy=remedy[first])]
+    deepest = max([state.explained.deepest, *(site.measure_depth(state.deviation) for site in gone)])
+    all_causes = {*causes.values(), *(("views",) if state.explained.places else ())}
+    told = [_describe_cause(state, cause) for cause in CAUSES if cause in all_causes]
+    many, unit = f"{count} places are" if count > 1 else "1 place is", state.unit
+    text = (
+        f"{many} below the skin by up to {deepest:.3g} {unit}, which errors of this scan explain: "
+        f"{'; '.join(words for words, _ in told)}; they are no sites, and their {volume:.4g} {unit}³ are in the high "
+        "end of the total"
+    )
+    kept = tuple(site for site in state.found if site.number not in causes)
+    return kept, volume, [Reason("below_noise", text, amount=volume, unit=f"{unit}³", remedy=told[0][1])]
+
+
+def limit_shown(aligned: Scan, deviation: Deviation, members: Ints) -> float:
+    """How much scan points ``members`` (M,) show at most of a loss: the skin that they cover, and as much beside it,
+    times the largest depth."""
+    area = 2 * len(members) * (aligned.spacing / 1.1) ** 2
+    return area * max(float(-deviation.distance[members].min(initial=0.0)), 0.0)
+
+
+def _is_folding(aligner: Align | None, accept: Accept) -> bool:
+    """Whether sites that errors of the scan explain are set aside: not where the pose is given, whose error is not the
+    sensor's, and not where the job accepts them."""
+    return getattr(aligner, "use", "none") != "none" and isinstance(accept, str) and accept != "all"
 
 
 def _choose_limit(state: JobState) -> float:
@@ -87,29 +140,28 @@ def _choose_limit(state: JobState) -> float:
 def _explain(state: JobState, site: FoundSite) -> str:
     """What explains a doubtful site that is no loss, one of `CAUSES`; empty where it may be one."""
     depth = site.measure_depth(state.deviation)
-    if site.verdict.level != "doubtful" or not depth:
+    if not _is_folding(state.aligner, state.accept) or site.verdict.level != "doubtful" or not depth:
         return ""
     against = {reason.code for reason in site.verdict.reasons if reason.effect == "contradicts"}
     if depth < _choose_limit(state):
         return "shallow"
-    if against & {"two_sheets", "misplaced_view"} and state.facts.sheets_share > OF_SCAN:
-        return "views"
     return "stray" if "few_points" in against and against & UNSUPPORTED else ""
 
 
-def _limit_explained(state: JobState, site: FoundSite) -> float:
-    """How much an explained site may hold at most: no more than its points show, on the skin that they cover."""
-    area = 2 * len(site.members) * (state.aligned.spacing / 1.1) ** 2  # twice: of its rim as well
-    return min(limit_doubtful(site), area * site.measure_depth(state.deviation))
-
-
-def _describe_cause(state: JobState, cause: str) -> str:
-    unit, sensor, facts = state.unit, state.sensor, state.facts
+def _describe_cause(state: JobState, cause: str) -> tuple[str, str]:
+    """Words for a cause, and its remedy."""
+    unit, sensor, sheets = state.unit, state.sensor, state.sheets
     if cause == "shallow":
+        limit = _choose_limit(state)
         return (
             f"its points deviate by {np.hypot(sensor.noise, sensor.correlated):.3g} {unit} on intact skin, so that "
-            f"losses below {_choose_limit(state):.3g} {unit} cannot be seen in it"
+            f"losses below {limit:.3g} {unit} cannot be seen in it",
+            f"tolerance: {limit:.2g}, or a scan with smaller errors",
         )
     if cause == "views":
-        return f"at {facts.sheets_share:.1%} of its points it shows two surfaces, {facts.sheets_apart:.3g} {unit} apart"
-    return "so few points lie on them, among intact ones, that they may be stray"
+        return (
+            f"at {sheets.share:.1%} of its points it shows two surfaces, {sheets.apart:.3g} {unit} apart, as of views "
+            "that do not fit together",
+            "register the views to each other again, or give them as a list of files, so that they can be fitted",
+        )
+    return "so few points lie on them, among intact ones, that they may be stray", "scan these places more densely"

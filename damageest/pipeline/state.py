@@ -38,10 +38,11 @@ from damageest.checks.coverage import SkinView
 from damageest.checks.free_pose import Dependence
 from damageest.checks.model_fit import FittedModel
 from damageest.checks.pose_error import PoseError
+from damageest.checks.two_sheets import Sheets
 from damageest.checks.uncertainty import SiteError
 from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
-from damageest.findings import Coverage, Interval, Sensor, Surplus, Uncertainty, Verdict
+from damageest.findings import Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict
 from damageest.job.model import Accept, SiteChoice
 from damageest.pipeline.cache import digest
 from damageest.result import Conversion, Result
@@ -200,6 +201,7 @@ class JobState(State):
     ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the sites.
     ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written into,
     ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
+    ``sheets``: two surfaces over the same skin; ``explained``: places that views which lie apart explain, no sites.
     """
 
     name = Value[str]()
@@ -241,6 +243,8 @@ class JobState(State):
     pose_error = Value[PoseError]()
     sensor = Value[Sensor]()
     folded = Value[float]()
+    sheets = Value[Sheets]()
+    explained = Value[Explained]()
     surplus = Value[tuple[Surplus, ...]]()
     volume_95 = Value[Interval | None]()
     enclosures = Value[Enclosures]()

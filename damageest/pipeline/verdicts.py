@@ -14,7 +14,7 @@ from damageest.checks.free_pose import compare_other_poses, describe_motion
 from damageest.checks.model_fit import FittedModel
 from damageest.checks.one_motion import is_one_motion
 from damageest.checks.scan_facts import gather_scan_facts
-from damageest.checks.two_sheets import measure_two_sheets
+from damageest.checks.two_sheets import Sheets, measure_two_sheets
 from damageest.checks.unseen_rim import measure_unseen_rim
 from damageest.checks.verdict import ask_rules, decide, open_end
 from damageest.errors import StageError
@@ -65,12 +65,12 @@ def choose_sites(
 @step(gives="facts")
 def gather_facts(
     skin: SkinView, part: Part, aligned: Scan, deviation: Deviation, surplus: tuple[Surplus, ...], pose: Pose,
-    fitted: FittedModel | None, tolerance: float, unit: str, aligner: Align | None,
+    fitted: FittedModel | None, tolerance: float, unit: str, aligner: Align | None, sheets: Sheets,
 ) -> ScanFacts:  # fmt: skip
     """Measures what the whole scan says about skin that deviates and is not damaged."""
     return gather_scan_facts(
         skin, part, aligned, deviation, surplus, pose, None if fitted is None else fitted.fit, tolerance, unit,
-        is_fitted=getattr(aligner, "use", "none") != "none" and not pose.is_held,
+        is_fitted=getattr(aligner, "use", "none") != "none" and not pose.is_held, sheets=sheets,
     )  # fmt: skip
 
 

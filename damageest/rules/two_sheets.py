@@ -20,6 +20,12 @@ EXPLAINED = 2.5
 shows the skin, it lies too deep by more than it does across the view where both show it."""
 
 
+def explains(own: float, depth: float, share: float, apart: float) -> bool:
+    """Whether two surfaces over the same skin explain a site: the share of its ``own`` points among them, its typical
+    ``depth``, and the ``share`` of all points among them and how far these are ``apart``."""
+    return own > AGAINST or (share > OF_SCAN and depth < EXPLAINED * apart)
+
+
 class TwoSheets(Rule):
     code = "two_sheets"
     meaning = (
@@ -33,13 +39,15 @@ class TwoSheets(Rule):
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         share, apart = scan.sheets_share, scan.sheets_apart
+        if not explains(site.two_sheets, site.typical, share, apart):
+            return
         if site.two_sheets > AGAINST:
             text = (
                 f"{site.two_sheets:.0%} of its points lie below others on intact skin, by {site.typical:.3g} "
                 f"{scan.unit}: the scan shows two surfaces there, and views may not fit together"
             )
             yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)
-        elif share > OF_SCAN and site.typical < EXPLAINED * apart:
+        else:
             text = (
                 f"at {share:.1%} of the scan's points it shows two surfaces, {apart:.3g} {scan.unit} apart: views may "
                 "not fit together, and one of them explains the site"
