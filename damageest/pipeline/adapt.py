@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples, Scan
+from damageest.artefacts import AdaptedPart, Deviation, Floats, Part, Pose, Samples, Scan
 from damageest.checks.model_fit import measure_fit
+from damageest.checks.two_sheets import measure_sheets
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.transforms import move_points
@@ -17,6 +18,7 @@ from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules.notes import make_notes
+from damageest.rules.two_sheets import OF_SCAN
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
 from damageest.stages.sample import Sample
@@ -32,6 +34,8 @@ MEASURED = 40_000
 """Points, about, that the form of the part is measured with before it is adapted."""
 ASKING = ("deformed", "scaled", "wavy")
 """What the fit of the model calls a part that a field may explain."""
+BEYOND_VIEWS = 2.0
+"""How far the form has to move the skin, in a tenth of it, in distances of views that lie apart."""
 BY_FORM = "another_part"
 """Code of the doubt in a pose that a part of another form explains."""
 
@@ -93,13 +97,22 @@ def call_adapt(engine: Engine, state: JobState) -> tuple[JobState | None, tuple[
 
 def is_asked_for(state: JobState) -> bool:
     """Whether the intact skin shows a part that is not as designed: a form that the fit of the model names, or a scan
-    of which too little lies on the part in the best pose."""
+    of which too little lies on the part in the best pose. Where views lie apart, a form has to be larger than that: a
+    field would follow the views."""
     if any(doubt.code == BY_FORM for doubt in state.pose.doubts):
         return True
-    points = state.aligned.points[:: max(1, len(state.aligned.points) // MEASURED)]
-    distance, _ = signed_distance(points, state.part)
-    found = measure_fit(state.part, points, distance, state.aligned.noise, state.tolerance, state.unit, state.views)
-    return found is not None and found.fit.model in ASKING
+    step = max(1, len(state.aligned.points) // MEASURED)
+    some = state.aligned.take(np.arange(0, len(state.aligned.points), step))
+    distance, face = signed_distance(some.points, state.part)
+    found = measure_fit(state.part, some.points, distance, some.noise, state.tolerance, state.unit, state.views)
+    if found is None or found.fit.model not in ASKING:
+        return False
+    deviation = Deviation(distance, face, np.zeros(len(distance), np.uint8))
+    sheets = measure_sheets(some, deviation, state.part, state.tolerance)
+    if sheets.share <= OF_SCAN or not len(some.points):
+        return True
+    form = np.quantile(np.abs(found.predict(some.points, state.part.face_normals[face])), 0.9)
+    return bool(form > BEYOND_VIEWS * sheets.apart)
 
 
 def doubt_anew(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pose:
