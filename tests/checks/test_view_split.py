@@ -96,7 +96,7 @@ def test_a_scan_that_names_its_views_is_not_separated() -> None:
 def test_a_misplaced_view_in_one_file_gives_no_accepted_site() -> None:
     """Left where they are, as a given pose asks for, views that do not fit make every false site doubtful; registered,
     they are moved, and no site is left."""
-    scan, _ = scan_part("rib_bracket", deepen(1.5), count=8_000)
+    scan, _ = scan_part("rib_bracket", deepen(1.5), count=15_000)
     job = {"version": 1, "tolerance": TOLERANCE, "report": "none"}
     left = damageest.run(job | {"align": "none"}, part=get_part("rib_bracket"), scan=Scan(scan.points))
     assert left.sites
