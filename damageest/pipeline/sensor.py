@@ -9,7 +9,7 @@ import numpy as np
 from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Ints, Part, Reason, Scan, Sites
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.sensor import describe_sensor, measure_levels
-from damageest.checks.two_sheets import FARTHEST, Sheets, measure_sheets, measure_two_sheets
+from damageest.checks.two_sheets import Sheets, measure_sheets, measure_two_sheets
 from damageest.findings import Explained, Sensor
 from damageest.job.model import Accept
 from damageest.pipeline.state import FoundSite, JobState, Reasons
@@ -17,7 +17,7 @@ from damageest.pipeline.steps import step
 from damageest.pipeline.uncertainty import limit_doubtful
 from damageest.rules import ScanFacts
 from damageest.rules.misplaced_view import AGAINST
-from damageest.rules.two_sheets import OF_SCAN, explains
+from damageest.rules.two_sheets import EXPLAINED, OF_SCAN, explains
 from damageest.stages.align import Align
 
 HIDES = 1.2
@@ -25,6 +25,8 @@ HIDES = 1.2
 doubtful to be no sites."""
 BEYOND = 1.645
 """How many standard deviations of the errors a site has to be deeper than a tolerance `auto`, for the same."""
+DEEPEST = 0.95
+"""Share of the points of a cluster above the depth that has to be within what views apart explain."""
 CAUSES = ("shallow", "views", "stray")
 """What explains a site that is no loss: too shallow for the sensor, in views that lie apart, a few stray points."""
 UNSUPPORTED = {"intact_over", "intact_inside", "beyond_points", "off_boundary", "scattered"}
@@ -51,20 +53,24 @@ def measure_sensor(
 )
 def set_explained_aside(state: JobState) -> tuple[Sites, Sheets, Explained]:
     """Looks for two surfaces over the same skin, and takes clusters of points that views which lie apart explain for no
-    sites: their verdict would be doubtful, whatever their volume is. What the job accepts by number stays."""
+    sites: their verdict would be doubtful, whatever their volume is. What is deeper than the views explain stays, and
+    what the job accepts by number."""
     part, aligned, deviation, sites = state.part, state.aligned, state.deviation, state.sites
     views, tolerance = state.views, state.tolerance
     sheets = measure_sheets(aligned, deviation, part, tolerance)
     is_apart = sheets.share > OF_SCAN or (views is not None and views.disagree)
     if not is_apart or not _is_folding(state.aligner, state.accept):
         return sites, sheets, Explained()
+    apart = max([sheets.apart, *(one.apart for one in (views.views if views else ()))])
     gone = []
     for number in range(1, sites.count + 1):
         members = sites.members(number)
-        depth = float(np.median(-deviation.distance[members])) if len(members) else np.inf
-        if depth < FARTHEST * tolerance and (
-            explains(measure_two_sheets(aligned, deviation, part, members, tolerance), depth, *sheets)
-            or (views is not None and views.find_explained(part, aligned, deviation, members, tolerance) > AGAINST)
+        depth = -deviation.distance[members]
+        if not len(depth) or np.quantile(depth, DEEPEST) > EXPLAINED * apart:
+            continue
+        own = measure_two_sheets(aligned, deviation, part, members, tolerance)
+        if explains(own, float(np.median(depth)), *sheets) or (
+            views is not None and views.find_explained(part, aligned, deviation, members, tolerance) > AGAINST
         ):
             gone.append(number)
     if not gone:
@@ -97,9 +103,7 @@ def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]
     if not count:
         return state.found, 0.0, ()
     gone = [site for site in state.found if site.number in causes]
-    volume = state.explained.volume + sum(
-        min(limit_doubtful(site), limit_shown(state.aligned, state.deviation, site.members)) for site in gone
-    )
+    volume = state.explained.volume + sum(_limit_explained(state, site, causes[site.number]) for site in gone)
     deepest = max([state.explained.deepest, *(site.measure_depth(state.deviation) for site in gone)])
     all_causes = {*causes.values(), *(("views",) if state.explained.places else ())}
     told = [_describe_cause(state, cause) for cause in CAUSES if cause in all_causes]
@@ -114,10 +118,16 @@ def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]
 
 
 def limit_shown(aligned: Scan, deviation: Deviation, members: Ints) -> float:
-    """How much scan points ``members`` (M,) show at most of a loss: the skin that they cover, and as much beside it,
-    times the largest depth."""
-    area = 2 * len(members) * (aligned.spacing / 1.1) ** 2
+    """How much scan points ``members`` (M,) show at most of a loss: the skin that they cover, and twice as much beside
+    it, where it is shallower than the tolerance, times the largest depth."""
+    area = 3 * len(members) * (aligned.spacing / 1.1) ** 2
     return area * max(float(-deviation.distance[members].min(initial=0.0)), 0.0)
+
+
+def _limit_explained(state: JobState, site: FoundSite, cause: str) -> float:
+    """How much a site that is none holds at most. The volume of a few stray points is what bulges between them."""
+    most = limit_doubtful(site)
+    return min(most, limit_shown(state.aligned, state.deviation, site.members)) if cause == "stray" else most
 
 
 def _is_folding(aligner: Align | None, accept: Accept) -> bool:
@@ -143,9 +153,9 @@ def _explain(state: JobState, site: FoundSite) -> str:
     if not _is_folding(state.aligner, state.accept) or site.verdict.level != "doubtful" or not depth:
         return ""
     against = {reason.code for reason in site.verdict.reasons if reason.effect == "contradicts"}
-    if depth < _choose_limit(state):
-        return "shallow"
-    return "stray" if "few_points" in against and against & UNSUPPORTED else ""
+    if "few_points" in against and against & UNSUPPORTED:
+        return "stray"
+    return "shallow" if depth < _choose_limit(state) else ""
 
 
 def _describe_cause(state: JobState, cause: str) -> tuple[str, str]:
