@@ -28,6 +28,9 @@ MOST_CLOSED = 16
 FEW, FEW_SHARE = 30, 0.001
 """Points, and share of the scan, below both of which a cluster is too small for more than an estimate of its volume: at
 the edge of what was seen it may be joined with skin that was not."""
+SHALLOW = 3.0
+"""Height in tolerances below which a surplus is a layer, as of views apart or of paint: area times height is its
+volume, and to close it costs more than all the rest of a run."""
 MOST_SKIN = 0.5
 """Share of the part's skin from which surplus is an error of the pose, of the unit or of the tolerance."""
 EQUAL, EQUAL_TOUCHING = 1.35, 1.1
@@ -136,7 +139,8 @@ def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: S
         note = "surplus covers most of the part: check pose, unit and tolerance; its volume was not computed"
         return done + [replace(item, notes=(*item.notes, note)) for item in metal]
     order = sorted(range(1, len(metal) + 1), key=lambda number: -metal[number - 1].estimate)
-    order = [number for number in order if not _is_small(metal[number - 1])]
+    open_ = {number: _say_why_open(item, turned.tolerance) for number, item in enumerate(metal, 1)}
+    order = [number for number in order if not open_[number]]
     tried = order[:MOST_CLOSED]  # the numbers of the clusters that are closed, in the order of their own numbers below
     renumbered = np.zeros(kept.count + 1, np.int32)
     renumbered[tried] = np.arange(1, len(tried) + 1)
@@ -154,14 +158,16 @@ def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: S
             done.append(solid)
             left = {number: other for number, other in left.items() if number not in own}
     for number, item in left.items():
-        why = reason if number in tried else f"only the {MOST_CLOSED} largest are closed"
-        why = f"it has {len(item.points)} points" if _is_small(item) else why
+        why = open_[number] or (reason if number in tried else f"only the {MOST_CLOSED} largest are closed")
         done.append(replace(item, notes=(*item.notes, f"its volume was not computed: {why}")))
     return done
 
 
-def _is_small(item: Surplus) -> bool:
-    return len(item.points) < FEW and item.share < FEW_SHARE
+def _say_why_open(item: Surplus, tolerance: float) -> str:
+    """Why no more than an estimate is asked of a surplus; empty where it is to be closed."""
+    if len(item.points) < FEW and item.share < FEW_SHARE:
+        return f"it has {len(item.points)} points"
+    return f"it is a layer below {SHALLOW:g} tolerances" if item.height < SHALLOW * tolerance else ""
 
 
 def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces]:
