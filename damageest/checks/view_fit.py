@@ -29,6 +29,9 @@ OF_NOISE = 0.8
 """The same in noises, where these are large: means of a few points differ."""
 FEWEST_OF_VIEW, FEWEST_SHARED = 4, 25
 """Points of a view in a cell, for its mean to be compared, and cells that it has to share with other views."""
+EVEN, EVEN_NOISE = 0.6, 2.0
+"""Standard deviation of the points of a view in a cell, up to which they show its skin: the larger of these, in
+tolerances and in noises."""
 FEWEST_POINTS = 300
 """Points near the part below which a view is not fitted."""
 HELD = 0.5
@@ -149,7 +152,8 @@ def fit_views(
     if len(where) < FEWEST_POINTS:
         return None
     points, view = aligned.points[where], label[where]
-    before = _compare(skin, points, view, count, gap, tolerance)
+    even = max(EVEN * tolerance, EVEN_NOISE * aligned.noise)
+    before = _compare(skin, points, view, count, gap, tolerance, even)
     agreed = ViewFits((), np.tile(np.eye(4), (count, 1, 1)), False, np.eye(4), label, found_by)
     known = np.nan_to_num(before)
     least = max(APART * tolerance, OF_NOISE * aligned.noise)
@@ -164,7 +168,7 @@ def fit_views(
         return replace(agreed, views=_describe_unfitted(known), disagree=True)
     fit = _hold_doubtful(fit, np.where(many, known, 0.0), least)
     moved = np.einsum("nij,nj->ni", fit.moves[view, :3, :3], points) + fit.moves[view, :3, 3]
-    after = np.nan_to_num(_compare(skin, moved, view, count, gap, tolerance))
+    after = np.nan_to_num(_compare(skin, moved, view, count, gap, tolerance, even))
     healed = float(after.max()) < max(HEALED * float(known.max()), least) and fit.kept > KEPT
     healed &= _measure_far(fit, fit.common, None) < COMMON * float(known.max())
     views = []
@@ -223,8 +227,9 @@ def _draw(aligned: Scan, label: Ints, number: int, gap: float) -> Ints:
     return own[pick_one_per_cube(aligned.points[own], gap)] if len(own) else own
 
 
-def _compare(skin: Skin, points: Floats, view: Ints, count: int, gap: float, tolerance: float) -> Floats:
-    """How far each view (V,) lies from the others where they overlap, in a fifth of it; NaN where it does not."""
+def _compare(skin: Skin, points: Floats, view: Ints, count: int, gap: float, tolerance: float, even: float) -> Floats:
+    """How far each view (V,) lies from the others where they overlap, in a fifth of it; NaN where it does not. Cells
+    where the points of a view scatter by more than ``even`` show no skin of it: they are mixed ones at edges."""
     distance, places, normals = skin.find_feet(points)
     offset = np.einsum("ij,ij->i", normals, points - places)
     used = (distance < REACH * tolerance) & (np.abs(np.abs(offset) - distance) < 0.1 * tolerance)
@@ -232,7 +237,10 @@ def _compare(skin: Skin, points: Floats, view: Ints, count: int, gap: float, tol
     cells = int(cell.max(initial=-1)) + 1
     total = np.bincount(cell * count + view[used], minlength=cells * count).reshape(-1, count).astype(np.float64)
     sums = np.bincount(cell * count + view[used], offset[used], cells * count).reshape(-1, count)
-    mean = np.where(total >= FEWEST_OF_VIEW, sums / np.maximum(total, 1), np.nan)
+    squares = np.bincount(cell * count + view[used], offset[used] ** 2, cells * count).reshape(-1, count)
+    mean = sums / np.maximum(total, 1)
+    scatter = np.sqrt(np.maximum(squares / np.maximum(total, 1) - mean**2, 0))
+    mean[(total < FEWEST_OF_VIEW) | (scatter > even)] = np.nan
     apart = np.full(count, np.nan)
     for number in range(count):
         others = np.delete(mean, number, axis=1)

@@ -72,9 +72,14 @@ def adapt_part(
     if pose.doubts or pose.free:
         with suppress(StageError):  # a given pose, which the adapted part moves away from, keeps its doubts
             pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
-    settled = {f"{doubt}" for doubt in state.pose.doubts} - {f"{doubt}" for doubt in pose.doubts}
-    kept = [note for note in state.warnings if note.code != "align" or note.text not in settled]
+    kept = drop_settled(state.warnings, state.pose, pose)
     return adapted, adapted.part, aligned, pose, samples, (*kept, *make_notes("adapt", adapted.notes))
+
+
+def drop_settled(warnings: Reasons, before: Pose, after: Pose) -> Reasons:
+    """The warnings without those of doubts that the pose had before, and has no more."""
+    settled = {f"{doubt}" for doubt in before.doubts} - {f"{doubt}" for doubt in after.doubts}
+    return [note for note in warnings if note.code != "align" or note.text not in settled]
 
 
 def call_adapt(engine: Engine, state: JobState) -> tuple[JobState | None, tuple[str, ...]]:
@@ -128,8 +133,8 @@ def doubt_anew(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pos
 
 
 def fit_pose(pose: Pose, motion: Floats, points: Floats, part: Part, tolerance: float) -> tuple[Pose, bool]:
-    """The pose of the aligned ``points`` (N,3) on the adapted part, and whether they show that part. That little of the
-    scan lay on the part as designed is then no doubt."""
+    """The pose of the aligned ``points`` (N,3) on the adapted part, or of corrected views, and whether they show that
+    part. That little of the scan lay on the part as designed is then no doubt."""
     distance, _ = signed_distance(points[:: max(1, len(points) // ASKED)], part)
     on = np.abs(distance) <= tolerance
     near = max(int((distance < NEAR * part.diagonal).sum()), 1)

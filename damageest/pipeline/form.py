@@ -20,6 +20,7 @@ from damageest.findings import Surplus
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import find_nearby
 from damageest.geometry.noise import measure_noise_and_spacing
+from damageest.pipeline.adapt import drop_settled, fit_pose
 from damageest.pipeline.state import FoundSite, Reasons
 from damageest.pipeline.steps import step
 from damageest.stages.align import Align
@@ -29,27 +30,30 @@ MEASURED = 40_000
 """Points, about, that the scale is measured with before it is corrected."""
 
 
-@step(gives=("views", "pose", "aligned", "noise", "spacing", "tolerance"))
+@step(gives=("views", "pose", "aligned", "noise", "spacing", "tolerance", "warnings"))
 def correct_views(
     part: Part, pose: Pose, aligned: Scan, noise: float, spacing: float, tolerance: float,
-    asked_tolerance: float | None, aligner: Align | None,
-) -> tuple[ViewFits | None, Pose, Scan, float, float, float]:  # fmt: skip
+    asked_tolerance: float | None, aligner: Align | None, warnings: Reasons,
+) -> tuple[ViewFits | None, Pose, Scan, float, float, float, Reasons]:  # fmt: skip
     """Compares the views, also those that only the points tell apart, and puts misplaced ones right where the alignment
-    fits views: noise, spacing and a tolerance `auto` are then measured again."""
+    fits views: noise, spacing and a tolerance `auto` are then measured again, and that little of the scan lay on the
+    part is no doubt any more."""
     label, found_by = separate_views(part, aligned, tolerance) or (None, "given")
     views = fit_views(part, aligned, tolerance, getattr(aligner, "fit_views", False), label, found_by)
     if label is not None:
         if views is None or not views.disagree:
-            return None, pose, aligned, noise, spacing, tolerance
+            return None, pose, aligned, noise, spacing, tolerance, warnings
         aligned = replace(aligned, cloud=label.astype(np.int32))
     if views is not None and any(view.is_corrected for view in views.views):
-        pose = replace(pose, T_part_scan=_make_rigid(views.common @ pose.T_part_scan))
-        aligned = views.apply(aligned)
+        before, aligned = pose, views.apply(aligned)
+        pose, _ = fit_pose(before, views.common, aligned.points, part, tolerance)
+        pose = replace(pose, T_part_scan=_make_rigid(pose.T_part_scan))
+        warnings = drop_settled(warnings, before, pose)
         noise, spacing = measure_noise_and_spacing(aligned.points)
         aligned = replace(aligned, noise=noise, spacing=spacing)
         if asked_tolerance is None:
             tolerance = min(tolerance, choose_tolerance(None, aligned, part)[0])
-    return views, pose, aligned, noise, spacing, tolerance
+    return views, pose, aligned, noise, spacing, tolerance, warnings
 
 
 @step(gives=("scan", "pose", "aligned", "corrected_scale"))

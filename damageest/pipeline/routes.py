@@ -75,8 +75,8 @@ ACQUIRE: Route = (
         add_points_near_damage,  # reader, scan, pose, part, tolerance, unit -> scan
         place_scan,  # scan, pose -> aligned, noise, spacing
     ),
-    correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner
-    #     -> views, pose, aligned, noise, spacing, tolerance
+    correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner, warnings
+    #     -> views, pose, aligned, noise, spacing, tolerance, warnings
     correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader -> scan, pose, aligned, corrected_scale
     adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, refusal, samples, tolerance, unit, views, warnings,
     #     adapter, scan -> adapted, part, aligned, pose, samples, warnings

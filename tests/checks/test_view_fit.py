@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from damageest_evaluate.parts import PARTS
 from scipy.spatial.transform import Rotation
 
+import damageest
 from damageest.artefacts import Scan
 from damageest.checks.view_fit import fit_views
+from damageest.geometry.noise import measure_noise_and_spacing
+from damageest.stages.scan.simulate import Simulate
 from tests.checks.form_scenes import NOISE, TOLERANCE, add_noise, draw_skin, get_part
 
 SCANNERS = 200.0 * np.array([(1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1), (-1, 1, 1), (1, 1, -1)])
@@ -105,3 +109,27 @@ def test_files_without_scanner_positions_are_views_as_well() -> None:
     )
     assert found is not None
     assert [one.number for one in found.views if one.is_corrected] == [1]
+
+
+def test_mixed_points_at_edges_are_no_misplaced_view() -> None:
+    """A view that sees an edge has points beside skin that others show: they scatter, and are none of its skin."""
+    part = PARTS["ribbed_plate"]()
+    scan = Simulate(points=40_000, noise=0.04, scanners=6, mixed=0.03, outliers=0.02, seed=10).run(part.unit, part)
+    noise, spacing = measure_noise_and_spacing(scan.points)
+    found = fit_views(part, Scan(scan.points, noise=noise, spacing=spacing, cloud=scan.view), 0.25, True)
+    assert found is not None
+    assert not found.disagree
+
+
+def test_views_that_are_put_right_leave_no_doubt_that_the_scan_shows_this_part() -> None:
+    """Only half of the scan lay on the part before."""
+    part = PARTS["ribbed_plate"]()
+    scanners = ((-150.0, -250.0, 300.0), (200.0, 150.0, 250.0), (0.0, 250.0, -300.0), (-200.0, -100.0, -250.0))
+    simulate = Simulate(points=12_000, noise=0.04, seed=7, scanners=scanners, misplaced=0.6, pose="random")
+    scan = simulate.run(part.unit, part)
+    job = {"version": 1, "tolerance": 0.25, "report": "none"}
+    result = damageest.run(job, part=part, scan=Scan(scan.points, viewpoints=scan.viewpoints, view=scan.view))
+    assert result.fit is not None
+    assert sum(view.is_corrected for view in result.fit.views) == 3
+    assert not [doubt for doubt in result.pose.doubts if doubt.code == "another_part"]
+    assert not [note for note in result.warnings if "another part" in note.text]
