@@ -36,6 +36,8 @@ FEWEST_IN_CUBE = 16
 SURE, BENT = 2.0, 0.1
 """Such a cube is flat where the variance of its points from a plane exceeds that of their noise by no more than
 ``SURE`` times the error of that variance, and by the square of ``BENT`` cells."""
+OF_SITE = 0.05
+"""Share of the points of a site from which a group holds the site; a few stray ones do not."""
 MOST_LOST = 5000
 """Samples of the lost skin that tell on which side of the points the lost metal is."""
 
@@ -229,7 +231,7 @@ def _group_losses(
     pairs = cKDTree(cell[first]).query_pairs(2.5, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     _, component = connected_components(links, directed=False)
-    group = component[cube]
+    group = _join_by_site(component[cube], label)
     of_points, of_bare = group[: len(points)], group[len(points) :]
     groups: list[LossGroup] = []
     sizes = np.bincount(label)
@@ -237,7 +239,7 @@ def _group_losses(
     for number in np.unique(of_points):
         members = of_points == number
         share = np.bincount(label[members], minlength=len(sizes))
-        labels = tuple(int(k) for k in np.flatnonzero(share > 0.05 * sizes))
+        labels = tuple(int(k) for k in np.flatnonzero(share > OF_SITE * sizes))
         if not labels:
             continue
         lost = bare[of_bare == number]
@@ -246,6 +248,21 @@ def _group_losses(
         surface = _build_surface(points[members], above[members], depth[members], *of_skin, noise, 0.8 * tolerance)
         groups.append(LossGroup(*surface, skin.points[lost], labels))
     return tuple(groups), lost_by
+
+
+def _join_by_site(group: Ints, label: Ints) -> Ints:
+    """The groups (M,) of points and skin samples, joined where they share a site: stage cluster may link points that
+    lie farther apart. ``label`` (N,): the sites of the points, which come first."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, sizes = int(group.max(initial=-1)) + 1, np.bincount(label)
+    pair, shared = np.unique(group[: len(label)] * len(sizes) + label, return_counts=True)
+    of_group, of_site = pair // len(sizes), pair % len(sizes)
+    many = shared > OF_SITE * sizes[of_site]
+    ends = of_group[many], count + of_site[many]
+    links = coo_array((np.ones(int(many.sum())), ends), shape=(count + len(sizes),) * 2)
+    return np.asarray(connected_components(links, directed=False)[1][group], np.int64)
 
 
 def _thin_flat(points: Floats, chosen: Ints, counts: Ints, depth: Floats, noise: float, cell: float) -> Ints:

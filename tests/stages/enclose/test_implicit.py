@@ -50,6 +50,16 @@ def test_every_site_is_in_an_enclosure_and_none_in_two() -> None:
     assert (first ^ second).volume() == pytest.approx(0, abs=1e-6)
 
 
+def test_a_site_of_two_places_is_in_one_enclosure() -> None:
+    """Stage cluster may link points over a wider gap than the enclosure does; it was in two, which is not valid."""
+    case = scene("two")
+    inputs = case.inputs()
+    sites = Sites(np.minimum(case.sites.label, 1).astype(np.int32), 1)
+    enclosures = Implicit().run(**inputs | {"sites": sites})
+    assert [item.sites for item in enclosures.items] == [(1,)]
+    assert iou(to_solid(unite(intersect_pieces(case, enclosures))), case.truth) > 0.9
+
+
 def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
     case = scene("pit")
     away = np.linalg.norm(case.aligned.points - [26, 3, 12], axis=1) < 3
