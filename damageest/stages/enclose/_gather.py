@@ -10,39 +10,18 @@ import numpy as np
 
 from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Samples, Scan, Sites
 from damageest.geometry.duplicates import group_integers
-from damageest.geometry.local_fits import average_points
 from damageest.geometry.neighbourhoods import (
     find_in_box,
     find_neighbours,
     measure_local_areas,
-    pick_one_per_cube,
-    thin_points,
 )
-from damageest.geometry.orientation import turn_toward_void
 from damageest.geometry.poisson import Grid, GridValues, refine_field
 from damageest.geometry.voxels import measure_bounds, number_cubes
-from damageest.stages.enclose._fill_gaps import fill_gaps
+from damageest.stages.enclose._loss_surface import build_surface
 from damageest.stages.enclose._skin import SkinSamples, find_held, push_outward, sample_skin_near
 
-APART = 0.75
-"""Edge of the cubes with one averaged point each, in cells of the surface."""
-
-APART_FLAT, FLAT_CUBE, RIM = 2.5, 6.0, 4.0
-"""The same where the surface is flat; edge of the cubes in which it has to be flat; depth up to which points count as
-near the rim. All in cells of the surface."""
-
-FEWEST_IN_CUBE = 16
-"""Points of such a cube from which its flatness is known; in a sparse scan nothing is left out."""
-SURE, BENT = 2.0, 0.1
-"""Such a cube is flat where the variance of its points from a plane exceeds that of their noise by no more than
-``SURE`` times the error of that variance, and by the square of ``BENT`` cells."""
 OF_SITE = 0.05
 """Share of the points of a site from which a group holds the site; a few stray ones do not."""
-MOST_LOST = 5000
-"""Samples of the lost skin that tell on which side of the points the lost metal is."""
-
-OrientedPoints = tuple[Floats, Floats, Floats]
-"""Points (M,3), unit normals (M,3) toward the lost side, and the area (M,) that each point stands for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,30 +157,6 @@ def cut_beyond_reach(grid: Grid, field: GridValues, gathered: GatheredLosses, nu
     return np.minimum(field, refine_field(cut))
 
 
-def _build_surface(
-    points: Floats, above: Floats, depth: Floats, lost: Floats, lost_normals: Floats, noise: float, cell: float
-) -> OrientedPoints:
-    """The points (M,3) of one group, smoothed, thinned and oriented toward the lost side.
-
-    ``above`` (M,3): the normal of the part's skin nearest to each point, and ``depth`` (M,) below it; ``lost`` (L,3):
-    samples of the skin that is lost with them.
-    """
-    points, counts, first = thin_points(points, 0.5 * cell)
-    # The local fits overlap much farther than this, so that more of them would add nothing.
-    chosen = pick_one_per_cube(points, APART * cell)
-    chosen = _thin_flat(points, chosen, counts, depth[first], noise, cell)
-    above, depth = above[first][chosen], depth[first][chosen]
-    points, normals = average_points(points, counts, noise, chosen)
-    size, chosen = cell, np.arange(len(lost))
-    while len(chosen) > MOST_LOST:
-        size *= 1.3
-        chosen = pick_one_per_cube(lost, size)
-    places = lost[chosen]
-    normals = turn_toward_void(points, normals, above, places, lost_normals[chosen], measure_local_areas(places), cell)
-    points, normals = fill_gaps(points, normals, depth, cell)
-    return points, normals, measure_local_areas(points)
-
-
 def _group_losses(
     points: Floats,
     above: Floats,
@@ -231,7 +186,7 @@ def _group_losses(
     pairs = cKDTree(cell[first]).query_pairs(2.5, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
     _, component = connected_components(links, directed=False)
-    group = _join_by_site(component[cube], label)
+    group = _join_by_site(component[cube].astype(np.int64), label)
     of_points, of_bare = group[: len(points)], group[len(points) :]
     groups: list[LossGroup] = []
     sizes = np.bincount(label)
@@ -245,7 +200,7 @@ def _group_losses(
         lost = bare[of_bare == number]
         lost_by[lost] = len(groups)
         of_skin = skin.points[lost], skin.normals[lost]
-        surface = _build_surface(points[members], above[members], depth[members], *of_skin, noise, 0.8 * tolerance)
+        surface = build_surface(points[members], above[members], depth[members], *of_skin, noise, 0.8 * tolerance)
         groups.append(LossGroup(*surface, skin.points[lost], labels))
     return tuple(groups), lost_by
 
@@ -263,28 +218,6 @@ def _join_by_site(group: Ints, label: Ints) -> Ints:
     ends = of_group[many], count + of_site[many]
     links = coo_array((np.ones(int(many.sum())), ends), shape=(count + len(sizes),) * 2)
     return np.asarray(connected_components(links, directed=False)[1][group], np.int64)
-
-
-def _thin_flat(points: Floats, chosen: Ints, counts: Ints, depth: Floats, noise: float, cell: float) -> Ints:
-    """Of the points ``chosen`` (M,), one in each larger cube where the surface is flat and not near the rim.
-
-    Flat are cubes of `FLAT_CUBE` cells in which the points (N,3) lie on a plane within their noise. Each is the mean
-    of ``counts`` (N,) scan points.
-    """
-    _, cube, size = group_integers(number_cubes(points, FLAT_CUBE * cell)[1])
-    mean = np.stack([np.bincount(cube, points[:, axis]) for axis in range(3)], axis=1) / size[:, None]
-    off = points - mean[cube]
-    moments = np.stack([np.bincount(cube, off[:, i] * off[:, j]) for i in range(3) for j in range(3)], axis=1)
-    variance = np.linalg.eigvalsh(moments.reshape(-1, 3, 3) / size[:, None, None])[:, 0]
-    expected = noise**2 * np.bincount(cube, 1 / counts) / size
-    most = expected * (1 + SURE * np.sqrt(2 / size)) + (BENT * cell) ** 2
-    plane = (size >= FEWEST_IN_CUBE) & (variance < most)
-    flat = plane[cube[chosen]] & (depth[chosen] > RIM * cell)
-    interior = chosen[flat]
-    if not len(interior):
-        return chosen
-    kept = interior[pick_one_per_cube(points[interior], APART_FLAT * cell)]
-    return np.sort(np.concatenate([chosen[~flat], kept]))
 
 
 def _grow_to_rim(
