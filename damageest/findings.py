@@ -249,6 +249,15 @@ class NoiseLevel:
 
 
 @dataclass(frozen=True)
+class VariogramPoint:
+    """Half the mean square by which the errors of two points differ, ``semivariance``, in the square of the job's unit,
+    where they lie ``distance`` from each other."""
+
+    distance: float
+    semivariance: float
+
+
+@dataclass(frozen=True)
 class Explained:
     """Places below the skin that views which lie apart explain: how many, their number of ``points``, the ``volume``
     that they hold at most, and the depth of the ``deepest`` point, in the job's unit."""
@@ -267,6 +276,7 @@ class Sensor:
     region of ``alike`` across. ``depth_step``: 0 where the depth is continuous. ``stray``: share of the points that lie
     off the skin and belong to no site and no surplus. A loss that is shallower than ``least_depth`` or narrower than
     ``least_width`` cannot be seen. ``levels``: noise by incidence and by distance, where scanner positions are known.
+    ``semivariogram``: how alike errors are, by the distance between the points, nearest first.
     """
 
     noise: float
@@ -277,3 +287,4 @@ class Sensor:
     least_depth: float
     least_width: float
     levels: tuple[NoiseLevel, ...] = ()
+    semivariogram: tuple[VariogramPoint, ...] = ()

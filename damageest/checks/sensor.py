@@ -12,7 +12,7 @@ import numpy as np
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Scan
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scan_quality import AUTO_STEPS, AUTO_TOLERANCE
-from damageest.findings import NoiseLevel, Sensor
+from damageest.findings import NoiseLevel, Sensor, VariogramPoint
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_faced_cubes
 
@@ -53,7 +53,7 @@ def measure_levels(part: Part, aligned: Scan, deviation: Deviation) -> tuple[Noi
 
 def describe_sensor(
     levels: Sequence[NoiseLevel], aligned: Scan, pose: PoseError, systematic: float,
-    depth_step: float, tolerance: float, stray: float,
+    depth_step: float, tolerance: float, stray: float, semivariogram: Sequence[VariogramPoint] = (),
 ) -> Sensor:  # fmt: skip
     """What the intact skin says about the sensor.
 
@@ -74,6 +74,7 @@ def describe_sensor(
         least_depth=max(tolerance, AUTO_TOLERANCE * spread, AUTO_STEPS * depth_step),
         least_width=float(2 * np.sqrt(NEEDED * area / np.pi)),
         levels=tuple(levels),
+        semivariogram=tuple(semivariogram),
     )
 
 

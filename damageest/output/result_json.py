@@ -40,6 +40,11 @@ class NoiseLevelReport(JsonModel):
     noise: float
 
 
+class VariogramReport(JsonModel):
+    distance: float = Field(description="between two intact points, mean of a range")
+    semivariance: float = Field(description="half the mean square by which their errors differ")
+
+
 class SensorReport(JsonModel):
     """The errors of the sensor, measured on intact skin."""
 
@@ -51,6 +56,7 @@ class SensorReport(JsonModel):
     least_depth: float = Field(description="shallower losses cannot be seen in this scan")
     least_width: float = Field(description="narrower losses cannot be seen in this scan")
     levels: list[NoiseLevelReport] = Field(description="empty where no scanner position is known")
+    semivariogram: list[VariogramReport] = Field(description="how alike errors are, by distance, nearest first")
 
 
 class ScanReport(JsonModel):

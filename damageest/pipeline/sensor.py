@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Ints, Part, Reason, Scan, Sites
 from damageest.checks.pose_error import PoseError, measure_pose_error
+from damageest.checks.semivariogram import measure_semivariogram
 from damageest.checks.sensor import describe_sensor, measure_levels
 from damageest.checks.two_sheets import Sheets, measure_sheets, measure_two_sheets
 from damageest.findings import Explained, Sensor
@@ -43,7 +44,8 @@ def measure_sensor(
     levels = measure_levels(part, aligned, deviation)
     stray = (deviation.label == OUTLIER) | ((deviation.label == DAMAGE) & (sites.label == 0))
     share = (int(stray.sum()) - explained.points) / max(len(stray), 1)
-    sensor = describe_sensor(levels, aligned, pose, facts.systematic, depth_step, tolerance, share)
+    variogram = measure_semivariogram(part, aligned, deviation)
+    sensor = describe_sensor(levels, aligned, pose, facts.systematic, depth_step, tolerance, share, variogram)
     return pose, sensor
 
 

@@ -38,6 +38,8 @@ def test_errors_of_a_clean_scan_are_its_noise() -> None:
     assert sensor.correlated < 0.02
     assert sensor.least_depth == pytest.approx(0.2, rel=0.15)
     assert all(one.noise == pytest.approx(0.05, rel=0.6) for one in sensor.levels)
+    assert len(sensor.semivariogram) > 6
+    assert all(one.semivariance == pytest.approx(0.05**2, rel=0.25) for one in sensor.semivariogram)
     assert {one.of for one in sensor.levels} == {"incidence", "distance"}
 
 
@@ -48,6 +50,10 @@ def test_errors_that_regions_share_are_told_from_noise() -> None:
     assert sensor.noise == pytest.approx(0.57 * UNIT, rel=0.15)
     assert 0.3 * UNIT < sensor.correlated < 0.9 * UNIT
     assert sensor.depth_step == pytest.approx(UNIT, rel=0.05) or not sensor.depth_step
+    near = next(one.semivariance for one in sensor.semivariogram if one.distance > 3 * UNIT)  # beyond one step's area
+    assert near == pytest.approx((0.57 * UNIT) ** 2, rel=0.2)
+    far = max(one.semivariance for one in sensor.semivariogram)
+    assert far == pytest.approx((0.57**2 + 0.6**2) * UNIT**2, rel=0.3), "noise, and what regions share"
     assert sensor.least_depth > 2.3 * UNIT
 
 
