@@ -140,7 +140,7 @@ class Report(JsonModel):
     material: MaterialReport = Field(description="what the whole repair takes")
     truth: TruthReport | None
     stages: list[StageReport]
-    steps: list[StepReport] = Field(description="between the stages, those that took 5 ms or more, up to the report")
+    steps: list[StepReport] = Field(description="between the stages, up to the report")
     failures: list[str] = Field(description="sites without a damage volume or a deposit, and why")
     warnings: list[ReasonReport] = Field(description="about the whole run, those first that may change a decision")
     versions: dict[str, str]

@@ -38,9 +38,6 @@ OPTIONS: dict[str, Contract] = {
 }
 """The stages whose options steps read, by the names of these values."""
 
-LISTED = 0.005
-"""Seconds from which on a step is in the list of what took time."""
-
 S = TypeVar("S", JobState, Candidate, FoundSite)
 T = TypeVar("T")
 
@@ -138,9 +135,8 @@ class Engine:
         except MemoryError:
             raise StageError(f"{what}: ran out of memory", MORE_MEMORY) from None
         seconds = time.perf_counter() - start - sum(record.seconds for record in self.records[called:])
-        if seconds >= LISTED:
-            self.steps.append(StepRecord(step.name, round(seconds, 3)))
-            _tell(self.registry.hooks.hook.damageest_after_step, step=what, seconds=seconds)
+        self.steps.append(StepRecord(step.name, round(seconds, 3)))
+        _tell(self.registry.hooks.hook.damageest_after_step, step=what, seconds=seconds)
         for name, value in step.name_values(given).items():
             earlier = ""
             if name in GATHERED:

@@ -9,6 +9,7 @@ import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, Deviation, Floats, Reason, Scan, Sites
 from damageest.checks.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
+from damageest.checks.two_sheets import FARTHEST, measure_sheets
 from damageest.errors import DamageestError, StageError
 from damageest.findings import Surplus
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples, label_strays
@@ -18,6 +19,7 @@ from damageest.pipeline.engine import Engine
 from damageest.pipeline.sites import find_place
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
+from damageest.rules.two_sheets import EXPLAINED, OF_SCAN
 from damageest.stages.cluster import Cluster
 from damageest.stages.enclose import EncloseAll
 
@@ -28,9 +30,8 @@ MOST_CLOSED = 16
 FEW, FEW_SHARE = 30, 0.001
 """Points, and share of the scan, below both of which a cluster is too small for more than an estimate of its volume: at
 the edge of what was seen it may be joined with skin that was not."""
-SHALLOW = 3.0
-"""Height in tolerances below which a surplus is a layer, as of views apart or of paint: area times height is its
-volume, and to close it costs more than all the rest of a run."""
+SHALLOW = 2.0
+"""Height in tolerances below which a surplus is a layer, as of paint: its area times its mean height is its volume."""
 MOST_SKIN = 0.5
 """Share of the part's skin from which surplus is an error of the pose, of the unit or of the tolerance."""
 EQUAL, EQUAL_TOUCHING = 1.35, 1.1
@@ -58,7 +59,7 @@ def find_surplus(engine: Engine, state: JobState) -> tuple[tuple[Surplus, ...], 
     found = describe_surplus(clusters, state.sites, state.aligned, state.deviation, state.part, state.tolerance)
     kept = _keep_metal(clusters, found)
     deviation = label_strays(state.deviation, ADDED, kept)
-    surplus = _close(own, turned, found, kept) if kept.count else found
+    surplus = _close(own, turned, found, kept, _choose_layer(state, found)) if kept.count else found
     surplus = tuple(replace(item, id=number) for number, item in enumerate(_sort(surplus), 1))
     return surplus, deviation, ()
 
@@ -131,15 +132,16 @@ def _keep_metal(clusters: Sites, found: tuple[Surplus, ...]) -> Sites:
     return Sites(number[clusters.label], len(kept))
 
 
-def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: Sites) -> list[Surplus]:
-    """The surplus with solids where they close; ``turned`` is the state of the part's complement."""
+def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: Sites, layer: float) -> list[Surplus]:
+    """The surplus with solids where they close; ``turned`` is the state of the part's complement. What is lower than a
+    ``layer`` is not closed."""
     metal = [item for item in found if item.kind != "surroundings"]
     done = [item for item in found if item.kind == "surroundings"]
     if sum(item.area for item in metal) > MOST_SKIN * turned.part.area:
         note = "surplus covers most of the part: check pose, unit and tolerance; its volume was not computed"
         return done + [replace(item, notes=(*item.notes, note)) for item in metal]
     order = sorted(range(1, len(metal) + 1), key=lambda number: -metal[number - 1].estimate)
-    open_ = {number: _say_why_open(item, turned.tolerance) for number, item in enumerate(metal, 1)}
+    open_ = {number: _say_why_open(item, layer) for number, item in enumerate(metal, 1)}
     order = [number for number in order if not open_[number]]
     tried = order[:MOST_CLOSED]  # the numbers of the clusters that are closed, in the order of their own numbers below
     renumbered = np.zeros(kept.count + 1, np.int32)
@@ -163,11 +165,21 @@ def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: S
     return done
 
 
-def _say_why_open(item: Surplus, tolerance: float) -> str:
+def _choose_layer(state: JobState, found: tuple[Surplus, ...]) -> float:
+    """Height below which a surplus is a layer. Where views lie apart, one of them is up to that far outside the skin,
+    over much of it: to close such layers costs more than all the rest of a run."""
+    layer = SHALLOW * state.tolerance
+    if not any(layer <= item.height < FARTHEST * state.tolerance for item in found):
+        return layer
+    sheets = measure_sheets(state.aligned, state.deviation, state.part, state.tolerance)
+    return max(layer, EXPLAINED * sheets.apart) if sheets.share > OF_SCAN else layer
+
+
+def _say_why_open(item: Surplus, layer: float) -> str:
     """Why no more than an estimate is asked of a surplus; empty where it is to be closed."""
     if len(item.points) < FEW and item.share < FEW_SHARE:
         return f"it has {len(item.points)} points"
-    return f"it is a layer below {SHALLOW:g} tolerances" if item.height < SHALLOW * tolerance else ""
+    return f"it is a layer lower than {layer:.3g}" if item.height < layer else ""
 
 
 def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces]:

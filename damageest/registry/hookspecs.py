@@ -74,4 +74,4 @@ def damageest_stage_failed(stage: str, use: str, site: int, error: Exception) ->
 
 @hookspec
 def damageest_after_step(step: str, seconds: float) -> None:
-    """Called after a step between the stages that took 5 ms or more; ``seconds``: without those of stages it called."""
+    """Called after a step between the stages; ``seconds``: without those of stages it called."""

@@ -42,6 +42,7 @@ def strip(folder: Path) -> dict[str, bytes]:
     if "result.json" in found:
         content = json.loads(found.pop("result.json"))
         content.pop("stages")
+        content["steps"] = [step["step"] for step in content["steps"]]
         found["result.json"] = json.dumps(content).encode()
     return found
 

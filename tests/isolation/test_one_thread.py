@@ -39,7 +39,7 @@ def run_job(program: str, path: Path, threads: str) -> dict[str, bytes]:
     subprocess.run(arguments, env=environment | {"OPENBLAS_CORETYPE": "Haswell"}, check=True, timeout=300)
     found = {name: data for name, data in damaged_box.content(out).items() if not name.startswith("stages/")}
     content = json.loads(found["result.json"])
-    for stage in content["stages"]:
+    for stage in [*content["stages"], *content["steps"]]:
         del stage["seconds"]
     found["result.json"] = json.dumps(content).encode()
     shutil.rmtree(out)

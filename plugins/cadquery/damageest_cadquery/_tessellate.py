@@ -14,9 +14,9 @@ from damageest.errors import InputError
 from damageest_cadquery._read import explore
 
 _CHECKED = 2000
-_ON_EDGES, _WITHIN = 0.97, 1.03
-"""Deflection on edges and within faces, in chords. With the same on both, a doubly curved face that is divided by the
-deflection of its edges is a few percent over it within, and OpenCASCADE divides all of its triangles by four."""
+_WITHIN = 1.06
+"""Deflection within faces, in chords, beside that on edges. With the same on both, a doubly curved face that is divided
+by the deflection of its edges is a few percent over it within, and OpenCASCADE divides all of its triangles by four."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def _tessellate_once(solids: list[Any], chord: float, angle: float, name_of: Cal
     from OCP.IMeshTools import IMeshTools_Parameters
 
     parameters = IMeshTools_Parameters()
-    parameters.Deflection, parameters.DeflectionInterior = _ON_EDGES * chord, _WITHIN * chord
+    parameters.Deflection, parameters.DeflectionInterior = chord, _WITHIN * chord
     parameters.MinSize = chord / 10
     parameters.Angle = float(np.radians(angle))
     parameters.Relative = parameters.InParallel = False
