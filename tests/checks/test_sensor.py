@@ -8,7 +8,9 @@ from damageest_evaluate.parts import PARTS
 
 import damageest
 from damageest.artefacts import Part, Scan
+from damageest.checks.sensor import map_least_depth
 from damageest.result import Result
+from damageest.stages.report._values import list_sensor
 from damageest.stages.scan.simulate import Simulate
 
 UNIT = PARTS["ribbed_plate"]().diagonal / 250
@@ -95,3 +97,20 @@ def test_a_loss_deeper_than_the_errors_is_found() -> None:
     low, high = result.sites[0].volume_95
     assert low <= result.truth[0] <= high
     assert np.isfinite(low)
+
+
+def test_where_the_scan_is_noisier_a_loss_has_to_be_deeper() -> None:
+    """By place: half of a plate is scanned with four times the noise."""
+    part = PARTS["ribbed_plate"]()
+    scan = Simulate(points=20_000, noise=0.02, scanners=6).run("mm", part)
+    noisy = scan.points[:, 0] > 0
+    extra = np.random.default_rng(3).normal(scale=0.08, size=scan.points.shape) * noisy[:, None]
+    result = run(part, Scan(scan.points + extra), 0.4)
+    assert result.sensor is not None
+    chosen = np.flatnonzero((result.deviation.label == 0) & (np.abs(result.aligned.points[:, 0]) > 5))
+    depth = map_least_depth(result.aligned, result.deviation, result.sensor, 0.05, chosen)
+    right = result.aligned.points[chosen, 0] > 0
+    assert np.median(depth[right]) > 2.5 * np.median(depth[~right])
+    assert depth.min() >= 0.05
+    (page,) = list_sensor(result)[:1]
+    assert page[1].startswith("deeper than 0.4")

@@ -23,7 +23,7 @@ from damageest.stages.report import _style as style
 from damageest.stages.report._scene import EXAGGERATED, LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
 from damageest.stages.report._sites import MOST_DRAWN, Shown
-from damageest.stages.report._values import list_fit, list_freedom, show_total_interval
+from damageest.stages.report._values import list_fit, list_freedom, list_sensor, show_total_interval
 
 FOLDER = Path(__file__).parent / "page"
 DEFINE = "window.define = (name, needs, make) => { window.k3d = make(); };"
@@ -99,6 +99,7 @@ def fill_page(
         labels=LABELS,
         fit=list_fit(result),
         freedom=list_freedom(result),
+        sensor=list_sensor(result),
         why=WHY,
         hashes=_hash_scans(result, content),
         job=job_text,

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import DAMAGE, INTACT, Floats, Mesh
+from damageest.checks.sensor import map_least_depth
 from damageest.geometry.transforms import turn_to_axis
 from damageest.io import colours
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._thin import find_sharp_edges, thin_mesh, thin_points
+from damageest.stages.report._values import choose_least_ends
 
 LAYERS = {
     "part": ("Part", True),
@@ -26,6 +28,7 @@ LAYERS = {
     "nozzle": ("Nozzle where it is tightest", False),
     "surplus": ("Surplus", True),
     "unseen": ("Skin that the scan does not show", True),
+    "least": ("Least depth of a loss that can be seen", False),
     "form": ("Form, exaggerated", False),
 }
 """Name in the page's script, to name on the page and whether it is shown at first."""
@@ -121,6 +124,7 @@ def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
             places = places[thin_points(places, most_points // 8)]
             stage.add_points(places, "surplus", 0, part.diagonal / 300, color=style.to_number(colours.SURPLUS))
     _add_unseen(stage, result, share)
+    _add_least_depth(stage, result, most_points // 4)
     exaggerate = _add_form(stage, result, min(share, FORM_TRIANGLES))
     plot = k3d.plot(
         grid_visible=False, menu_visibility=False, camera_auto_fit=False, camera_mode="trackball", axes_helper=1.0,
@@ -269,6 +273,23 @@ def _add_unseen(stage: _Stage, result: Result, share: int) -> None:
     used, number = np.unique(faces, return_inverse=True)
     skin = Mesh(coverage.skin.vertices[used], number.reshape(-1, 3))
     stage.add_mesh(thin_mesh(skin, share), "unseen", colours.UNSEEN, opacity=0.45)
+
+
+def _add_least_depth(stage: _Stage, result: Result, most: int) -> None:
+    """Adds points of the skin, coloured by the least depth of a loss that the scan can show there."""
+    import k3d
+
+    if result.sensor is None:
+        return
+    own = np.flatnonzero(result.deviation.label == INTACT)
+    chosen = own[thin_points(result.aligned.points[own], most)]
+    depth = map_least_depth(result.aligned, result.deviation, result.sensor, result.tolerance, chosen)
+    ends = choose_least_ends(result.sensor, result.tolerance)
+    stage.add_points(
+        result.aligned.points[chosen], "least", 0, _choose_point_size(result, len(chosen)),
+        attribute=np.clip(depth, ends[0], ends[1]).astype(np.float32), color_range=ends,
+        color_map=k3d.matplotlib_color_maps.Viridis,
+    )  # fmt: skip
 
 
 def _tell_nobody(_: Any) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from damageest.findings import Interval
+from damageest.findings import Interval, Sensor
 from damageest.result import Result, Site
 from damageest.stages.report._style import THIN, format_number, format_share
 
@@ -47,6 +47,28 @@ def list_fit(result: Result) -> list[tuple[str, str]]:
 def list_freedom(result: Result) -> list[tuple[str, str]]:
     """Motions of the part that the scan does not fix, in words."""
     return [("", motion.text) for motion in result.pose.free]
+
+
+def list_sensor(result: Result) -> list[tuple[str, str]]:
+    """Errors of the scan, and the smallest loss that it can show: names and values; empty where they are not known."""
+    sensor, unit = result.sensor, result.units
+    if sensor is None:
+        return []
+    rows = [
+        ("a loss can be seen", f"deeper than {format_number(sensor.least_depth, 3)} {unit} and wider than "
+         f"{format_number(sensor.least_width, 3)} {unit}"),
+        ("noise of a point", f"{format_number(sensor.noise, 3)} {unit}"),
+        ("errors that regions share", f"{format_number(sensor.correlated, 3)} {unit}"),
+    ]  # fmt: skip
+    if sensor.depth_step:
+        rows.append(("step of the depth", f"{format_number(sensor.depth_step, 3)} {unit}"))
+    low, high = (format_number(end, 3) for end in choose_least_ends(sensor, result.tolerance))
+    return [*rows, ("colours of the layer of least depth", f"from {low} {unit}, dark, to {high} {unit}, bright")]
+
+
+def choose_least_ends(sensor: Sensor, tolerance: float) -> list[float]:
+    """The ends of the colours of the least depth: the tolerance, and twice that of the whole scan."""
+    return [tolerance, 2 * max(sensor.least_depth, tolerance)]
 
 
 def list_path(site: Site, unit: str) -> list[tuple[str, str]]:

@@ -12,7 +12,7 @@ import numpy as np
 
 import damageest
 from damageest.artefacts import DAMAGE, AdaptedPart, Deviation, Reason, Scan
-from damageest.findings import Verdict
+from damageest.findings import Sensor, Verdict
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.sampling import sample_by_area
 from damageest.output.files import describe_result
@@ -46,9 +46,11 @@ def two_sites(count: int = 12_000) -> Result:
             verdict=Verdict("likely", (Reason("beside", "a part of its rim was not seen", "open", 1.0, "mm³"),)),
         ),
     )
+    sensor = Sensor(0.02, 0.01, 5.0, 0.0, 0.0, 2 * plain.tolerance, 1.0)
     return replace(
-        plain, scan=scan, aligned=scan, deviation=Deviation(distance, face, label), site_label=number, sites=sites
-    )
+        plain, scan=scan, aligned=scan, deviation=Deviation(distance, face, label), site_label=number, sites=sites,
+        sensor=sensor,
+    )  # fmt: skip
 
 
 @cache

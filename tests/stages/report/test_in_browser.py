@@ -80,7 +80,7 @@ def test_each_layer_draws_and_switches(shown: browser.Shown) -> None:
         box.uncheck()
     shown.settle()
     empty = shown.picture()
-    for layer in ("part", "scan", "points", "damage", "surface", "deposit", "surplus", "unseen"):
+    for layer in ("part", "scan", "points", "damage", "surface", "deposit", "surplus", "unseen", "least"):
         shown.switch(layer, True)
         assert count_changed(empty, shown.picture()) > 60, layer
         shown.page.uncheck(f"input[data-layer={layer}]")
