@@ -8,7 +8,7 @@ from damageest.artefacts import INTACT, Deviation, Floats, Part, Scan
 from damageest.findings import VariogramPoint
 from damageest.geometry.neighbourhoods import find_neighbours
 
-ASKED = 2000
+ASKED = 1200
 """Intact points whose pairs are compared, spread over the scan at random."""
 NEIGHBOURS = 12
 """Nearest points that each of them is compared with besides, for the shortest distances."""
