@@ -9,12 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Floats, Ints, Part, Scan
+from damageest.artefacts import INTACT, Deviation, Floats, Part, Scan
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scan_quality import AUTO_STEPS, AUTO_TOLERANCE
 from damageest.findings import NoiseLevel, Sensor, VariogramPoint
 from damageest.geometry.duplicates import group_integers
-from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.voxels import number_faced_cubes
 
 EDGE = 4.0
@@ -29,8 +28,6 @@ DISTANCES = 3
 """Ranges of the distance from the scanner whose noise is told apart."""
 FEWEST_OF_LEVEL = 200
 """Points of a range, for its noise to be told."""
-NEAR = 24
-"""Intact points whose scatter is the noise of a place."""
 NEEDED = 10
 """Points that have to lie deeper than the tolerance beside each other for a site, as stage cluster asks for."""
 
@@ -97,15 +94,3 @@ def _list_levels(ray: Floats, normals: Floats, square: Floats) -> tuple[NoiseLev
             if inside.sum() >= FEWEST_OF_LEVEL:
                 found.append(NoiseLevel(of, low, high, float(np.sqrt(square[inside].mean()))))
     return tuple(found)
-
-
-def map_least_depth(aligned: Scan, deviation: Deviation, sensor: Sensor, tolerance: float, chosen: Ints) -> Floats:
-    """The least depth of a loss that can be seen at each of the points ``chosen`` (K,): `Sensor.least_depth` with the
-    noise of the intact skin there."""
-    intact = np.flatnonzero(deviation.label == INTACT)
-    if len(intact) < FEWEST_OF_LEVEL or not len(chosen):
-        return np.full(len(chosen), sensor.least_depth)
-    near = find_neighbours(aligned.points[chosen], NEAR, aligned.points[intact])[1]
-    noise = deviation.distance[intact][near].std(axis=1)
-    least = np.maximum(AUTO_TOLERANCE * np.hypot(noise, sensor.correlated), AUTO_STEPS * sensor.depth_step)
-    return np.asarray(np.maximum(least, tolerance))

@@ -8,8 +8,8 @@ from damageest_evaluate.parts import PARTS
 
 import damageest
 from damageest.artefacts import Part, Scan
-from damageest.checks.sensor import map_least_depth
 from damageest.result import Result
+from damageest.stages.report._least_depth import map_least_depth
 from damageest.stages.report._values import list_sensor
 from damageest.stages.scan.simulate import Simulate
 

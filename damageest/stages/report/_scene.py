@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import DAMAGE, INTACT, Floats, Mesh
-from damageest.checks.sensor import map_least_depth
 from damageest.geometry.transforms import turn_to_axis
 from damageest.io import colours
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
+from damageest.stages.report._least_depth import map_least_depth
 from damageest.stages.report._thin import find_sharp_edges, thin_mesh, thin_points
 from damageest.stages.report._values import choose_least_ends
 
