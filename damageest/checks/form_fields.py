@@ -62,6 +62,11 @@ class FieldFrame:
     axes: Floats
     half: float
 
+    def list_motions(self, points: Floats, normals: Floats) -> Floats:
+        """How far each of six rigid motions moves points (N,3) along normals (N,3), as (N,6): rotations about the
+        centre, as displacement at ``half``, and shifts."""
+        return np.concatenate([np.cross((points - self.centre) / self.half, normals), normals], axis=1)
+
     def evaluate(self, fields: tuple[Field, ...], points: Floats) -> Floats:
         """The displacement (K,N,3) of points (N,3) by each of K fields with coefficient 1, in the part's frame."""
         q = (points - self.centre) @ self.axes.T / self.half

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Mesh
+from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.checks.form_fields import Field, FieldFrame
 from damageest.geometry.distance import SurfaceTree
 from damageest.geometry.duplicates import group_integers
@@ -41,6 +41,14 @@ class Skin:
         """For points (N,3) in the part's frame: distance (N,), nearest places (N,3) and the skin's normals there."""
         distance, face, place = self.tree.closest(points - self.origin)
         return distance, place + self.origin, self.normals[face]
+
+    def find_over(self, points: Floats, reach: float, tolerance: float) -> tuple[Flags, Floats, Floats, Floats]:
+        """Which of points (N,3) lie within ``reach`` of the skin and straight over it, not beside an edge; and of
+        these, K of them, the nearest places (K,3), the normals there (K,3) and the offsets (K,), positive outside."""
+        distance, places, normals = self.find_feet(points)
+        offset = np.einsum("ij,ij->i", normals, points - places)
+        over = (distance < reach) & (np.sqrt(np.maximum(distance**2 - offset**2, 0)) < NEAREST * tolerance)
+        return over, places[over], normals[over], offset[over]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +120,7 @@ class Feet:
         """The means over the cells of what is left of the points' distances after a form is undone."""
         back = form.undo(self.points)
         offset = np.einsum("ij,ij->i", self.normals, back - self.places)
-        at = (back - form.frame.centre) / form.frame.half
-        rigid = np.concatenate([np.cross(at, self.normals), self.normals], axis=1)
+        rigid = form.frame.list_motions(back, self.normals)
         bent = -np.einsum("nj,knj->nk", self.normals, form.frame.evaluate(form.fields, back))
         means = self.mean(np.concatenate([offset[:, None], rigid, bent, self.places, self.normals], axis=1))
         size = 6 + len(form.fields)
@@ -128,13 +135,10 @@ def find_feet(skin: Skin, form: Form, points: Floats, edge: float, reach: float,
     """The nearest places on the skin of points (N,3) after a form is undone; without points farther than ``reach`` and
     without those beside an edge. Cells have the width ``edge``."""
     back = form.undo(points)
-    distance, places, normals = skin.find_feet(back)
-    along = np.abs(np.einsum("ij,ij->i", normals, back - places))
-    kept = (distance < reach) & (np.sqrt(np.maximum(distance**2 - along**2, 0)) < NEAREST * tolerance)
-    if not kept.any():
-        return Feet(points[kept], places[kept], normals[kept], np.empty(0, np.int64))
-    number = number_faced_cubes(places[kept], normals[kept], edge)[1]
-    return Feet(points[kept], places[kept], normals[kept], group_integers(number)[1])
+    over, places, normals, _ = skin.find_over(back, reach, tolerance)
+    if not over.any():
+        return Feet(points[over], places, normals, np.empty(0, np.int64))
+    return Feet(points[over], places, normals, group_integers(number_faced_cubes(places, normals, edge)[1])[1])
 
 
 def weigh(offset: Floats, width: float, is_one_sided: bool = False) -> Floats:

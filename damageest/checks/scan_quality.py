@@ -6,18 +6,13 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Reason, Scan
 from damageest.errors import InputError, StageError
-
-AUTO_TOLERANCE = 4.0
-"""Lambda over the scan's noise where the job says auto: 6 in 100,000 intact points deviate by more."""
+from damageest.geometry.noise import AUTO_STEPS, AUTO_TOLERANCE
 
 FEW_POINTS = 100
 """Number of points below which a scan shows next to nothing of a part."""
 
 LEAST_TOLERANCE = 1e-6
 """Least tolerance in diagonals of the part; coordinates in single precision, as in STL, have no more digits."""
-
-AUTO_STEPS = 1.5
-"""Least lambda over the step of the scan's depth where the job says auto; a point is off by up to half a step."""
 
 RAISE = 1.12
 """How many times larger the tolerance has to become before auto raises it after the alignment."""

@@ -11,9 +11,9 @@ import numpy as np
 
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Scan
 from damageest.checks.pose_error import PoseError
-from damageest.checks.scan_quality import AUTO_STEPS, AUTO_TOLERANCE
 from damageest.findings import NoiseLevel, Sensor, VariogramPoint
 from damageest.geometry.duplicates import group_integers
+from damageest.geometry.noise import find_least_depth
 from damageest.geometry.voxels import number_faced_cubes
 
 EDGE = 4.0
@@ -53,7 +53,7 @@ def measure_levels(part: Part, aligned: Scan, deviation: Deviation) -> tuple[Noi
 
 def describe_sensor(
     levels: Sequence[NoiseLevel], aligned: Scan, pose: PoseError, systematic: float,
-    depth_step: float, tolerance: float, stray: float, semivariogram: Sequence[VariogramPoint] = (),
+    depth_step: float, tolerance: float, stray: float, semivariogram: Sequence[VariogramPoint],
 ) -> Sensor:  # fmt: skip
     """What the intact skin says about the sensor.
 
@@ -63,19 +63,22 @@ def describe_sensor(
         stray: share of the points that lie off the skin and belong to nothing.
     """
     correlated = max(pose.systematic, systematic)
-    spread = float(np.hypot(aligned.noise, correlated))
-    area = (aligned.spacing / 1.1) ** 2  # for each point, as the spacing is measured
     return Sensor(
         noise=aligned.noise,
         correlated=correlated,
         alike=float(np.sqrt(pose.patch_area)) if correlated else 0.0,
         depth_step=depth_step,
         stray=stray,
-        least_depth=max(tolerance, AUTO_TOLERANCE * spread, AUTO_STEPS * depth_step),
-        least_width=float(2 * np.sqrt(NEEDED * area / np.pi)),
+        least_depth=float(find_least_depth(np.array(aligned.noise), correlated, depth_step, tolerance)),
+        least_width=float(2 * np.sqrt(measure_shown(aligned, NEEDED) / np.pi)),
         levels=tuple(levels),
         semivariogram=tuple(semivariogram),
     )
+
+
+def measure_shown(aligned: Scan, count: int) -> float:
+    """The area of skin that a number of points of a scan cover."""
+    return count * (aligned.spacing / 1.1) ** 2  # as the spacing is measured
 
 
 def _list_levels(ray: Floats, normals: Floats, square: Floats) -> tuple[NoiseLevel, ...]:

@@ -82,11 +82,10 @@ class ViewFits:
             every &= ~own
         for own, move in [(every, self.common), *places]:
             points[own] = move_points(points[own], move)
-            if scanners is not None and aligned.view is not None:
+            if scanners is not None and aligned.view is not None and aligned.viewpoints is not None:
                 # a scanner moves with its view; where points of one scanner move in two ways, the last one counts
                 seen = np.unique(aligned.view[own])
                 seen = seen[seen >= 0]
-                assert aligned.viewpoints is not None
                 scanners[seen] = move_points(aligned.viewpoints[seen], move)
         return replace(aligned, points=points, viewpoints=scanners)
 
@@ -108,7 +107,7 @@ class ViewFits:
                 explained[own] |= signed_distance(back, part)[0] > -tolerance
             is_near = depth[own] < EXPLAINED * one.apart
             if one.is_elsewhere and self.frame is not None:
-                rows = np.concatenate([np.cross((at - self.frame.centre) / self.frame.half, normals), normals], axis=1)
+                rows = self.frame.list_motions(at, normals)
                 is_free = np.einsum("ni,ij,nj->n", rows, self.free[one.number], rows) > FREE
                 explained[own] |= is_free & is_near
             if not one.is_corrected and one.left > APART * tolerance:

@@ -12,7 +12,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.checks.form_fields import FieldFrame
-from damageest.checks.form_fit import FEWEST, LARGEST, NEAREST, Skin, make_motion, weigh
+from damageest.checks.form_fit import FEWEST, LARGEST, Skin, make_motion, weigh
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_cubes, number_faced_cubes
 
@@ -92,11 +92,8 @@ def pair_views(
     skin: Skin, frame: FieldFrame, points: Floats, view: Ints, gap: float, reach: float, tolerance: float
 ) -> Pairs:
     """The pairs of points (N,3) of views (N,) that lie within ``reach`` of the skin, straight over it."""
-    distance, places, normals = skin.find_feet(points)
-    along = np.einsum("ij,ij->i", normals, points - places)
-    kept = (distance < reach) & (np.sqrt(np.maximum(distance**2 - along**2, 0)) < NEAREST * tolerance)
-    points, places, normals, offset = (one[kept] for one in (points, places, normals, along))
-    view = view[kept]
+    over, places, normals, offset = skin.find_over(points, reach, tolerance)
+    points, view = points[over], view[over]
     if not len(points):
         none = np.empty(0, np.int64)
         return Pairs(none, none, none, np.empty(0), np.empty((0, 6)), np.empty(0), np.empty(0, bool))
@@ -106,7 +103,7 @@ def pair_views(
     count = int(view.max()) + 1
     first, pair, _ = group_integers(cell * count + view)
     size = np.bincount(pair).astype(np.float64)
-    rows = np.concatenate([offset[:, None], np.cross((points - frame.centre) / frame.half, normals), normals], axis=1)
+    rows = np.concatenate([offset[:, None], frame.list_motions(points, normals)], axis=1)
     means = np.stack([np.bincount(pair, column) for column in rows.T], axis=1) / size[:, None]
     many = size >= FEWEST
     cell, view, patch = (one[first][many] for one in (cell, view, patch))
@@ -216,10 +213,15 @@ def _find_certain(hessian: Floats, variance: float, tolerance: float) -> Floats:
     return np.asarray(motions[:, error < CERTAIN * tolerance])
 
 
+def deal_patches(patch: Ints, count: int) -> Ints:
+    """Which of ``count`` shares each of some patches (N,) is in: neighbours in any, the same in each run."""
+    return np.asarray(patch * 2654435761 % 1048573 % count)
+
+
 def _cross_validate(pairs: Pairs, count: int, width: float, tolerance: float) -> float:
     """Share of the cost that the motions explain which they also explain on patches that they were not fitted to. Above
     that of one motion of all views."""
-    fold = (pairs.patch * 2654435761 % 1048573) % FOLDS
+    fold = deal_patches(pairs.patch, FOLDS)
     gain = [0.0, 0.0]
     for number in range(FOLDS):
         out = fold == number

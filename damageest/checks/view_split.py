@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan
-from damageest.checks.form_fit import NEAREST, Skin, weigh
+from damageest.checks.form_fields import FieldFrame
+from damageest.checks.form_fit import Skin, weigh
 from damageest.checks.two_sheets import LEAST_NOISE, find_sheets
 from damageest.checks.view_fit import (
     APART,
@@ -20,7 +21,7 @@ from damageest.checks.view_fit import (
     FoundBy,
     number_views,
 )
-from damageest.checks.view_joint import PER_CELL, PER_PATCH
+from damageest.checks.view_joint import PER_CELL, PER_PATCH, deal_patches
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_cubes, number_faced_cubes
@@ -70,18 +71,15 @@ class _Points:
     def measure(cls, skin: Skin, part: Part, aligned: Scan, index: Ints, tolerance: float) -> _Points:
         """Those of the points ``index`` (M,) of the scan."""
         points = aligned.points[index]
-        distance, places, normals = skin.find_feet(points)
-        offset = np.einsum("ij,ij->i", normals, points - places)
-        beside = np.sqrt(np.maximum(distance**2 - offset**2, 0))
-        kept = (distance < REACH * tolerance) & (beside < NEAREST * tolerance)
-        places, normals = places[kept], normals[kept]
-        at = (points[kept] - part.bounds.mean(axis=0)) / (part.diagonal / 2)
-        rows = np.concatenate([np.cross(at, normals), normals], axis=1)
-        if not kept.any():
-            return cls(index[kept], offset[kept], rows, index[kept], index[kept])
+        over, places, normals, offset = skin.find_over(points, REACH * tolerance, tolerance)
+        index = index[over]
+        frame = FieldFrame(part.bounds.mean(axis=0), np.eye(3), part.diagonal / 2)
+        rows = frame.list_motions(points[over], normals)
+        if not over.any():
+            return cls(index, offset, rows, index, index)
         gap = float(np.sqrt(part.area / COMPARED))
         cell = group_integers(number_faced_cubes(places, normals, PER_CELL * gap)[1])[1]
-        return cls(index[kept], offset[kept], rows, cell, number_cubes(places, PER_PATCH * gap)[1])
+        return cls(index, offset, rows, cell, number_cubes(places, PER_PATCH * gap)[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +120,7 @@ class _Apart:
         before = self.measure_cost(np.zeros(6), width)
         if before - self.measure_cost(motion, width) < EXPLAINED * before:
             return False
-        half = self.patch * 2654435761 % 1048573 % 2 == 0
+        half = deal_patches(self.patch, 2) == 0
         gain = [0.0, 0.0]
         for out in (half, ~half):
             if not out.any() or out.all():

@@ -5,9 +5,10 @@ from __future__ import annotations
 from contextlib import suppress
 
 from damageest.artefacts import Pose
-from damageest.checks.scan_quality import AUTO_TOLERANCE, require_tolerance
+from damageest.checks.scan_quality import require_tolerance
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.noise import AUTO_TOLERANCE
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState

@@ -45,9 +45,8 @@ T = TypeVar("T")
 @dataclass
 class Engine:
     """One run of a job. ``records`` of stages and ``steps`` grow as it goes; ``stems`` are the cache entries that it
-    used. ``silent``: it
-    calls stages on values that are not the job's own, and observers do not get these calls. ``limits``: of each stage,
-    of memory for those that run in a process of their own."""
+    used. ``silent``: it calls stages on values that are not the job's own, and observers do not get these calls.
+    ``limits``: of each stage, of memory for those that run in a process of their own."""
 
     job: Job
     registry: Registry

@@ -33,7 +33,7 @@ from damageest.pipeline.prepare import (
     take_tolerance,
 )
 from damageest.pipeline.selections import check_selections
-from damageest.pipeline.sensor import fold_hidden, measure_sensor, set_explained_aside
+from damageest.pipeline.sensor import fold_hidden, look_for_sheets, measure_sensor, set_explained_aside
 from damageest.pipeline.sites import (
     gather_sites,
     number_sites,
@@ -85,12 +85,13 @@ ACQUIRE: Route = (
     check_intact,  # deviation, tolerance, part, segmenter ->
     inspect_skin,  # part, aligned, deviation, tolerance -> skin, deviation
     Cluster,  # aligned, deviation, tolerance -> sites
-    find_surplus,  # calls Cluster, EncloseAll: unit, aligned, deviation, tolerance, part, sites, samples
+    look_for_sheets,  # part, aligned, deviation, tolerance -> sheets
+    find_surplus,  # calls Cluster, EncloseAll: unit, sheets, aligned, deviation, tolerance, part, sites, samples
     #     -> surplus, deviation, +warnings
     fit_model,  # part, aligned, adapted, deviation, surplus, tolerance, unit, views, corrected_scale
     #     -> fitted, +warnings
-    set_explained_aside,  # part, aligned, deviation, sites, views, tolerance, aligner, accept
-    #     -> sites, sheets, explained
+    set_explained_aside,  # part, aligned, deviation, sites, sheets, views, tolerance, aligner, accept
+    #     -> sites, explained
     gather_intact,  # aligned, deviation, sites -> intact, +warnings
 )
 BY_SITE: Route = (

@@ -9,7 +9,7 @@ import numpy as np
 from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Ints, Part, Reason, Scan, Sites
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.semivariogram import measure_semivariogram
-from damageest.checks.sensor import describe_sensor, measure_levels
+from damageest.checks.sensor import describe_sensor, measure_levels, measure_shown
 from damageest.checks.two_sheets import Sheets, measure_sheets, measure_two_sheets
 from damageest.findings import Explained, Sensor
 from damageest.job.model import Accept
@@ -49,20 +49,24 @@ def measure_sensor(
     return pose, sensor
 
 
+@step(gives="sheets")
+def look_for_sheets(part: Part, aligned: Scan, deviation: Deviation, tolerance: float) -> Sheets:
+    """Looks for two surfaces over the same skin."""
+    return measure_sheets(aligned, deviation, part, tolerance)
+
+
 @step(
-    gives=("sites", "sheets", "explained"),
-    reads=("part", "aligned", "deviation", "sites", "views", "tolerance", "aligner", "accept"),
+    gives=("sites", "explained"),
+    reads=("part", "aligned", "deviation", "sites", "sheets", "views", "tolerance", "aligner", "accept"),
 )
-def set_explained_aside(state: JobState) -> tuple[Sites, Sheets, Explained]:
-    """Looks for two surfaces over the same skin, and takes clusters of points that views which lie apart explain for no
-    sites: their verdict would be doubtful, whatever their volume is. What is deeper than the views explain stays, and
-    what the job accepts by number."""
+def set_explained_aside(state: JobState) -> tuple[Sites, Explained]:
+    """Takes clusters of points that views which lie apart explain for no sites: their verdict would be doubtful,
+    whatever their volume is. What is deeper than the views explain stays, and what the job accepts by number."""
     part, aligned, deviation, sites = state.part, state.aligned, state.deviation, state.sites
-    views, tolerance = state.views, state.tolerance
-    sheets = measure_sheets(aligned, deviation, part, tolerance)
+    views, sheets, tolerance = state.views, state.sheets, state.tolerance
     is_apart = sheets.share > OF_SCAN or (views is not None and views.disagree)
     if not is_apart or not _is_folding(state.aligner, state.accept):
-        return sites, sheets, Explained()
+        return sites, Explained()
     apart = max([sheets.apart, *(one.apart for one in (views.views if views else ()))])
     gone = []
     for number in range(1, sites.count + 1):
@@ -76,18 +80,15 @@ def set_explained_aside(state: JobState) -> tuple[Sites, Sheets, Explained]:
         ):
             gone.append(number)
     if not gone:
-        return sites, sheets, Explained()
+        return sites, Explained()
     members = np.flatnonzero(np.isin(sites.label, gone))
     deepest = float(-deviation.distance[members].min())
     volume = sum(limit_shown(aligned, deviation, sites.members(number)) for number in gone)
     new = np.zeros(sites.count + 1, np.int32)
     kept = np.setdiff1d(np.arange(1, sites.count + 1), gone)
     new[kept] = np.arange(1, len(kept) + 1)
-    return (
-        replace(sites, label=new[sites.label], count=len(kept)),
-        sheets,
-        Explained(len(gone), len(members), volume, deepest),
-    )
+    explained = Explained(len(gone), len(members), volume, deepest)
+    return replace(sites, label=new[sites.label], count=len(kept)), explained
 
 
 @step(
@@ -122,7 +123,7 @@ def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]
 def limit_shown(aligned: Scan, deviation: Deviation, members: Ints) -> float:
     """How much scan points ``members`` (M,) show at most of a loss: the skin that they cover, and twice as much beside
     it, where it is shallower than the tolerance, times the largest depth."""
-    area = 3 * len(members) * (aligned.spacing / 1.1) ** 2
+    area = 3 * measure_shown(aligned, len(members))
     return area * max(float(-deviation.distance[members].min(initial=0.0)), 0.0)
 
 

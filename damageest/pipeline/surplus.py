@@ -9,7 +9,7 @@ import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, Deviation, Floats, Reason, Scan, Sites
 from damageest.checks.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
-from damageest.checks.two_sheets import FARTHEST, measure_sheets
+from damageest.checks.two_sheets import FARTHEST
 from damageest.errors import DamageestError, StageError
 from damageest.findings import Surplus
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples, label_strays
@@ -39,7 +39,7 @@ EQUAL, EQUAL_TOUCHING = 1.35, 1.1
 the loss, and may be a weld bead on it."""
 
 
-@step(gives=("surplus", "deviation", "warnings"), reads=("unit",), calls=(Cluster, EncloseAll))
+@step(gives=("surplus", "deviation", "warnings"), reads=("unit", "sheets"), calls=(Cluster, EncloseAll))
 def find_surplus(engine: Engine, state: JobState) -> tuple[tuple[Surplus, ...], Deviation, Reasons]:
     """Finds added metal and surroundings, and the volume of the former.
 
@@ -140,10 +140,10 @@ def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: S
     if sum(item.area for item in metal) > MOST_SKIN * turned.part.area:
         note = "surplus covers most of the part: check pose, unit and tolerance; its volume was not computed"
         return done + [replace(item, notes=(*item.notes, note)) for item in metal]
-    order = sorted(range(1, len(metal) + 1), key=lambda number: -metal[number - 1].estimate)
     open_ = {number: _say_why_open(item, layer) for number, item in enumerate(metal, 1)}
-    order = [number for number in order if not open_[number]]
-    tried = order[:MOST_CLOSED]  # the numbers of the clusters that are closed, in the order of their own numbers below
+    closed = [number for number, why in open_.items() if not why]
+    # the numbers of the clusters that are closed, in the order of their own numbers below
+    tried = sorted(closed, key=lambda number: -metal[number - 1].estimate)[:MOST_CLOSED]
     renumbered = np.zeros(kept.count + 1, np.int32)
     renumbered[tried] = np.arange(1, len(tried) + 1)
     reason, pieces = "no closed surface could be reconstructed through its points", []
@@ -168,11 +168,10 @@ def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: S
 def _choose_layer(state: JobState, found: tuple[Surplus, ...]) -> float:
     """Height below which a surplus is a layer. Where views lie apart, one of them is up to that far outside the skin,
     over much of it: to close such layers costs more than all the rest of a run."""
-    layer = SHALLOW * state.tolerance
-    if not any(layer <= item.height < FARTHEST * state.tolerance for item in found):
+    layer, sheets = SHALLOW * state.tolerance, state.sheets
+    if sheets.share <= OF_SCAN or not any(layer <= item.height < FARTHEST * state.tolerance for item in found):
         return layer
-    sheets = measure_sheets(state.aligned, state.deviation, state.part, state.tolerance)
-    return max(layer, EXPLAINED * sheets.apart) if sheets.share > OF_SCAN else layer
+    return max(layer, EXPLAINED * sheets.apart)
 
 
 def _say_why_open(item: Surplus, layer: float) -> str:

@@ -7,11 +7,10 @@ import numpy as np
 from damageest.artefacts import INTACT, Deviation, Floats, Ints, Scan
 from damageest.findings import Sensor
 from damageest.geometry.neighbourhoods import find_neighbours
+from damageest.geometry.noise import find_least_depth
 
 NEAR, FEWEST = 24, 200
 """Intact points whose scatter is the noise of a place, and of the whole scan, below which the places are not told."""
-NOISES, STEPS = 4.0, 1.5
-"""How many standard deviations of the errors, and steps of the depth, a loss has to be deep, as in `Sensor`."""
 
 
 def map_least_depth(aligned: Scan, deviation: Deviation, sensor: Sensor, tolerance: float, chosen: Ints) -> Floats:
@@ -22,5 +21,4 @@ def map_least_depth(aligned: Scan, deviation: Deviation, sensor: Sensor, toleran
         return np.full(len(chosen), sensor.least_depth)
     near = find_neighbours(aligned.points[chosen], NEAR, aligned.points[intact])[1]
     noise = deviation.distance[intact][near].std(axis=1)
-    least = np.maximum(NOISES * np.hypot(noise, sensor.correlated), STEPS * sensor.depth_step)
-    return np.asarray(np.maximum(least, tolerance))
+    return find_least_depth(noise, sensor.correlated, sensor.depth_step, tolerance)

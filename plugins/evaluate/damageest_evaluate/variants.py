@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
 
-from damageest.checks.scan_quality import AUTO_TOLERANCE
 from damageest.errors import InputError
+from damageest.geometry.noise import AUTO_TOLERANCE
 from damageest.geometry.units import unit_factor
 from damageest.job.yamlfile import parse
 
