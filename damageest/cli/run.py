@@ -205,7 +205,7 @@ def _print_table(result: Result, target: Path) -> None:
 
     from damageest.findings import describe_interval
     from damageest.rules.advice import list_topics
-    from damageest.rules.notes import cap_notes, list_notes
+    from damageest.rules.notes import cap_notes, list_notes, qualify_nothing
 
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 160)
 
@@ -232,8 +232,8 @@ def _print_table(result: Result, target: Path) -> None:
         known = "" if result.volume_95 is None else f" (95 %: {describe_interval(result.volume_95)})"
         show(f"damage volume: {result.damage_volume:.6g} {unit}³{known}; part volume: {result.part.volume:.6g} {unit}³")
     elif not result.failures:
-        depth = f"{result.tolerance:.4g} {unit}"
-        show(f"no damage deeper than the tolerance of {depth} was found{_on_seen(result)}")
+        where = f"{_on_seen(result)}{qualify_nothing(result.warnings)}"
+        show(f"no damage deeper than the tolerance of {result.tolerance:.4g} {unit} was found{where}")
         if result.pose.free and result.volume_95 and result.volume_95[1] > 0:
             most = f"{result.volume_95[1]:.4g} {unit}³"
             show(f"the pose is free: wear of up to {most} over a whole face would not show; see align.datum")

@@ -16,7 +16,7 @@ from damageest.checks.model_fit import FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import ViewFits, fit_views
 from damageest.checks.view_split import separate_views
-from damageest.findings import Surplus
+from damageest.findings import Explained, Surplus
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import find_nearby
 from damageest.geometry.noise import measure_noise_and_spacing
@@ -138,7 +138,8 @@ def _tell_adapted(fitted: FittedModel | None, adapted: AdaptedPart | None) -> Fi
 @step(gives=("fitted", "warnings"))
 def question_fit(
     fitted: FittedModel | None, surplus: tuple[Surplus, ...], found: tuple[FoundSite, ...], pose: Pose, aligned: Scan,
-    adapted: AdaptedPart | None, deviation: Deviation, skin: SkinView, unit: str, tolerance: float, warnings: Reasons,
+    adapted: AdaptedPart | None, deviation: Deviation, skin: SkinView, unit: str, tolerance: float,
+    explained: Explained, warnings: Reasons,
 ) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
     """Withdraws the statement that the part as designed explains the intact skin, where there are doubts."""
     if fitted is None or fitted.fit.model != "ok":
@@ -147,6 +148,8 @@ def question_fit(
     displaced = frozenset(site.number for site in found if clusters & set(site.clusters))
     verdicts = {site.number: site.verdict for site in found}
     doubts = find_fit_doubts(pose, verdicts, surplus, displaced, aligned, deviation, skin)
+    if explained.places:
+        doubts += ("views lie apart",)
     if not doubts:
         return fitted, warnings
     fit = describe_fit(replace(fitted.fit, model="open"), unit, tolerance, doubts)

@@ -9,7 +9,7 @@ import numpy as np
 from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Ints, Part, Reason, Scan, Sites
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.semivariogram import measure_semivariogram
-from damageest.checks.sensor import describe_sensor, measure_levels, measure_shown
+from damageest.checks.sensor import NEEDED, describe_sensor, measure_levels, measure_shown
 from damageest.checks.two_sheets import Sheets, measure_sheets, measure_two_sheets
 from damageest.findings import Explained, Sensor
 from damageest.job.model import Accept
@@ -27,7 +27,8 @@ doubtful to be no sites."""
 BEYOND = 1.645
 """How many standard deviations of the errors a site has to be deeper than a tolerance `auto`, for the same."""
 DEEPEST = 0.95
-"""Share of the points of a cluster above the depth that has to be within what views apart explain."""
+"""Share of the points of a cluster above the depth that has to be within what views apart explain. As many points
+deeper than that as a site needs may be a loss, in however large a cluster."""
 CAUSES = ("shallow", "views", "stray")
 """What explains a site that is no loss: too shallow for the sensor, in views that lie apart, a few stray points."""
 UNSUPPORTED = {"intact_over", "intact_inside", "beyond_points", "off_boundary", "scattered"}
@@ -72,7 +73,8 @@ def set_explained_aside(state: JobState) -> tuple[Sites, Explained]:
     for number in range(1, sites.count + 1):
         members = sites.members(number)
         depth = -deviation.distance[members]
-        if not len(depth) or np.quantile(depth, DEEPEST) > EXPLAINED * apart:
+        most = EXPLAINED * apart
+        if not len(depth) or np.quantile(depth, DEEPEST) > most or np.count_nonzero(depth > most) >= NEEDED:
             continue
         own = measure_two_sheets(aligned, deviation, part, members, tolerance)
         if explains(own, float(np.median(depth)), *sheets) or (

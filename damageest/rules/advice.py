@@ -96,10 +96,11 @@ TOPICS = (
     Topic(
         "views",
         "The views do not fit together",
-        ("two_sheets", "one_motion"),
+        ("two_sheets", "one_motion", "misplaced_view"),
         "Register the views to each other again. Or give each view as a file of its own, with the position of its "
         "scanner: align: register then compares them and puts each view right that fixes its pose by itself. Views "
-        "that were merged into one file cannot be told apart. To find out which view is wrong, run each alone.",
+        "that were merged into one file are told apart only where they follow each other in it. To find out which view "
+        "is wrong, run each alone.",
         "scan:\n"
         "  - {path: view-1.ply, viewpoint: [0, -400, 350]}\n"
         "  - {path: view-2.ply, viewpoint: [0, 400, 350]}\n"

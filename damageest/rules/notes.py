@@ -125,3 +125,8 @@ def cap_notes(notes: Sequence[str]) -> list[str]:
         return list(notes)
     more = len(notes) - MOST_PRINTED + 1
     return [*notes[: MOST_PRINTED - 1], f"{more} more notes are in result.json and report.html"]
+
+
+def qualify_nothing(notes: Iterable[Reason]) -> str:
+    """What belongs after "no damage was found" where places were taken for errors of the scan; else empty."""
+    return " that errors of the scan do not explain" if any(note.code == "below_noise" for note in notes) else ""

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from damageest_evaluate.parts import PARTS
 from scipy.spatial.transform import Rotation
 
 import damageest
@@ -13,6 +14,7 @@ from damageest.artefacts import Floats, Scan
 from damageest.checks.view_fit import fit_views
 from damageest.checks.view_split import separate_views
 from damageest.geometry.distance import distance_to_mesh
+from damageest.stages.scan.simulate import Simulate
 from tests.checks.form_scenes import NOISE, TOLERANCE, add_noise, draw_skin, get_part
 
 SCANNERS = np.array([(1.0, 0.3, 1.0), (-0.8, 0.5, 1.0), (0.1, -1.0, 0.9)])
@@ -123,3 +125,20 @@ def test_views_that_two_surfaces_tell_apart_give_no_site_and_one_line() -> None:
     (told,) = [note for note in result.warnings if note.code == "below_noise"]
     assert "two surfaces" in told.text
     assert told.amount
+
+
+def test_a_loss_under_views_that_lie_apart_stays_a_site() -> None:
+    """It is in one cluster with the skin of a view that lies too deep, and deeper than that explains."""
+    part = PARTS["ribbed_plate"]()
+    loss = {"tool": "blob", "centre": [-20, -26, 17], "radius": 7, "seed": 5}
+    simulate = {"points": 40_000, "noise": 0.04, "seed": 7, "scanners": [[-150, -250, 300], [200, 250, 300]]}
+    scan = Simulate.model_validate(simulate | {"misplaced": 0.5, "damage": [loss], "pose": "random"}).run(
+        part.unit, part
+    )
+    job = {"version": 1, "tolerance": 0.25, "report": "none"}
+    result = damageest.run(job, part=part, scan=Scan(scan.points))
+    assert result.sites
+    assert max(site.max_depth for site in result.sites) > 1
+    assert "below_noise" in {note.code for note in result.warnings}
+    assert result.fit is not None
+    assert result.fit.model != "ok"

@@ -18,7 +18,7 @@ from damageest.errors import StageError
 from damageest.io import colours
 from damageest.io.files import embed_png, file_sha256
 from damageest.result import Result
-from damageest.rules.notes import fold_notes
+from damageest.rules.notes import fold_notes, qualify_nothing
 from damageest.stages.report import _style as style
 from damageest.stages.report._scene import EXAGGERATED, LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
@@ -127,7 +127,7 @@ def describe_run(result: Result) -> str:
                 f"Incomplete: {_count(len(result.failures), 'site')} without a damage volume, and no other was found."
             )
         depth = f"{style.format_number(result.tolerance)} {result.units}"
-        return f"No damage deeper than the tolerance of {depth} was found{on}."
+        return f"No damage deeper than the tolerance of {depth} was found{on}{qualify_nothing(result.warnings)}."
     levels = [site.verdict.level for site in result.sites]
     parts = [f"{levels.count(level)} {level}" for level in ("proven", "likely", "doubtful") if level in levels]
     counted = f"all {levels[0]}" if len(parts) == 1 and len(levels) > 1 else ", ".join(parts)
