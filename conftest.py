@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,15 @@ import pytest
 import trimesh
 
 from damageest.registry import Registry
+
+
+@pytest.fixture(scope="session", autouse=True)
+def part_store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """What is kept of parts goes to a folder of the session, not to the user's."""
+    folder = tmp_path_factory.mktemp("kept") / "parts"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DAMAGEEST_CACHE", str(folder))
+        yield folder
 
 
 @pytest.fixture(scope="session")

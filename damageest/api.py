@@ -12,6 +12,7 @@ import numpy as np
 from damageest.artefacts import Part, Scan
 from damageest.errors import InputError
 from damageest.io.files import resolve_path, working_folder
+from damageest.io.part_store import use_part_store
 from damageest.isolation import Limits, keep_one_thread
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
@@ -53,18 +54,19 @@ def run(
     if not isinstance(job, Job):
         source, given = _split(job, part, scan)
         job = load(source, registry, settings, given)
-    if output is False:
-        engine = Engine(job, registry, limits=limits)
-        return follow(route_of(job.method), engine, start(engine)).result
-    target = job.output if output is True else resolve_path(Path(output), working_folder())
-    job = replace(job, stages={contract: stage.leave_out(target) for contract, stage in job.stages.items()})
-    with open_workspace(target, cache) as place:
-        engine = Engine(job, registry, place.cache, limits=limits)
-        state = start(engine).with_value(JobState.folder, place.folder, digest(str(target)))
-        state = state.with_value(JobState.target, target, digest(str(target)))
-        result = follow((*route_of(job.method), *WRITE), engine, state).result
-        place.finish(engine.stems)
-    return result
+    with use_part_store(cache):
+        if output is False:
+            engine = Engine(job, registry, limits=limits)
+            return follow(route_of(job.method), engine, start(engine)).result
+        target = job.output if output is True else resolve_path(Path(output), working_folder())
+        job = replace(job, stages={contract: stage.leave_out(target) for contract, stage in job.stages.items()})
+        with open_workspace(target, cache) as place:
+            engine = Engine(job, registry, place.cache, limits=limits)
+            state = start(engine).with_value(JobState.folder, place.folder, digest(str(target)))
+            state = state.with_value(JobState.target, target, digest(str(target)))
+            result = follow((*route_of(job.method), *WRITE), engine, state).result
+            place.finish(engine.stems)
+        return result
 
 
 def _split(

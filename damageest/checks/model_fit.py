@@ -66,6 +66,15 @@ class FittedModel:
         return np.asarray(np.einsum("ij,ij->i", at - places, normals))
 
 
+@dataclass(frozen=True, eq=False)
+class AskedFit:
+    """The fit of the model (None where it could not be measured) as it was with this ``tolerance`` and ``noise``."""
+
+    fitted: FittedModel | None
+    tolerance: float
+    noise: float
+
+
 def measure_fit(
     part: Part, points: Floats, distance: Floats, noise: float, tolerance: float, unit: str,
     views: ViewFits | None, corrected_scale: float = 1.0,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import AdaptedPart, Deviation, Floats, Part, Pose, Samples, Scan
-from damageest.checks.model_fit import measure_fit
+from damageest.checks.model_fit import AskedFit, measure_fit
 from damageest.checks.two_sheets import measure_sheets
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
@@ -41,7 +41,7 @@ BY_FORM = "another_part"
 
 
 @step(
-    gives=("adapted", "part", "aligned", "pose", "samples", "warnings"),
+    gives=("adapted", "part", "aligned", "pose", "samples", "asked_fit", "warnings"),
     reads=(
         "part", "aligned", "pose", "refusal", "samples", "tolerance", "unit", "views", "warnings", "adapter"
     ),
@@ -49,12 +49,13 @@ BY_FORM = "another_part"
 )  # fmt: skip
 def adapt_part(
     engine: Engine, state: JobState
-) -> tuple[AdaptedPart | None, Part, Scan, Pose, Samples, Reasons]:  # fmt: skip
+) -> tuple[AdaptedPart | None, Part, Scan, Pose, Samples, AskedFit | None, Reasons]:  # fmt: skip
     """Calls `adapt`, unless the job takes the part as designed, and puts what it gives in the place of the part, with
-    the scan and its pose moved onto it, and samples on its skin. Raises the refusal of stage `align` where the adapted
-    part does not explain the scan either."""
-    as_designed = (None, state.part, state.aligned, state.pose, state.samples)
-    called, failed = call_adapt(engine, state)
+    the scan and its pose moved onto it, and samples on its skin. Where the fit of the model was measured to ask whether
+    the part is as designed, and the part stays so, it gives that too. Raises the refusal of stage `align` where the
+    adapted part does not explain the scan either."""
+    called, asked, failed = call_adapt(engine, state)
+    as_designed = (None, state.part, state.aligned, state.pose, state.samples, asked)
     if called is None or called.get(Adapt.gives) is None:
         if state.refusal is not None:
             raise state.refusal
@@ -73,7 +74,7 @@ def adapt_part(
         with suppress(StageError):  # a given pose, which the adapted part moves away from, keeps its doubts
             pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
     kept = drop_settled(state.warnings, state.pose, pose)
-    return adapted, adapted.part, aligned, pose, samples, (*kept, *make_notes("adapt", adapted.notes))
+    return adapted, adapted.part, aligned, pose, samples, None, (*kept, *make_notes("adapt", adapted.notes))
 
 
 def drop_settled(warnings: Reasons, before: Pose, after: Pose) -> Reasons:
@@ -82,42 +83,43 @@ def drop_settled(warnings: Reasons, before: Pose, after: Pose) -> Reasons:
     return [note for note in warnings if note.code != "align" or note.text not in settled]
 
 
-def call_adapt(engine: Engine, state: JobState) -> tuple[JobState | None, tuple[str, ...]]:
+def call_adapt(engine: Engine, state: JobState) -> tuple[JobState | None, AskedFit | None, tuple[str, ...]]:
     """The state after `adapt`; None where it is not asked for, or fails where nobody asked for it by name, with a note
-    of why."""
+    of why. And the fit of the model, where it was measured to ask."""
     stage = state.adapter
     if Adapt in engine.job.given:
-        return engine.call(Adapt, state), ()
+        return engine.call(Adapt, state), None, ()
     if stage is None or not stage.deforms:
-        return None, ()
-    if stage.asks_first and state.refusal is None and not is_asked_for(state):
-        return None, ()
+        return None, None, ()
+    asked = None
+    if stage.asks_first and state.refusal is None and not any(doubt.code == BY_FORM for doubt in state.pose.doubts):
+        asked, is_asked_for = ask_form(state)
+        if not is_asked_for:
+            return None, asked, ()
     try:
-        return engine.call(Adapt, state), ()
+        return engine.call(Adapt, state), asked, ()
     except StageError as error:
         if not stage.asks_first:
             raise
-        return None, (f"the part was not adapted: {error.message}; the result is that of the part as designed",)
+        return None, asked, (f"the part was not adapted: {error.message}; the result is that of the part as designed",)
 
 
-def is_asked_for(state: JobState) -> bool:
-    """Whether the intact skin shows a part that is not as designed: a form that the fit of the model names, or a scan
-    of which too little lies on the part in the best pose. Where views lie apart, a form has to be larger than that: a
-    field would follow the views."""
-    if any(doubt.code == BY_FORM for doubt in state.pose.doubts):
-        return True
+def ask_form(state: JobState) -> tuple[AskedFit, bool]:
+    """The fit of the model, and whether the intact skin shows a part that is not as designed by a form that it names.
+    Where views lie apart, a form has to be larger than that: a field would follow the views."""
     step = max(1, len(state.aligned.points) // MEASURED)
     some = state.aligned.take(np.arange(0, len(state.aligned.points), step))
     distance, face = signed_distance(some.points, state.part)
     found = measure_fit(state.part, some.points, distance, some.noise, state.tolerance, state.unit, state.views)
+    asked = AskedFit(found, state.tolerance, some.noise)
     if found is None or found.fit.model not in ASKING:
-        return False
+        return asked, False
     deviation = Deviation(distance, face, np.zeros(len(distance), np.uint8))
     sheets = measure_sheets(some, deviation, state.part, state.tolerance)
     if sheets.share <= OF_SCAN or not len(some.points):
-        return True
+        return asked, True
     form = np.quantile(np.abs(found.predict(some.points, state.part.face_normals[face])), 0.9)
-    return bool(form > BEYOND_VIEWS * sheets.apart)
+    return asked, bool(form > BEYOND_VIEWS * sheets.apart)
 
 
 def doubt_anew(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pose:

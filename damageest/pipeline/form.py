@@ -12,7 +12,7 @@ from damageest.artefacts import AdaptedPart, Deviation, Flags, Floats, Ints, Par
 from damageest.checks.coverage import SkinView
 from damageest.checks.fit_doubts import find_fit_doubts
 from damageest.checks.form_words import describe_fit, describe_view_of
-from damageest.checks.model_fit import FittedModel, measure_fit
+from damageest.checks.model_fit import AskedFit, FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import ViewFits, fit_views
 from damageest.checks.view_split import separate_views
@@ -97,14 +97,20 @@ def _make_rigid(T: Floats) -> Floats:
 @step(gives=("fitted", "warnings"))
 def fit_model(
     part: Part, aligned: Scan, adapted: AdaptedPart | None, deviation: Deviation, surplus: tuple[Surplus, ...],
-    tolerance: float, unit: str, views: ViewFits | None, corrected_scale: float,
+    tolerance: float, unit: str, views: ViewFits | None, corrected_scale: float, asked_fit: AskedFit | None,
 ) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
     """Measures how well the part as designed explains the intact skin, and warns where it does not. Surroundings are
     left out: a table ends at the part's lower edges as skin that is bent away does."""
     own = _leave_surroundings_out(aligned, surplus, tolerance)
-    found = measure_fit(
-        part, aligned.points[own], deviation.distance[own], aligned.noise, tolerance, unit, views, corrected_scale
-    )
+    if asked_fit is not None and own.all() and (asked_fit.tolerance, asked_fit.noise) == (tolerance, aligned.noise):
+        found = asked_fit.fitted  # measured before, with the same part in the same pose
+        if found is not None:
+            fit = replace(found.fit, corrected_scale=corrected_scale)
+            found = replace(found, fit=describe_fit(fit, unit, tolerance))
+    else:
+        found = measure_fit(
+            part, aligned.points[own], deviation.distance[own], aligned.noise, tolerance, unit, views, corrected_scale
+        )
     found = _tell_adapted(found, adapted)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
     if found is not None and told:

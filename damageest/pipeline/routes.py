@@ -79,7 +79,7 @@ ACQUIRE: Route = (
     #     -> views, pose, aligned, noise, spacing, tolerance, warnings
     correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader -> scan, pose, aligned, corrected_scale
     adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, refusal, samples, tolerance, unit, views, warnings,
-    #     adapter, scan -> adapted, part, aligned, pose, samples, warnings
+    #     adapter, scan -> adapted, part, aligned, pose, samples, asked_fit, warnings
     settle_tolerance,  # tolerance, asked_tolerance, part, aligned, noise -> tolerance, +warnings
     Segment,  # aligned, part, samples, tolerance -> deviation
     check_intact,  # deviation, tolerance, part, segmenter ->
@@ -88,7 +88,7 @@ ACQUIRE: Route = (
     look_for_sheets,  # part, aligned, deviation, tolerance -> sheets
     find_surplus,  # calls Cluster, EncloseAll: unit, sheets, aligned, deviation, tolerance, part, sites, samples
     #     -> surplus, deviation, +warnings
-    fit_model,  # part, aligned, adapted, deviation, surplus, tolerance, unit, views, corrected_scale
+    fit_model,  # part, aligned, adapted, deviation, surplus, tolerance, unit, views, corrected_scale, asked_fit
     #     -> fitted, +warnings
     set_explained_aside,  # part, aligned, deviation, sites, sheets, views, tolerance, aligner, accept
     #     -> sites, explained

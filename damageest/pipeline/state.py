@@ -36,7 +36,7 @@ from damageest.artefacts import (
 from damageest.checks.beyond_points import BeyondPoints
 from damageest.checks.coverage import SkinView
 from damageest.checks.free_pose import Dependence
-from damageest.checks.model_fit import FittedModel
+from damageest.checks.model_fit import AskedFit, FittedModel
 from damageest.checks.pose_error import PoseError
 from damageest.checks.two_sheets import Sheets
 from damageest.checks.uncertainty import SiteError
@@ -197,7 +197,8 @@ class JobState(State):
     ``tolerance``: None until it is measured where the job says `auto`. ``depth_step``: of the scan's depth, 0 where it
     is continuous. ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a larger.
     ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan, which is ``part`` from
-    then on; None: it is as designed. ``intact`` (K,3): its points on the nominal surface.
+    then on; None: it is as designed. ``asked_fit``: how it fits, where that was asked before.
+    ``intact`` (K,3): its points on the nominal surface.
     ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the sites.
     ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written into,
     ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
@@ -231,6 +232,7 @@ class JobState(State):
     refusal = Value[StageError | None]()
     aligned = Value[Scan]()
     adapted = Value[AdaptedPart | None]()
+    asked_fit = Value[AskedFit | None]()
     deviation = Value[Deviation]()
     sites = Value[Sites]()
     intact = Value[Floats]()

@@ -14,7 +14,10 @@ from damageest.stages.align._evidence import DECISIVE, weigh_poses
 from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._fine import fit, robust_cost
 from damageest.stages.align._points import OrientedPoints, orient_surface
+from damageest.stages.align._prepare_part import PreparedPart
 from damageest.stages.align._search import refine, score, select_distinct
+from damageest.stages.align._symmetries import SAME as SAME_SYMMETRY
+from damageest.stages.align._symmetries import measure_apart, pick_heads
 from damageest.stages.align._turns import Axis, find_common_axis, group_turns
 
 MAX_POSES = 40
@@ -36,6 +39,9 @@ FIRST_POINTS, SECOND_POINTS = 1500, 10_000
 
 SAME = 0.002
 """Distance, in diagonals, up to which places of two surfaces are the same for a symmetry, where the scan is coarser."""
+
+MANY = 8
+"""Number of poses from which on the symmetries of the part are asked for: to fit fewer costs less."""
 
 RIVAL, MAX_RIVALS = 0.15, 8
 """How much more, for each point, a pose may cost than the best one for them to be compared by patches, and how
@@ -64,15 +70,14 @@ class Choice:
         return replace(self, pose=poses[0], others=poses[1:])
 
 
-def choose_pose(
-    poses: Floats, target: PartSurface, field: PlaneGrid, scan: OrientedPoints, points: Floats, noise: float
-) -> Choice:
+def choose_pose(poses: Floats, part: PreparedPart, scan: OrientedPoints, points: Floats, noise: float) -> Choice:
     """Fits the promising poses among ``poses`` (H,4,4), and these turned about a common axis, to the triangles and
-    compares them point by point.
+    compares them point by point. Of poses that differ by a symmetry of the part two are fitted; the others follow.
 
     ``points`` (N,3): spread evenly over the scan and in random order, for the fit to the triangles. ``scan``: for the
     lookups in the grid. Lengths in diagonals of the part.
     """
+    target, field = part.surface, part.grid
     poses, axis = _add_counterparts(poses, field, scan)
     if axis is not None:
         some = points[:SECOND_POINTS]
@@ -85,8 +90,21 @@ def choose_pose(
             if found.axis is not None:
                 return found
     poses = _put_copies_last(poses)[:MAX_POSES]
-    turned = turn_poses(poses, target, field, scan)
-    return _compare(np.concatenate([poses, turned]), axis, target, field, points, noise)
+    together = np.concatenate([poses, turn_poses(poses, target, field, scan)])
+    if len(together) < MANY:
+        return _compare(together, axis, target, field, points, noise)
+    heads = together[pick_heads(together, part.symmetries, APART, 2)]
+    return _list_symmetric(_compare(heads, axis, target, field, points, noise), part.symmetries)
+
+
+def _list_symmetric(choice: Choice, symmetries: Floats) -> Choice:
+    """The choice with all poses that the symmetries (G,4,4) of the part make of its own."""
+    if choice.axis is not None or len(symmetries) == 1:
+        return choice
+    every = (symmetries[None] @ choice.poses[:, None]).reshape(-1, 4, 4)
+    order = -np.arange(len(every), dtype=np.float64)
+    apart = min(APART, 0.5 * float(measure_apart(symmetries[1:], symmetries[0]).min()))
+    return choice.keep(every[select_distinct(every, order, apart, len(every))])
 
 
 def _compare(
@@ -280,12 +298,15 @@ def describe_choice(choice: Choice) -> tuple[str, ...]:
     return ()
 
 
-def note_ambiguity(choice: Choice, target: PartSurface) -> tuple[Reason, ...]:
+def note_ambiguity(choice: Choice, part: PreparedPart) -> tuple[Reason, ...]:
     """A doubt where other poses fit as well and are not symmetries of the part; empty where there are none."""
-    if not len(choice.others):
+    target, motions, band = part.surface, choice.others @ np.linalg.inv(choice.pose), choice.band
+    if len(choice.poses) >= MANY and choice.axis is None:
+        known = [measure_apart(part.symmetries, one).min() < SAME_SYMMETRY for one in motions]
+        motions = motions[~np.array(known)]
+    if not len(motions):
         return ()
     surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
-    motions, band = choice.others @ np.linalg.inv(choice.pose), choice.band
     if band > 2 * SAME:
         # poses of a coarse scan are less exact than the part: the motions are fitted, and a hole that is larger counts
         moved = [fit(target, move_points(surface, D), np.eye(4), band, SAME / 4, 12).pose @ D for D in motions]

@@ -16,7 +16,7 @@ from damageest.stages.align._fine import Fit
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._free import MIN_MOVED as APART
 from damageest.stages.align._free import find_freedoms
-from damageest.stages.align._one_sided import measure_bands, search_motions
+from damageest.stages.align._one_sided import Proposals, measure_bands, propose_motions, search_motions
 from damageest.stages.align._patches import Patches, measure_patches
 from damageest.stages.align._words import describe_open, to_free_motion
 
@@ -135,8 +135,10 @@ def _search(patches: Patches, datum: Flags | None, noise: float, tolerance: floa
     explains the patches best: wear and large errors both leave skin inside, but errors leave as much outside."""
     if datum is not None:
         weighted = replace(patches, weight=np.where(datum, patches.weight, patches.weight / DATUM_WEIGHT))
-        return _search_with(weighted, patches, FORM_ERRORS[0], noise, tolerance, rng)
-    found = [_search_with(patches, patches, error, noise, tolerance, rng) for error in FORM_ERRORS]
+        proposals = propose_motions(weighted, APART * tolerance, rng)
+        return _search_with(weighted, patches, proposals, FORM_ERRORS[0], noise, tolerance)
+    proposals = propose_motions(patches, APART * tolerance, rng)
+    found = [_search_with(patches, patches, proposals, error, noise, tolerance) for error in FORM_ERRORS]
 
     def weigh(offset: Floats, error: float) -> float:
         return explain(patches, offset, error * tolerance, noise, tolerance)
@@ -151,12 +153,12 @@ def _search(patches: Patches, datum: Flags | None, noise: float, tolerance: floa
 
 
 def _search_with(
-    weighted: Patches, patches: Patches, error: float, noise: float, tolerance: float, rng: np.random.Generator
+    weighted: Patches, patches: Patches, proposals: Proposals, error: float, noise: float, tolerance: float
 ) -> _Found:
     """The best motion where errors of form have a standard deviation of ``error``, in tolerances. ``weighted``: the
     patches with the weights by which motions are searched."""
     band = measure_bands(patches, noise, error * tolerance)
-    searched = search_motions(weighted, band, APART * tolerance, rng)
+    searched = search_motions(weighted, proposals, band)
     offset = patches.move(searched.motions[:1])[0]
     outside = measure_outside(patches, offset, band, tolerance)
     contact = float(patches.weight[np.abs(offset) < band].sum() / patches.weight.sum())

@@ -7,10 +7,12 @@ asymmetric kernel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Flags, Floats
 from damageest.stages.align._patches import Patches
 
 REACH = 3.0
@@ -46,31 +48,50 @@ def measure_bands(patches: Patches, noise: float, least: float) -> Floats:
     return np.asarray(REACH * np.sqrt(noise**2 / points + least**2))
 
 
-def score_motions(patches: Patches, motions: Floats, band: Floats) -> Floats:
-    """(H,) share of the area in contact with the skin, less that outside it as `OUTSIDE` says, for motions (H,K)."""
-    offset = patches.move(motions) / band
-    gain = np.maximum(1 - offset**2, 0) * patches.is_flat
-    cost = OUTSIDE * np.clip(offset - 1, 0, 1)
-    return np.asarray((gain - cost) @ patches.weight / patches.weight.sum())
+@dataclass(frozen=True)
+class Proposals:
+    """Motions (H,K) in the basis of the patches, the present pose first, the ``offset`` (H,P) of the patches after
+    each, in single precision, and whether each moves the skin far (H,)."""
+
+    motions: Floats
+    offset: NDArray[np.float32]
+    is_far: Flags
 
 
-def search_motions(patches: Patches, band: Floats, apart: float, rng: np.random.Generator) -> Scored:
-    """The motions from the present pose by which skin comes into contact and little lies outside.
-
-    Half of them move the skin by more than ``apart``, so that other poses which explain the scan are among them.
-    """
+def propose_motions(patches: Patches, apart: float, rng: np.random.Generator) -> Proposals:
+    """Motions that bring a few patches to the skin. ``apart``: movement of the skin from which on one is far."""
     found = [np.zeros((1, patches.basis.shape[1]))]
     found += [_propose(patches, size, TRIALS, rng) for size in SIZES]
     motions = np.concatenate(found)
-    score = score_motions(patches, motions, band)
-    far = measure_movement(patches, motions) > apart
+    moved = motions.astype(np.float32) @ patches.slopes.T.astype(np.float32)
+    is_far = np.quantile(np.abs(moved), MOVED, axis=1) > apart
+    return Proposals(motions, moved + patches.offset.astype(np.float32), is_far)
+
+
+def score_offsets(patches: Patches, offset: NDArray[Any], band: Floats) -> Floats:
+    """(H,) share of the area in contact with the skin, less that outside it as `OUTSIDE` says, for the patches' offsets
+    (H,P) after motions."""
+    kind = offset.dtype.type
+    share = offset / band.astype(kind)
+    weight = (patches.weight / patches.weight.sum()).astype(kind)
+    contact = np.maximum(1 - share**2, 0) @ (weight * patches.is_flat)
+    outside = np.clip(share - 1, 0, 1) @ weight
+    return np.asarray(contact - OUTSIDE * outside, np.float64)
+
+
+def search_motions(patches: Patches, proposals: Proposals, band: Floats) -> Scored:
+    """The motions from the present pose by which skin comes into contact and little lies outside.
+
+    Half of them move the skin far, so that other poses which explain the scan are among them.
+    """
+    score = score_offsets(patches, proposals.offset, band)
     first = np.argsort(-score, kind="stable")[: REFINED // 2]
-    others = np.flatnonzero(far)[np.argsort(-score[far], kind="stable")[: REFINED // 2]]
-    motions = refine_motions(patches, motions[np.unique([0, *first, *others])], band)
-    score = score_motions(patches, motions, band)
+    far = np.flatnonzero(proposals.is_far)
+    others = far[np.argsort(-score[far], kind="stable")[: REFINED // 2]]
+    motions = refine_motions(patches, proposals.motions[np.unique([0, *first, *others])], band)
+    score = score_offsets(patches, patches.move(motions), band)
     order = np.argsort(-score, kind="stable")
-    start = float(score_motions(patches, np.zeros((1, motions.shape[1])), band)[0])
-    return Scored(motions[order], score[order], start)
+    return Scored(motions[order], score[order], float(score_offsets(patches, patches.offset[None], band)[0]))
 
 
 def measure_movement(patches: Patches, motions: Floats) -> Floats:

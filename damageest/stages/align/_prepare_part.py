@@ -1,4 +1,4 @@
-"""What an alignment computes from the part alone. A process that aligns many scans of one part computes it once."""
+"""What an alignment computes from the part alone: once for all scans of one part, also in later runs."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from damageest.artefacts import Mesh
+from damageest.artefacts import Floats, Mesh
+from damageest.io.part_store import Arrays, recall
 from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._pairs import PairTable
-from damageest.stages.align._points import orient_surface
+from damageest.stages.align._points import OrientedPoints, orient_surface
+from damageest.stages.align._symmetries import find_symmetries
 
 MOST_KEPT = 200_000
 """Number of triangles up to which the part's data is kept for the next scan: beyond it they would take memory from
@@ -20,26 +22,38 @@ SURFACE_POINTS = 20_000
 """Number of points on the part that the pairs are drawn from."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PreparedPart:
-    """A part centred and scaled to a diagonal of 1: its surface, the grid of planes, and the table of its pairs."""
+    """A part centred and scaled to a diagonal of 1: its surface, the grid of planes, and the table of its pairs.
+    ``key``: digest of the part and the seed."""
 
     surface: PartSurface
     grid: PlaneGrid
     pairs: PairTable
+    seed: int
+    key: str
+
+    @functools.cached_property
+    def symmetries(self) -> Floats:
+        """The part's symmetries (G,4,4), the identity first; found when they are asked for."""
+
+        def find() -> Arrays:
+            return {"motions": find_symmetries(self.surface, self.grid, self.pairs, self.seed)}
+
+        return np.asarray(recall("symmetries", self.key, find)["motions"])
 
 
 @dataclass(frozen=True)
 class _Asked:
     """A mesh that is compared by the digest of its arrays."""
 
-    digest: bytes
+    digest: str
     seed: int
     surface: PartSurface = field(compare=False)
 
 
 def prepare_part(surface: PartSurface, seed: int) -> PreparedPart:
-    """The data of a part, from the last call where the mesh and the seed are the same."""
+    """The data of a part, from the last call or an earlier run where the mesh and the seed are the same."""
     asked = _Asked(_digest(surface.mesh), seed, surface)
     if len(surface.mesh.faces) > MOST_KEPT:
         return _prepare(asked)
@@ -47,16 +61,36 @@ def prepare_part(surface: PartSurface, seed: int) -> PreparedPart:
 
 
 def _prepare(asked: _Asked) -> PreparedPart:
-    surface, rng = asked.surface, np.random.default_rng([asked.seed, 1])
-    points = orient_surface(surface.mesh, SURFACE_POINTS, rng)
-    return PreparedPart(surface, PlaneGrid.build(surface), PairTable.build(points, rng))
+    key = f"{asked.digest} {asked.seed}"
+    grid, pairs = _unpack(recall("align", key, lambda: _compute(asked)))
+    return PreparedPart(asked.surface, grid, pairs, asked.seed, key)
 
 
 _prepare_once = functools.lru_cache(maxsize=1)(_prepare)
 
 
-def _digest(mesh: Mesh) -> bytes:
+def _compute(asked: _Asked) -> Arrays:
+    """The grid and the table of pairs as arrays, in types that take little space."""
+    surface, rng = asked.surface, np.random.default_rng([asked.seed, 1])
+    points = orient_surface(surface.mesh, SURFACE_POINTS, rng)
+    grid, pairs = PlaneGrid.build(surface), PairTable.build(points, rng)
+    return {
+        "low": grid.low, "cell": np.array(grid.cell), "shape": np.array(grid.shape),
+        "plane": grid.plane, "distance": grid.distance,
+        "points": pairs.points.points, "normals": pairs.points.normals,
+        "i": pairs.i.astype(np.uint16), "j": pairs.j.astype(np.uint16), "key": pairs.key.astype(np.int32),
+    }  # fmt: skip
+
+
+def _unpack(arrays: Arrays) -> tuple[PlaneGrid, PairTable]:
+    x, y, z = (int(size) for size in arrays["shape"])
+    grid = PlaneGrid(arrays["low"], float(arrays["cell"]), (x, y, z), arrays["plane"], arrays["distance"])
+    points = OrientedPoints(arrays["points"], arrays["normals"], True)
+    return grid, PairTable(points, *(arrays[name].astype(np.int64) for name in ("i", "j", "key")))
+
+
+def _digest(mesh: Mesh) -> str:
     found = hashlib.blake2b(digest_size=16)
     for array in (mesh.vertices, mesh.faces):
         found.update(np.ascontiguousarray(array).data)
-    return found.digest()
+    return found.hexdigest()

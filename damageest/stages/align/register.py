@@ -81,7 +81,7 @@ class Register(Align):
         if given.signed and not oriented.signed:
             more = search(propose_poses(given, prepared.pairs, self.trials, rng), given, field, rng)
             poses = np.concatenate([poses, more])
-        choice = choose_pose(poses, target, field, few, fine, noise)
+        choice = choose_pose(poses, prepared, few, fine, noise)
         if given.signed:
             choice = choice.keep(prefer_outward(target, given, choice.poses, choice.band))
         last = LastFit(frame, fine, dense, noise, tolerance / frame.size, part.unit, datum)
@@ -103,7 +103,7 @@ class Register(Align):
             turns = choice.others @ np.linalg.inv(choice.pose)
             poses = turns @ best.pose if finish.is_changed else choice.others
             others = np.array([frame.unscale_pose(pose) for pose in poses])
-        doubts = check.note_doubts() + doubts + note_ambiguity(choice, target)
+        doubts = check.note_doubts() + doubts + note_ambiguity(choice, prepared)
         if not finish.free:  # those have amounts, and are terms of the intervals
             doubts += note_free_motion(best.pose, target, fine, best.band)
         told = note_inward(target, frame, scan, best)
