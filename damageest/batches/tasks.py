@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import math
+import time
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -37,23 +39,32 @@ def run_tasks(
     tries = dict.fromkeys(tasks, 0)
     waiting = list(tasks)[::-1]
     futures: dict[Any, str] = {}
+    threads, counted = 0, -math.inf
     try:
         while waiting or futures:
-            while waiting and len(futures) < max(1, sum(client.nthreads().values())):
+            if time.monotonic() > counted + POLL:  # workers come and go
+                threads, counted = max(1, sum(client.nthreads().values())), time.monotonic()
+            while waiting and len(futures) < threads:
                 name = waiting.pop()
                 tries[name] += 1
                 key = f"{token}-{name}-{tries[name]}"
                 futures[client.submit(function, *tasks[name], key=key, pure=False)] = name
+            done = {futures[future]: future for future in _wait(list(futures))}
+            finished = {name: future for name, future in done.items() if future.status == "finished"}
+            # None for one whose worker died since; where Dask has it run again elsewhere, this waits for it
+            values = client.gather(finished, errors="skip") if finished else {}
             ended = []
-            for future in _wait(list(futures)):
-                name = futures.pop(future)
-                if future.status == "finished":
-                    ended.append(Ended(name, future.result(), "", tries[name]))
-                elif future.status == "error" and tries[name] < TRIES:
+            for name, future in done.items():
+                del futures[future]
+                if values.get(name) is not None:
+                    ended.append(Ended(name, values[name], "", tries[name]))
+                elif future.status != "error":
+                    ended.append(Ended(name, None, "the cluster ended", tries[name]))
+                elif tries[name] < TRIES:
                     waiting.append(name)
+                    counted = -math.inf  # fewer workers now: with one task more than threads, one would wait
                 else:
-                    why = f"{tries[name]} workers died with it" if future.status == "error" else "the cluster ended"
-                    ended.append(Ended(name, None, why, tries[name]))
+                    ended.append(Ended(name, None, f"{tries[name]} workers died with it", tries[name]))
             yield ended, set(futures.values())
     finally:
         if futures:
