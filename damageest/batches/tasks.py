@@ -6,6 +6,7 @@ import contextlib
 import math
 import time
 from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ TRIES = 2
 """How many workers a task is given to, one after the other, where they die."""
 POLL = 0.5
 """Seconds between two looks at the tasks."""
+_LOST = "the cluster ended"
 
 
 @dataclass(frozen=True)
@@ -39,11 +41,16 @@ def run_tasks(
     tries = dict.fromkeys(tasks, 0)
     waiting = list(tasks)[::-1]
     futures: dict[Any, str] = {}
-    threads, counted = 0, -math.inf
+    threads, counted = 1, -math.inf
     try:
         while waiting or futures:
+            if client.status in ("closing", "closed"):  # its scheduler ended, and none took its place
+                yield [Ended(name, None, _LOST, tries[name]) for name in (*futures.values(), *waiting)], set()
+                break
             if time.monotonic() > counted + POLL:  # workers come and go
-                threads, counted = max(1, sum(client.nthreads().values())), time.monotonic()
+                with contextlib.suppress(OSError):  # the scheduler is gone: Dask looks for it
+                    threads = max(1, sum(client.nthreads().values()))
+                counted = time.monotonic()
             while waiting and len(futures) < threads:
                 name = waiting.pop()
                 tries[name] += 1
@@ -59,7 +66,7 @@ def run_tasks(
                 if values.get(name) is not None:
                     ended.append(Ended(name, values[name], "", tries[name]))
                 elif future.status != "error":
-                    ended.append(Ended(name, None, "the cluster ended", tries[name]))
+                    ended.append(Ended(name, None, _LOST, tries[name]))
                 elif tries[name] < TRIES:
                     waiting.append(name)
                     counted = -math.inf  # fewer workers now: with one task more than threads, one would wait
@@ -76,6 +83,6 @@ def _wait(futures: list[Any]) -> list[Any]:
     """The futures that are done, after at most `POLL` seconds."""
     from distributed import wait
 
-    with contextlib.suppress(TimeoutError):
+    with contextlib.suppress(TimeoutError, CancelledError):  # cancelled, where the scheduler ended
         wait(futures, timeout=POLL, return_when="FIRST_COMPLETED")
     return [future for future in futures if future.done()]
