@@ -8,12 +8,17 @@ import numpy as np
 
 from damageest.findings import DONE, ModelFit, ViewFit
 
+LITTLE_SEEN = 0.5
+"""Share of the skin that was seen, below which a fit that holds says little of the rest of the part."""
 
-def describe_fit(fit: ModelFit, unit: str, tolerance: float, doubts: tuple[str, ...] = ()) -> ModelFit:
+
+def describe_fit(
+    fit: ModelFit, unit: str, tolerance: float, doubts: tuple[str, ...] = (), partly: str = ""
+) -> ModelFit:
     """The fit with its ``words``: the model with its amounts, in the job's ``unit``. ``doubts``: what makes it open
-    whether the part as designed explains the skin."""
+    whether the part as designed explains the skin. ``partly``: what limits a fit that holds, of `describe_view_of`."""
     words = {
-        "ok": "the part as designed explains the intact skin",
+        "ok": f"the part as designed explains the intact skin{partly}",
         "open": f"whether the part as designed explains the intact skin is open: {'; '.join(doubts)}",
         "scaled": _describe_scale(fit, unit),
         "deformed": _describe_deformation(fit, unit),
@@ -26,6 +31,18 @@ def describe_fit(fit: ModelFit, unit: str, tolerance: float, doubts: tuple[str, 
             f"the scale of the scan was corrected by {100 * (fit.corrected_scale - 1):+.3g} %, as the job says; {words}"
         )
     return replace(fit, words=words)
+
+
+def describe_view_of(fit: ModelFit, seen: float, length: float, unit: str, tolerance: float) -> str:
+    """What a fit that holds does not say, where little of the part was ``seen`` (share of its skin): as an addition to
+    the fit's words, empty where it says enough. ``length``: of the part."""
+    if seen >= LITTLE_SEEN:
+        return ""
+    hidden = abs(fit.scale - 1) + 2 * fit.scale_error
+    words = f" that was seen, {100 * seen:.2g} % of the part's"
+    if hidden * length > tolerance:
+        words += f"; a scale wrong by {100 * hidden:.2g} %, {hidden * length:.2g} {unit} over the part, would not show"
+    return words
 
 
 def _describe_scale(fit: ModelFit, unit: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from damageest.artefacts import AdaptedPart, Deviation, Flags, Floats, Ints, Part, Pose, Reason, Scan
 from damageest.checks.coverage import SkinView
 from damageest.checks.fit_doubts import find_fit_doubts
-from damageest.checks.form_words import describe_fit
+from damageest.checks.form_words import describe_fit, describe_view_of
 from damageest.checks.model_fit import FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import ViewFits, fit_views
@@ -138,10 +138,11 @@ def _tell_adapted(fitted: FittedModel | None, adapted: AdaptedPart | None) -> Fi
 @step(gives=("fitted", "warnings"))
 def question_fit(
     fitted: FittedModel | None, surplus: tuple[Surplus, ...], found: tuple[FoundSite, ...], pose: Pose, aligned: Scan,
-    adapted: AdaptedPart | None, deviation: Deviation, skin: SkinView, unit: str, tolerance: float,
+    part: Part, adapted: AdaptedPart | None, deviation: Deviation, skin: SkinView, unit: str, tolerance: float,
     explained: Explained, warnings: Reasons,
 ) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
-    """Withdraws the statement that the part as designed explains the intact skin, where there are doubts."""
+    """Withdraws the statement that the part as designed explains the intact skin, where there are doubts; limits it to
+    what was seen, where that is little."""
     if fitted is None or fitted.fit.model != "ok":
         return fitted, warnings
     clusters = {number for item in surplus if item.kind == "displaced piece" for number in item.clusters}
@@ -151,7 +152,11 @@ def question_fit(
     if explained.places:
         doubts += ("views lie apart",)
     if not doubts:
-        return fitted, warnings
+        seen = float(skin.cells.areas[skin.perhaps_seen].sum() / skin.cells.areas.sum())
+        partly = describe_view_of(fitted.fit, seen, part.diagonal, unit, tolerance)
+        return _tell_adapted(
+            replace(fitted, fit=describe_fit(fitted.fit, unit, tolerance, partly=partly)), adapted
+        ), warnings
     fit = describe_fit(replace(fitted.fit, model="open"), unit, tolerance, doubts)
     fit = _tell_adapted(replace(fitted, fit=fit), adapted).fit
     # a corrected scale was reported in a note whose text is no longer true

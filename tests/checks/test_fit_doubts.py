@@ -68,3 +68,15 @@ def test_it_is_not_said_of_a_doubtful_pose() -> None:
     assert result.fit is not None
     assert result.fit.model == "open"
     assert "the pose is doubtful" in result.fit.words
+
+
+def test_it_is_said_of_no_more_than_was_seen() -> None:
+    points = scenes.scan(scenes.block())
+    result = run(points[points[:, 2] > scenes.TOP - 1])
+    assert result.fit is not None
+    assert result.fit.model == "ok"
+    said = re.fullmatch(
+        rf"{SAID} the intact skin that was seen, (\d+) % of the part's(; a scale wrong .*)?", result.fit.words
+    )
+    assert said, result.fit.words
+    assert 15 < float(said[1]) < 45  # the upper face, with a little of the sides

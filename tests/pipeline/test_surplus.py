@@ -56,3 +56,19 @@ def test_without_added_metal_there_is_no_surplus() -> None:
 def test_surplus_over_most_of_the_skin_is_another_pose_or_part() -> None:
     with pytest.raises(StageError, match="does not lie on the part"):
         run(scan(slab((24, 18, 13), 0, 0, 0) + slab((12, 19, 13), 0, 0, 0)))
+
+
+def test_tape_and_powder_on_intact_skin_leave_the_volume_right() -> None:
+    damaged = block() - ball(4, -6, 0, 7)
+    tape = slab((6, 18, 0.4), 6, 0, 6.2)  # over the edges, 2 to 3 tolerances thick
+    rng = np.random.default_rng(4)
+    powder = np.column_stack([rng.normal([7, -6], 1.0, (300, 2)), 6 + np.abs(rng.normal(0, 0.5, 300))])
+    result = run(np.concatenate([scan(damaged + tape), powder]), align="register")
+    (site,) = [site for site in result.sites if site.damage.volume > 1]
+    lost = block().volume() - damaged.volume()
+    assert site.uncertainty is not None
+    low, high = site.uncertainty.volume_95
+    assert low < lost < high < 1.3 * lost
+    assert abs(site.damage.volume - lost) < 0.05 * lost
+    assert site.accepted
+    assert result.surplus
