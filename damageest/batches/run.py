@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import uuid
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from damageest.batches.cluster import open_client, require_dask
-from damageest.batches.files import write_page, write_tables
+from damageest.batches.files import Tables, read_rows
 from damageest.batches.jobs import BatchJob, find_jobs
+from damageest.batches.page import write_page
 from damageest.batches.rows import Row, read_row
-from damageest.batches.tasks import run_tasks
+from damageest.batches.tasks import Ended, run_tasks
 from damageest.batches.work import compute_key, load_job, release, work
 from damageest.errors import DamageestError, Fault, JobError
 from damageest.geometry.threads import count_cores
-from damageest.io.files import expand_home, read_json, working_folder
+from damageest.io.files import expand_home, working_folder
 from damageest.isolation import measure_free_memory
 from damageest.isolation.limits import STAGE_SECONDS
 
@@ -71,23 +72,20 @@ def batch(
     waiting = [job for job in found if job.name not in rows]
     with contextlib.ExitStack() as stack:
         stack.callback(lambda: write_page(_in_order(found, rows), folder))
-        write_tables(_in_order(found, rows), folder)
+        tables = stack.enter_context(contextlib.closing(Tables([job.name for job in found], rows.values(), folder)))
         if waiting and client is None:
             count = min(workers or count_cores(), len(waiting))
             if options.memory is None and not scheduler:
                 options = replace(options, memory=measure_free_memory() // count)
             client = stack.enter_context(open_client(scheduler, count))
         if waiting:
-            _run(client, waiting, folder, options, rows, lambda active: _report(found, rows, active, folder, tell))
+            steps = stack.enter_context(contextlib.closing(_run(client, waiting, folder, options)))
+            for new, active in steps:
+                rows |= {row.name: row for row in new}
+                tables.add(new)
+                if tell:
+                    tell(found, rows, active)
     return _in_order(found, rows)
-
-
-def _report(
-    jobs: Sequence[BatchJob], rows: Mapping[str, Row], active: set[str], folder: Path, tell: Tell | None
-) -> None:
-    write_tables(_in_order(jobs, rows), folder)
-    if tell:
-        tell(jobs, rows, active)
 
 
 def _in_order(jobs: Sequence[BatchJob], rows: Mapping[str, Row]) -> list[Row]:
@@ -99,14 +97,10 @@ def _row(job: BatchJob, folder: Path, **values: Any) -> Row:
 
 
 def _run(
-    client: Any,
-    jobs: Sequence[BatchJob],
-    folder: Path,
-    options: Options,
-    rows: dict[str, Row],
-    report: Callable[[set[str]], None],
-) -> None:
-    """Adds a row for each job. Where it is interrupted, what runs is ended."""
+    client: Any, jobs: Sequence[BatchJob], folder: Path, options: Options
+) -> Generator[tuple[list[Row], set[str]], None, None]:
+    """Gives the rows of the jobs that have ended since, and the names of those that run. Where it is interrupted, what
+    runs is ended."""
     token = f"damageest-{uuid.uuid4().hex[:8]}"
     shared = {"batch": token, **vars(options)}
     places = {job.name: job for job in jobs}
@@ -117,14 +111,15 @@ def _run(
         )
         for job in jobs
     }
+
+    def read(task: Ended) -> Row:
+        lost = _row(places[task.name], folder, outcome="lost", error=task.why)
+        return replace(lost if task.value is None else read_row(task.value), tries=task.tries)
+
     try:
         with contextlib.closing(run_tasks(client, work, tasks, token)) as steps:
             for ended, active in steps:
-                for task in ended:
-                    lost = _row(places[task.name], folder, outcome="lost", error=task.why)
-                    row = lost if task.value is None else read_row(task.value)
-                    rows[task.name] = replace(row, tries=task.tries)
-                report(active)
+                yield [read(task) for task in ended], active
     finally:
         with contextlib.suppress(Exception):  # a cluster that has ended
             client.run(release, token)
@@ -132,11 +127,10 @@ def _run(
 
 def _find_done(jobs: Sequence[BatchJob], folder: Path) -> dict[str, Row]:
     """The rows of an earlier batch that stand: with a result that is there, of the same job, files and code."""
-    try:
-        stored = [read_row(values) for values in read_json(folder / "batch.json")["jobs"]]
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
-    known = {row.name: row for row in stored if row.has_result and (Path(row.output) / "result.json").is_file()}
+    stored = read_rows(folder)
+    known = {
+        name: row for name, row in stored.items() if row.has_result and (Path(row.output) / "result.json").is_file()
+    }
     if not known:
         return {}
     from damageest.registry import Registry

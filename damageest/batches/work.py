@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from damageest.batches.files import keep_picture
 from damageest.batches.jobs import MATRIX
+from damageest.batches.page import keep_picture
 from damageest.batches.rows import describe_result
 from damageest.errors import DamageestError, StageError, clean_message
 from damageest.isolation import Limits, ProcessError, Usage, call_isolated, end_workers, find_place

@@ -16,6 +16,7 @@ from damageest.cli._streams import say
 from damageest.errors import DamageestError, clean_message, describe_missing_library, is_interrupt
 from damageest.io.files import working_folder
 from damageest.isolation.one_thread import ONE_THREAD
+from damageest.isolation.supervise import note_status
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells give it."""
@@ -80,7 +81,8 @@ def main() -> None:
         failure = _streams.describe_failure()
         if failure and not end.code:
             say(f"error: standard output cannot be written: {failure}; files that were written are whole", err=True)
-            sys.exit(1)
+            end.code = 1
+        note_status(end.code)
         raise
 
 

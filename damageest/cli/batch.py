@@ -83,7 +83,7 @@ class _Display:
         from rich.console import Console
 
         self.console = Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
-        self.told: set[str] = set()
+        self.told = 0
 
     def __enter__(self) -> _Display:
         from rich.live import Live
@@ -100,11 +100,10 @@ class _Display:
     def show(self, jobs: Sequence[BatchJob], rows: Mapping[str, Row], active: set[str]) -> None:
         if self.live.is_started:
             self.live.update(_make_live_table(jobs, rows, active))
-        new = [name for name in rows if name not in self.told]
-        for name in new:
-            self.told.add(name)
+        for name in list(rows)[self.told :]:  # in the order in which they came
+            self.told += 1
             if not self.live.is_started and not self.console.quiet:
-                count = f"[{len(self.told)}/{len(jobs)}]"
+                count = f"[{self.told}/{len(jobs)}]"
                 say(f"{count} {name}: {_describe(rows[name])}", err=True)
 
 

@@ -114,12 +114,12 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
     if status:
         return status
     for number, job in enumerate(loaded):
-        from damageest.api import run
-
         note_job(number)
         output = given.output or job.output
         try:
             with progress.show_job(job.name):
+                from damageest.api import run  # after the first line: it imports all of the pipeline
+
                 result = run(
                     job, output=given.output or True, cache=given.cache, registry=registry, limits=given.limits
                 )

@@ -28,7 +28,6 @@ def _check(jobs: list[Path], settings: list[str]) -> int:
     """Prints what is wrong, and gives the exit status."""
     from damageest.errors import InputError, JobError, StageError
     from damageest.job import load
-    from damageest.pipeline.selections import check_with_part
     from damageest.registry import Registry
 
     registry = Registry.discover()
@@ -36,7 +35,10 @@ def _check(jobs: list[Path], settings: list[str]) -> int:
     for path in jobs:
         try:
             job = load(path, registry, settings)
-            check_with_part(job, registry)
+            if any(stage.find_selectors() for stage in job.stages.values()):  # it is the engine that reads the part
+                from damageest.pipeline.selections import check_with_part
+
+                check_with_part(job, registry)
         except JobError as error:
             status = 2
             for line in error.lines():

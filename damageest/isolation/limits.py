@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import psutil
-
 from damageest.errors import InputError
 
 STAGE_SECONDS = 3600.0
@@ -51,6 +49,8 @@ def format_bytes(size: float) -> str:
 def measure_free_memory() -> int:
     """Bytes that can still be allocated: the least of what the machine, its control group (version 1 or 2) and the
     process' own limits of address space (``ulimit -v``) and data (--memory) leave."""
+    import psutil  # 20 ms, which a command that measures nothing need not take
+
     held = psutil.Process().memory_info()
     known = [int(psutil.virtual_memory().available), *_group_free()]
     for limit, used in ((resource.RLIMIT_AS, held.vms), (resource.RLIMIT_DATA, getattr(held, "data", held.rss))):
@@ -62,6 +62,8 @@ def measure_free_memory() -> int:
 
 def own_memory() -> int:
     """Bytes that this process holds in memory."""
+    import psutil
+
     return int(psutil.Process().memory_info().rss)
 
 

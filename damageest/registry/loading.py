@@ -21,6 +21,8 @@ from damageest.isolation import at_work
 from damageest.registry import hookspecs
 
 GROUP = "damageest"
+OWN = "damageest"
+"""The distribution of the built-ins."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def ignore_shadow_warnings() -> Iterator[None]:
 
 
 def _describe_own() -> Provider:
-    return Provider("damageest", version("damageest"), "Apache-2.0", "damageest.registry.builtins")
+    return Provider(OWN, version(OWN), "Apache-2.0", "damageest.registry.builtins")
 
 
 def _list_installed() -> list[tuple[EntryPoint, Provider]]:

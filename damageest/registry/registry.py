@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from damageest.errors import InputError, PluginError, clean_message, suggest
 from damageest.registry import bundled
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
-from damageest.registry.loading import Broken, Provider, describe_broken, ignore_shadow_warnings, load
+from damageest.registry.loading import OWN, Broken, Provider, describe_broken, ignore_shadow_warnings, load
 from damageest.result import Conversion
 from damageest.rules import Rule
 from damageest.stages import Stage
@@ -180,7 +180,8 @@ def _check_implementation(cls: Any, provider: Provider) -> Implementation:
         raise PluginError(f"{cls.__qualname__} changes {', '.join(map(repr, changed))}, which its contract fixes")
     cls.needs()
     name = _read_name(cls)
-    _check_defaults(cls)
+    if provider.name != OWN:  # those of the built-ins are tested, and cost each command 0.05 s
+        check_defaults(cls)
     return Implementation(name, cls, contract, provider)
 
 
@@ -232,7 +233,7 @@ def _read_rules(plugin: Any, known: Mapping[str, Rule]) -> dict[str, Rule]:
     return rules
 
 
-def _check_defaults(cls: type[Stage]) -> None:
+def check_defaults(cls: type[Stage]) -> None:
     """Refuses a default that its own option would refuse; options without a default are the job's to give."""
     fields = {name: field for name, field in cls.model_fields.items() if not field.is_required()}
     try:

@@ -6,7 +6,10 @@ import csv
 import json
 from pathlib import Path
 
-from damageest.batches.files import keep_picture, write_page, write_tables
+import pytest
+
+from damageest.batches import files
+from damageest.batches.files import NEW_ROWS, Tables, read_rows, write_tables
 from damageest.batches.rows import Row, read_row
 
 EVIL = "<script>alert(1)</script>\n\"quote'"
@@ -45,20 +48,28 @@ def test_csv(tmp_path: Path) -> None:
     assert second["damage_volume"] == ""
 
 
-def test_page_is_escaped_and_needs_no_network(tmp_path: Path) -> None:
-    report = tmp_path / "good/report.html"
-    report.parent.mkdir()
-    report.write_text("a report of a plugin, with no picture in it")
-    keep_picture(report.parent, b"\x89PNG")
-    write_page(make_rows(tmp_path), tmp_path)
-    text = (tmp_path / "batch.html").read_text()
-    assert "<script>alert" not in text
-    assert "&lt;script&gt;alert(1)" in text
-    assert "http" not in text.replace("http-equiv", "")
-    assert 'href="good/report.html"' in text
-    assert 'src="data:image/png;base64,iVBORw=="' in text
-    assert "1 proven, 1 doubtful" in text
-    assert "(2 tries)" in text
-    keep_picture(report.parent, b"")
-    write_page(make_rows(tmp_path), tmp_path)
-    assert "<img" not in (tmp_path / "batch.html").read_text()
+def test_a_batch_that_is_killed_loses_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tables are not written for each row, which would cost the square of their number; the rows are kept."""
+    monkeypatch.setattr(files, "WRITTEN", 1e9)
+    rows = [Row(f"job-{k}", "job.yaml", str(tmp_path / f"job-{k}"), "ok") for k in range(4)]
+    tables = Tables([row.name for row in rows], rows[:1], tmp_path)
+    tables.add([rows[2]])
+    tables.add([rows[1]])
+    assert len(json.loads((tmp_path / "batch.json").read_text())["jobs"]) == 1
+    with (tmp_path / NEW_ROWS).open("a") as stream:
+        stream.write('{"name": "job-3", "jo')  # killed while it wrote the fourth
+    assert list(read_rows(tmp_path).values()) == [rows[0], rows[2], rows[1]]
+    tables.add([rows[3]])
+    tables.close()
+    assert list(read_rows(tmp_path).values()) == rows, "in the order of the jobs"
+    with (tmp_path / "batch.csv").open(newline="") as stream:
+        assert [line["name"] for line in csv.DictReader(stream)] == [row.name for row in rows]
+    assert not (tmp_path / NEW_ROWS).exists()
+
+
+def test_tables_are_written_while_a_batch_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "WRITTEN", 0.0)
+    tables = Tables(["a"], [], tmp_path)
+    tables.add([Row("a", "a.yaml", str(tmp_path / "a"), "ok")])
+    assert len(json.loads((tmp_path / "batch.json").read_text())["jobs"]) == 1
+    tables.close()

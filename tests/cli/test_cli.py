@@ -135,17 +135,6 @@ def test_plugins_and_the_schema_of_results() -> None:
     assert json.loads(call("schema", "result").stdout)["title"] == "damageest result"
 
 
-def test_help_imports_nothing_heavy() -> None:
-    code = (
-        "import sys\nfrom damageest.cli import main\nsys.argv = ['damageest', '--help']\n"
-        "try:\n    main()\nexcept SystemExit:\n    pass\n"
-        "heavy = {'numpy', 'scipy', 'trimesh', 'vtkmodules', 'pyvista', 'igl', 'cadquery'}\n"
-        "print(sorted(heavy & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.splitlines()[-1] == "[]"
-
-
 def test_debug_shows_where_an_error_came_from(tmp_path: Path) -> None:
     path = damaged_box.write(tmp_path)
     (tmp_path / "box.stl").write_bytes(b"nonsense")

@@ -188,3 +188,21 @@ def _read(terminal: int) -> bytes:
         return os.read(terminal, 1 << 12)
     except OSError:  # the other end is closed
         return b""
+
+
+def test_what_a_plugin_left_open_is_written_before_the_process_ends(site: Site, tmp_path: Path) -> None:
+    """The fork ends without taking down its objects; its threads, exit handlers and files come first."""
+    site.add("acme-bad", FAULTY)
+    damaged_box.write(tmp_path)
+    left = (
+        "import atexit, builtins, threading\n"
+        "builtins.left = open('left.txt', 'w')\n"
+        "left.write('whole')\n"
+        "atexit.register(lambda: left.write(', handler called'))\n"
+        "threading.Thread(target=lambda: (__import__('time').sleep(3), left.write(', thread ended'))).start()\n"
+    )
+    job = write_job(tmp_path, "leaving", left)
+    command = [*MAIN, str(job), "--set", "report=none", "-q"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment(site), cwd=tmp_path, timeout=100)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "left.txt").read_text() == "whole, thread ended, handler called"

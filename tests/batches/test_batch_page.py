@@ -1,0 +1,88 @@
+"""The page of a batch."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from damageest.batches import page
+from damageest.batches.page import keep_picture, write_page
+from damageest.batches.rows import Row
+from tests.batches.test_batch_files import EVIL, make_rows
+from tests.stages.report import browser
+
+
+def read_items(folder: Path) -> list[dict[str, Any]]:
+    """The rows that the page holds, in its order."""
+    text = (folder / "batch.html").read_text().split('<script type="application/json" id="rows">')[1]
+    items: list[dict[str, Any]] = json.loads(html.unescape(text.split("</script>")[0]))
+    return items
+
+
+def test_page_is_escaped_and_needs_no_network(tmp_path: Path) -> None:
+    report = tmp_path / "good/report.html"
+    report.parent.mkdir()
+    report.write_text("a report of a plugin, with no picture in it")
+    keep_picture(report.parent, b"\x89PNG")
+    write_page(make_rows(tmp_path), tmp_path)
+    text = (tmp_path / "batch.html").read_text()
+    assert "<script>alert" not in text
+    assert "http" not in text.replace("http-equiv", "")
+    good, bad = read_items(tmp_path)
+    assert (good["link"], good["verdict"]) == ("good/report.html", "1 proven, 1 doubtful")
+    assert good["picture"] == "data:image/png;base64,iVBORw=="
+    assert (bad["name"], bad["error"]) == (EVIL, f"{EVIL} (2 tries)")
+    keep_picture(report.parent, b"")
+    write_page(make_rows(tmp_path), tmp_path)
+    assert not read_items(tmp_path)[0]["picture"]
+
+
+def test_pictures_past_the_size_of_a_page_stay_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page, "MOST_PICTURES", 1)
+    rows = [Row(name, "job.yaml", str(tmp_path / name), "ok") for name in ("a", "b", "c")]
+    keep_picture(tmp_path / "a", b"\x89PNG")
+    keep_picture(tmp_path / "b", b"\x89PNG")
+    write_page(rows, tmp_path)
+    assert [item["picture"] for item in read_items(tmp_path)] == ["data:image/png;base64,iVBORw==", ".b.png", ""]
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser.open_browser() as opened:
+        yield opened
+
+
+def test_ten_thousand_rows_in_a_browser(chromium: Any, tmp_path: Path) -> None:
+    """Those to look at come first; others are drawn when they are scrolled to, searched for or sorted to the front."""
+    good = {"verdicts": {"proven": 1}, "damage_volume": 2.0, "volume_95": (1.0, None), "units": "mm", "sites": 1}
+    rows = [Row(f"job-{k}", "job.yaml", str(tmp_path / f"job-{k}"), "ok", seconds=k, **good) for k in range(10_000)]
+    rows[7000] = Row(EVIL, "evil.yaml", str(tmp_path / "evil"), "refused", error="gone.ply: there is no such file")
+    rows[8000] = Row("doubted", "d.yaml", str(tmp_path / "d"), "ok", **{**good, "verdicts": {"doubtful": 1}})
+    write_page(rows, tmp_path)
+    window = chromium.new_page(viewport={"width": 900, "height": 600})
+    faults: list[str] = []
+    window.on("console", lambda message: faults.append(message.text))
+    window.on("pageerror", lambda error: faults.append(str(error)))
+    window.goto((tmp_path / "batch.html").as_uri())
+    lines = window.locator("tbody tr")
+    drawn = lines.count()
+    assert 0 < drawn < 500
+    names = [text.split("\t")[1] for text in lines.all_inner_texts()[:3]]
+    assert names == ["doubted", " ".join(EVIL.split()), "job-0"]
+    assert "at least 1" in lines.first.inner_text()
+    window.mouse.wheel(0, 1_000_000)
+    window.wait_for_selector(f"tbody tr:nth-child({drawn + 1})")
+    window.fill("input", "NO such file")
+    assert lines.count() == 1
+    window.fill("input", "job-9999")
+    assert [text.split("\t")[1] for text in lines.all_inner_texts()] == ["job-9999"]
+    window.fill("input", "")
+    for _ in range(2):
+        window.click("th[data-key=seconds] button")
+    assert lines.first.inner_text().split("\t")[1] == "job-9999"
+    assert not faults
