@@ -125,7 +125,7 @@ CLOSE: Route = (
     #     views -> found
     fold_hidden,  # found, sensor, explained, sheets, aligner, accept, aligned, deviation, tolerance, asked_tolerance,
     #     unit -> found, folded, +warnings
-    question_fit,  # fitted, surplus, found, pose, aligned, adapted, deviation, skin, unit, tolerance, explained,
+    question_fit,  # fitted, surplus, found, pose, aligned, part, adapted, deviation, skin, unit, tolerance, explained,
     #     warnings -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     separate_deposits,  # found, tolerance -> found
