@@ -22,7 +22,7 @@ from damageest.stages.scan.simulate import Simulate
 from damageest_evaluate.damages import make_random_damage
 from damageest_evaluate.memory import PeakMemory
 from damageest_evaluate.meter import Meter, measure_libigl_seconds, measure_start_seconds
-from damageest_evaluate.parts import PARTS
+from damageest_evaluate.parts import PARTS, REFINED
 from damageest_evaluate.scores import measure_depth, score
 from damageest_evaluate.sized import make_sized_damage
 
@@ -90,7 +90,7 @@ def save_part(part: Part, path: Path) -> None:
 def load_part(case: DamageCase) -> Part:
     """The case's part: read from its file, or the built-in one."""
     if not case.file:
-        return PARTS[case.part]()
+        return (PARTS | REFINED)[case.part]()
     data = np.load(case.file)
     return Part(
         data["vertices"],

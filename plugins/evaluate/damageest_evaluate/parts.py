@@ -252,3 +252,21 @@ PARTS: dict[str, Callable[[], Part]] = {
     "cuboid": make_cuboid,
 }
 """Name of a part: the function that makes it. Equal calls give equal parts."""
+
+
+def refine(part: Part, times: int) -> Part:
+    """The same part with each triangle cut into four, so many times."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
+    for _ in range(times):
+        mesh = mesh.subdivide()
+    return Part(mesh.vertices, mesh.faces, unit=part.unit, tessellation_error=part.tessellation_error)
+
+
+REFINED: dict[str, Callable[[], Part]] = {
+    "fine_plate": lambda: refine(make_ribbed_plate(), 1),
+    "fine_blade": lambda: refine(make_blade(), 2),
+    "finest_blade": lambda: refine(make_blade(), 3),
+}
+"""Parts with many triangles, to measure speed with."""

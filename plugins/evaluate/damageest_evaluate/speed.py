@@ -11,7 +11,7 @@ from damageest.errors import InputError, suggest
 from damageest.registry import Registry
 from damageest_evaluate.case import DamageCase
 from damageest_evaluate.job import fingerprint_code
-from damageest_evaluate.parts import PARTS
+from damageest_evaluate.parts import PARTS, REFINED
 from damageest_evaluate.processes import Row
 from damageest_evaluate.readme import format_markdown
 
@@ -41,6 +41,17 @@ MANY: Tools = [
     {"tool": "sphere", "centre": [-52 + 34 * (k // 3), -33 + 33 * (k % 3), 0], "radius": 5 + 0.2 * k} for k in range(12)
 ]
 
+TOOTH = [{"tool": "sphere", "centre": [40, 3, 4], "radius": 3.0}]
+ON_BLADE: Tools = [
+    {"tool": "sphere", "centre": [0, -1, 40], "radius": 4},
+    {"tool": "sphere", "centre": [12, 4, 60], "radius": 4},
+    {"tool": "sphere", "centre": [-10, -3, 20], "radius": 4},
+]
+ON_PLATE: Tools = [
+    {"tool": "plane", "point": [45, 25, 0], "normal": [1, 1, 0.2]},
+    {"tool": "sphere", "centre": [-30, -20, 8], "radius": 16},
+]
+
 KINDS: Mapping[str, Kind] = {
     "small chip": Kind("gear", CHIP, 1_000_000, 500),
     "small scan": Kind("gear", CHIP, 20_000, 500),
@@ -50,6 +61,10 @@ KINDS: Mapping[str, Kind] = {
     "fine tolerance": Kind("block", FIXED, 1_000_000, 3000),
     "twelve sites": Kind("ribbed_plate", MANY, 150_000, 500),
     "featureless": Kind("cylinder", CYLINDER, 150_000, 500, known=False),
+    "a tooth": Kind("gear", TOOTH, 150_000, 500, known=False),
+    "three sites, 242,752 triangles": Kind("fine_blade", ON_BLADE, 150_000, 500, known=False),
+    "the same, 971,008 triangles": Kind("finest_blade", ON_BLADE, 150_000, 500, known=False),
+    "two large losses, 5,224 triangles, fine": Kind("fine_plate", ON_PLATE, 1_000_000, 2000),
     "dense scan": Kind("gear", CHIP, 10_000_000, 500),
 }
 MOST_STAGES = 4
@@ -76,7 +91,7 @@ def make_speed_cases(
 
 def _make_case(name: str, points: int, settings: Sequence[str]) -> DamageCase:
     kind = KINDS[name]
-    tolerance = float(f"{PARTS[kind.part]().diagonal / kind.fineness:.3g}")
+    tolerance = float(f"{(PARTS | REFINED)[kind.part]().diagonal / kind.fineness:.3g}")
     pose = "identity" if kind.known else "random"
     return DamageCase(
         part=kind.part,
@@ -100,6 +115,7 @@ def make_speed_table(rows: Sequence[Sequence[Row]]) -> str:
         "processor s",
         "s",
         "libigl s",
+        "a million",
         "x libigl",
         "peak MB",
         "stages, s",
@@ -111,7 +127,7 @@ def _make_line(runs: Sequence[Row]) -> list[str]:
     row = runs[0]
     name, points = str(row["varied"]["kind"]), f"{row['points']}"
     if row["error"]:
-        return [name, points, row["error"], *[""] * 7]
+        return [name, points, row["error"], *[""] * 8]
     seconds, processor, libigl = (
         median(run[what] for run in runs) for what in ("seconds", "cpu_seconds", "libigl_seconds")
     )
@@ -126,6 +142,7 @@ def _make_line(runs: Sequence[Row]) -> list[str]:
         f"{processor:.1f}",
         f"{seconds:.1f}",
         f"{libigl:.2f}",
+        f"{1e6 * libigl / float(points):.2f}",
         f"{processor / libigl:.1f}",
         f"{max(run['megabytes'] for run in runs):.0f}",
         ", ".join(f"{stage} {took:.1f}" for stage, took in longest) + f", checks {rest:.1f}",

@@ -20,9 +20,12 @@ def test_a_case_is_measured_against_one_distance_pass(tmp_path: Path) -> None:
     done = evaluate("speed", "--kinds", "small scan", "--points", "2e4", "--set", "report=none", "--write", page)
     assert done.returncode == 0, done.stderr
     (line,) = [text for text in page.read_text().splitlines() if text.startswith("| small scan")]
-    _, points, iou, _, processor, _, libigl, ratio, *_ = (word.strip() for word in line.strip("|").split("|"))
+    _, points, iou, _, processor, _, libigl, a_million, ratio, *_ = (
+        word.strip() for word in line.strip("|").split("|")
+    )
     assert points == "20000"
     assert float(iou) > 0.8
+    assert float(a_million) == pytest.approx(50 * float(libigl), rel=0.3)
     assert float(ratio) == pytest.approx(float(processor) / float(libigl), rel=0.3)
     assert "enclose" in line
     assert "`damageest evaluate speed" in page.read_text()
