@@ -1,4 +1,4 @@
-"""Distances from points to triangle meshes, and which points lie inside. No other module imports libigl.
+"""Distances from points to triangle meshes, and which points lie inside. Only it and `_signs.py` import libigl.
 
 Points and mesh are in one unit and one frame; distances are in that unit. Far from the origin, differences of
 coordinates lose digits. So the functions first move points and mesh to the centre of the mesh's bounds, except where a
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry._signs import keep_signed_mesh
 from damageest.geometry.duplicates import list_used
 from damageest.geometry.vectors import normalise
 from damageest.geometry.voxels import order_by_place
@@ -28,10 +29,15 @@ LARGE = 16.0
 
 MOST_KEPT = 100_000
 """Triangles up to which the tree of a mesh is kept with the mesh: the result's checks ask one damage volume ten times.
-More would hold memory that the next stages need."""
+Of larger meshes the last one keeps its tree, as a part that all checks ask: more would hold memory that the next stages
+need."""
+
+FEW = 1.0
+"""Points for each triangle below which a mesh is prepared once for all calls, and not by libigl for each."""
 
 _faults: WeakKeyDictionary[Mesh, tuple[Flags, Flags]] = WeakKeyDictionary()
 _centred: WeakKeyDictionary[Mesh, SurfaceTree] = WeakKeyDictionary()
+_large: WeakKeyDictionary[Mesh, SurfaceTree] = WeakKeyDictionary()
 
 
 class Closest(NamedTuple):
@@ -52,10 +58,12 @@ def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
         return _find_none()
     _require_some(mesh.faces, "triangle")
     centre = mesh.bounds.mean(axis=0)
-    if (tree := _centred.get(mesh)) is None:
+    kept = _centred if len(mesh.faces) <= MOST_KEPT else _large
+    if (tree := kept.get(mesh)) is None:
         tree = SurfaceTree(Mesh(mesh.vertices - centre, mesh.faces))
-        if len(mesh.faces) <= MOST_KEPT:
-            _centred[mesh] = tree
+        if kept is _large:
+            _large.clear()
+        kept[mesh] = tree
     distance, face, place = tree.closest(points - centre)
     return Closest(distance, face, place + centre)
 
@@ -207,14 +215,14 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     used = np.flatnonzero(~flat)
     _require_some(used, "triangle with an area")
     faces = mesh.faces[used]
-    kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-    signed, nearest, foot, pseudo = igl.signed_distance(query, vertices, faces, sign_type=kind)
-    signed = np.array(signed, dtype=np.float64)
-    nearest = np.asarray(nearest, np.int64)
-
+    if len(points) < FEW * len(faces):
+        signed, nearest, foot, pseudo = keep_signed_mesh(mesh, vertices, faces).measure(query)
+    else:
+        kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
+        signed, nearest, foot, pseudo = igl.signed_distance(query, vertices, faces, sign_type=kind)
+        signed, nearest = np.array(signed, dtype=np.float64), np.asarray(nearest, np.int64)
     away = query - foot
-    cross = mesh.cross[used]
-    normal = normalise(cross)[nearest]
+    normal = normalise(mesh.cross[used[nearest]])
     beside = np.linalg.norm(np.cross(away, normal), axis=1) > 1e-7 * np.abs(signed)
     # Where the nearest place lies on the short edge of a slender triangle, libigl sometimes gives the normal of that
     # face and not the pseudonormal of the edge: 4 of 70,000 points around a tube with a hole, millimetres from the

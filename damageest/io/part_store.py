@@ -26,7 +26,7 @@ FOLDER = "DAMAGEEST_CACHE"
 """Variable of the environment that names the folder; `none`: nothing is kept."""
 MOST_BYTES = 1_000_000_000
 """Size of the folder, in bytes, above which the entries that were used longest ago are removed."""
-COMPUTED_BY = ("stages/align", "geometry")
+COMPUTED_BY = ("stages/align", "stages/sample", "geometry")
 """Folders of this package whose code computes what is kept."""
 LIBRARIES = ("numpy", "scipy", "libigl")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Literal
 
 import numpy as np
@@ -9,10 +10,14 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Mesh, Part, Samples
 from damageest.errors import InputError
+from damageest.io.digests import digest
+from damageest.io.part_store import Arrays, recall
 from damageest.stages.sample import Sample
 from damageest.stages.sample._edges import place_sharp_points
 from damageest.stages.sample._spread import spread_points, thin
 
+COSTLY = 50_000
+"""Triangles from which on the points of a part are kept for later runs with the same part and tolerance."""
 FINE = 0.4
 """Step of the first points on faces that are too small for a grid of their own, in spacings."""
 
@@ -41,9 +46,16 @@ class EdgeAware(Sample):
 
         Raises InputError where the part has no area.
         """
-        area = part.area
-        if not area > 0:
+        if not part.area > 0:
             raise InputError("the part's surface has no area; check the file it was read from")
+        if len(part.faces) < COSTLY:
+            return self._place(part, tolerance)
+        key = digest(part.vertices, part.faces, tolerance, self.spacing, self.angle, self.max_points)
+        kept = recall("samples", key, lambda: _pack(self._place(part, tolerance)))
+        return Samples(**{**kept, "spacing": float(kept["spacing"])})  # type: ignore[arg-type]
+
+    def _place(self, part: Part, tolerance: float) -> Samples:
+        area = part.area
         # one grid per triangle needs at least a quarter more points than one grid over all
         spacing = max(self.spacing * tolerance, float(np.sqrt(1.25 * area / self.max_points)))
         while True:
@@ -52,6 +64,10 @@ class EdgeAware(Sample):
             if excess <= 1:
                 return samples
             spacing *= 1.04 * np.sqrt(excess)
+
+
+def _pack(samples: Samples) -> Arrays:
+    return {field.name: np.asarray(getattr(samples, field.name)) for field in dataclasses.fields(samples)}
 
 
 def _sample(part: Mesh, spacing: float, angle: float) -> Samples:
