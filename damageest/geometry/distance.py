@@ -1,4 +1,4 @@
-"""Distances from points to triangle meshes, and which points lie inside. Only it and `_signs.py` import libigl.
+"""Distances from points to triangle meshes, and which points lie inside. Only it and `pseudonormals.py` import libigl.
 
 Points and mesh are in one unit and one frame; distances are in that unit. Far from the origin, differences of
 coordinates lose digits. So the functions first move points and mesh to the centre of the mesh's bounds, except where a
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
-from damageest.geometry._signs import keep_signed_mesh
 from damageest.geometry.duplicates import list_used
+from damageest.geometry.pseudonormals import keep_signed_mesh
 from damageest.geometry.vectors import normalise
 from damageest.geometry.voxels import order_by_place
 from damageest.isolation.memory import FEWER_POINTS, require_memory

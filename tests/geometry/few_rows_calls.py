@@ -33,6 +33,7 @@ from damageest.geometry import (
     pieces,
     point_pieces,
     poisson,
+    pseudonormals,
     rays,
     refinement,
     slivers,
@@ -135,6 +136,9 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "distance.is_inside": call_both(distance.is_inside),
     "distance.signed_distance": call_signed,
     "distance.run_libigl_pass": call_both(distance.run_libigl_pass),
+    "pseudonormals.SignedMesh": call_both(
+        lambda points, mesh: pseudonormals.SignedMesh(mesh.vertices, mesh.faces).measure(points)[0]
+    ),
     "distance_by_cells.signed_distance_by_cells": call_by_cells,
     "duplicates.list_distinct": lambda r: expect(duplicates.list_distinct(r.numbers), (None,)),
     "duplicates.order_integers": lambda r: expect(duplicates.order_integers(r.numbers), (r.count,)),
@@ -284,7 +288,7 @@ WITHOUT_ROWS: dict[str, str] = {
     **dict.fromkeys(
         (
             "distance.Closest", "families.Errors", "families.Family", "pieces.JoinedPieces", "pieces.Piece",
-            "rays.Crossings", "stiff_modes.StiffMode", "views.View",
+            "pseudonormals.keep_signed_mesh", "rays.Crossings", "stiff_modes.StiffMode", "views.View",
         ),
         "is a result",
     ),
@@ -308,6 +312,7 @@ REFUSALS: dict[str, str] = {
     "distance.distance_to_edges": NO_TRIANGLE,
     "distance.signed_distance": NO_TRIANGLE,
     "distance.run_libigl_pass": NO_TRIANGLE,
+    "pseudonormals.SignedMesh": NO_TRIANGLE,
     "healing.heal": NO_VOLUME,
     "height_spline.fit_height_plane": r"no plane for a surface without area",
     "height_spline.fit_height_spline": r"no spline for \d points",

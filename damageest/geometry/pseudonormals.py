@@ -58,7 +58,11 @@ class SignedMesh:
 
     def measure(self, points: Floats) -> tuple[Floats, Ints, Floats, Floats]:
         """Signed distance (N,) of points (N,3), positive outside, the nearest face (N,), the nearest place (N,3) and
-        the pseudonormal (N,3) there."""
+        the pseudonormal (N,3) there. Raises ValueError where the mesh has no triangle."""
+        if not len(points):
+            return np.empty(0), np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3))
+        if not len(self.faces):  # libigl ends the process by a segmentation fault there
+            raise ValueError("no distance: what it is measured to has no triangle; ask only where there is one")
         squared, face, place = self._tree.squared_distance(self.vertices, self.faces, points)
         face, place = np.asarray(face, np.int64).ravel(), np.reshape(place, (-1, 3))
         pseudo = self._find_pseudonormals(face, place)

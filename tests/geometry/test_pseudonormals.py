@@ -1,0 +1,43 @@
+"""Signed distances of few points, from what is kept of a mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from damageest.artefacts import Mesh
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.pseudonormals import keep_signed_mesh
+from damageest.geometry.solids import to_arrays, to_manifold
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_few_points_get_what_many_get(seed: int) -> None:
+    """Few points are answered from what is kept of a mesh, many by libigl: the same numbers, the same side."""
+    rng = np.random.default_rng(seed)
+    holes = trimesh.creation.cylinder(4, 60, sections=64).apply_translation([5, 0, 0])
+    solid = to_manifold(Mesh(*_as_arrays(trimesh.creation.icosphere(4, 20))), np.zeros(3)) - to_manifold(
+        Mesh(*_as_arrays(holes)), np.zeros(3)
+    )
+    mesh = Mesh(*to_arrays(solid))
+    corners, edges = mesh.vertices, mesh.triangles[:, :2].mean(axis=1)
+    places = np.concatenate([corners, edges, mesh.triangles.mean(axis=1)])[rng.permutation(len(corners))[:600]]
+    asked = np.concatenate([places, places + rng.normal(0, 0.3, places.shape), rng.uniform(-25, 25, (600, 3))])
+    assert len(asked) < len(mesh.faces)
+    few = signed_distance(asked, mesh)
+    many = signed_distance(np.tile(asked, (5, 1)), mesh)
+    for k in range(5):
+        own = slice(k * len(asked), (k + 1) * len(asked))
+        np.testing.assert_array_equal(few[0], many[0][own])
+    of_kept = keep_signed_mesh(mesh, mesh.vertices, mesh.faces).measure(asked)
+    np.testing.assert_allclose(of_kept[0], few[0], atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(asked - of_kept[2], axis=1), np.abs(few[0]), atol=1e-12)
+    again = signed_distance(asked[::-1], mesh)[0][::-1]
+    np.testing.assert_array_equal(few[0], again)
+    other = signed_distance(asked, Mesh(mesh.vertices * 1.1, mesh.faces))[0]
+    assert (other < few[0] + 1e-12).mean() > 0.9  # not the mesh that was asked last
+
+
+def _as_arrays(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
