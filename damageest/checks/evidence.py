@@ -26,6 +26,7 @@ from damageest.geometry.neighbourhoods import find_in_box, pick_one_per_cube
 from damageest.geometry.point_pieces import number_pieces
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.threads import count_threads
 
 MOST = 10_000
 """Points looked at for each figure: a share is right to about half a percent."""
@@ -136,7 +137,7 @@ def _measure_gap(places: Floats, points: Floats, most: float) -> Floats:
 
     if not len(places) or not len(points):
         return np.full(len(places), np.inf)
-    return np.asarray(cKDTree(points).query(places, distance_upper_bound=1.001 * most, workers=2)[0])
+    return np.asarray(cKDTree(points).query(places, distance_upper_bound=1.001 * most, workers=count_threads())[0])
 
 
 def _share_far(places: Floats, points: Floats, distance: float) -> float:

@@ -17,6 +17,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.threads import count_threads
 from damageest.geometry.voxels import measure_area, measure_bounds
 
 if TYPE_CHECKING:
@@ -229,7 +230,7 @@ def _is_beside(patch: _Patch, loss: _Patch, tolerance: float, spacing: float) ->
     reach = max(NEAR * tolerance, 3 * spacing)
     if _measure_box_gap(loss.bounds, patch.bounds).max() > reach:  # no point of one is nearer to the other
         return False
-    gap = np.asarray(patch.tree.query(loss.points, workers=2)[0])
+    gap = np.asarray(patch.tree.query(loss.points, workers=count_threads())[0])
     return bool(gap.min() <= reach)
 
 
@@ -245,7 +246,7 @@ def _is_opposite(patch: _Patch, loss: _Patch) -> bool:
     beyond = np.linalg.norm(np.maximum(np.maximum(low - loss.feet, loss.feet - high), 0.0), axis=1)
     if np.median(beyond) > near:  # each is at least as far from the feet as from the box around them
         return False
-    return bool(np.median(patch.feet_tree.query(loss.feet, workers=2)[0]) <= near)
+    return bool(np.median(patch.feet_tree.query(loss.feet, workers=count_threads())[0]) <= near)
 
 
 def _is_alike(patch: _Patch, losses: Sequence[_Patch]) -> bool:

@@ -15,6 +15,7 @@ from damageest.cli import _process
 from damageest.cli._process import end_with_each
 from damageest.cli._streams import keep_for_results, say, say_result
 from damageest.errors import clean_message
+from damageest.geometry.threads import use_threads
 from damageest.isolation.limits import STAGE_SECONDS, Limits, limit_this_process, parse_memory
 from damageest.isolation.notes import note_job
 
@@ -55,9 +56,14 @@ def command(
     stage_timeout: Annotated[
         float, typer.Option(min=0, help="Seconds after which a stage is ended; 0: never.")
     ] = STAGE_SECONDS,
+    threads: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Threads that the run uses; 0: one for each core.")
+    ] = 0,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Run jobs: compute the damage volumes from part and scan."""
+    if threads:
+        use_threads(threads)
     limits = Limits(parse_memory(memory) if memory else None, stage_timeout)
     given = _Given(output, tuple(settings or ()), not no_cache, limits, as_json, quiet, debug)
     if output is not None and len(jobs) > 1:

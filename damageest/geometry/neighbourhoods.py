@@ -12,6 +12,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import group_integers
+from damageest.geometry.threads import count_threads
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid, measure_bounds, number_cubes, order_by_place
 from damageest.isolation.memory import FEWER_POINTS, require_memory
 
@@ -119,13 +120,13 @@ def query_neighbours(tree: Any, points: Floats, count: int, reach: float = np.in
     if not count:
         return np.empty(shape), np.empty(shape, np.int64)
     if len(points) < MANY:
-        distance, index = tree.query(points, k=count, distance_upper_bound=reach, workers=2)
+        distance, index = tree.query(points, k=count, distance_upper_bound=reach, workers=count_threads())
         return np.reshape(distance, shape), np.reshape(index, shape)
     order = order_by_place(points[:, :3])
     distance, index = np.empty(shape), np.empty(shape, np.intp)
     for start in range(0, len(order), CHUNK):
         some = order[start : start + CHUNK]
-        found = tree.query(points[some], k=count, distance_upper_bound=reach, workers=2)
+        found = tree.query(points[some], k=count, distance_upper_bound=reach, workers=count_threads())
         distance[some], index[some] = (np.reshape(of_some, (len(some), count)) for of_some in found)
     return distance, index
 

@@ -13,6 +13,7 @@ from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.local_fits import smooth_points
 from damageest.geometry.neighbourhoods import thin_points
 from damageest.geometry.orientation import turn_toward_void
+from damageest.geometry.threads import count_threads
 from damageest.geometry.vectors import normalise
 
 FEWEST = 16
@@ -97,7 +98,7 @@ def trim_surface(vertices: Floats, faces: Ints, cloud: Floats, reach: float, par
 
     if len(faces):
         # Surface far from all points, or outside the part, does not bound lost metal.
-        is_near = np.asarray(cKDTree(cloud).query(vertices, workers=2)[0]) < reach
+        is_near = np.asarray(cKDTree(cloud).query(vertices, workers=count_threads())[0]) < reach
         is_near &= signed_distance(vertices, part)[0] < 0.5 * tolerance
         faces = take_largest_piece(faces[is_near[faces].all(axis=1)])
     if not len(faces):

@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.threads import count_threads
 from damageest.geometry.vectors import normalise
 from damageest.geometry.voxels import number_cubes
 
@@ -44,7 +45,7 @@ def turn_toward_void(
     toward_lost = _sum_solid_angles(viewpoints, lost, lost_normals, areas, cell) + _sum_missed_above(
         viewpoints, lost, lost_normals, areas, cell
     )
-    nearest = cKDTree(viewpoints).query(points, workers=2)[1]
+    nearest = cKDTree(viewpoints).query(points, workers=count_threads())[1]
     evidence = np.einsum("ij,ij->i", normals, toward_lost[nearest] / np.pi + 0.01 * above)
     return _find_signs(points, normals, evidence)[:, None] * normals
 
@@ -158,7 +159,7 @@ def _sum_missed_above(viewpoints: Floats, skin: Floats, normals: Floats, areas: 
     if not len(skin):
         return np.zeros((len(viewpoints), 3))
     soft = _softening(areas, cell)
-    nearest = cKDTree(skin).query(viewpoints, workers=2)[1]
+    nearest = cKDTree(skin).query(viewpoints, workers=count_threads())[1]
     step = skin[nearest] - viewpoints
     height = np.einsum("ij,ij->i", step, normals[nearest])
     beside = np.einsum("ij,ij->i", step, step) - height**2 > areas.mean()

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
+from damageest.geometry.threads import count_threads
 from damageest.isolation.memory import require_memory
 
 GridValues = NDArray[np.float32]
@@ -206,6 +207,6 @@ def _precondition(right: GridValues, eigenvalues: GridValues) -> GridValues:
     """The solution with the constant-coefficient part of the operator alone."""
     from scipy.fft import dctn, idctn
 
-    waves = dctn(right, workers=2)
+    waves = dctn(right, workers=count_threads())
     waves /= eigenvalues
-    return np.asarray(idctn(waves, workers=2, overwrite_x=True), dtype=np.float32)
+    return np.asarray(idctn(waves, workers=count_threads(), overwrite_x=True), dtype=np.float32)

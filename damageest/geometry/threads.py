@@ -27,6 +27,12 @@ def count_threads() -> int:
     return max(1, min(cores, MOST))
 
 
+def use_threads(number: int) -> None:
+    """Sets how many threads this process and those that it starts use, at most. libigl reads it when it is loaded."""
+    for name in ("OMP_NUM_THREADS", "IGL_NUM_THREADS"):
+        os.environ[name] = str(number)
+
+
 def cut_evenly(count: int, most: int) -> list[slice]:
     """Slices of ``most`` items that together are the first ``count``; one empty slice for none."""
     return [slice(start, start + most) for start in range(0, max(count, 1), most)]

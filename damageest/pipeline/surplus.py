@@ -15,6 +15,7 @@ from damageest.findings import Surplus
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples, label_strays
 from damageest.geometry.pieces import JoinedPieces, find_pieces, join_pieces
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.geometry.threads import count_threads
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.sites import find_place
 from damageest.pipeline.state import FoundSite, JobState, Reasons
@@ -120,7 +121,9 @@ def _is_equal(item: Surplus, volumes: tuple[float, ...], most: float) -> bool:
 def _is_touching(points: Floats, item: Surplus, site: FoundSite, reach: float) -> bool:
     from scipy.spatial import cKDTree
 
-    gap = cKDTree(points[item.points]).query(points[site.members], distance_upper_bound=reach, workers=2)[0]
+    gap = cKDTree(points[item.points]).query(points[site.members], distance_upper_bound=reach, workers=count_threads())[
+        0
+    ]
     return bool(np.isfinite(gap).any())
 
 

@@ -140,3 +140,16 @@ def test_debug_shows_where_an_error_came_from(tmp_path: Path) -> None:
     (tmp_path / "box.stl").write_bytes(b"nonsense")
     assert "Traceback" not in call("run", path).stderr
     assert "Traceback" in call("run", path, "--debug").stderr
+
+
+def test_any_number_of_threads_gives_the_same_bytes(tmp_path: Path) -> None:
+    job, found = damaged_box.write(tmp_path), []
+    for threads in (1, 2, 5):
+        done = call("run", job, "--threads", threads, "--no-cache", "-o", tmp_path / f"out-{threads}")
+        assert done.returncode == 0, done.stderr
+        folder = tmp_path / f"out-{threads}"
+        files = [path for kind in ("*.stl", "*.ply") for path in sorted(folder.rglob(kind))]
+        assert len(files) > 3
+        found.append({str(path.relative_to(folder)): path.read_bytes() for path in files})
+    assert found[0] == found[1] == found[2]
+    assert call("run", job, "--threads", "many").returncode == 2

@@ -10,6 +10,7 @@ from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import order_integers
 from damageest.geometry.morton import encode_cells
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.threads import count_threads
 from damageest.geometry.voxels import measure_bounds
 
 MAX_DENSE = 120_000
@@ -81,7 +82,7 @@ def orient_scan(
     # neighbours are searched among all points, but only for every second point where there are many
     index = index[:: 1 + (len(index) > MAX_DENSE // 2)]
     dense = points[index]
-    reach = np.asarray(tree.query(dense, k=min(9, len(every)), workers=-1)[0])[:, -1]
+    reach = np.asarray(tree.query(dense, k=min(9, len(every)), workers=count_threads())[0])[:, -1]
     typical = float(np.median(reach))
     weights = np.where(reach < 5 * typical, np.minimum(reach, 2.5 * typical) ** 2, 0.0)
 
@@ -93,7 +94,9 @@ def orient_scan(
         # so many points lie within the radius, as far as the noise leaves them near the surface
         count_near = int(np.clip(9 * (radius / max(typical, 1e-300)) ** 2, NEIGHBOURS, MAX_NEIGHBOURS))
     near = np.asarray(
-        tree.query(dense[chosen], k=min(count_near, len(every)), distance_upper_bound=radius, workers=-1)[1]
+        tree.query(dense[chosen], k=min(count_near, len(every)), distance_upper_bound=radius, workers=count_threads())[
+            1
+        ]
     )
     there = near < len(every)
     around = every[np.minimum(near, len(every) - 1)] - dense[chosen][:, None]

@@ -14,6 +14,7 @@ from damageest.geometry.distance import distance_to_edges, distance_to_mesh, is_
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.selectors import Mask
 from damageest.geometry.solids import to_arrays
+from damageest.geometry.threads import count_threads
 from damageest.stages.allowance._limits import StockConflict
 from damageest.stages.allowance._skin import ON_PART, SkinFaces
 
@@ -147,7 +148,7 @@ def measure_thickness(
     ended = _is_near(ends, work.left, 10 * rounding) | _is_near(ends, work.kept_out, 10 * rounding)
     ended |= _is_inside(ends, work.kept_out)
     for conflict in conflicts:
-        away = np.asarray(cKDTree(conflict.points - work.origin).query(points, workers=2)[0])
+        away = np.asarray(cKDTree(conflict.points - work.origin).query(points, workers=count_threads())[0])
         ended |= away <= 2 * height
     return Thickness(points, normal, far, height, np.where(covered, nearest, far), covered, ended)
 

@@ -9,6 +9,7 @@ from pydantic import Field, PositiveFloat
 
 from damageest.artefacts import Floats, Part, Samples, Solid, Surface, Vector
 from damageest.errors import StageError
+from damageest.geometry.threads import count_threads
 from damageest.stages.background import Background
 
 
@@ -96,14 +97,14 @@ def _find_neighbourhood(
 
     bare = samples.points
     if len(intact):
-        bare = bare[~np.isfinite(cKDTree(intact).query(bare, distance_upper_bound=reach, workers=2)[0])]
+        bare = bare[~np.isfinite(cKDTree(intact).query(bare, distance_upper_bound=reach, workers=count_threads())[0])]
     places = [surface.vertices]
     if len(bare):
         tree = cKDTree(bare)
         pairs = tree.query_pairs(2 * gap, output_type="ndarray")
         links = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(len(bare),) * 2)
         label = connected_components(links, directed=False)[1]
-        near, _ = cKDTree(surface.vertices).query(bare, distance_upper_bound=2 * reach, workers=2)
+        near, _ = cKDTree(surface.vertices).query(bare, distance_upper_bound=2 * reach, workers=count_threads())
         places.append(bare[np.isin(label, label[np.isfinite(near)])])
     points = np.concatenate(places)
     return points.min(axis=0), points.max(axis=0)

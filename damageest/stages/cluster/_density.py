@@ -6,6 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import group_integers
+from damageest.geometry.threads import count_threads
 from damageest.geometry.voxels import number_cubes
 from damageest.isolation.memory import FEWER_POINTS, require_memory
 
@@ -63,7 +64,7 @@ def measure_neighbour_distances(points: Floats, neighbours: int) -> Floats:
     """Mean distance (M,) of each of ``points`` (M,3) to its ``neighbours`` nearest ones; inf where there are fewer."""
     from scipy.spatial import cKDTree
 
-    distance, _ = cKDTree(points).query(points, k=neighbours + 1, workers=-1)
+    distance, _ = cKDTree(points).query(points, k=neighbours + 1, workers=count_threads())
     result: Floats = np.asarray(distance)[:, 1:].mean(axis=1)
     return result
 

@@ -10,6 +10,7 @@ from pydantic import Field, PositiveFloat
 
 from damageest.artefacts import DAMAGE, Deviation, Floats, Ints, Scan, Sites
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, gather_around
+from damageest.geometry.threads import count_threads
 from damageest.stages.cluster import Cluster
 from damageest.stages.cluster._density import measure_neighbour_distances, run_dbscan
 
@@ -156,7 +157,9 @@ def _is_supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], re
     from scipy.spatial import cKDTree
 
     here = find_nearby(points, points[damage], reach)
-    _, near = cKDTree(points[here]).query(points[damage], k=NEIGHBOURHOOD, distance_upper_bound=reach, workers=2)
+    _, near = cKDTree(points[here]).query(
+        points[damage], k=NEIGHBOURHOOD, distance_upper_bound=reach, workers=count_threads()
+    )
     padded = np.append(is_damage[here], False)  # the index of a missing neighbour is one past the last
     result: NDArray[np.bool_] = padded[near].sum(axis=1) >= MIN_DAMAGE
     return result

@@ -8,6 +8,7 @@ from damageest.artefacts import Floats, Mesh, Part, Rims, Surface
 from damageest.errors import StageError
 from damageest.geometry.body_repair import label_bodies
 from damageest.geometry.distance import is_inside, winding_number
+from damageest.geometry.threads import count_threads
 from damageest.stages.enclose import NotSeparatedError
 from damageest.stages.enclose._sew import ClosedPath, ExtendedSurface, build_strip, cut_off, fill_loops
 
@@ -64,7 +65,7 @@ def close_enclosure(
     # Points close to the rim may lie on either side.
     few = near[:: max(1, len(near) // 4000)]
     few = few[is_inside(few, background)]
-    few = few[cKDTree(surface.vertices).query(few, workers=2)[0] > 3 * tolerance] if len(few) else few
+    few = few[cKDTree(surface.vertices).query(few, workers=count_threads())[0] > 3 * tolerance] if len(few) else few
     inside = [float(is_inside(few, mesh).mean()) if len(few) else 0.0 for mesh in candidates]
     best = int(np.argmin(inside))
     if inside[best] > 0.02:
@@ -98,7 +99,9 @@ def orient_by_intact(surface: Surface, rims: Rims, intact: Floats) -> tuple[Surf
     label, size = label_bodies(surface.faces)
     nodes = np.concatenate(rims.loops)
     count = min(BESIDE, len(intact))
-    beside = np.asarray(cKDTree(intact).query(surface.vertices[nodes], count, workers=2)[1]).reshape(len(nodes), count)
+    beside = np.asarray(cKDTree(intact).query(surface.vertices[nodes], count, workers=count_threads())[1]).reshape(
+        len(nodes), count
+    )
     # The nearest points lie above the rim, which ends a tolerance below the skin; the farther ones lie beside it.
     way = intact[beside[:, count // 2 :]] - surface.vertices[nodes][:, None]
     lean = np.einsum("ijk,ik->ij", way, surface.vertex_normals[nodes]) / np.maximum(np.linalg.norm(way, axis=2), 1e-300)

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Ints, Mesh, Part, Rims, Solid, Surface
 from damageest.errors import StageError
+from damageest.geometry.threads import count_threads
 from damageest.stages.enclose import Enclose
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def _find_along(mesh: Mesh, places: Floats, reach: float) -> NDArray[np.bool_]:
     """(F,) whether a corner of each face is within ``reach`` of places (K,3)."""
     from scipy.spatial import cKDTree
 
-    far, _ = cKDTree(places).query(mesh.vertices, distance_upper_bound=reach, workers=2)
+    far, _ = cKDTree(places).query(mesh.vertices, distance_upper_bound=reach, workers=count_threads())
     return np.asarray(np.isfinite(far)[mesh.faces].any(axis=1))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Floats, Mesh, Part, Rims, Solid, Surface
+from damageest.geometry.threads import count_threads
 from damageest.stages.enclose import Enclose
 
 
@@ -36,6 +37,8 @@ class ShortestPath(Enclose):
         surface, rims = orient_by_intact(surface, rims, intact)
         wide = extend_rims(surface, rims, self.overhang * tolerance)
         tree = cKDTree(background.vertices)
-        images = [np.asarray(tree.query(wide.vertices[loop], workers=2)[1], np.int64) for loop in wide.loops]
+        images = [
+            np.asarray(tree.query(wide.vertices[loop], workers=count_threads())[1], np.int64) for loop in wide.loops
+        ]
         paths = [trace_closed_path(background.vertices, background.faces, image) for image in images]
         return close_enclosure(surface, wide, background, paths, intact, part, tolerance)

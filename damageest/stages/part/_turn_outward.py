@@ -7,6 +7,7 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.errors import InputError
 from damageest.geometry.poisson import Grid
+from damageest.geometry.threads import count_threads
 
 MAX_VOXELS = 60_000_000
 
@@ -58,7 +59,7 @@ def turn_outward(points: Floats, normals: Floats, voxel: float) -> Floats:
             f"{middle[2]:.4g}); scan more points there, or set part.cell smaller"
         )
     # The sum over neighbours on the same face decides where the score of a single point is near 0.
-    _, near = cKDTree(points).query(points, k=9, workers=2)
+    _, near = cKDTree(points).query(points, k=9, workers=count_threads())
     agree = np.einsum("ij,ikj->ik", normals, normals[near])
     score = (score[near] * agree).sum(axis=1)
     return np.where(score < 0, -1.0, 1.0)[:, None] * normals

@@ -12,6 +12,7 @@ from pydantic import Field
 from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.errors import InputError
 from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.threads import count_threads
 from damageest.geometry.units import UnitOption
 from damageest.io.files import file_sha256
 from damageest.io.scans import read_scan
@@ -139,9 +140,9 @@ def _note_openings(vertices: Floats, faces: Ints, points: Floats) -> tuple[str, 
 
     tree = cKDTree(points)
     middle = vertices[faces].mean(axis=1)
-    far, nearest = (np.asarray(found) for found in tree.query(middle, workers=2))
+    far, nearest = (np.asarray(found) for found in tree.query(middle, workers=count_threads()))
     near, at = np.unique(nearest, return_inverse=True)
-    gap = far / np.asarray(tree.query(points[near], 8, workers=2)[0])[at, -1]
+    gap = far / np.asarray(tree.query(points[near], 8, workers=count_threads())[0])[at, -1]
     place, size = middle[gap.argmax()], 2 * float(far[gap.argmax()])
     text = f"of about {size:.2g} across at ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g})"
     if gap.max() > MAX_GAP:

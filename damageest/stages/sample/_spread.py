@@ -6,6 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import group_integers
+from damageest.geometry.threads import count_threads
 from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.isolation.memory import require_memory
 
@@ -73,7 +74,7 @@ def thin(points: Floats, apart: float, reach: float) -> Ints:
     kept = np.empty(0, np.int64)
     while len(todo):
         kept = np.concatenate([kept, todo[_pick_apart(points[todo], apart)]])
-        far, _ = cKDTree(points[kept]).query(points, workers=-1)
+        far, _ = cKDTree(points[kept]).query(points, workers=count_threads())
         todo = _pick_one_per_cell(points, 0.2 * apart, np.flatnonzero(far > reach))
     return np.sort(kept)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.geometry.duplicates import group_integers
+from damageest.geometry.threads import count_threads
 from damageest.geometry.voxels import CHUNK, number_cubes, number_faced_cubes
 from damageest.isolation.memory import FEWER_POINTS, require_memory
 
@@ -132,7 +133,7 @@ def _count_cubes_away(cube: Ints, low: Flags) -> Floats:
     """(C,) distance from each cube to the nearest ``low`` one, between centres, in cubes."""
     from scipy.spatial import cKDTree
 
-    return np.asarray(cKDTree(cube[low]).query(cube, distance_upper_bound=4.0, workers=2)[0])
+    return np.asarray(cKDTree(cube[low]).query(cube, distance_upper_bound=4.0, workers=count_threads())[0])
 
 
 def _average_neighbours(
@@ -152,7 +153,9 @@ def _average_neighbours(
     mean, number = np.empty(len(asked)), np.empty(len(asked), np.int64)
     for start in range(0, len(asked), CHUNK):
         own = slice(start, start + CHUNK)
-        gap, index = tree.query(place[asked[own]], k=[*range(1, count + 1)], distance_upper_bound=reach, workers=2)
+        gap, index = tree.query(
+            place[asked[own]], k=[*range(1, count + 1)], distance_upper_bound=reach, workers=count_threads()
+        )
         number[own] = np.maximum(np.isfinite(gap).sum(axis=1), 1)
         mean[own] = padded[index].sum(axis=1) / number[own]
     return mean, number

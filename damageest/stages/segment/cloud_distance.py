@@ -9,6 +9,7 @@ from pydantic import Field
 
 from damageest.artefacts import ADDED, DAMAGE, INTACT, Deviation, Floats, Ints, Samples, Scan
 from damageest.errors import StageError
+from damageest.geometry.threads import count_threads
 from damageest.stages.segment import Segment
 
 NEAREST = 12
@@ -78,11 +79,11 @@ def cloud_distance(points: Floats, samples: Samples, plain: bool = False) -> tup
     distance, face = np.empty(len(points)), np.empty(len(points), np.int64)
     for start in range(0, len(points), 200_000):  # so that the neighbours of a scan of millions fit in memory
         part = slice(start, start + 200_000)
-        far, index = (np.reshape(a, (-1, count)) for a in tree.query(points[part], k=count, workers=2))
+        far, index = (np.reshape(a, (-1, count)) for a in tree.query(points[part], k=count, workers=count_threads()))
         distance[part], face[part] = _sign_distance(points[part], samples, far, flat[index], plain)
     if len(flat) < len(samples.points):
         # The distance to a sample on an edge is an upper bound.
-        edge, _ = cKDTree(samples.points[samples.kind > 0]).query(points, workers=2)
+        edge, _ = cKDTree(samples.points[samples.kind > 0]).query(points, workers=count_threads())
         distance = np.sign(distance) * np.minimum(np.abs(distance), edge)
     return distance, face
 
