@@ -6,12 +6,14 @@ import numpy as np
 
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Scan
 from damageest.findings import VariogramPoint
-from damageest.geometry.neighbourhoods import find_neighbours
+from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
 
 ASKED = 1200
 """Intact points whose pairs are compared, spread over the scan at random."""
 NEIGHBOURS = 12
 """Nearest points that each of them is compared with besides, for the shortest distances."""
+AROUND = 6.0
+"""Distance in spacings within which these lie: there are a hundred points, where the scan has no gap."""
 FARTHEST = 0.3
 """Largest distance of a pair, in diagonals of the part."""
 STEPS = 10
@@ -33,13 +35,15 @@ def measure_semivariogram(part: Part, aligned: Scan, deviation: Deviation) -> tu
     if len(index) < FEWEST or not aligned.spacing:
         return ()
     some = np.sort(np.random.default_rng(0).permutation(len(index))[:ASKED])
-    points, normals = aligned.points[index], part.face_normals[deviation.face[index]]
+    points = aligned.points[index]
     first, second = np.triu_indices(len(some), 1)
-    near = find_neighbours(points[some], min(NEIGHBOURS, len(index)), points)[1]
+    around = find_nearby(points, points[some], AROUND * aligned.spacing)
+    near = around[find_neighbours(points[some], min(NEIGHBOURS, len(around)), points[around])[1]]
     first = np.concatenate([some[first], np.repeat(some, near.shape[1])])
     second = np.concatenate([some[second], near.ravel()])
     apart: Floats = np.linalg.norm(points[first] - points[second], axis=1)
-    alike = np.einsum("ij,ij->i", normals[first], normals[second]) > FACING
+    normals = [part.face_normals[deviation.face[index[one]]] for one in (first, second)]
+    alike = np.einsum("ij,ij->i", *normals) > FACING
     used = alike & (apart > 0) & (apart < FARTHEST * part.diagonal)
     edges = np.geomspace(0.5 * aligned.spacing, max(FARTHEST * part.diagonal, aligned.spacing), STEPS + 1)
     step = np.clip(np.searchsorted(edges, apart[used]) - 1, 0, STEPS - 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,9 @@ FEWEST_POINTS = 25
 """Points of a site among two surfaces below which nothing is said: at the roots of walls that are gone are some."""
 MOST_ASKED, ALL_ASKED = 2000, 4000
 """Points of a site, and of the whole scan, that are asked; a share is right to two percent, and to 0.2 percent."""
+
+MOST_COMPARED = 1_000_000
+"""Points of a scan, chosen at random, among which these are asked: two surfaces are two in few points as well."""
 
 
 class Sheets(NamedTuple):
@@ -87,7 +91,12 @@ def find_sheets(aligned: Scan, deviation: Deviation, part: Part, tolerance: floa
     nothing = np.empty(0)
     if len(near) < NEIGHBOURS:
         return SheetPlaces(Sheets(), near[:0], nothing, nothing)
-    asked = np.random.default_rng(0).permutation(near)[:ALL_ASKED]
+    rng, spacing = np.random.default_rng(0), aligned.spacing
+    if len(near) > MOST_COMPARED:
+        share = MOST_COMPARED / len(near)
+        near, spacing = near[rng.random(len(near)) < share], spacing / np.sqrt(share)
+    asked = rng.permutation(near)[:ALL_ASKED]
+    aligned = replace(aligned, spacing=float(spacing))
     is_double, upper, apart = _find_double(aligned, deviation, part, asked, near, tolerance)
     if not is_double.any():
         return SheetPlaces(Sheets(), near[:0], nothing, nothing)
