@@ -25,7 +25,7 @@ LAYER = 5.0
 
 def gather_scan_facts(
     skin: SkinView, part: Part, aligned: Scan, deviation: Deviation, surplus: Iterable[Surplus], pose: Pose,
-    fit: ModelFit | None, tolerance: float, unit: str, is_fitted: bool, sheets: Sheets,
+    fit: ModelFit | None, tolerance: float, unit: str, is_fitted: bool, sheets: Sheets, adapted: float,
 ) -> ScanFacts:  # fmt: skip
     """Measures how far skin deviates that is not damaged. ``surplus``: higher one is left out, since it is metal."""
     layer = (deviation.label == ADDED) & (deviation.distance < LAYER * tolerance)
@@ -51,6 +51,7 @@ def gather_scan_facts(
         sheets_apart=sheets.apart,
         pose=pose.doubts,
         fit=fit,
+        adapted=adapted,
     )
 
 

@@ -117,7 +117,8 @@ CLOSE: Route = (
     choose_sites,  # found, choice, aligned, deviation, part, tolerance -> found, +warnings
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
-    gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner, sheets -> facts
+    gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner, sheets, adapted
+    #     -> facts
     measure_sensor,  # part, aligned, deviation, sites, facts, explained, depth_step, tolerance -> pose_error, sensor
     measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
     #     tolerance, unit -> found

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Part, Pose, Reason, Scan
+from damageest.artefacts import AdaptedPart, Deviation, Part, Pose, Reason, Scan
 from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import compare_other_poses, describe_motion
@@ -66,11 +66,13 @@ def choose_sites(
 def gather_facts(
     skin: SkinView, part: Part, aligned: Scan, deviation: Deviation, surplus: tuple[Surplus, ...], pose: Pose,
     fitted: FittedModel | None, tolerance: float, unit: str, aligner: Align | None, sheets: Sheets,
+    adapted: AdaptedPart | None,
 ) -> ScanFacts:  # fmt: skip
     """Measures what the whole scan says about skin that deviates and is not damaged."""
     return gather_scan_facts(
         skin, part, aligned, deviation, surplus, pose, None if fitted is None else fitted.fit, tolerance, unit,
         is_fitted=getattr(aligner, "use", "none") != "none" and not pose.is_held, sheets=sheets,
+        adapted=0.0 if adapted is None else adapted.amount,
     )  # fmt: skip
 
 

@@ -67,6 +67,7 @@ def damageest_stages() -> list[type[Stage]]:
 @hookimpl
 def damageest_rules() -> list[type[Rule]]:
     """Every built-in rule, in the order in which reasons of equal effect are listed."""
+    from damageest.rules.adapted_skin import AdaptedSkin
     from damageest.rules.beside import Beside
     from damageest.rules.beyond_points import BeyondPointsRule
     from damageest.rules.covered import Covered
@@ -88,9 +89,9 @@ def damageest_rules() -> list[type[Rule]]:
     from damageest.rules.wide_loss import WideLoss
 
     return [
-        Nothing, PoseDoubt, Displaced, TwoSheets, MisplacedView, OneMotion, Scattered, OffBoundary, IntactInside,
-        IntactOver, BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered, FreePoseRule, FewPoints, FadingOut,
-        Terms,
+        Nothing, PoseDoubt, AdaptedSkin, Displaced, TwoSheets, MisplacedView, OneMotion, Scattered, OffBoundary,
+        IntactInside, IntactOver, BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered, FreePoseRule, FewPoints,
+        FadingOut, Terms,
     ]  # fmt: skip
 
 

@@ -37,7 +37,8 @@ class ScanFacts:
     outside the part by some tolerances, and by how much. ``between_views``: how far the views differ where they
     overlap, 0 where they agree or are not known. ``sheets_share``: share of its points at which it shows two surfaces,
     ``sheets_apart`` from each other. ``pose``: reasons that the stage align gave against its pose.
-    ``fit``: how well the part as designed explains the intact skin; None where that was not measured.
+    ``fit``: how well the part as designed explains the intact skin; None where that was not measured. ``adapted``: by
+    how much the part was deformed to follow the scan, 0 where it was not.
     """
 
     tolerance: float
@@ -54,6 +55,7 @@ class ScanFacts:
     sheets_apart: float = 0.0
     pose: tuple[Reason, ...] = ()
     fit: ModelFit | None = None
+    adapted: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ TOPICS = (
     Topic(
         "form",
         "The part is bent, or the scan is scaled",
-        ("model_fit", "adapt"),
+        ("model_fit", "adapt", "adapted_skin"),
         "Measure one length of the part and compare it with the scan. If the scan is wrong, correct its scale; if "
         "the part is bent or twisted, adapt: auto, the default, bends the CAD model until it follows the intact "
         "skin. Look at scan.ply by distance: what is left should be even noise, without bands.",
