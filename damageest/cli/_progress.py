@@ -89,6 +89,13 @@ class Progress:
         self.console.print(f"  {'the whole run':<40} {whole:6.2f} s")
 
     @contextmanager
+    def show_step(self, label: str) -> Iterator[None]:
+        """Prints a line for what the ``with`` block does, where it takes time."""
+        before = time.perf_counter()
+        yield
+        self._print_line(label, time.perf_counter() - before)
+
+    @contextmanager
     def _show_live(self) -> Iterator[None]:
         if not self.console.is_terminal:
             yield

@@ -124,7 +124,8 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
         output = given.output or job.output
         try:
             with progress.show_job(job.name):
-                from damageest.api import run  # after the first line: it imports all of the pipeline
+                with progress.show_step("import of the pipeline"):  # after the first line: it takes time
+                    from damageest.api import run
 
                 result = run(
                     job, output=given.output or True, cache=given.cache, registry=registry, limits=given.limits

@@ -280,7 +280,8 @@ WITHOUT_ROWS: dict[str, str] = {
     **dict.fromkeys(
         (
             "open_surfaces.choose_cell", "selectors.Facing", "selectors.HalfSpace", "selectors.StrictMapping",
-            "selectors.find_face", "threads.count_cores", "threads.count_threads", "transforms.invert_pose",
+            "selectors.find_face", "threads.count_cores", "threads.count_threads", "threads.use_threads",
+            "transforms.invert_pose",
             "units.canonical_unit", "units.unit_factor",
         ),
         "takes single values",
