@@ -19,6 +19,8 @@ TRIALS = 20_000
 """Candidate motions, of which the best are refined."""
 START = 0.008
 """Width of the band, in diagonals, at which the fit of a motion begins."""
+MOST_CORNERS = 20_000
+"""Vertices of the part that are verified beside points of its surface: a small hole has few of those."""
 SAME = 1e-3
 """Distance of two motions, in diagonals, below which they are the same symmetry."""
 FAILURES = 5
@@ -36,13 +38,14 @@ def find_symmetries(target: PartSurface, grid: PlaneGrid, pairs: PairTable, seed
     rng = np.random.default_rng([seed, 2])
     cloud = orient_surface(target.mesh, 3000, rng)
     surface = orient_surface(target.mesh, 4000, rng).points
+    corners = target.mesh.vertices[rng.permutation(len(target.mesh.vertices))[:MOST_CORNERS]]
     group, failures = np.eye(4)[None], 0
     generators: list[Floats] = []
     for rough in search(propose_poses(cloud, pairs, TRIALS, rng), cloud, grid, rng):
         if measure_apart(group, rough).min() < 2 * START:
             continue
         motion = fit(target, surface[:1500], rough, START, 0.0, 15).pose
-        if np.abs(target.closest(move_points(surface, motion))[0]).max() > EXACT:
+        if not all(np.abs(target.closest(move_points(some, motion))[0]).max() < EXACT for some in (surface, corners)):
             failures += 1
             if failures == FAILURES:
                 break

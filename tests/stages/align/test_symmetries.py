@@ -38,6 +38,7 @@ def prism(sides: int) -> Manifold:
         (prism(60), 120),
         (Manifold.cube((40, 30, 20)) - Manifold.cube((5, 5, 5)), 1),
         (prism(60) - Manifold.cube((4, 4, 50)).translate((13, -2, 0)), 2),  # a keyway: one half turn is left
+        (prism(60) - Manifold.cylinder(0.4, 0.04, circular_segments=8).translate((9, 3, 19.8)), 1),  # a tiny hole
     ],
 )
 def test_all_symmetries_of_a_part_are_found_and_no_others(body: Manifold, count: int) -> None:
