@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
+from damageest_evaluate.adapting.drift import fit_by_drift
 from damageest_evaluate.adapting.plain import fit_plainly
 from damageest_evaluate.adapting.report import make_adapting_table
 from damageest_evaluate.adapting.suite import GROUPS, SHAPES, USES, make_adapting_cases
+from damageest_evaluate.parts import PARTS
 from evaluate_calls import evaluate
 
+from damageest.errors import InputError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.sampling import sample_by_area
 from damageest.stages.scan.deformation import Deformation, deform
@@ -64,3 +68,10 @@ def test_a_case_is_run_once(tmp_path: Path) -> None:
     assert "whole" in first.stdout
     assert first.stdout == second.stdout
     assert len((tmp_path / "adapt.jsonl").read_text().splitlines()) == 1
+
+
+def test_drift_without_its_library_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pycpd", None)
+    part = PARTS["cuboid"]()
+    with pytest.raises(InputError, match=r"damageest-evaluate\[drift\]"):
+        fit_by_drift(part, part.vertices)

@@ -17,6 +17,7 @@ from damageest.geometry.transforms import move_points
 from damageest.isolation import cpu_seconds
 from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate
+from damageest_evaluate.adapting.drift import fit_by_drift
 from damageest_evaluate.adapting.plain import fit_plainly
 from damageest_evaluate.parts import PARTS
 from damageest_evaluate.scores import iou
@@ -25,6 +26,9 @@ from damageest_evaluate.sized import make_sized_damage
 TOLERANCE = 0.2
 """In mm; the noise is a quarter of it."""
 KINDS = ("chip", "pit", "cut")
+
+DEFORMING = {"plain": fit_plainly, "drift": fit_by_drift}
+"""Fits that a part is deformed by before the run."""
 
 
 @dataclass(frozen=True)
@@ -129,13 +133,13 @@ def measure(case: DeformedCase) -> dict[str, Any]:
 
 
 def run_job(case: DeformedCase, part: Part, scan: Scan) -> Result:
-    """The program's result. For `plain` the part is deformed by the plain fit from the rigid pose first."""
+    """The program's result. For `plain` and `drift` the part is deformed by that fit from the rigid pose first."""
     import damageest
 
     job = {"version": 1, "units": part.unit, "tolerance": TOLERANCE, "report": "none"}
-    if case.use != "plain":
+    if case.use not in DEFORMING:
         use = "none" if case.use == "straight" else case.use
         return damageest.run(job, part=part, scan=scan, settings=[f"adapt={use}"])
     pose = damageest.run(job, part=part, scan=scan).pose
-    deformed = fit_plainly(part, move_points(scan.points, pose.T_part_scan))
+    deformed = DEFORMING[case.use](part, move_points(scan.points, pose.T_part_scan))
     return damageest.run(job, part=deformed, scan=scan)

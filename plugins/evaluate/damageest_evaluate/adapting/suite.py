@@ -8,8 +8,8 @@ from typing import Any
 from damageest_evaluate.adapting.case import TOLERANCE, DeformedCase
 from damageest_evaluate.parts import PARTS
 
-USES = ("straight", "none", "auto", "plain")
-"""What is compared: a part that is not deformed, rigid, the stage, and a plain non-rigid fit."""
+USES = ("straight", "none", "auto", "plain", "drift")
+"""What is compared: a part that is not deformed, rigid, the stage, a plain non-rigid fit, and coherent point drift."""
 GROUPS = ("damaged", "lost end", "seen in part", "large loss", "whole", "worn")
 SHAPES = (
     "blade", "lever", "ribbed_plate", "keyed_shaft", "gear", "coupling", "tube", "block", "half_torus", "grille",

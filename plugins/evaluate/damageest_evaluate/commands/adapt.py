@@ -13,7 +13,7 @@ def command(
         str, typer.Option(metavar="A,B", help="damaged, lost end, seen in part, large loss, whole, worn. Default: all.")
     ] = "",
     only: Annotated[str, typer.Option(metavar="TEXT", help="Only cases with this in their name.")] = "",
-    use: Annotated[str, typer.Option(metavar="A,B", help="straight, none, auto, plain. Default: all.")] = "",
+    use: Annotated[str, typer.Option(metavar="A,B", help="straight, none, auto, plain, drift. Default: all.")] = "",
     every: Annotated[int, typer.Option(min=1, help="Take one case of so many.")] = 1,
     points: Annotated[int, typer.Option(min=1000, help="Number of points of each scan.")] = 120_000,
     workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 1,
