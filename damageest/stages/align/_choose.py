@@ -7,16 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Floats, Reason
-from damageest.geometry.transforms import make_motions, move_points
+from damageest.artefacts import Floats
+from damageest.geometry.transforms import move_points
 from damageest.stages.align._counterparts import turn_poses
 from damageest.stages.align._evidence import DECISIVE, weigh_poses
 from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._fine import fit, robust_cost
-from damageest.stages.align._points import OrientedPoints, orient_surface
+from damageest.stages.align._points import OrientedPoints
 from damageest.stages.align._prepare_part import PreparedPart
 from damageest.stages.align._search import refine, score, select_distinct
-from damageest.stages.align._symmetries import SAME as SAME_SYMMETRY
 from damageest.stages.align._symmetries import measure_apart, pick_heads
 from damageest.stages.align._turns import Axis, find_common_axis, group_turns
 
@@ -36,18 +35,12 @@ one that slid a little."""
 FIRST_POINTS, SECOND_POINTS = 1500, 10_000
 """Number of points for the first comparison of poses and the fits before it, and for the second comparison."""
 
-
-SAME = 0.002
-"""Distance, in diagonals, up to which places of two surfaces are the same for a symmetry, where the scan is coarser."""
-
 MANY = 8
 """Number of poses from which on the symmetries of the part are asked for: to fit fewer costs less."""
 
 RIVAL, MAX_RIVALS = 0.15, 8
 """How much more, for each point, a pose may cost than the best one for them to be compared by patches, and how
 many are."""
-
-REMEDY = "where the pose is known, give it to align: icp or align: none"
 
 
 @dataclass(frozen=True)
@@ -255,68 +248,3 @@ def is_worse(cost: Floats, best: Floats) -> bool:
     more = cost - best
     total = float(more.sum())
     return total > 0.0005 * len(more) and total > 5 * float(np.sqrt((more**2).sum()))
-
-
-def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[Reason, ...]:
-    """A doubt where the scan does not fix the pose; empty where it does.
-
-    A bar with both ends missing or unseen fits at any place along its axis. Each motion that hardly changes the points'
-    distances to their planes is tried, by a few bands in both directions.
-    """
-    at = move_points(points, pose)
-    distance, _, face = target.closest(at)
-    on = np.abs(distance) < band
-    jacobian = np.column_stack([np.cross(at[on], target.normals[face[on]]), target.normals[face[on]]])
-    stiffness, motions = np.linalg.eigh(jacobian.T @ jacobian / max(int(on.sum()), 1))
-    surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
-    here = robust_cost(distance, band)
-    for twist in motions.T[stiffness < 0.01]:
-        for D in make_motions(np.stack([twist, -twist]) * 6 * band):
-            differs = float((np.abs(target.closest(move_points(surface, D))[0]) > band).mean())
-            if differs > 0.002 and not is_worse(
-                robust_cost(target.closest(move_points(points, D @ pose))[0], band), here
-            ):
-                text = (
-                    "the scan does not fix the pose: the part can be moved or turned a little and fits as well, "
-                    "because the surface that would prevent it is missing or was not seen"
-                )
-                return (Reason("pose_free", text, "contradicts", remedy=REMEDY),)
-    return ()
-
-
-def describe_choice(choice: Choice) -> tuple[str, ...]:
-    """Notes for the user about the other poses; empty where there are none."""
-    if choice.axis is not None:
-        x, y, z = choice.axis.direction + 0.0
-        return (
-            f"the part fits at any angle about the axis ({x:.3f}, {y:.3f}, {z:.3f}) of its own frame "
-            "(continuous symmetry): the pose is one of infinitely many correct ones; the alternatives list quarter "
-            "turns",
-        )
-    if len(choice.others):
-        return (f"the part fits in {len(choice.others) + 1} poses equally well; the others are listed as alternatives",)
-    return ()
-
-
-def note_ambiguity(choice: Choice, part: PreparedPart) -> tuple[Reason, ...]:
-    """A doubt where other poses fit as well and are not symmetries of the part; empty where there are none."""
-    target, motions, band = part.surface, choice.others @ np.linalg.inv(choice.pose), choice.band
-    if len(choice.poses) >= MANY and choice.axis is None:
-        known = [measure_apart(part.symmetries, one).min() < SAME_SYMMETRY for one in motions]
-        motions = motions[~np.array(known)]
-    if not len(motions):
-        return ()
-    surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
-    if band > 2 * SAME:
-        # poses of a coarse scan are less exact than the part: the motions are fitted, and a hole that is larger counts
-        moved = [fit(target, move_points(surface, D), np.eye(4), band, SAME / 4, 12).pose @ D for D in motions]
-        motions, band = np.array(moved), max(SAME, 0.25 * band)
-    apart = max(float((np.abs(target.closest(move_points(surface, D))[0]) > band).mean()) for D in motions)
-    if apart <= 0.002:
-        return ()
-    text = (
-        f"the poses that fit are not all symmetries of the part (up to {apart:.1%} of its surface differs): the "
-        "surface that would distinguish them is missing, was not seen, or does so by no more than the errors of the "
-        "scan, so the damage found depends on the pose"
-    )
-    return (Reason("other_poses", text, "contradicts", apart, remedy=REMEDY),)

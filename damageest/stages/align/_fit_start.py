@@ -6,8 +6,8 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
+from damageest.stages.align._ambiguity import note_free_motion
 from damageest.stages.align._check_worn import check_with_wear
-from damageest.stages.align._choose import note_free_motion
 from damageest.stages.align._datum import Datum, DatumSkin
 from damageest.stages.align._fine import fit
 from damageest.stages.align._finish import Finish, finish_pose

@@ -38,14 +38,8 @@ class Register(Align):
         """The fitted pose. Raises StageError where no pose explains the scan: it shows another part, has another unit,
         or most of it is not the part."""
         from damageest.errors import StageError
-        from damageest.stages.align._choose import (
-            COARSE,
-            Choice,
-            choose_pose,
-            describe_choice,
-            note_ambiguity,
-            note_free_motion,
-        )
+        from damageest.stages.align._ambiguity import describe_choice, note_ambiguity, note_free_motion
+        from damageest.stages.align._choose import COARSE, Choice, choose_pose
         from damageest.stages.align._datum import DatumSkin
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import MIN_POINTS, Frame
