@@ -40,6 +40,7 @@ class PathReport(JsonModel):
     minutes: float
     bead_volume: float = Field(description="volume that the passes add: length by section")
     deposit_volume: float
+    surplus_volume: float = Field(description="volume that the passes add beyond what of the deposit is reached")
     unreachable_volume: float = Field(description="of the deposit that no pass fills")
     unreached: list[UnreachedReport] = Field(description="the same by reason")
     clearance: Bound = Field(
@@ -47,6 +48,10 @@ class PathReport(JsonModel):
         "deposition; null: none is near"
     )
     travel_clearance: Bound = Field(description="the same between passes")
+    setup: list[list[float]] | None = Field(
+        description="with 3 axes: transform (4 rows) of a point of the part's frame to the frame in which the part is "
+        "set up, z along the tool; the path's files are in that frame. Null: they are in the part's frame"
+    )
     fill: BeadFillReport | None = Field(description="null where it was not simulated")
     files: list[str]
     notes: list[str]

@@ -166,11 +166,23 @@ class PathSettings:
 @dataclass(frozen=True)
 class PathWriter:
     """How a deposition path is written. ``write``: a function of ``file, path, settings``, a file to create, the
-    path in the frame asked for, and a `PathSettings`; the same path gives the same bytes. It raises StageError for a
+    path in the frame asked for, or in its set-up frame where it has one (`DepositPath.setup` then takes points of the
+    frame asked for to it), and a `PathSettings`; the same path gives the same bytes. It raises StageError for a
     path that the format cannot hold. ``suffix``: of the file, without the dot."""
 
     write: Callable[[Path, DepositPath, PathSettings], None]
     suffix: str
+
+
+def describe_setup(path: DepositPath, factor: float = 1.0) -> list[str]:
+    """Lines for the head of a program that say how to set up the part; none for a path without a set-up frame.
+    ``factor``: from the path's unit to that of the file."""
+    if path.setup is None:
+        return []
+    T = path.setup.copy()
+    T[:3, 3] *= factor
+    rows = [" ".join(f"{value:.9g}" for value in row + 0.0) for row in T[:3]]
+    return ["set-up frame, z along the tool: x y z here = rows times x y z 1 of the part file's frame", *rows]
 
 
 class Export(Stage, ABC):

@@ -86,13 +86,13 @@ class Files(Export):
         description="formats of deposition paths, where the job plans them: csv, apt (CLDATA), rs274 (G-code)",
     )
     path_header: JobPath | None = Field(
-        None, description="file with the first lines of G-code, in which $title, $units and $site are replaced"
+        None, description="file with the first lines of G-code, in which $title, $units, $offset and $site are replaced"
     )
     path_footer: JobPath | None = Field(None, description="file with the last lines of G-code, as path_header")
     path_options: Mapping[str, str] = Field(
         {},
-        description="for the writers of paths; rs274: on, off (default M3, M5), tcpm_on, tcpm_off (G43.4 H1, G49), "
-        "rotary (AC, BC, none, auto)",
+        description="for the writers of paths; rs274: on, off (default M3, M5), power (the S word), work_offset (G54 ...), "
+        "rotary (AC, BC, none, auto), tcp (control, machine, table), tcpm_on, tcpm_off (G43.4 H1, G49), pivot",
     )
 
     def run(

@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import BeadFill, DepositPath, Floats, Mesh, Solid, Unreached
 from damageest.geometry.simplification import simplify_within
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
+from damageest.geometry.transforms import turn_to_axis
 from damageest_paths.beads import SHARE, Beads, simulate_beads
 from damageest_paths.clearance import Clearance
 from damageest_paths.directions import Planner, gather_missing, list_directions, plan_parts
@@ -90,8 +91,17 @@ def plan_path(
         unreached=_list_unreached(plans),
         missing=solid,
         fill=fill,
+        kinds=moves.kinds,
+        setup=_choose_setup(plans[0].frame.direction) if process.axes == 3 else None,
     )  # fmt: skip
     return _add_notes(path, moves, process)
+
+
+def _choose_setup(direction: Floats) -> Floats:
+    """The transform (4,4) into a frame about the same origin whose z is the build direction (3,)."""
+    setup = np.eye(4)
+    setup[:3, :3] = turn_to_axis(direction).T
+    return setup
 
 
 def _take_metal(left: Solid | None, origin: Floats) -> Any:
@@ -109,7 +119,7 @@ def _to_relative(one: Pass, plan: Plan) -> Pass:
     """A pass turned from the plan's local axes to those of the part, about the frame's origin."""
     turn = plan.frame.turn
     tightest = None if one.tightest is None else (one.tightest[0] @ turn, one.tightest[1] @ turn)
-    return Pass(one.points @ turn, one.axes @ turn, one.normals @ turn, one.layer, one.gap, tightest)
+    return Pass(one.points @ turn, one.axes @ turn, one.normals @ turn, one.layer, one.gap, tightest, one.kind)
 
 
 def _gather_obstacles(

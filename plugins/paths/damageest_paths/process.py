@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.fill import Pattern
+from damageest_paths.fill import Kind, Pattern
 from damageest_paths.frames import Frame
 from damageest_paths.stripes import Bead
 
@@ -55,7 +55,8 @@ class Process:
 @dataclass(frozen=True, eq=False)
 class Pass:
     """One pass: ``points`` (K,3) on the top of the bead, ``axes`` (K,3) from the tip away from the work, ``normals``
-    (K,3) of the layer, ``gap``: least distance of the nozzle, ``tightest``: the point (3,) and axis (3,) there."""
+    (K,3) of the layer, ``gap``: least distance of the nozzle, ``tightest``: the point (3,) and axis (3,) there,
+    ``kind``: see `fill.Kind`."""
 
     points: Floats
     axes: Floats
@@ -63,6 +64,7 @@ class Pass:
     layer: int
     gap: float = np.inf
     tightest: tuple[Floats, Floats] | None = None
+    kind: Kind = "row"
 
     def reverse(self) -> Pass:
         """The same pass, run the other way."""
