@@ -92,9 +92,7 @@ def _write_moves(
 def _choose_rotary(path: DepositPath, rotary: str) -> str:
     straight = bool(len(path.axes) == 0 or (np.abs(path.axes - [0, 0, 1]).max() < 1e-9))
     if rotary == "none" and not straight:
-        raise StageError(
-            "rs274: the tool axis is not along z, and rotary is none", "path.axes: 3, or rotary AC or BC"
-        )
+        raise StageError("rs274: the tool axis is not along z, and rotary is none", "path.axes: 3, or rotary AC or BC")
     return ("none" if straight else "AC") if rotary == "auto" else rotary
 
 

@@ -63,14 +63,14 @@ def plan_path(
     origin: Floats = task.body.bounds.mean(axis=0)
     detail = DETAIL * min(process.bead.width, process.height)
     body = to_manifold(simplify_within(task.body, detail), origin)
-    clearance = Clearance(nozzle, standoff, None, detail)
+    clearance = Clearance(nozzle, standoff, None, detail, beam=process.beam)
     around = Surroundings(_take_metal(task.left, origin), _shift(task.others, origin), clearance)
     directions = list_directions(task.body, task.left, task.tolerance) if direction is None else [direction]
     plans = plan_parts(body, origin, directions, around, process, planner)
     groups = [[_to_relative(one, plan) for one in plan.passes] for plan in plans]
     near = _gather_obstacles(groups, plans, around, task.body.bounds - origin, process)
     moves = join_passes(
-        groups, clearance.with_obstacles(near), _choose_travel(task, clearance, speeds, process, origin)
+        groups, clearance.without_beam().with_obstacles(near), _choose_travel(task, clearance, speeds, process, origin)
     )
     missing = gather_missing(plans)
     solid = None if missing is None else to_solid(missing, origin)

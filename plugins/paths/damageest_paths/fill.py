@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from damageest.artefacts import Floats
 from damageest_paths.regions import cover, find_main_angle, measure_length, shift_border
 from damageest_paths.stripes import Bead, fill_with_rows
+from damageest_paths.trim import lengthen_line, trim_line
 
 Pattern = Literal["zigzag", "contour", "spiral", "offset-zigzag"]
+Kind = Literal["row", "ring", "spiral", "gap"]
+"""What a pass is: a row or rows to and fro, a ring, rings that are linked, or a row in a gap between others."""
 
 SLIVER = 0.04
 """Area of a gap, in squares of the bead's width, from which it gets a pass of its own."""
@@ -19,48 +22,75 @@ ROUNDS = 2
 """How often gaps between passes are looked for and filled."""
 
 
+class Line(NamedTuple):
+    """The middle line of a pass (K,2), and what it is."""
+
+    points: Floats
+    kind: Kind
+
+
 def fill_region(region: Any, pattern: Pattern, bead: Bead, angle: float) -> list[Floats]:
     """Polylines (K,2) whose beads cover a region. ``angle`` in radians: of the rows of a zigzag."""
+    return [line.points for line in list_lines(region, pattern, bead, angle)]
+
+
+def list_lines(
+    region: Any, pattern: Pattern, bead: Bead, angle: float, free: Any = None, shortest: float = 0.0
+) -> list[Line]:
+    """Lines whose beads cover a region, as far as their middles may lie in the region ``free``, None for everywhere.
+
+    ``shortest``: lines that are shorter are lengthened where there is room; the others are given as they are.
+    """
     if region.is_empty():
         return []
-    lines = {"zigzag": _fill_zigzag, "contour": _fill_contour, "spiral": _fill_spiral, "offset-zigzag": _fill_both}[
-        pattern
-    ](region, bead, angle)
+    fill = {"zigzag": _fill_zigzag, "contour": _fill_contour, "spiral": _fill_spiral, "offset-zigzag": _fill_both}
+    lines = _finish(fill[pattern](region, bead, angle), region, bead, free, shortest)
     for _ in range(ROUNDS):
-        added = _fill_gaps(region, lines, bead)
+        added = _fill_gaps(region, [line.points for line in lines], bead)
         if not added:
             break
-        lines += added
+        lines += _finish(added, region, bead, free, shortest)
     return lines
 
 
-def _fill_gaps(region: Any, lines: Sequence[Floats], bead: Bead) -> list[Floats]:
+def _finish(lines: Sequence[Line], region: Any, bead: Bead, free: Any, shortest: float) -> list[Line]:
+    """The lines, trimmed and lengthened."""
+    pieces = [
+        Line(piece, line.kind)
+        for line in lines
+        for piece in ([line.points] if free is None else trim_line(line.points, free, bead))
+    ]
+    return [Line(lengthen_line(line.points, shortest, region, free, bead), line.kind) for line in pieces]
+
+
+def _fill_gaps(region: Any, lines: Sequence[Floats], bead: Bead) -> list[Line]:
     """Rows in what the beads leave of a region, along the longer side of each gap."""
     gaps = (region - cover(lines, bead.width)).decompose()
     large = [gap for gap in gaps if gap.area() > SLIVER * bead.width**2]
     large.sort(key=lambda gap: gap.bounds())
-    return [line for gap in large for line in fill_with_rows(gap, bead, find_main_angle(gap), linked=False)]
+    rows = [row for gap in large for row in fill_with_rows(gap, bead, find_main_angle(gap), linked=False)]
+    return [Line(row, "gap") for row in rows]
 
 
-def _fill_zigzag(region: Any, bead: Bead, angle: float) -> list[Floats]:
-    return fill_with_rows(region, bead, angle)
+def _fill_zigzag(region: Any, bead: Bead, angle: float) -> list[Line]:
+    return [Line(row, "row") for row in fill_with_rows(region, bead, angle)]
 
 
-def _fill_contour(region: Any, bead: Bead, angle: float) -> list[Floats]:
-    return [_close(ring) for ring in _find_rings(region, bead)]
+def _fill_contour(region: Any, bead: Bead, angle: float) -> list[Line]:
+    return [Line(_close(ring), "ring") for ring in _find_rings(region, bead)]
 
 
-def _fill_both(region: Any, bead: Bead, angle: float) -> list[Floats]:
+def _fill_both(region: Any, bead: Bead, angle: float) -> list[Line]:
     rings = shift_border(region, -bead.width / 2)
-    outer = [_close(ring) for ring in _read_rings(rings, bead)]
+    outer = [Line(_close(ring), "ring") for ring in _read_rings(rings, bead)]
     inner = shift_border(shift_border(region, -bead.width / 2 - bead.step), bead.width / 2) if outer else region
-    return [*outer, *(fill_with_rows(inner, bead, angle) if not inner.is_empty() else [])]
+    return [*outer, *(_fill_zigzag(inner, bead, angle) if not inner.is_empty() else [])]
 
 
-def _fill_spiral(region: Any, bead: Bead, angle: float) -> list[Floats]:
+def _fill_spiral(region: Any, bead: Bead, angle: float) -> list[Line]:
     """Rings, each linked with the one inside it: it ends a step before it closes, and goes on at the nearest point."""
     rings = _find_rings(region, bead)
-    lines: list[Floats] = []
+    lines: list[Line] = []
     while rings:
         line = rings.pop(0)
         closed = True
@@ -76,7 +106,7 @@ def _fill_spiral(region: Any, bead: Bead, angle: float) -> list[Floats]:
                 corner = int(np.argmin(np.linalg.norm(ring - line[-1], axis=1)))
                 closed = False
             line = np.concatenate([line, _open(np.roll(ring, -corner, axis=0), bead.step)])
-        lines.append(_close(line) if closed else line)
+        lines.append(Line(_close(line) if closed else line, "spiral"))
     return lines
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest_paths.fill import Kind, Pattern
 from damageest_paths.frames import Frame
+from damageest_paths.sight import Beam
 from damageest_paths.stripes import Bead
 
 Axes = Literal[3, "3+2", 5]
@@ -24,7 +25,8 @@ class Process:
     build direction and an overhanging side. ``shortest``: least length of a pass. ``gap``: distance that the nozzle has
     to keep. ``tilt``: largest of the tool axis against the build direction. ``extend``: how far a pass begins before
     its start and goes on beyond its end. ``turn_rate``: largest turn of the tool axis per length along a pass.
-    ``is_trial``: few axes are tried.
+    ``is_trial``: few axes are tried. ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact metal; None:
+    half the height of a layer.
     """
 
     height: float
@@ -40,6 +42,8 @@ class Process:
     extend: tuple[float, float] = (0.0, 0.0)
     turn_rate: float = 0.0
     is_trial: bool = False
+    beam: Beam | None = None
+    sink: float | None = None
 
     @property
     def step(self) -> float:
@@ -49,7 +53,11 @@ class Process:
     def coarsen(self, factor: float) -> Process:
         """The same with larger layers and beads, for a quick trial."""
         bead = Bead(factor * self.bead.width, factor * self.bead.step)
-        return replace(self, height=factor * self.height, bead=bead, pattern="zigzag", extend=(0.0, 0.0), is_trial=True)
+        beam = None if self.beam is None else replace(self.beam, radius=factor * self.beam.radius)
+        return replace(
+            self, height=factor * self.height, bead=bead, pattern="zigzag", extend=(0.0, 0.0), is_trial=True,
+            shortest=factor * self.shortest, beam=beam, sink=None if self.sink is None else factor * self.sink,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,17 +95,6 @@ class Plan:
     @property
     def missing_volume(self) -> float:
         return float(self.missing.volume()) if self.missing is not None else 0.0
-
-
-def resample(line: Floats, longest: float) -> tuple[Floats, Floats]:
-    """Points (N,3) along a polyline (K,3), no farther from each other than ``longest``, with its corners; and the
-    number of the corner (N,) that each is, -1 for one between corners."""
-    sides = np.diff(line, axis=0)
-    counts = np.maximum(np.ceil(np.linalg.norm(sides, axis=1) / longest - 1e-9).astype(int), 1)
-    share = np.concatenate([np.arange(count) / count for count in counts] or [np.empty(0)])
-    points = np.repeat(line[:-1], counts, axis=0) + share[:, None] * np.repeat(sides, counts, axis=0)
-    corner = np.where(share == 0, np.repeat(np.arange(len(sides)), counts), -1)
-    return np.concatenate([points, line[-1:]]), np.append(corner, len(line) - 1)
 
 
 def measure_along(points: Floats) -> Floats:
