@@ -91,7 +91,7 @@ class Files(Export):
     path_footer: JobPath | None = Field(None, description="file with the last lines of G-code, as path_header")
     path_options: Mapping[str, str] = Field(
         {},
-        description="for the writers of paths; rs274: on, off (default M3, M5), power (the S word), work_offset (G54 ...), "
+        description="for the writers of paths; rs274: on, off (default M3, M5), power (the S word), work_offset (G54), "
         "rotary (AC, BC, none, auto), tcp (control, machine, table), tcpm_on, tcpm_off (G43.4 H1, G49), pivot",
     )
 

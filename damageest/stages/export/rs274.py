@@ -28,11 +28,11 @@ CHOICES = {"rotary": ("auto", "none", "AC", "BC"), "tcp": ("control", "machine",
 
 
 def write_rs274(file: Path, path: DepositPath, settings: PathSettings) -> None:
-    """G0 to the first point, then blocks of G1, travel too, since its speed is given and its way is straight. ``$title``,
-    ``$units``, ``$offset`` and ``$site`` are replaced in the templates of the first and last lines.
+    """G0 to the first point, then blocks of G1, travel too, since its speed is given and its way is straight.
 
-    Coordinates are those of the frame asked for. For the angles see `find_angles`; for a table that turns, `turn_table`:
-    there each move has its time (G93). Raises StageError for a tilted tool without rotary axes, or for an
+    ``$title``, ``$units``, ``$offset`` and ``$site`` are replaced in the templates of the first and last lines.
+    Coordinates are those of the frame asked for. For the angles see `find_angles`; for a table that turns see
+    `turn_table`: there each move has its time (G93). Raises StageError for a tilted tool without rotary axes, or for an
     option that is not known.
     """
     options = _check_options(settings)

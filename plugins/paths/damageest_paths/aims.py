@@ -11,17 +11,21 @@ from damageest_paths.regions import make_region, shift_border
 
 FLUSH = 0.02
 """Share of its radius by which a bead or beam may touch a wall beside it."""
+SINK = 0.45
+"""Share of a layer's height to which a bead may lie in intact metal where the job does not say how deep."""
 SLICES = 4
 """Heights between bead and tip at which a widening beam is compared with the metal."""
 
 
 class Aims(NamedTuple):
     """Regions of a plane. ``free``: where the middles of beads may lie; ``reached``: what they then cover at most;
-    ``flush``: what those cover that only keep out of the metal of the layer itself."""
+    ``flush``: what those cover that only keep out of the metal of the layer itself; ``drawn``: somewhat less than
+    reached, so that a ring half a bead within its border is free."""
 
     free: Any
     reached: Any
     flush: Any
+    drawn: Any
 
 
 def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: float, process: Process) -> Aims:
@@ -40,12 +44,12 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
     extent = (right - left + 2 * margin, high - low + 2 * margin)
     plane = CrossSection.square(extent).translate((left - margin, low - margin))
     column = metal ^ plane.extrude(top + standoff - floor).translate((0, 0, floor))
-    sink = min((top - floor) / 2 if process.sink is None else process.sink, (1 - FLUSH) * (top - floor))
+    sink = min(SINK * (top - floor) if process.sink is None else process.sink, (1 - FLUSH) * (top - floor))
     free = plane - shift_border(_shadow(column, floor + sink, top, process), (1 - FLUSH) * radius)
-    reach = width / 2 * (1 + FLUSH)
+    reach, inner = width / 2 * (1 + FLUSH), width / 2 * (1 - 2 * FLUSH)
     flush = shift_border(free, reach)
     if beam is None or process.axes == 5:
-        return Aims(free, flush, flush)
+        return Aims(free, flush, flush, shift_border(free, inner))
     if beam.cone == 0:
         free -= shift_border(_shadow(column, top, top + standoff, process), (1 - FLUSH) * beam.radius)
     else:
@@ -53,7 +57,7 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
         for bottom, end in zip(heights[:-1].tolist(), heights[1:].tolist(), strict=True):
             wide = (1 - FLUSH) * beam.measure_radius(end)
             free -= shift_border(_shadow(column, top + bottom, top + end, process), wide)
-    return Aims(free, shift_border(free, reach), flush)
+    return Aims(free, shift_border(free, reach), flush, shift_border(free, inner))
 
 
 def _shadow(metal: Any, low: float, high: float, process: Process) -> Any:

@@ -12,11 +12,11 @@ from damageest.artefacts import Flags, Floats, Mesh
 from damageest.geometry.solids import to_arrays
 from damageest_paths.fill import Line, list_lines
 from damageest_paths.floor import Floor, find_floor
-from damageest_paths.follow import follow_line, make_pass
+from damageest_paths.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.patches import NotFollowedError, Patch, list_patches
-from damageest_paths.planar import COLLIDES, SHORT, UNSUPPORTED, Surroundings
+from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings
 from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes
 from damageest_paths.regions import cover, measure_length, resample, shift_border
 from damageest_paths.sheets import (
@@ -160,25 +160,26 @@ class _Work:
         lines = list_lines(held, process.pattern, process.bead, angle, None, process.shortest)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
         short = [line.points for line in lines if measure_length(line.points) < process.shortest]
-        done, dropped = [], []
+        done: list[Floats] = []
+        dropped: dict[str, list[Floats]] = {COLLIDES: [], SHADED: [], SHORT: short}
         for line in long:
             made, left = self._place(patch, line, layer, around)
             done += made
-            dropped += left
-        filled = cover(done, process.bead.width)
-        unreached = cover(dropped, process.bead.width)
-        left_out = {
-            UNSUPPORTED: wanted - held,
-            COLLIDES: (unreached ^ held) - filled,
-            SHORT: (cover(short, process.bead.width) ^ held) - filled - unreached,
-        }
+            for why, piece in left:
+                dropped[why].append(piece)
+        gaps = held - cover(done, process.bead.width)
+        left_out = {UNSUPPORTED: wanted - held}
+        for why, lines_left in dropped.items():
+            left_out[why] = cover(lines_left, process.bead.width) ^ gaps
+            gaps -= left_out[why]
         for why, region in left_out.items():
             self._add_missing(patch, region, layer, why)
 
     def _place(
         self, patch: Patch, line: Line, layer: int, around: Sequence[Sweeps]
-    ) -> tuple[list[Floats], list[Floats]]:
-        """Adds the passes along a line (K,2) of the plane. Gives the pieces with a bead (K,2), and those without."""
+    ) -> tuple[list[Floats], list[tuple[str, Floats]]]:
+        """Adds the passes along a line of the plane. Gives the pieces with a bead (K,2), and those without, each with
+        the reason."""
         process = self.process
         places, _ = resample(extend_line(line.points, *process.extend), process.step)
         points, normals, _ = patch.tree.find(places)
@@ -189,7 +190,13 @@ class _Work:
         made = [make_pass(points, normals, run, layer, process, reach) for run in runs]
         self.layer += [replace(one, kind=line.kind) for one in made]
         stops = [0, *(k for run in runs for k in (run.start, run.stop)), len(places)]
-        left = [places[max(a - 1, 0) : b + 1] for a, b in zip(stops[::2], stops[1::2], strict=True) if b > a]
+        spans = [(max(a - 1, 0), b + 1) for a, b in zip(stops[::2], stops[1::2], strict=True) if b > a]
+        left = []
+        for a, b in spans:
+            body = [part.clearance.without_beam() for part in around]
+            upright = limit_tilt(normals[a:b], process.tilt if process.axes == 5 else 0.0)
+            free = all((one.bound(points[a:b], upright, process.gap)[0] >= process.gap).mean() > 0.5 for one in body)
+            left.append((SHADED if free else COLLIDES, places[a:b]))
         return [places[run.start : run.stop] for run in runs], left
 
     def _add_missing(self, patch: Patch, region: Any, layer: int, why: str) -> None:

@@ -8,16 +8,19 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.regions import cover, find_main_angle, measure_length, shift_border
+from damageest_paths.regions import cover, find_main_angle, measure_length, shift_border, unite_regions
 from damageest_paths.stripes import Bead, fill_with_rows
-from damageest_paths.trim import lengthen_line, trim_line
+from damageest_paths.trim import follow_rim, lengthen_line, trim_line
 
 Pattern = Literal["zigzag", "contour", "spiral", "offset-zigzag"]
-Kind = Literal["row", "ring", "spiral", "gap"]
-"""What a pass is: a row or rows to and fro, a ring, rings that are linked, or a row in a gap between others."""
+Kind = Literal["row", "ring", "spiral", "rim", "gap"]
+"""What a pass is: a row or rows to and fro, a ring, rings that are linked, a piece of the outermost ring beside
+rows, or a row in a gap between others."""
 
 SLIVER = 0.04
 """Area of a gap, in squares of the bead's width, from which it gets a pass of its own."""
+FINE_SLIVER = 0.01
+"""The same beside which a piece of the outermost ring is laid: the ends of rows leave many of them along a rim."""
 ROUNDS = 2
 """How often gaps between passes are looked for and filled."""
 
@@ -43,13 +46,23 @@ def list_lines(
     """
     if region.is_empty():
         return []
-    fill = {"zigzag": _fill_zigzag, "contour": _fill_contour, "spiral": _fill_spiral, "offset-zigzag": _fill_both}
-    lines = _finish(fill[pattern](region, bead, angle), region, bead, free, shortest)
+    if pattern == "zigzag":
+        lines = [Line(row, "row") for row in fill_with_rows(region, bead, angle, True, free)]
+    else:
+        fill = {"contour": _fill_contour, "spiral": _fill_spiral, "offset-zigzag": _fill_both}
+        lines = fill[pattern](region, bead, angle)
+    lines = _finish(lines, region, bead, free, shortest)
+    if free is not None:
+        gaps = _list_gaps(region, lines, bead, FINE_SLIVER)
+        rings = _read_rings(shift_border(region, -bead.width / 2), bead) if gaps else []
+        rim = [Line(piece, "rim") for piece in follow_rim(rings, unite_regions(gaps), bead.width)]
+        lines += _finish(rim, region, bead, free, shortest)
     for _ in range(ROUNDS):
-        added = _fill_gaps(region, [line.points for line in lines], bead)
-        if not added:
+        gaps = _list_gaps(region, lines, bead)
+        rows = [row for gap in gaps for row in fill_with_rows(gap, bead, find_main_angle(gap), linked=False)]
+        if not rows:
             break
-        lines += _finish(added, region, bead, free, shortest)
+        lines += _finish([Line(row, "gap") for row in rows], region, bead, free, shortest)
     return lines
 
 
@@ -58,18 +71,16 @@ def _finish(lines: Sequence[Line], region: Any, bead: Bead, free: Any, shortest:
     pieces = [
         Line(piece, line.kind)
         for line in lines
-        for piece in ([line.points] if free is None else trim_line(line.points, free, bead))
+        for piece in ([line.points] if free is None else trim_line(line.points, free, bead.width))
     ]
-    return [Line(lengthen_line(line.points, shortest, region, free, bead), line.kind) for line in pieces]
+    return [Line(lengthen_line(line.points, shortest, region, free, bead.width), line.kind) for line in pieces]
 
 
-def _fill_gaps(region: Any, lines: Sequence[Floats], bead: Bead) -> list[Line]:
-    """Rows in what the beads leave of a region, along the longer side of each gap."""
-    gaps = (region - cover(lines, bead.width)).decompose()
-    large = [gap for gap in gaps if gap.area() > SLIVER * bead.width**2]
-    large.sort(key=lambda gap: gap.bounds())
-    rows = [row for gap in large for row in fill_with_rows(gap, bead, find_main_angle(gap), linked=False)]
-    return [Line(row, "gap") for row in rows]
+def _list_gaps(region: Any, lines: Sequence[Line], bead: Bead, least: float = SLIVER) -> list[Any]:
+    """What the beads leave of a region, without what is smaller than ``least`` squares of the bead's width."""
+    gaps = (region - cover([line.points for line in lines], bead.width)).decompose()
+    large = [gap for gap in gaps if gap.area() > least * bead.width**2]
+    return sorted(large, key=lambda gap: gap.bounds())
 
 
 def _fill_zigzag(region: Any, bead: Bead, angle: float) -> list[Line]:

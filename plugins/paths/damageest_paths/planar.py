@@ -10,9 +10,9 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
+from damageest_paths.aims import find_aims
 from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
-from damageest_paths.aims import find_aims
 from damageest_paths.fill import Kind, Line, list_lines
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
@@ -69,7 +69,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         held = wanted ^ shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
         aims = find_aims(metal, wanted, (floor, top), around.clearance.standoff, process)
         lines = list_lines(
-            held ^ aims.reached, process.pattern, process.bead, process.angle + number * process.turn, aims.free,
+            held ^ aims.drawn, process.pattern, process.bead, process.angle + number * process.turn, aims.free,
             process.shortest,
         )  # fmt: skip
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
@@ -77,14 +77,14 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         made, dropped, shaded = choice.place(long, top, number)
         made = order_passes(made, passes[-1].points[-1] if passes else None)
         done = cover([one.points[:, :2] for one in made], width)
-        colliding = (cover(dropped, width) ^ held) - done
-        dark = (cover(shaded, width) ^ held) - done - colliding
+        causes = [cover(dropped, width), cover(shaded, width), short if made else wanted]
+        lost = _share_out((held ^ aims.reached) - done, causes)
         left = {
             UNSUPPORTED: wanted - held,
             SUNK: held - aims.flush,
-            SHADED: unite_regions([held ^ (aims.flush - aims.reached), dark]),
-            COLLIDES: colliding ^ aims.reached,
-            SHORT: (short ^ held ^ aims.reached) - done - colliding - dark,
+            SHADED: unite_regions([held ^ (aims.flush - aims.reached), lost[1]]),
+            COLLIDES: lost[0],
+            SHORT: lost[2],
         }
         for why, region in left.items():
             if region.is_empty():
@@ -95,6 +95,17 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
                 reasons[why] = reasons.get(why, 0.0) + piece.volume()
         passes += made
     return Plan(frame, height, tuple(passes), _gather(missing), reasons)
+
+
+def _share_out(gaps: Any, causes: Sequence[Any]) -> list[Any]:
+    """The pieces of ``gaps``, a region, for each of the regions ``causes`` the ones that it is the first to meet."""
+    found: list[list[Any]] = [[] for _ in causes]
+    for piece in gaps.decompose():
+        for own, cause in zip(found, causes, strict=True):
+            if not (piece ^ cause).is_empty():
+                own.append(piece)
+                break
+    return [unite_regions(own) for own in found]
 
 
 def _gather(pieces: list[Any]) -> Any:

@@ -60,7 +60,9 @@ class Sweeps:
         edges = np.flatnonzero(np.diff(np.concatenate([[0], (found == -np.inf).astype(int), [0]])))
         for first, last in zip(edges[::2], edges[1::2], strict=True):
             found[first:last] = body.measure_poses(points[first:last], axes[first:last], needed)
-        found[clearance.find_shaded(points, axes)] = 0.0
+        open_ = np.flatnonzero(found >= needed)
+        if clearance.beam is not None and len(open_):
+            found[open_[clearance.find_shaded(points[open_], axes[open_])]] = 0.0
         return found
 
 

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.regions import cover, is_within, measure_length, resample
-from damageest_paths.stripes import Bead
+from damageest_paths.regions import cover, is_within, measure_length, resample, shift_border
 
 FINE = 0.05
 """Distance, in bead widths, of the places of a line at which it is looked whether it may be there."""
 MORE = 0.05
 """Area, in squares of the bead's width, that a pass may cover outside of a region because it was lengthened."""
+NEAR = 0.9
+"""Share of half a bead's width within which a ring lies beside a gap."""
+JOIN = 1.0
+"""Bead widths round gaps by which what lies between them is bridged: a few long passes for many short ones."""
 
 
-def trim_line(line: Floats, free: Any, bead: Bead) -> list[Floats]:
-    """The pieces (K,2) of a polyline (N,2) that lie in the region ``free``."""
-    points, corner = resample(line, FINE * bead.width)
+def trim_line(line: Floats, free: Any, width: float) -> list[Floats]:
+    """The pieces (K,2) of a polyline (N,2) that lie in the region ``free``; ``width`` of a bead."""
+    points, corner = resample(line, FINE * width)
     inside = is_within(points, free)
     if inside.all():
         return [line]
@@ -32,7 +36,7 @@ def trim_line(line: Floats, free: Any, bead: Bead) -> list[Floats]:
     return pieces
 
 
-def lengthen_line(line: Floats, shortest: float, region: Any, free: Any, bead: Bead) -> Floats:
+def lengthen_line(line: Floats, shortest: float, region: Any, free: Any, width: float) -> Floats:
     """A line (2,2) that is shorter than a pass may be, made that long about its middle; the line as it is where its
     bead would then cover much outside of the region, or its ends would not lie in ``free``, None for everywhere."""
     length = measure_length(line)
@@ -43,5 +47,21 @@ def lengthen_line(line: Floats, shortest: float, region: Any, free: Any, bead: B
     longer = np.array([middle - half, middle + half])
     if free is not None and not is_within(longer, free).all():
         return line
-    outside = float((cover([longer], bead.width) - region).area() - (cover([line], bead.width) - region).area())
-    return longer if outside <= MORE * bead.width**2 else line
+    outside = float((cover([longer], width) - region).area() - (cover([line], width) - region).area())
+    return longer if outside <= MORE * width**2 else line
+
+
+def follow_rim(rings: Sequence[Floats], gaps: Any, width: float) -> list[Floats]:
+    """The pieces of closed rings (K,2) whose beads lie beside gaps, a region."""
+    near = shift_border(shift_border(gaps, width / 2 * NEAR + JOIN * width), -JOIN * width)
+    pieces = []
+    for ring in rings:
+        closed = np.concatenate([ring, ring[:1]])
+        inside = is_within(closed, near)
+        if not inside.all() and inside[0]:  # begins outside, so that no piece is cut in two
+            points, _ = resample(closed, FINE * width)
+            out = np.flatnonzero(~is_within(points, near))
+            if len(out):
+                closed = np.concatenate([points[out[0] : -1], points[: out[0] + 1]])
+        pieces += trim_line(closed, near, width)
+    return pieces
