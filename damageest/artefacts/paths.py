@@ -29,7 +29,8 @@ class BeadFill(Checked):
     ``filled``: share of the reachable deposit that is filled. ``gap``: volume of the reachable deposit that is not;
     ``largest_gap``: that of its largest connected piece; ``void``: diameter of the largest ball in it. ``spill``:
     volume of beads outside the deposit and the metal; ``spill_distance``: how far it reaches from the deposit.
-    ``sunk``: volume of beads where metal is already.
+    ``sunk``: volume of beads where metal is already. ``of_deposit``: share of the whole deposit that is filled, what is
+    listed as unreached included.
     """
 
     voxel: float
@@ -40,6 +41,7 @@ class BeadFill(Checked):
     spill: float
     spill_distance: float
     sunk: float
+    of_deposit: float
 
 
 @dataclass(frozen=True, eq=False)

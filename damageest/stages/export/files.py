@@ -22,7 +22,7 @@ from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathWrit
 from damageest.stages.export._colours import DAMAGE, DEPOSIT, DOUBTFUL, SURPLUS, UNDAMAGED
 from damageest.stages.export._coverage import write_coverage
 from damageest.stages.export._nominal import map_to_nominal
-from damageest.stages.export._options import Formats, PathFormats, check_spline_writer
+from damageest.stages.export._options import Formats, PathFormats, PathOption, check_spline_writer
 from damageest.stages.export._paths import write_paths
 from damageest.stages.export._scan_points import PointColours, write_scan
 
@@ -89,7 +89,7 @@ class Files(Export):
         None, description="file with the first lines of G-code, in which $title, $units, $offset and $site are replaced"
     )
     path_footer: JobPath | None = Field(None, description="file with the last lines of G-code, as path_header")
-    path_options: Mapping[str, str] = Field(
+    path_options: Mapping[str, PathOption] = Field(
         {},
         description="for the writers of paths; rs274: on, off (default M3, M5), power (the S word), work_offset (G54), "
         "rotary (AC, BC, none, auto), tcp (control, machine, table), tcpm_on, tcpm_off (G43.4 H1, G49), pivot",

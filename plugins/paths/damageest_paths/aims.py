@@ -28,6 +28,11 @@ class Aims(NamedTuple):
     drawn: Any
 
 
+def find_sink(height: float, process: Process) -> float:
+    """How deep a bead may lie in intact metal, in a layer of a height."""
+    return min(SINK * height if process.sink is None else process.sink, (1 - FLUSH) * height)
+
+
 def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: float, process: Process) -> Aims:
     """The aims of a layer between two heights.
 
@@ -44,7 +49,7 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
     extent = (right - left + 2 * margin, high - low + 2 * margin)
     plane = CrossSection.square(extent).translate((left - margin, low - margin))
     column = metal ^ plane.extrude(top + standoff - floor).translate((0, 0, floor))
-    sink = min(SINK * (top - floor) if process.sink is None else process.sink, (1 - FLUSH) * (top - floor))
+    sink = find_sink(top - floor, process)
     free = plane - shift_border(_shadow(column, floor + sink, top, process), (1 - FLUSH) * radius)
     reach, inner = width / 2 * (1 + FLUSH), width / 2 * (1 - 2 * FLUSH)
     flush = shift_border(free, reach)

@@ -21,7 +21,7 @@ from damageest_paths.obstacles import Obstacles, draw_passes
 from damageest_paths.planar import Surroundings
 from damageest_paths.process import Pass, Plan, Process
 
-MUCH_TRAVEL = 0.2
+MUCH_TRAVEL, MUCH_SURPLUS, MUCH_SUNK = 0.2, 0.1, 0.05
 DETAIL = 0.01
 """Share of the bead's height or width by which the body that is sliced may differ from the deposit."""
 
@@ -166,6 +166,24 @@ def _list_unreached(plans: Sequence[Plan]) -> tuple[Unreached, ...]:
     return tuple(Unreached(volume, why) for why, volume in sorted(last.reasons.items()) if volume > 0)
 
 
+def _describe_surplus(path: DepositPath) -> list[str]:
+    """Notes on beads that add more than the deposit has, or lie in metal."""
+    notes = []
+    share = path.surplus_volume / path.deposit_volume
+    if share > MUCH_SURPLUS:
+        beside = "" if path.fill is None else f"; {path.fill.spill:.4g} lies beside the deposit"
+        notes.append(
+            f"the beads add {path.surplus_volume:.4g} ({share:.0%} of the deposit) more than what they fill{beside}: "
+            "it is to be milled off; thinner layers and narrower beads add less"
+        )
+    if path.fill is not None and path.fill.sunk > MUCH_SUNK * path.deposit_volume:
+        notes.append(
+            f"beads lie in {path.fill.sunk:.4g} of intact metal ({path.fill.sunk / path.deposit_volume:.0%} of the "
+            "deposit): a smaller path.penetration or thinner layers leave more of it"
+        )
+    return notes
+
+
 def _add_notes(path: DepositPath, moves: Moves, process: Process) -> DepositPath:
     from dataclasses import replace
 
@@ -178,6 +196,7 @@ def _add_notes(path: DepositPath, moves: Moves, process: Process) -> DepositPath
             )
     if share > 1e-3 and process.axes != 5:
         notes.append("more axes (path.axes: 5), another path.direction or a slimmer nozzle may reach more")
+    notes += _describe_surplus(path)
     total = path.length + path.travel
     if total and path.travel > MUCH_TRAVEL * total:
         mean = path.length / max(path.passes, 1)

@@ -125,7 +125,7 @@ class Layers(Path):
         None,
         ge=0,
         allow_inf_nan=False,
-        description="depth to which a bead may lie in intact metal, which melts; default: 0.45 of the height of a layer",
+        description="depth to which a bead may lie in intact metal, which melts; default: 0.45 of a layer's height",
     )
     standoff: Length | None = Field(
         None, description="distance from the nozzle's tip to the top of the bead; default: the bead's width"

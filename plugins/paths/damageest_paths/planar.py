@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
-from damageest_paths.aims import find_aims
+from damageest_paths.aims import find_aims, find_sink
 from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
 from damageest_paths.fill import Kind, Line, list_lines
@@ -26,6 +26,8 @@ UNSUPPORTED, COLLIDES, SHORT, SUNK, SHADED = (
     "so thin over intact metal that a bead would lie in it",
     "no line of sight: something stands between nozzle and bead",
 )
+OFF = 0.1
+"""Bead widths by which the middle of a bead may lie beside what a layer has to fill."""
 Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -65,12 +67,14 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         floor, top = low + number * height, low + (number + 1) * height
         slab = _cut_slab(local, floor, top)
         wanted = _cast_shadow(slab, process)
-        ground = _cast_shadow(_cut_slab(near, floor - height / 4, top), process)
+        # below, where the layer before was too thin over metal for a bead, metal is that much lower
+        under = max(height / 4, height - find_sink(height, process))
+        ground = _cast_shadow(_cut_slab(near, floor - under, top), process)
         held = wanted ^ shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
         aims = find_aims(metal, wanted, (floor, top), around.clearance.standoff, process)
         lines = list_lines(
-            held ^ aims.drawn, process.pattern, process.bead, process.angle + number * process.turn, aims.free,
-            process.shortest,
+            held ^ aims.drawn, process.pattern, process.bead, process.angle + number * process.turn,
+            aims.free ^ shift_border(held, OFF * width), process.shortest,
         )  # fmt: skip
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
         short = cover([line.points for line in lines if measure_length(line.points) < process.shortest], width)
@@ -87,9 +91,10 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
             SHORT: lost[2],
         }
         for why, region in left.items():
-            if region.is_empty():
+            rest = region - done
+            if rest.is_empty():
                 continue
-            piece = slab ^ region.extrude(top - floor).translate((0, 0, floor))
+            piece = slab ^ rest.extrude(top - floor).translate((0, 0, floor))
             if piece.volume() > 0:
                 missing.append(piece)
                 reasons[why] = reasons.get(why, 0.0) + piece.volume()
