@@ -27,8 +27,8 @@ class BeadFillReport(JsonModel):
     spill_distance: float = Field(description="how far beads reach out of the deposit, beside metal")
     sunk: float = Field(description="volume of beads where metal is already")
     of_deposit: float = Field(
-        description="share of the whole deposit that beads fill: 1 without the shares of `unreachable_volume` and `gap`, "
-        "as far as the voxels resolve it"
+        description="share of the whole deposit that beads fill: 1 without the shares of `unreachable_volume` and "
+        "`gap`, as far as the voxels resolve it"
     )
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
+import numpy as np
+
 from damageest.artefacts import DepositPath, Floats, Solid
 from damageest.artefacts.fields import Checked
 from damageest.result import Result
@@ -177,7 +179,7 @@ class PathWriter:
 def describe_setup(path: DepositPath, factor: float = 1.0) -> list[str]:
     """Lines for the head of a program that say how to set up the part; none for a path without a set-up frame.
     ``factor``: from the path's unit to that of the file."""
-    if path.setup is None:
+    if path.setup is None or np.array_equal(path.setup, np.eye(4)):
         return []
     T = path.setup.copy()
     T[:3, 3] *= factor

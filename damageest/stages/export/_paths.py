@@ -12,7 +12,7 @@ import numpy as np
 from damageest.artefacts import DepositPath, Floats
 from damageest.geometry.transforms import move_points
 from damageest.result import Result
-from damageest.stages.export import ExportedFiles, PathSettings, PathWriter
+from damageest.stages.export import ExportedFiles, PathSettings, PathWriter, describe_setup
 
 
 def write_paths(
@@ -42,7 +42,7 @@ def write_paths(
             name = f"{place}path/site-{site.id}.{writer.suffix}"
             writer.write(folder / name, moved, settings)
             files.append(name)
-        if moved.setup is not None and names:
+        if names and describe_setup(moved):
             name = f"{place}path/site-{site.id}.setup.json"
             values = {"units": result.units, "transform": (moved.setup + 0.0).tolist()}
             (folder / name).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")

@@ -72,5 +72,5 @@ def _turn_part(angles: Floats, rotary: str) -> Floats:
     """Rotations (N,3,3) that take the tool axis of each pair of angles (N,2), in degrees, to z."""
     from scipy.spatial.transform import Rotation
 
-    first = Rotation.from_euler(rotary[0].replace("A", "x").replace("B", "y"), -angles[:, 0], degrees=True)
-    return np.asarray((first * Rotation.from_euler("z", -angles[:, 1], degrees=True)).as_matrix())
+    first = Rotation.from_euler(rotary[0].replace("A", "x").replace("B", "y"), -angles[:, :1], degrees=True)
+    return np.asarray((first * Rotation.from_euler("z", -angles[:, 1:], degrees=True)).as_matrix())
