@@ -18,7 +18,7 @@ SLICES = 4
 
 
 class Aims(NamedTuple):
-    """Regions of a plane. ``free``: where the middles of beads may lie; ``reached``: what they then cover at most;
+    """Regions of a plane. ``free``: where the middles of beads may lie, None for everywhere; ``reached``: what they then cover at most;
     ``flush``: what those cover that only keep out of the metal of the layer itself; ``drawn``: somewhat less than
     reached, so that a ring half a bead within its border is free."""
 
@@ -38,14 +38,18 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
 
     A bead may lie in metal, a Manifold, by the process's ``sink``. Above the layer the beam along z must not meet any,
     but where the tool may be tilted: there each pose is looked at. ``wanted``: the region round which the metal counts.
+    Without a beam all is free.
     """
     from manifold3d import CrossSection
 
+    beam = process.beam
+    if beam is None:
+        return Aims(None, wanted, wanted, wanted)
     floor, top = layer
     left, low, right, high = wanted.bounds() if not wanted.is_empty() else (0.0, 0.0, 0.0, 0.0)
-    beam, width = process.beam, process.bead.width
-    radius = min(width / 2, beam.radius) if beam else width / 2
-    margin = 2 * width + (beam.measure_radius(standoff) if beam else 0.0)
+    width = process.bead.width
+    radius = min(width / 2, beam.radius)
+    margin = 2 * width + beam.measure_radius(standoff)
     extent = (right - left + 2 * margin, high - low + 2 * margin)
     plane = CrossSection.square(extent).translate((left - margin, low - margin))
     column = metal ^ plane.extrude(top + standoff - floor).translate((0, 0, floor))
@@ -53,7 +57,7 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
     free = plane - shift_border(_shadow(column, floor + sink, top, process), (1 - FLUSH) * radius)
     reach, inner = width / 2 * (1 + FLUSH), width / 2 * (1 - 2 * FLUSH)
     flush = shift_border(free, reach)
-    if beam is None or process.axes == 5:
+    if process.axes == 5:
         return Aims(free, flush, flush, shift_border(free, inner))
     if beam.cone == 0:
         free -= shift_border(_shadow(column, top, top + standoff, process), (1 - FLUSH) * beam.radius)

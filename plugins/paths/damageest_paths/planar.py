@@ -72,10 +72,9 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         ground = _cast_shadow(_cut_slab(near, floor - under, top), process)
         held = wanted ^ shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
         aims = find_aims(metal, wanted, (floor, top), around.clearance.standoff, process)
-        lines = list_lines(
-            held ^ aims.drawn, process.pattern, process.bead, process.angle + number * process.turn,
-            aims.free ^ shift_border(held, OFF * width), process.shortest,
-        )  # fmt: skip
+        free = None if aims.free is None else aims.free ^ shift_border(held, OFF * width)
+        angle = process.angle + number * process.turn
+        lines = list_lines(held ^ aims.drawn, process.pattern, process.bead, angle, free, process.shortest)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
         short = cover([line.points for line in lines if measure_length(line.points) < process.shortest], width)
         made, dropped, shaded = choice.place(long, top, number)
