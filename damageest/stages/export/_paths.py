@@ -42,9 +42,9 @@ def write_paths(
             name = f"{place}path/site-{site.id}.{writer.suffix}"
             writer.write(folder / name, moved, settings)
             files.append(name)
-        if names and describe_setup(moved):
+        if names and moved.setup is not None and describe_setup(moved):
             name = f"{place}path/site-{site.id}.setup.json"
-            values = {"units": result.units, "transform": (moved.setup + 0.0).tolist()}
+            values = {"units": result.units, "transform": np.add(moved.setup, 0.0).tolist()}
             (folder / name).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
             files.append(name)
     return ExportedFiles(tuple(files))

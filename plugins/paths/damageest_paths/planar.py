@@ -24,7 +24,7 @@ UNSUPPORTED, COLLIDES, SHORT, SUNK, SHADED = (
     "the nozzle would come too near to something",
     "shorter than the shortest pass",
     "so thin over intact metal that a bead would lie in it",
-    "no line of sight: something stands between nozzle and bead",
+    "no line of sight: something stands between nozzle and bead, or the tool would be too oblique",
 )
 OFF = 0.1
 """Bead widths by which the middle of a bead may lie beside what a layer has to fill."""
