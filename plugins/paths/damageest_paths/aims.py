@@ -18,10 +18,12 @@ SLICES = 4
 
 
 class Aims(NamedTuple):
-    """Regions of a plane. ``free``: where the middles of beads may lie, None for everywhere; ``reached``: what they then
-    cover at most;
+    """Regions of a plane.
+
+    ``free``: where the middles of beads may lie, None for everywhere; ``reached``: what they then cover at most;
     ``flush``: what those cover that only keep out of the metal of the layer itself; ``drawn``: somewhat less than
-    reached, so that a ring half a bead within its border is free."""
+    reached, so that a ring half a bead within its border is free.
+    """
 
     free: Any
     reached: Any
