@@ -10,7 +10,7 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest_paths.regions import cover, find_main_angle, measure_length, shift_border, unite_regions
 from damageest_paths.stripes import Bead, fill_with_rows
-from damageest_paths.trim import follow_rim, lengthen_line, trim_line
+from damageest_paths.trim import cut_ring, follow_rim, join_lines, lengthen_line, trim_line
 
 Pattern = Literal["zigzag", "contour", "spiral", "offset-zigzag"]
 Kind = Literal["row", "ring", "spiral", "rim", "gap"]
@@ -21,6 +21,8 @@ SLIVER = 0.04
 """Area of a gap, in squares of the bead's width, from which it gets a pass of its own."""
 FINE_SLIVER = 0.01
 """The same beside which a piece of the outermost ring is laid: the ends of rows leave many of them along a rim."""
+WAY = 6.0
+"""Bead widths of travel that a pass more costs, where a ring beside rows is compared with pieces of it."""
 ROUNDS = 2
 """How often gaps between passes are looked for and filled."""
 
@@ -46,17 +48,16 @@ def list_lines(
     """
     if region.is_empty():
         return []
-    if pattern == "zigzag":
-        lines = [Line(row, "row") for row in fill_with_rows(region, bead, angle, True, free)]
+    if pattern == "zigzag" and free is not None:
+        pieces = sorted(region.decompose(), key=lambda each: each.bounds())
+        lines = [line for piece in pieces for line in _fill_piece(piece, bead, angle, free, shortest)]
     else:
-        fill = {"contour": _fill_contour, "spiral": _fill_spiral, "offset-zigzag": _fill_both}
-        lines = fill[pattern](region, bead, angle)
-    lines = _finish(lines, region, bead, free, shortest)
-    if free is not None:
-        gaps = _list_gaps(region, lines, bead, FINE_SLIVER)
-        rings = _read_rings(shift_border(region, -bead.width / 2), bead) if gaps else []
-        rim = [Line(piece, "rim") for piece in follow_rim(rings, unite_regions(gaps), bead.width)]
-        lines += _finish(rim, region, bead, free, shortest)
+        fill = {
+            "zigzag": _fill_zigzag, "contour": _fill_contour, "spiral": _fill_spiral, "offset-zigzag": _fill_both
+        }  # fmt: skip
+        lines = _finish(fill[pattern](region, bead, angle), region, bead, free, shortest)
+        if free is not None:
+            lines += _fill_rim(region, lines, bead, free, shortest)
     for _ in range(ROUNDS):
         gaps = _list_gaps(region, lines, bead)
         rows = [row for gap in gaps for row in fill_with_rows(gap, bead, find_main_angle(gap), linked=False)]
@@ -64,6 +65,53 @@ def list_lines(
             break
         lines += _finish([Line(row, "gap") for row in rows], region, bead, free, shortest)
     return lines
+
+
+def _fill_piece(region: Any, bead: Bead, angle: float, free: Any, shortest: float) -> list[Line]:
+    """Rows, and what of the outermost ring they need beside them; or all of that ring, and rows within it. That with
+    the fewer and shorter passes is taken: many short pieces of the ring cost more travel than the whole of it."""
+    rows = [Line(row, "row") for row in fill_with_rows(region, bead, angle, True, free)]
+    rows = _finish(rows, region, bead, free, shortest)
+    rim = _fill_rim(region, rows, bead, free, shortest)
+    if not rim:
+        return rows
+    plain = _join([*rows, *rim], free, bead)
+    rings = _read_rings(shift_border(region, -bead.width / 2), bead)
+    border = [Line(piece, "rim") for ring in rings for piece in cut_ring(ring, free, bead.width)]
+    inner = shift_border(shift_border(region, -bead.width / 2 - bead.step), bead.width / 2)
+    rows_within = [] if inner.is_empty() else fill_with_rows(inner, bead, angle, True, free)
+    within = [Line(row, "row") for row in rows_within]
+    ringed = _join(_finish([*border, *within], region, bead, free, shortest), free, bead)
+    missed = [_measure_gaps(region, lines, bead) for lines in (plain, ringed)]
+    if not border or missed[1] > missed[0] + FINE_SLIVER * bead.width**2:
+        return plain
+    return min(plain, ringed, key=lambda lines: _estimate(lines, bead))
+
+
+def _fill_rim(region: Any, lines: Sequence[Line], bead: Bead, free: Any, shortest: float) -> list[Line]:
+    """The pieces of the outermost ring that lie beside gaps which the lines leave."""
+    gaps = _list_gaps(region, lines, bead, FINE_SLIVER)
+    rings = _read_rings(shift_border(region, -bead.width / 2), bead) if gaps else []
+    rim = [Line(piece, "rim") for piece in follow_rim(rings, unite_regions(gaps), bead.width)]
+    return _finish(rim, region, bead, free, shortest)
+
+
+def _join(lines: Sequence[Line], free: Any, bead: Bead) -> list[Line]:
+    """The lines, joined where their ends meet; what has a piece of a ring and rows is of kind row."""
+    rows = [line.points for line in lines if line.kind == "row"]
+    joined = join_lines([line.points for line in lines], free, bead.width)
+    ends = {tuple(point) for row in rows for point in row.tolist()}
+    return [Line(line, "row" if any(tuple(point) in ends for point in line.tolist()) else "rim") for line in joined]
+
+
+def _estimate(lines: Sequence[Line], bead: Bead) -> float:
+    """The way along the lines and between them, in bead widths."""
+    return WAY * len(lines) + sum(measure_length(line.points) for line in lines) / bead.width
+
+
+def _measure_gaps(region: Any, lines: Sequence[Line], bead: Bead) -> float:
+    """The area of the gaps worth a piece of the ring."""
+    return float(sum(gap.area() for gap in _list_gaps(region, lines, bead, FINE_SLIVER)))
 
 
 def _finish(lines: Sequence[Line], region: Any, bead: Bead, free: Any, shortest: float) -> list[Line]:

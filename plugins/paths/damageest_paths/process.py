@@ -15,6 +15,8 @@ from damageest_paths.sight import Beam
 from damageest_paths.stripes import Bead
 
 Axes = Literal[3, "3+2", 5]
+LESS = 1e-6
+"""Share of the extent of a pass by which the ways have to become shorter where passes are put in another order."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,11 @@ def extend_line(line: Floats, before: float, after: float) -> Floats:
 
 
 def order_passes(passes: Sequence[Pass], start: Floats | None) -> list[Pass]:
-    """The passes of one layer, each the nearest to the end of the one before, some of them the other way round."""
+    """The passes of one layer, some of them the other way round, so that the ways between them are short.
+
+    Each is the nearest to the end of the one before; then stretches of the sequence are run the other way round as
+    long as that makes the ways shorter (2-opt, Croes 1958).
+    """
     left, ordered = list(passes), []
     at = start
     while left:
@@ -128,4 +134,29 @@ def order_passes(passes: Sequence[Pass], start: Floats | None) -> list[Pass]:
         one = left.pop(int(number))
         ordered.append(one.reverse() if end else one)
         at = ordered[-1].points[-1]
+    for _ in range(len(ordered) ** 2):
+        low, high, gain = _find_turn(ordered, start)
+        if gain <= LESS * ordered[0].points.std():
+            break
+        ordered[low : high + 1] = [one.reverse() for one in ordered[low : high + 1][::-1]]
     return ordered
+
+
+def _find_turn(passes: Sequence[Pass], start: Floats | None) -> tuple[int, int, float]:
+    """The first and last pass of the stretch that is best run the other way round, and by how much that is shorter."""
+    if len(passes) < 2:
+        return 0, 0, 0.0
+    first = np.array([one.points[0] for one in passes])
+    last = np.array([one.points[-1] for one in passes])
+    before = np.concatenate([first[:1] if start is None else start[None], last[:-1]])
+    # before a stretch, its first pass is now reached at its last point, and what follows from its first
+    into = np.linalg.norm(before[:, None] - last[None], axis=2)
+    out = np.zeros((len(passes), len(passes)))
+    out[:, :-1] = np.linalg.norm(first[:, None] - first[None, 1:], axis=2)
+    was_in = np.linalg.norm(before - first, axis=1)
+    was_out = np.append(np.linalg.norm(last[:-1] - first[1:], axis=1), 0.0)
+    if start is None:
+        into[0], was_in[0] = 0.0, 0.0
+    gain = np.triu(was_in[:, None] + was_out[None] - into - out)
+    low, high = np.unravel_index(int(np.argmax(np.round(gain, 9))), gain.shape)
+    return int(low), int(high), float(gain[low, high])

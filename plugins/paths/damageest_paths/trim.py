@@ -18,6 +18,8 @@ NEAR = 0.9
 """Share of half a bead's width within which a ring lies beside a gap."""
 JOIN = 1.0
 """Bead widths round gaps by which what lies between them is bridged: a few long passes for many short ones."""
+LINK = 1.5
+"""Bead widths between the ends of two lines up to which they become one pass."""
 
 
 def trim_line(line: Floats, free: Any, width: float) -> list[Floats]:
@@ -54,14 +56,62 @@ def lengthen_line(line: Floats, shortest: float, region: Any, free: Any, width: 
 def follow_rim(rings: Sequence[Floats], gaps: Any, width: float) -> list[Floats]:
     """The pieces of closed rings (K,2) whose beads lie beside gaps, a region."""
     near = shift_border(shift_border(gaps, width / 2 * NEAR + JOIN * width), -JOIN * width)
-    pieces = []
-    for ring in rings:
-        closed = np.concatenate([ring, ring[:1]])
-        inside = is_within(closed, near)
-        if not inside.all() and inside[0]:  # begins outside, so that no piece is cut in two
-            points, _ = resample(closed, FINE * width)
-            out = np.flatnonzero(~is_within(points, near))
-            if len(out):
-                closed = np.concatenate([points[out[0] : -1], points[: out[0] + 1]])
-        pieces += trim_line(closed, near, width)
-    return pieces
+    return [piece for ring in rings for piece in cut_ring(ring, near, width)]
+
+
+def cut_ring(ring: Floats, region: Any, width: float) -> list[Floats]:
+    """The pieces of a closed ring (K,2) that lie in a region; the whole ring, closed, where all of it does."""
+    closed = np.concatenate([ring, ring[:1]])
+    points, _ = resample(closed, FINE * width)
+    out = np.flatnonzero(~is_within(points, region))
+    if len(out):  # begins outside, so that no piece is cut in two
+        closed = np.concatenate([points[out[0] : -1], points[: out[0] + 1]])
+    return trim_line(closed, region, width)
+
+
+def join_lines(lines: Sequence[Floats], free: Any, width: float) -> list[Floats]:
+    """The polylines (K,2), joined end to end where the ends are not farther apart than ``LINK`` bead widths and the
+    straight way between them lies in the region ``free``. A closed one begins where it is nearest to an end of
+    another. The shortest ways are taken first."""
+    left = list(lines)
+    while len(left) > 1:
+        found = [
+            way for k in range(len(left)) for n in range(len(left)) if k != n for way in _list_links(left, k, n, width)
+        ]
+        for _, first, second, pair in sorted(found, key=lambda way: way[:3]):
+            start, stop = pair
+            link, _ = resample(np.array([start[-1], stop[0]]), FINE * width)
+            if is_within(link[1:-1], free).all():
+                left = [line for k, line in enumerate(left) if k not in (first, second)]
+                left.append(np.concatenate([start, stop]))
+                break
+        else:
+            break
+    return left
+
+
+def _list_links(
+    lines: Sequence[Floats], first: int, second: int, width: float
+) -> list[tuple[float, int, int, tuple[Floats, Floats]]]:
+    """The ways from a line to an open one that are short enough: length, the two numbers, and both as they are run."""
+    one, other = lines[first], lines[second]
+    if is_closed(other) or (first > second and not is_closed(one)):
+        return []
+    found = []
+    for stop in (other, other[::-1]):
+        if is_closed(one):
+            nearest = int(np.argmin(np.linalg.norm(one[:-1] - stop[0], axis=1)))
+            turned = np.roll(one[:-1], -nearest, axis=0)
+            starts = [np.concatenate([turned, turned[:1]])]
+        else:
+            starts = [one, one[::-1]]
+        for start in starts:
+            far = float(np.linalg.norm(start[-1] - stop[0]))
+            if far <= LINK * width:
+                found.append((far, first, second, (start, stop)))
+    return found
+
+
+def is_closed(line: Floats) -> bool:
+    """Whether a polyline (K,2) ends where it begins."""
+    return len(line) > 3 and bool(np.allclose(line[0], line[-1]))
