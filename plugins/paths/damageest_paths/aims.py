@@ -58,7 +58,7 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
     column = metal ^ plane.extrude(top + standoff - floor).translate((0, 0, floor))
     sink = find_sink(top - floor, process)
     free = plane - shift_border(_shadow(column, floor + sink, top, process), (1 - FLUSH) * radius)
-    reach, inner = width / 2 * (1 + FLUSH), width / 2 * (1 - 2 * FLUSH)
+    reach, inner = width / 2 * (1 + FLUSH), width / 2 * (1 - FLUSH / 2)
     flush = shift_border(free, reach)
     if process.axes == 5:
         return Aims(free, flush, flush, shift_border(free, inner))

@@ -23,6 +23,8 @@ FINE_SLIVER = 0.01
 """The same beside which a piece of the outermost ring is laid: the ends of rows leave many of them along a rim."""
 WAY = 6.0
 """Bead widths of travel that a pass more costs, where a ring beside rows is compared with pieces of it."""
+NEARER = 0.85
+"""Share of a step from a ring to the border of the rows within it: their ends are round."""
 ROUNDS = 2
 """How often gaps between passes are looked for and filled."""
 
@@ -78,12 +80,12 @@ def _fill_piece(region: Any, bead: Bead, angle: float, free: Any, shortest: floa
     plain = _join([*rows, *rim], free, bead)
     rings = _read_rings(shift_border(region, -bead.width / 2), bead)
     border = [Line(piece, "rim") for ring in rings for piece in cut_ring(ring, free, bead.width)]
-    inner = shift_border(shift_border(region, -bead.width / 2 - bead.step), bead.width / 2)
+    inner = shift_border(shift_border(region, -bead.width / 2 - NEARER * bead.step), bead.width / 2)
     rows_within = [] if inner.is_empty() else fill_with_rows(inner, bead, angle, True, free)
     within = [Line(row, "row") for row in rows_within]
     ringed = _join(_finish([*border, *within], region, bead, free, shortest), free, bead)
     missed = [_measure_gaps(region, lines, bead) for lines in (plain, ringed)]
-    if not border or missed[1] > missed[0] + FINE_SLIVER * bead.width**2:
+    if not border or missed[1] > missed[0] + SLIVER * bead.width**2:
         return plain
     return min(plain, ringed, key=lambda lines: _estimate(lines, bead))
 
