@@ -135,3 +135,12 @@ def test_over_build_is_said() -> None:
     path = plan(corner(), direction=(0.6, 0.48, 0.64))
     assert path.surplus_volume > 0.1 * path.deposit_volume
     assert any("milled off" in note for note in path.notes)
+
+
+def test_few_passes_and_little_travel() -> None:
+    """A layer of one piece is a ring and rows in one pass; two passes at most."""
+    _, path = make_case("dent")
+    assert path.passes <= 2 * path.layers
+    assert path.travel < 0.4 * path.length
+    assert path.fill is not None
+    assert path.fill.filled > 0.99
