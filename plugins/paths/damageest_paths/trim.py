@@ -18,6 +18,8 @@ NEAR = 0.9
 """Share of half a bead's width within which a ring lies beside a gap."""
 JOIN = 1.0
 """Bead widths round gaps by which what lies between them is bridged: a few long passes for many short ones."""
+APART = 1e-12
+"""Product of areas below which two sides only touch."""
 LINK = 1.5
 """Bead widths between the ends of two lines up to which they become one pass."""
 
@@ -72,7 +74,7 @@ def cut_ring(ring: Floats, region: Any, width: float) -> list[Floats]:
 def join_lines(lines: Sequence[Floats], free: Any, width: float) -> list[Floats]:
     """The polylines (K,2), joined end to end where the ends are not farther apart than ``LINK`` bead widths and the
     straight way between them lies in the region ``free``. A closed one begins where it is nearest to an end of
-    another. The shortest ways are taken first."""
+    another. The shortest ways are taken first; a joined line crosses itself nowhere."""
     left = list(lines)
     while len(left) > 1:
         found = [
@@ -81,6 +83,9 @@ def join_lines(lines: Sequence[Floats], free: Any, width: float) -> list[Floats]
         for _, first, second, pair in sorted(found, key=lambda way: way[:3]):
             start, stop = pair
             link, _ = resample(np.array([start[-1], stop[0]]), FINE * width)
+            ends = np.array([start[-1], stop[0]])
+            if crosses(start, stop) or crosses(ends, start[:-1]) or crosses(ends, stop[1:]):
+                continue
             if is_within(link[1:-1], free).all():
                 left = [line for k, line in enumerate(left) if k not in (first, second)]
                 left.append(np.concatenate([start, stop]))
@@ -110,6 +115,17 @@ def _list_links(
             if far <= LINK * width:
                 found.append((far, first, second, (start, stop)))
     return found
+
+
+def crosses(line: Floats, other: Floats) -> bool:
+    """Whether a side of one polyline (K,2) properly crosses a side of another (M,2)."""
+    a, b, c, d = line[:-1, None], line[1:, None], other[None, :-1], other[None, 1:]
+
+    def side(p: Floats, q: Floats, r: Floats) -> Floats:
+        return np.asarray((q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0])
+
+    across = (side(a, b, c) * side(a, b, d) < -APART) & (side(c, d, a) * side(c, d, b) < -APART)
+    return bool(across.any())
 
 
 def is_closed(line: Floats) -> bool:
