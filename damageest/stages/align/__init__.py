@@ -57,9 +57,10 @@ class Align(Stage, ABC):
 
     def find_selectors(self) -> list[tuple[tuple[str | int, ...], Selector]]:
         """Those of an option `datum` as well, which may name CAD faces without a selector."""
-        bare = [(("datum", k), Selector(faces=(face,))) for k, face in enumerate(getattr(self, "datum", ()))
-                if isinstance(face, (int, str))]  # fmt: skip
-        return [*super().find_selectors(), *bare]
+        from damageest.stages.align._datum import list_bare_faces
+
+        bare = list_bare_faces(getattr(self, "datum", ()))
+        return [*super().find_selectors(), *((place, Selector(faces=(face,))) for place, face in bare)]
 
     @asked_by_name
     @abstractmethod
