@@ -68,7 +68,11 @@ class PoseError:
 
 
 def measure_pose_error(
-    part: Part, aligned: Scan, deviation: Deviation, tolerance: float, form: float = 0.0,
+    part: Part,
+    aligned: Scan,
+    deviation: Deviation,
+    tolerance: float,
+    form: float = 0.0,
     spread: Floats | None = None,
 ) -> PoseError:
     """The error that the intact points leave to the pose.

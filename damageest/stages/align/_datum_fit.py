@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats
+from damageest.artefacts import Flags, Floats, Ints
 from damageest.errors import StageError
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_faced_cubes
@@ -21,6 +21,8 @@ from damageest.stages.align._system import Feature
 PATCHES = 60
 """Patches that a datum is divided in where it has few points; of many points, sixteen make a patch."""
 POINTS = 16
+MIN_INNER = 0.4
+"""Share of a datum's points that has to lie off its rim, for those on the rim to be left out."""
 MIN_POINTS = 20
 """Points on a datum, below which the scan does not show it."""
 WEAK = 0.25
@@ -29,6 +31,10 @@ LOOSE = 10.0
 """Standard deviation, in tolerances, that the radius of a datum may be off."""
 ERRORS = (0.03, 0.06, 0.12, 0.25)
 """Standard deviations, in tolerances, that errors of form may give the mean of a patch."""
+TOLD = 0.12
+"""Standard deviation, in tolerances, that a patch may be off for it to count as in contact when wear is told."""
+DIRT = 0.01
+"""Share of a datum that may lie above it, where a surface plate lies on the rest."""
 MAX_SCATTER = 2.5
 """Standard deviations of the noise by which the points of a flat patch may scatter about its mean."""
 ALIKE = 1 / 15
@@ -71,15 +77,20 @@ class FittedDatum:
     error: float
 
 
-def gather_points(feature: Feature, at: Floats, shape: Floats, distance: Floats, noise: float) -> OnDatum:
+def gather_points(feature: Feature, at: Floats, shape: Ints, distance: Floats, noise: float, margin: float) -> OnDatum:
     """Averages the points ``at`` (N,3), which lie on the ``shape`` (N,) of a datum, -1 for none; ``distance`` (N,) from
-    the part. Raises StageError where they are too few."""
+    the part. Points within ``margin`` of the rim of a face are left out where others are as many: worn skin beside the
+    datum lies there. Raises StageError where they are too few."""
     offset, normals = np.zeros(len(at)), np.zeros((len(at), 3))
     for number, one in enumerate(feature.shapes):
         own = shape == number
         offset[own], normals[own] = one.measure(at[own])
     # beyond the rim of a face the part is farther than its shape; there the points belong to another face
     kept = (shape >= 0) & (np.abs(distance) - np.abs(offset) < max(noise, 1e-5))
+    index = np.flatnonzero(kept)
+    inner = feature.is_inner(at[index] - offset[index, None] * normals[index], margin)
+    if inner.sum() > max(MIN_INNER * len(index), MIN_POINTS):
+        kept[index[~inner]] = False
     count_points = int(kept.sum())
     if count_points < MIN_POINTS:
         raise StageError(
@@ -144,7 +155,7 @@ def fit_datum(
         if not _part_weak(on, even, chosen, noise, form, tolerance)[1].shape[1] or chosen is every:
             break
         every = chosen
-    return _describe(on, even, weak, values_now, offset, chosen, band, noise, form, error)
+    return _describe(on, even, weak, values_now, offset, chosen, noise, form, error, tolerance)
 
 
 def _join(even: Floats, sizes: int) -> Floats:
@@ -168,7 +179,7 @@ def _find_covariance(
     rows = on.patches.jacobian[chosen] @ _join(even, on.sizes)
     trust = 1 / _find_variance(on, noise, form)[chosen]
     prior = np.diag([1e-8 / tolerance**2] * even.shape[1] + [1 / (LOOSE * tolerance) ** 2] * on.sizes)
-    covariance = np.linalg.inv((rows * trust[:, None]).T @ rows + prior)
+    covariance = np.asarray(np.linalg.inv((rows * trust[:, None]).T @ rows + prior), np.float64)
     gain = np.zeros((len(covariance), len(chosen)))
     gain[:, chosen] = covariance @ (rows * trust[:, None]).T
     return covariance, gain
@@ -186,7 +197,7 @@ def _part_weak(
     is_weak = np.sqrt(np.maximum(values, 0)) > WEAK * tolerance
     if not is_weak.any():
         return even, np.empty((6, 0))
-    return even @ vectors[:, ~is_weak], even @ vectors[:, is_weak]
+    return np.asarray(even @ vectors[:, ~is_weak]), np.asarray(even @ vectors[:, is_weak])
 
 
 def _search(
@@ -239,16 +250,24 @@ def _step(rows: Floats, offset: Floats, weight: Floats) -> Floats:
 
 
 def _lay_on(on: OnDatum, even: Floats, moved: Floats, band: Floats, tolerance: float) -> Floats:
-    """The fit from outside: no patch lies outside, and the mean gap is the smallest. Patches outside by more than the
-    band are dirt."""
+    """The fit from outside: no patch lies outside, and the mean gap is the smallest. Up to `DIRT` of the datum outside
+    the fit that is given is dirt."""
     from scipy.optimize import linprog
 
     rows = on.patches.jacobian @ _join(even, on.sizes)
     offset = on.patches.offset + rows @ moved
-    real = (offset < band) & (offset > -3 * tolerance)
+    order = np.argsort(-offset, kind="stable")
+    above = np.empty(len(offset))
+    above[order] = np.cumsum(on.patches.weight[order]) / on.patches.weight.sum()
+    real = (offset < band) | ((above > DIRT) & (offset < LOOSE * tolerance))
+    real &= on.patches.is_flat & (offset > -LOOSE * tolerance)
+    if not real.any():
+        return moved
     weight = on.patches.weight[real] / on.patches.weight[real].sum()
-    found = linprog(-(weight @ rows[real]), A_ub=rows[real], b_ub=-offset[real], bounds=(-3 * tolerance, 3 * tolerance))
-    return moved + found.x if found.status == 0 else moved
+    found = linprog(
+        -(weight @ rows[real]), A_ub=rows[real], b_ub=-offset[real], bounds=(-LOOSE * tolerance, LOOSE * tolerance)
+    )
+    return moved if found.x is None or found.status else np.asarray(moved + found.x)
 
 
 def _measure_form(offset: Floats, weight: Floats, noise: float) -> float:
@@ -261,12 +280,14 @@ def _measure_form(offset: Floats, weight: Floats, noise: float) -> float:
 
 
 def _describe(
-    on: OnDatum, even: Floats, weak: Floats, moved: Floats, offset: Floats, chosen: Flags, band: Floats, noise: float,
-    form: float, error: float,
+    on: OnDatum, even: Floats, weak: Floats, moved: Floats, offset: Floats, chosen: Flags, noise: float, form: float,
+    error: float, tolerance: float,
 ) -> FittedDatum:  # fmt: skip
     count, weight = even.shape[1], on.patches.weight
-    covariance, gain = _find_covariance(on, even, chosen, noise, form, max(float(band.max()), 1e-9))
+    covariance, gain = _find_covariance(on, even, chosen, noise, form, tolerance)
     values, vectors = np.linalg.eigh(covariance[:count, :count])
+    # errors of the datums before it are no wear
+    band = measure_bands(on.patches, noise, max(error, TOLD) * tolerance)
     below = offset < -band
     return FittedDatum(
         twist=even @ moved[:count],
@@ -275,7 +296,7 @@ def _describe(
         weak=weak,
         gain=even @ gain[:count] @ on.patches.jacobian[:, :6],
         spread=even @ (vectors * np.sqrt(np.maximum(values, 0))),
-        contact=float(weight[chosen].sum() / weight.sum()),
+        contact=float(weight[np.abs(offset) < band].sum() / weight.sum()),
         inside=float(weight[below].sum() / weight.sum()),
         off=float(-np.quantile(offset[below], 0.1)) if below.any() else 0.0,
         rms=float(np.sqrt(np.average(offset[chosen] ** 2, weights=weight[chosen]))) if chosen.any() else 0.0,

@@ -53,7 +53,7 @@ def fit_from_start(
             "raise iterations, or use align: register",
         )
     doubts = result.note_doubts() + finish.doubts
-    if not finish.free:  # those have amounts, and are terms of the intervals
+    if not (finish.free or finish.datums):  # those have amounts, and are terms of the intervals
         doubts += note_free_motion(best.pose, frame.target, points, best.band)
     pose = frame.unscale_pose(best.pose)
     notes = (*map(str, doubts), *finish.notes)

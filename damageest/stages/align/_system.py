@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Part
+from damageest.artefacts import Flags, Floats, Ints, Part
 from damageest.errors import StageError
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.shapes import Shape, recognise_shape
@@ -27,6 +27,8 @@ SMOOTH = 0.87
 """Cosine of the angle between triangles of one face, where the part is a mesh."""
 SAME = 1e-5
 """Distance between two shapes, in diagonals, up to which they are one."""
+STEP = 1e-3
+"""Distance between places along the rim of a datum."""
 TAKEN = 1e-3
 """Movement of a datum's skin along its normal, as a share of a motion, from which the datum fixes the motion."""
 
@@ -34,7 +36,8 @@ TAKEN = 1e-3
 @dataclass(frozen=True, eq=False)
 class Feature:
     """One datum. ``shapes``: those of its faces; ``label`` (F,): which of them each triangle of the part lies on, -1
-    for none. ``places``: on each shape (N,3), all over the datum's skin. ``faces``: numbers of its CAD faces."""
+    for none. ``places``: on each shape (N,3), all over the datum's skin. ``faces``: numbers of its CAD faces. ``rim``
+    (M,3): places along the edges of its faces."""
 
     name: str
     skin: DatumSkin
@@ -43,6 +46,7 @@ class Feature:
     places: tuple[Floats, ...]
     faces: tuple[int, ...]
     is_one_sided: bool
+    rim: Floats
 
     @property
     def kind(self) -> str:
@@ -53,6 +57,15 @@ class Feature:
     def slopes(self) -> Floats:
         """(N,6) how twists change the distances of places all over the datum."""
         return np.concatenate([one.find_slopes(at) for one, at in zip(self.shapes, self.places, strict=True)])
+
+    def is_inner(self, places: Floats, margin: float) -> Flags:
+        """(N,) whether places (N,3) on the datum are farther than ``margin`` from its rim."""
+        from scipy.spatial import cKDTree
+
+        if not len(self.rim) or not len(places):
+            return np.ones(len(places), bool)
+        far = cKDTree(self.rim).query(places, distance_upper_bound=margin + STEP)[0]
+        return np.asarray(far > np.hypot(margin, STEP / 2))
 
     def divide(self, free: Floats) -> tuple[Floats, Floats]:
         """The twists (6,K) among ``free`` (6,M), which are orthonormal, that the datum fixes, and those that it leaves
@@ -103,7 +116,7 @@ def _find_feature(part: Part, name: str, given: DatumFeature | tuple[int | str |
     label = np.full(len(part.faces), -1)
     shapes: list[Shape] = []
     middle = part.bounds.mean(axis=0)
-    for group in _split_faces(part, chosen):
+    for group in split_faces(part, chosen):
         if area[group].sum() < RIM * area[chosen].sum() / 5 and part.faces_brep is None:
             continue
         found = recognise_shape(part.triangles[group], part.tessellation_error)
@@ -126,13 +139,32 @@ def _find_feature(part: Part, name: str, given: DatumFeature | tuple[int | str |
         places.append((at[:: max(1, len(at) // OF_SHAPE)] - middle) / part.diagonal)
     faces = () if part.faces_brep is None else tuple(int(one) for one in np.unique(part.faces_brep[chosen]))
     one_sided = isinstance(given, DatumFeature) and given.fit == "one_sided"
-    return Feature(name, skin, tuple(shapes), label, tuple(places), faces, one_sided)
+    return Feature(name, skin, tuple(shapes), label, tuple(places), faces, one_sided, _trace_rim(part, label))
 
 
-def _split_faces(part: Part, chosen: Ints) -> list[Ints]:
+def _trace_rim(part: Part, label: Ints) -> Floats:
+    """Places (M,3) along the edges that triangles with a ``label`` (F,) share with others."""
+    number = np.flatnonzero(label >= 0)
+    corners = part.faces[number]
+    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    key = np.sort(edges, axis=1) @ np.array([len(part.vertices), 1])
+    # an edge between two triangles of one shape is inside the datum
+    _, first, count = np.unique(
+        key * (label.max() + 2) + np.tile(label[number], 3), return_index=True, return_counts=True
+    )
+    ends = (part.vertices[edges[first[count == 1]]] - part.bounds.mean(axis=0)) / part.diagonal
+    steps = np.ceil(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / STEP).astype(np.int64) + 1
+    which = np.repeat(np.arange(len(ends)), steps)
+    share = (np.arange(len(which)) - np.repeat(np.cumsum(steps) - steps, steps)) / np.repeat(
+        np.maximum(steps - 1, 1), steps
+    )
+    return np.asarray(ends[which, 0] + share[:, None] * (ends[which, 1] - ends[which, 0]))
+
+
+def split_faces(part: Part, chosen: Ints) -> list[Ints]:
     """The triangles ``chosen`` (N,) by CAD face; of a mesh, by smooth pieces."""
     if part.faces_brep is not None:
-        number = part.faces_brep[chosen]
+        number: Ints = part.faces_brep[chosen]
     else:
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
@@ -147,5 +179,5 @@ def _split_faces(part: Part, chosen: Ints) -> list[Ints]:
         normals = part.face_normals[chosen]
         smooth = np.einsum("ij,ij->i", normals[first], normals[second]) > SMOOTH
         joined = coo_array((np.ones(smooth.sum()), (first[smooth], second[smooth])), shape=(len(chosen),) * 2)
-        number = connected_components(joined, directed=False)[1]
+        number = connected_components(joined, directed=False)[1].astype(np.int64)
     return [chosen[number == one] for one in np.unique(number)]

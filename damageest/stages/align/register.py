@@ -98,7 +98,7 @@ class Register(Align):
             poses = turns @ best.pose if finish.is_changed else choice.others
             others = np.array([frame.unscale_pose(pose) for pose in poses])
         doubts = check.note_doubts() + finish.doubts + doubts + note_ambiguity(choice, prepared)
-        if not finish.free:  # those have amounts, and are terms of the intervals
+        if not (finish.free or finish.datums):  # those have amounts, and are terms of the intervals
             doubts += note_free_motion(best.pose, target, fine, best.band)
         told = note_inward(target, frame, scan, best)
         notes = (*describe_choice(choice), *told, *map(str, doubts), *finish.notes)
