@@ -22,7 +22,7 @@ POSE_CODES = {
     "pose_free": "the part can be moved or turned a little and fits as well",
     "mirrored": "the scan fits better mirrored, and shows too little of the part to tell",
     "datum_worn": "a datum is worn or not in its place: the datum system puts it, or the skin, elsewhere",
-    "datum_decides": "in poses that the datum system excludes the scan fits as well: a worn datum would make other sites",
+    "datum_decides": "the scan fits as well in poses that the datum system excludes: it decides which metal is lost",
     "given_pose": "in a pose nearby more of the scan lies on the part than in the given one",
 }
 """Codes of the reasons that implementations of align give against their pose."""

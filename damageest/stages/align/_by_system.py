@@ -167,8 +167,8 @@ def _doubt_outside(frame: Frame, patches: Patches, band: Floats, tolerance: floa
 
 
 def _tell_decided(frame: Frame, patches: Patches, noise: float, tolerance: float, unit: str) -> tuple[Reason, ...]:
-    """What is to be known where the scan fits as well, or better, in poses that the datums exclude: a datum that is worn
-    all over looks as the opposite face does that is."""
+    """What is to be known where the scan fits as well, or better, in poses that the datums exclude: a datum that is
+    worn all over looks as an opposite face that is worn."""
     if len(patches.weight) < MIN_PATCHES or not patches.basis.shape[1]:
         return ()
     found = search_pose(patches, noise, tolerance, np.random.default_rng(0))

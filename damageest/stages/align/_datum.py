@@ -62,17 +62,3 @@ class DatumSkin:
         normals = self.part.face_normals[face]
         chosen = [one.matches(points, normals, face, self.part) for one in self.selectors]
         return np.asarray(np.any(chosen, axis=0))
-
-
-def list_bare_faces(datum: Datum) -> list[tuple[tuple[str | int, ...], int | str]]:
-    """The CAD faces that are named without a selector, each with its place below the stage's name in a job."""
-    if not isinstance(datum, dict):
-        lists: list[tuple[tuple[str | int, ...], tuple[Item, ...]]] = [(("datum",), datum)]
-    else:
-        lists = [
-            (("datum", name, "skin"), one.skin) if isinstance(one, DatumFeature) else (("datum", name), one)
-            for name, one in datum.items()
-        ]
-    return [
-        ((*place, k), item) for place, items in lists for k, item in enumerate(items) if isinstance(item, (int, str))
-    ]

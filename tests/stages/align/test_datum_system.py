@@ -159,7 +159,7 @@ def test_a_datum_that_is_worn_all_over_is_doubted() -> None:
     assert pose.doubts[0].amount == pytest.approx(2.5 * scene.tolerance, rel=0.2)
     foot = MUSHROOM.triangles[:, :, 2].max(axis=1) < -29
     stepped = scan_part(MUSHROOM, np.where(foot, 2.5, 0.0)).align({"A": face(MUSHROOM, 2, 0)})
-    assert [(one.code, one.effect) for one in stepped.doubts] == [("datum_worn", "contradicts")]
+    assert ("datum_worn", "contradicts") in [(one.code, one.effect) for one in stepped.doubts]
     assert not stepped.is_held
 
 
