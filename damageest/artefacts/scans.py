@@ -206,7 +206,9 @@ class DatumFit(Checked):
     faces, empty where the part is a mesh. ``takes``: the degrees of freedom that it fixes, as text in the part's frame.
     ``points``: scan points on it; ``contact``: the share of them on the fitted shape, ``inside``: below it, as where it
     is worn. ``rms``: of the means of patches in contact, in the job's unit. ``nominal`` and ``measured``: the radius of
-    each cylinder and sphere, in the job's unit.
+    each cylinder and sphere, in the job's unit. ``shapes``: the kind of each of its shapes, with ``places`` on it (a
+    plane's middle, on the axis, the apex, the centre), ``axes`` (a plane's outward normal; 0 for a sphere), and whether
+    it is a ``bores`` face, with the outside toward the axis.
     """
 
     name: str
@@ -219,6 +221,10 @@ class DatumFit(Checked):
     rms: float = 0.0
     nominal: tuple[float, ...] = ()
     measured: tuple[float, ...] = ()
+    shapes: tuple[str, ...] = ()
+    places: tuple[Vector, ...] = ()
+    axes: tuple[Vector, ...] = ()
+    bores: tuple[bool, ...] = ()
     _ranges: ClassVar[dict[str, Range]] = {
         "points": (0, MOST), "contact": (0.0, 1.0), "inside": (0.0, 1.0), "rms": (0.0, MOST),
     }  # fmt: skip

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import DatumFit, Floats, FreeMotion, Reason
+from damageest.artefacts import DatumFit, Floats, FreeMotion, Reason, Vector
 from damageest.stages.align._datum_fit import FittedDatum
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._system import DatumSystem, Feature
@@ -85,7 +85,16 @@ def _summarise(frame: Frame, feature: Feature, fitted: FittedDatum, radii: Float
         rms=fitted.rms * frame.size,
         nominal=tuple(float(one) for one in nominal),
         measured=tuple(float(one) for one in nominal + radii * frame.size),
+        shapes=tuple(one.kind for one in feature.shapes),
+        places=tuple(_to_vector(one.point * frame.size + frame.centre) for one in feature.shapes),
+        axes=tuple(_to_vector(one.axis) for one in feature.shapes),
+        bores=tuple(one.sign < 0 for one in feature.shapes),
     )
+
+
+def _to_vector(value: Floats) -> Vector:
+    x, y, z = (float(one) + 0.0 for one in value)
+    return x, y, z
 
 
 def _join(frame: Frame, twists: Floats, unit: str) -> str:
