@@ -45,7 +45,8 @@ _OPEN = "00000000-0000-0000-0000-000000000000"
 def build_document(result: Result) -> Element:
     """The root element, its identifier still open."""
     lists = Lists()
-    software, model, definition, part, component, path, results, actual = (lists.numbers.take() for _ in range(8))
+    numbers = [lists.numbers.take() for _ in range(9)]
+    software, model, definition, part, component, path, results, actual, standard = numbers
     _list_entities(lists, result)
     add_datums(lists, result)
     for site in result.sites:
@@ -53,12 +54,16 @@ def build_document(result: Result) -> Element:
     children = [
         make("QPId", text=_OPEN),
         _make_header(result),
+        make_list("StandardsDefinitions", [_make_standard(standard)]),
         make_list(
             "SoftwareDefinitions",
             [
                 make(
-                    "Software", make("VendorName", text="damageest"), make("ApplicationName", text="damageest"),
-                    make("Version", text=version("damageest")), id=software,
+                    "Software",
+                    make("VendorName", text="damageest"),
+                    make("ApplicationName", text="damageest"),
+                    make("Version", text=version("damageest")),
+                    id=software,
                 )
             ],
         ),
@@ -67,21 +72,32 @@ def build_document(result: Result) -> Element:
         make_list("DatumReferenceFrames", lists.frames),
         _make_product(lists, result, model, definition, part, component, path),
         _join(
-            "Features", FeatureDefinitions=lists.feature_definitions, FeatureNominals=lists.feature_nominals,
+            "Features",
+            FeatureDefinitions=lists.feature_definitions,
+            FeatureNominals=lists.feature_nominals,
             FeatureItems=lists.feature_items,
         ),
         _join(
-            "Characteristics", CharacteristicDefinitions=lists.definitions, CharacteristicNominals=lists.nominals,
+            "Characteristics",
+            make("FormalStandardId", text=standard),
+            CharacteristicDefinitions=lists.definitions,
+            CharacteristicNominals=lists.nominals,
             CharacteristicItems=lists.items,
         ),
         _make_results(lists, result, results, actual, path),
-    ]  # fmt: skip
+    ]
     return make("QIFDocument", *children, xmlns=NAMESPACE, versionQIF="3.0.0", idMax=str(lists.numbers.last))
 
 
-def _join(name: str, **lists: list[Element]) -> Element | None:
+def _join(name: str, *first: Element, **lists: list[Element]) -> Element | None:
     made = [make_list(kind, found) for kind, found in lists.items()]
-    return make(name, *made) if any(one is not None for one in made) else None
+    return make(name, *first, *made) if any(one is not None for one in made) else None
+
+
+def _make_standard(number: str) -> Element:
+    """The standard that words as profile and datum are taken from."""
+    organization = make("Organization", make("StandardsOrganizationEnum", text="ISO"))
+    return make("Standard", organization, make("Designator", text="1101"), make("Year", text="2017"), id=number)
 
 
 def _list_entities(lists: Lists, result: Result) -> None:
@@ -110,7 +126,7 @@ def _make_units(unit: str) -> Element:
         )  # fmt: skip
 
     primary = [
-        convert("AreaUnit", "squaremeter", f"{unit}2", SQUARE[unit]),
+        convert("AreaUnit", "square meter", f"{unit}2", SQUARE[unit]),
         make("AngularUnit", make("SIUnitName", text="radian"), make("UnitName", text="radian")),
         convert("LinearUnit", "meter", unit, METRES[unit]),
     ]

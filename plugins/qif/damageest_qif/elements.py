@@ -43,7 +43,7 @@ class Lists:
     measurements: list[Element] = field(default_factory=list)
 
 
-def make(name: str, *children: Element | None, text: str | None = None, **attributes: str) -> Element:
+def make(name: str, /, *children: Element | None, text: str | None = None, **attributes: str) -> Element:
     """An element with children, those that are None left out."""
     found = Element(name, attributes)
     found.text = text
