@@ -13,9 +13,10 @@ from dataclasses import dataclass
 Value = object
 """A reference, a number, a text, an enumeration as text with dots, a list of values, a `Typed` value, or None."""
 
-_STATEMENT = re.compile(r"(?:'[^']*'|/\*.*?\*/|[^';])*;", re.S)
+_STATEMENT = re.compile(r"(?:'[^']*+(?:'|\Z)|/\*(?:[^*]|\*(?!/))*+(?:\*/|\Z)|[^';/]|/(?!\*))*+(?:;|\Z)", re.S)
+"""Takes what is no statement too, so that no place is looked at twice."""
 _TOKEN = re.compile(
-    r"\s+|/\*.*?\*/|'(?:[^']|'')*'|#\d+|[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?|\.[A-Za-z0-9_]+\.|\"[0-9A-Fa-f]*\"|[A-Za-z_]\w*|[(),$*=]",
+    r"\s+|/\*(?:[^*]|\*(?!/))*+(?:\*/|\Z)|'(?:[^']|'')*'|#\d+|[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?|\.[A-Za-z0-9_]+\.|\"[0-9A-Fa-f]*\"|[A-Za-z_]\w*|[(),$*=]",
     re.S,
 )
 
@@ -42,7 +43,7 @@ def read_entities(text: str) -> dict[int, Entity]:
     found: dict[int, Entity] = {}
     for match in _STATEMENT.finditer(text):
         head = re.match(r"\s*#(\d+)\s*=", match.group())
-        if head is None:
+        if head is None or not match.group().endswith(";"):
             continue
         tokens = _split(match.group()[head.end() : -1])
         try:
