@@ -156,7 +156,8 @@ def test_ctc_01_is_as_others_read_it() -> None:
         one.findtext(f"{Q}CharacteristicDefinitionId"): one
         for one in root.find(f"{Q}Characteristics/{Q}CharacteristicNominals") or ()
     }
-    theirs, ours = [], []
+    theirs: list[tuple[str, float, float, tuple[str, ...]]] = []
+    ours: list[tuple[str, float, float, tuple[str, ...]]] = []
     for one in root.find(f"{Q}Characteristics/{Q}CharacteristicDefinitions") or ():
         kind = re.sub(r"(?<!^)(?=[A-Z])", "_", one.tag.removeprefix(Q).removesuffix("CharacteristicDefinition")).lower()
         nominal = nominals[one.attrib["id"]]
