@@ -129,6 +129,10 @@ ExactFunction = Callable[[Path, Result, Mapping[str, Body], Mapping[str, Floats 
 the stem, with the transform (4,4) of a point from the part's frame, None for none; ``seconds``: the time limit for each
 site. Gives the files that it wrote; those of other bodies are then written as usual."""
 
+DocumentFunction = Callable[[Path, Result], ExportedFiles]
+"""A function of ``folder, result`` that writes files about the whole result, in the part's frame. The same result gives
+the same bytes."""
+
 
 @dataclass(frozen=True)
 class Writer:
@@ -140,7 +144,8 @@ class Writer:
     for none; ``patch`` is None where the format cannot hold one. ``exact``: writes solids whose outer
     faces are those of the part's CAD file; None where the format has only facets.
     ``single``: whether readers round coordinates to single precision; it then gets solids that this does not open, with
-    the same triangles in each frame.
+    the same triangles in each frame. ``document``: for a format that holds the result as a whole: it is called once,
+    and ``write`` is not called for any solid.
     """
 
     write: WriteFunction
@@ -149,6 +154,7 @@ class Writer:
     patch: Callable[[Path, str, Patch, str], str | None] | None = None
     exact: ExactFunction | None = None
     single: bool = False
+    document: DocumentFunction | None = None
 
 
 @dataclass(frozen=True)

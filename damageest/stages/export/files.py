@@ -45,7 +45,7 @@ class Files(Export):
         ("stl",),
         description="format of the solids, one or a list: stl (single precision; a solid that rounding opens is "
         "written as ply too), ply (double precision), 3mf (one file for all, with unit, names and colours), step "
-        "(plugin cadquery)",
+        "(plugin cadquery), qif (plugin qif: a QIF 3.0 document of the result)",
     )
     solids: Literal["auto", "exact", "faceted"] = Field(
         "auto",
@@ -130,6 +130,7 @@ class Files(Export):
             done += self._write_shapes(back.result, shapes, folder, NOMINAL, None, writers, ())
             done.append(back.tell(bool(splines), any(writers[name].exact for name in self.format)))
         done.append(self._write_truth(result, folder, writers))
+        done += [document(folder, result) for name in self.format if (document := writers[name].document)]
         files = dict.fromkeys(f for one in done for f in one.files)  # the writer of STL may have written a PLY already
         notes = tuple(n for one in done for n in one.notes)
         fits = {number: spline for number, (_, spline) in splines.items()}
@@ -167,6 +168,8 @@ class Files(Export):
         `_prepare` gives them."""
         done = []
         for name in self.format:
+            if writers[name].document:
+                continue
             kind = "simplify" if writers[name].simplify else "single" if writers[name].single else "all"
             left = {stem: body for stem, body in shapes[kind].items() if f"{place}{stem}.{name}" not in ready}
             done += _write_solids(writers[name], folder, place, left, T, result.units)
