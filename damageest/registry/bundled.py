@@ -5,7 +5,7 @@ Only messages use this: what can be run is what was found, whoever provides it.
 
 from __future__ import annotations
 
-COMMANDS = {"evaluate": "damageest-evaluate"}
+COMMANDS = {"app": "damageest-app", "evaluate": "damageest-evaluate"}
 """Command to package."""
 
 CONVERSIONS = {"cadquery": "damageest-cadquery"}
