@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from damageest import read_inputs
 from damageest.artefacts import Part, Scan
 from damageest.geometry.crops import crop_points
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.units import diagnose_scale, diagnose_size, unit_factor
 from damageest.job import Job, load
-from damageest.pipeline.prepare import read_inputs
 from damageest.registry import Registry
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
@@ -39,8 +39,9 @@ class Inputs:
     def describe_part(self) -> str:
         size = " × ".join(f"{edge:.4g}" for edge in np.ptp(self.part.bounds, axis=0))
         faces = f", {len(set(self.part.faces_brep))} CAD faces" if self.part.faces_brep is not None else ""
-        return f"{size} {self.part.unit}, {self.part.volume:.5g} {self.part.unit}³, {len(self.part.faces)} triangles" + (
-            faces
+        return (
+            f"{size} {self.part.unit}, {self.part.volume:.5g} {self.part.unit}³, {len(self.part.faces)} triangles"
+            + faces
         )
 
     def describe_scan(self) -> str:

@@ -81,7 +81,8 @@ class Cutter:
 
 @dataclass(frozen=True)
 class Drawing:
-    """An SVG element and the frame that it shows: ``low`` is its left lower corner, ``scale`` drawing units a length."""
+    """An SVG element and the frame that it shows: ``low`` is its left lower corner, ``scale`` drawing units for
+    a length."""
 
     svg: str
     low: tuple[float, float]
@@ -101,8 +102,8 @@ def draw(
     colour: str,
     measured: list[tuple[float, float]] | None = None,
 ) -> Drawing:
-    """``loops``: outlines by name (part, damage, deposit); the damage decides what is shown. ``points`` (N,3): the scan;
-    those within ``spacing`` of the plane are drawn. ``measured``: up to two places in the plane."""
+    """``loops``: outlines by name (part, damage, deposit); the damage decides what is shown. ``points`` (N,3): the
+    scan; those within ``spacing`` of the plane are drawn. ``measured``: up to two places in the plane."""
     shown = loops.get("damage") or loops.get("part") or [np.zeros((1, 2))]
     ends = np.concatenate(shown)
     low, high = ends.min(axis=0), ends.max(axis=0)

@@ -62,21 +62,62 @@ def _build_bar(session: Session) -> None:
     with v3.VAppBar(density="compact", flat=True, border="b"):
         html.Div("damageest", classes="text-h6 ml-4 mr-4")
         html.Div("{{ job_name || 'no job is open' }}", classes="text-body-2 mr-2", data_test="job-name")
-        v3.VBtn(icon="mdi-file-code-outline", title="the job file (j)", click="show_job = !show_job", disabled=("!job_name",))
-        v3.VBtn(icon="mdi-undo", title="undo (Ctrl+Z)", click=session.step_back, disabled=("!can_undo || running",), data_test="undo")
-        v3.VBtn(icon="mdi-redo", title="redo (Ctrl+Y)", click=(session.step_back, "[true]"), disabled=("!can_redo || running",), data_test="redo")
-        v3.VChip("the job was changed since this result", v_if=("stale && !running",), color="warning", size="small", classes="ml-2")
+        v3.VBtn(
+            icon="mdi-file-code-outline",
+            title="the job file (j)",
+            click="show_job = !show_job",
+            disabled=("!job_name",),
+        )
+        v3.VBtn(
+            icon="mdi-undo",
+            title="undo (Ctrl+Z)",
+            click=session.step_back,
+            disabled=("!can_undo || running",),
+            data_test="undo",
+        )
+        v3.VBtn(
+            icon="mdi-redo",
+            title="redo (Ctrl+Y)",
+            click=(session.step_back, "[true]"),
+            disabled=("!can_redo || running",),
+            data_test="redo",
+        )
+        v3.VChip(
+            "the job was changed since this result",
+            v_if=("stale && !running",),
+            color="warning",
+            size="small",
+            classes="ml-2",
+        )
         v3.VSpacer()
         with html.Div(v_if=("running",), style="width: 340px", classes="mr-4"):
             html.Div("{{ doing }} · {{ seconds }} s", classes="fine")
             v3.VProgressLinear(model_value=("100 * share",), color="primary", height=6, rounded=True)
-        v3.VBtn(icon="mdi-format-list-checks", title="stages of the run", click="show_stages = !show_stages", disabled=("!stages.length",))
-        v3.VBtn("Stop", v_if=("running",), color="error", variant="tonal", prepend_icon="mdi-stop", click=session.stop, data_test="stop")
+        v3.VBtn(
+            icon="mdi-format-list-checks",
+            title="stages of the run",
+            click="show_stages = !show_stages",
+            disabled=("!stages.length",),
+        )
+        v3.VBtn(
+            "Stop",
+            v_if=("running",),
+            color="error",
+            variant="tonal",
+            prepend_icon="mdi-stop",
+            click=session.stop,
+            data_test="stop",
+        )
         v3.VBtn(
             "Run", v_if=("!running",), color="primary", variant="flat", prepend_icon="mdi-play", title="run the job (r)",
             click=session.run, disabled=("!job_name || !!busy",), data_test="run",
         )  # fmt: skip
-        v3.VBtn(icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",), title="dark or light", click="dark = !dark", data_test="dark")
+        v3.VBtn(
+            icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",),
+            title="dark or light",
+            click="dark = !dark",
+            data_test="dark",
+        )
         v3.VBtn(icon="mdi-keyboard-outline", title="keys (?)", click="show_keys = true")
         v3.VProgressLinear(active=("!!busy",), indeterminate=True, absolute=True, location="bottom", color="primary")
 
@@ -127,12 +168,20 @@ def _build_stage(session: Session, judge: JudgePanel) -> None:
 def _build_dialogs() -> None:
     with v3.VNavigationDrawer(v_model=("show_job",), location="right", temporary=True, width=520):
         html.Div("{{ job_text }}", classes="yaml pa-4", data_test="job-text")
-    with v3.VNavigationDrawer(v_model=("show_stages",), location="right", temporary=True, width=380), v3.VTable(
-        density="compact"
-    ), html.Tbody(), html.Tr(v_for=("(one, k) in stages",), key=("k",)):
+    with (
+        v3.VNavigationDrawer(v_model=("show_stages",), location="right", temporary=True, width=380),
+        v3.VTable(density="compact"),
+        html.Tbody(),
+        html.Tr(v_for=("(one, k) in stages",), key=("k",)),
+    ):
         html.Td("{{ one.name }}")
         html.Td("{{ one.cached ? 'from an earlier run' : one.seconds.toFixed(2) + ' s' }}", style="text-align: right")
-    with v3.VDialog(v_model=("show_keys",), width=420), v3.VCard(title="Keys"), v3.VTable(density="compact"), html.Tbody():
+    with (
+        v3.VDialog(v_model=("show_keys",), width=420),
+        v3.VCard(title="Keys"),
+        v3.VTable(density="compact"),
+        html.Tbody(),
+    ):
         for keys, what in KEYS:
             with html.Tr():
                 html.Td(keys, style="white-space: nowrap")
@@ -142,10 +191,11 @@ def _build_dialogs() -> None:
 def _bind(session: Session) -> None:
     state, server, ctrl = session.state, session.server, session.ctrl
 
-    @state.change("dark")
     def set_dark(dark: bool, **_: Any) -> None:
         session.scene.set_dark(dark)
         session.push()
+
+    state.change("dark")(set_dark)
 
     async def pick(click: dict[str, Any]) -> None:
         panel = session.panels.get(state.step)
