@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -84,8 +84,7 @@ class Reader:
         if scan.noise or len(scan.points) < 10:
             return scan
         noise, spacing = measure_noise_and_spacing(scan.points)
-        values = {name: getattr(scan, name) for name in scan.__dataclass_fields__}
-        return Scan(**{**values, "noise": noise, "spacing": spacing})
+        return replace(scan, noise=noise, spacing=spacing)
 
     def find_unit(self, job: Job) -> tuple[str, str]:
         """The units that the job gives for the files of part and scan, or those of the job."""

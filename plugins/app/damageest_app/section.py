@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
-from damageest.geometry.solids import to_manifold
 
 WIDTH, HEIGHT = 640.0, 420.0
 """Size of a drawing, in its own units."""
@@ -65,18 +64,20 @@ def measure_depth(damage: Mesh, plane: Plane) -> float:
 
 
 class Cutter:
-    """A solid that is cut by many planes."""
+    """A mesh that is cut by many planes. It need not be closed: files in single precision may not be."""
 
     def __init__(self, mesh: Mesh) -> None:
-        self._origin = mesh.bounds.mean(axis=0)
-        self._body = to_manifold(mesh, self._origin)
+        import trimesh
+
+        self._body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
     def cut(self, plane: Plane) -> list[Floats]:
-        """The closed outlines (K,2) in the plane."""
-        turn = np.stack([plane.right, plane.up, plane.normal])
-        shift = turn @ (self._origin - plane.origin)
-        loops = self._body.transform(np.column_stack([turn, shift])).slice(0.0).to_polygons()
-        return [np.vstack([loop, loop[:1]]) for loop in loops]
+        """The outlines (K,2) in the plane."""
+        outline = self._body.section(plane.normal, plane.origin)
+        if outline is None:
+            return []
+        axes = np.stack([plane.right, plane.up], axis=1)
+        return [(np.asarray(line) - plane.origin) @ axes for line in outline.discrete]
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ class AlignPanel(Panel):
     def build(self) -> None:
         with v3.VBtnToggle(v_model=("align_tool",), mandatory=True, color="primary", classes="mb-3", divided=True):
             for value, text in (("look", "deviation"), ("pairs", "pairs"), ("datum", "datum")):
-                v3.VBtn(text, value=value, size="small", data_test=f"tool-{value}")
+                v3.VBtn(text, value=value, size="small", raw_attrs=[f'data-test="tool-{value}"'])
         with html.Div(v_if=("align_tool === 'look'",)):
             html.Div("Run the job to see how the scan lies on the part.", v_if=("!has_result",))
             html.Div("{{ one }}", v_for=("(one, k) in pose_words",), key=("k",), classes="text-body-2 mb-1")
@@ -48,12 +48,12 @@ class AlignPanel(Panel):
                 html.Div("{{ poses }} poses fit. Step through them; take the right one.", classes="fine")
                 with html.Div(classes="d-flex align-center"):
                     v3.VBtn(icon="mdi-chevron-left", variant="text", click="pose = (pose + poses - 1) % poses")
-                    html.Div("pose {{ pose + 1 }} of {{ poses }}", data_test="pose")
+                    html.Div("pose {{ pose + 1 }} of {{ poses }}", raw_attrs=['data-test="pose"'])
                     v3.VBtn(
                         icon="mdi-chevron-right",
                         variant="text",
                         click="pose = (pose + 1) % poses",
-                        data_test="next-pose",
+                        raw_attrs=['data-test="next-pose"'],
                     )
                     v3.VBtn(
                         "take it",
@@ -70,7 +70,7 @@ class AlignPanel(Panel):
             html.Div(
                 "{{ half ? 'now the same place on the part' : 'a place on the scan' }}",
                 classes="text-primary",
-                data_test="pair-next",
+                raw_attrs=['data-test="pair-next"'],
             )
             html.Div("{{ one }}", v_for=("(one, k) in pairs",), key=("k",), classes="text-body-2")
             with html.Div(classes="d-flex mt-2", style="gap: 8px"):
@@ -81,7 +81,7 @@ class AlignPanel(Panel):
                     variant="tonal",
                     click=self.take_pairs,
                     disabled=("pairs.length < 3",),
-                    data_test="take-pairs",
+                    raw_attrs=['data-test="take-pairs"'],
                 )
                 v3.VBtn(
                     "take one back",
@@ -96,7 +96,11 @@ class AlignPanel(Panel):
                 classes="fine mb-2",
             )
             html.Div(
-                "{{ one }}", v_for=("(one, k) in datum",), key=("k",), classes="text-body-2", data_test="datum-row"
+                "{{ one }}",
+                v_for=("(one, k) in datum",),
+                key=("k",),
+                classes="text-body-2",
+                raw_attrs=['data-test="datum-row"'],
             )
             html.Div("no datum: all of the skin is used", v_if=("!datum.length",), classes="fine")
         html.Div("align: {{ align_use }}", classes="fine mt-4")

@@ -48,7 +48,7 @@ class JudgePanel(Panel):
                     ("unseen", "unseen"),
                     ("surplus", "surplus"),
                 ):
-                    v3.VBtn(text, value=value, size="x-small", data_test=f"layer-{value}")
+                    v3.VBtn(text, value=value, size="x-small", raw_attrs=[f'data-test="layer-{value}"'])
             with html.Div(v_if=("notes.length",)):
                 html.Div("Notes of the run", classes="head")
                 with html.Div(v_for=("(one, k) in notes",), key=("k",), classes="fine mb-1"):
@@ -58,7 +58,7 @@ class JudgePanel(Panel):
     def _build_site(self) -> None:
         with v3.VCard(
             v_for=("one in sites",), key=("one.id",), variant=("site === one.id ? 'tonal' : 'outlined'",), classes="mb-2 pa-2",
-            click=(self.choose, "[one.id]"), tabindex=0, keydown_enter=(self.choose, "[one.id]"), data_test="site",
+            click=(self.choose, "[one.id]"), tabindex=0, raw_attrs=['data-test="site"', '@keydown.enter="$event.currentTarget.click()"'],
         ):  # fmt: skip
             with html.Div(classes="d-flex align-center"):
                 html.Span(classes="site-dot", style=("{background: one.colour}",))
@@ -85,7 +85,7 @@ class JudgePanel(Panel):
                         size="x-small",
                         variant="tonal",
                         color="success",
-                        data_test="accept",
+                        raw_attrs=['data-test="accept"'],
                         click=(self.decide, "[one.id, 'accept']"),
                     )
                     v3.VBtn(
@@ -93,7 +93,7 @@ class JudgePanel(Panel):
                         size="x-small",
                         variant="tonal",
                         color="error",
-                        data_test="drop",
+                        raw_attrs=['data-test="drop"'],
                         click=(self.decide, "[one.id, 'drop']"),
                     )
                     v3.VBtn(
@@ -112,8 +112,8 @@ class JudgePanel(Panel):
         """The section, over the 3D view."""
         with v3.VSheet(classes="drawing", v_if=("step === 'judge' && section",), elevation=4):
             html.Div(
-                v_html=("section",), data_test="section",
-                raw_attrs=['@click="(at => at && trigger(\'measure\', at))(utils.damageest.place($event))"'],
+                v_html=("section",),
+                raw_attrs=['data-test="section"', '@click="(at => at && trigger(\'measure\', at))(utils.damageest.place($event))"'],
             )  # fmt: skip
             with html.Div(classes="d-flex align-center"):
                 with v3.VBtnToggle(
@@ -123,7 +123,7 @@ class JudgePanel(Panel):
                         v3.VBtn(value, value=value, size="x-small")
                 v3.VSlider(
                     v_model=("section_offset",), min=("-section_depth",), max=("section_depth",), step=("section_depth / 100",),
-                    hide_details=True, label="move", data_test="section-offset",
+                    hide_details=True, label="move", raw_attrs=['data-test="section-offset"'],
                 )  # fmt: skip
             html.Div("{{ hint_measure }}", classes="fine")
         self.session.ctrl.trigger("measure")(self.measure)

@@ -61,7 +61,7 @@ def _look() -> dict[str, Any]:
 def _build_bar(session: Session) -> None:
     with v3.VAppBar(density="compact", flat=True, border="b"):
         html.Div("damageest", classes="text-h6 ml-4 mr-4")
-        html.Div("{{ job_name || 'no job is open' }}", classes="text-body-2 mr-2", data_test="job-name")
+        html.Div("{{ job_name || 'no job is open' }}", classes="text-body-2 mr-2", raw_attrs=['data-test="job-name"'])
         v3.VBtn(
             icon="mdi-file-code-outline",
             title="the job file (j)",
@@ -73,14 +73,14 @@ def _build_bar(session: Session) -> None:
             title="undo (Ctrl+Z)",
             click=session.step_back,
             disabled=("!can_undo || running",),
-            data_test="undo",
+            raw_attrs=['data-test="undo"'],
         )
         v3.VBtn(
             icon="mdi-redo",
             title="redo (Ctrl+Y)",
             click=(session.step_back, "[true]"),
             disabled=("!can_redo || running",),
-            data_test="redo",
+            raw_attrs=['data-test="redo"'],
         )
         v3.VChip(
             "the job was changed since this result",
@@ -106,17 +106,17 @@ def _build_bar(session: Session) -> None:
             variant="tonal",
             prepend_icon="mdi-stop",
             click=session.stop,
-            data_test="stop",
+            raw_attrs=['data-test="stop"'],
         )
         v3.VBtn(
             "Run", v_if=("!running",), color="primary", variant="flat", prepend_icon="mdi-play", title="run the job (r)",
-            click=session.run, disabled=("!job_name || !!busy",), data_test="run",
+            click=session.run, disabled=("!job_name || !!busy",), raw_attrs=['data-test="run"'],
         )  # fmt: skip
         v3.VBtn(
             icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",),
             title="dark or light",
             click="dark = !dark",
-            data_test="dark",
+            raw_attrs=['data-test="dark"'],
         )
         v3.VBtn(icon="mdi-keyboard-outline", title="keys (?)", click="show_keys = true")
         v3.VProgressLinear(active=("!!busy",), indeterminate=True, absolute=True, location="bottom", color="primary")
@@ -124,10 +124,10 @@ def _build_bar(session: Session) -> None:
 
 def _build_rail(session: Session) -> None:
     with v3.VNavigationDrawer(permanent=True, width=132), v3.VList(density="compact", nav=True):
-        for number, (name, icon) in enumerate(zip(STEPS, ICONS, strict=True), 1):
+        for name, icon in zip(STEPS, ICONS, strict=True):
             v3.VListItem(
                 title=name.capitalize(), prepend_icon=icon, active=(f"step === '{name}'",), color="primary",
-                title_attr=f"key {number}", click=(session.go, f"['{name}']"), data_test=f"step-{name}",
+                click=(session.go, f"['{name}']"), raw_attrs=[f'data-test="step-{name}"'],
             )  # fmt: skip
 
 
@@ -135,10 +135,17 @@ def _build_messages(session: Session) -> None:
     html.Div("{{ busy }} …", v_if=("busy",), classes="fine mb-2")
     with v3.VAlert(
         v_if=("message",), type=("tone",), variant="tonal", density="compact", closable=True, classes="mb-3",
-        __events=[("close", "click:close")], close="message = ''", data_test="message",
+        __events=[("close", "click:close")], close="message = ''", raw_attrs=['data-test="message"'],
     ):  # fmt: skip
         html.Div("{{ message }}", classes="words")
-        v3.VBtn("Reload", v_if=("conflict",), size="small", classes="mt-2", click=session.reload, data_test="reload")
+        v3.VBtn(
+            "Reload",
+            v_if=("conflict",),
+            size="small",
+            classes="mt-2",
+            click=session.reload,
+            raw_attrs=['data-test="reload"'],
+        )
     html.Div(
         "This folder cannot be written to, so no job can be made or changed here. Change its rights, or start the app "
         "with another folder.", v_if=("!writable",), classes="text-warning fine mb-2",
@@ -167,7 +174,7 @@ def _build_stage(session: Session, judge: JudgePanel) -> None:
 
 def _build_dialogs() -> None:
     with v3.VNavigationDrawer(v_model=("show_job",), location="right", temporary=True, width=520):
-        html.Div("{{ job_text }}", classes="yaml pa-4", data_test="job-text")
+        html.Div("{{ job_text }}", classes="yaml pa-4", raw_attrs=['data-test="job-text"'])
     with (
         v3.VNavigationDrawer(v_model=("show_stages",), location="right", temporary=True, width=380),
         v3.VTable(density="compact"),

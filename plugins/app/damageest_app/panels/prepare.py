@@ -43,7 +43,7 @@ class PreparePanel(Panel):
                 variant="tonal",
                 click=(self.crop, "['piece']"),
                 disabled=("!has_inputs",),
-                data_test="crop-piece",
+                raw_attrs=['data-test="crop-piece"'],
             )
             v3.VBtn(
                 "box …",
@@ -51,7 +51,7 @@ class PreparePanel(Panel):
                 variant="tonal",
                 click="show_box = !show_box",
                 disabled=("!has_inputs",),
-                data_test="box",
+                raw_attrs=['data-test="box"'],
             )
         with html.Div(v_if=("show_box",), classes="mt-2"):
             for k, axis in enumerate(AXES):
@@ -66,7 +66,7 @@ class PreparePanel(Panel):
                     color="primary",
                     variant="tonal",
                     click=(self.crop, "['keep']"),
-                    data_test="crop-keep",
+                    raw_attrs=['data-test="crop-keep"'],
                 )
                 v3.VBtn("drop the box", size="small", variant="tonal", click=(self.crop, "['drop']"))
                 v3.VBtn("below z of the box away", size="small", variant="tonal", click=(self.crop, "['above']"))
@@ -83,11 +83,11 @@ class PreparePanel(Panel):
             v3.VSlider(
                 v_model=("tolerance",), min=("tolerance_limits[0]",), max=("tolerance_limits[1]",),
                 step=("(tolerance_limits[1] - tolerance_limits[0]) / 400",), hide_details=True, end=self.set_tolerance,
-                data_test="tolerance",
+                raw_attrs=['data-test="tolerance"'],
             )  # fmt: skip
             html.Div(
                 "λ = {{ Number(tolerance).toPrecision(3) }} {{ unit }}; {{ intact_share }} of the points are nearer",
-                data_test="share",
+                raw_attrs=['data-test="share"'],
             )
             v3.VBtn("auto", size="small", variant="text", click=self.set_auto)
         html.Div("The histogram needs a pose: run the job once.", v_if=("!histogram",), classes="fine")

@@ -46,7 +46,7 @@ class RepairPanel(Panel):
     def build(self) -> None:
         with v3.VBtnToggle(v_model=("repair_tool",), mandatory=True, color="primary", classes="mb-3", divided=True):
             for value in ("stock", "path", "export"):
-                v3.VBtn(value, value=value, size="small", data_test=f"repair-{value}")
+                v3.VBtn(value, value=value, size="small", raw_attrs=[f'data-test="repair-{value}"'])
         with html.Div(v_if=("repair_tool === 'stock'",)):
             self._build_stock()
         with html.Div(v_if=("repair_tool === 'path'",)):
@@ -65,7 +65,7 @@ class RepairPanel(Panel):
             suffix=("unit",),
             change=self.set_outer,
             classes="mb-3",
-            data_test="outer",
+            raw_attrs=['data-test="outer"'],
         )
         html.Div("A click on a face of the part:", classes="fine")
         with v3.VRadioGroup(v_model=("face_action",), inline=True, hide_details=True):
@@ -80,14 +80,14 @@ class RepairPanel(Panel):
             label="stock on the face",
             suffix=("unit",),
             classes="mt-2",
-            data_test="face-stock",
+            raw_attrs=['data-test="face-stock"'],
         )
         html.Div(
             "{{ one }}",
             v_for=("(one, k) in targets",),
             key=("'t' + k",),
             classes="text-body-2 mt-1",
-            data_test="target-row",
+            raw_attrs=['data-test="target-row"'],
         )
         html.Div("keep out: {{ one }}", v_for=("(one, k) in keep_out",), key=("'k' + k",), classes="text-body-2 mt-1")
         v3.VBtn("no allowance", v_if=("has_allowance",), size="small", variant="text", click=self.drop_allowance)
@@ -103,13 +103,13 @@ class RepairPanel(Panel):
                 variant="tonal",
                 click=self.add_path,
                 disabled=("!job_name",),
-                data_test="add-path",
+                raw_attrs=['data-test="add-path"'],
             )
         with html.Div(v_if=("has_path",)):
             for name, label in NUMBERS:
                 v3.VTextField(
                     model_value=(f"path.{name}",), type="number", label=label, classes="mb-2",
-                    change=(self.set_path, f"['{name}', $event.target.value]"), data_test=f"path-{name}",
+                    change=(self.set_path, f"['{name}', $event.target.value]"), raw_attrs=[f'data-test="path-{name}"'],
                 )  # fmt: skip
             v3.VBtn("no path", size="small", variant="text", click=self.drop_path)
         with html.Div(v_if=("path_layers",), classes="mt-2"):
@@ -121,13 +121,19 @@ class RepairPanel(Panel):
                 classes="mb-2",
             )
             v3.VSlider(
-                v_model=("path_share",), min=0, max=1, step=0.002, label="time", hide_details=True, data_test="time"
+                v_model=("path_share",),
+                min=0,
+                max=1,
+                step=0.002,
+                label="time",
+                hide_details=True,
+                raw_attrs=['data-test="time"'],
             )
             v3.VSlider(
                 model_value=("path_layer",), min=1, max=("path_layers",), step=1, label="layer", hide_details=True,
-                update_modelValue=(self.go_to_layer, "[$event]"), data_test="layer",
+                update_modelValue=(self.go_to_layer, "[$event]"), raw_attrs=['data-test="layer"'],
             )  # fmt: skip
-            html.Div("{{ path_words }}", classes="fine", data_test="path-words")
+            html.Div("{{ path_words }}", classes="fine", raw_attrs=['data-test="path-words"'])
 
     def _build_export(self) -> None:
         html.Div("Solids", classes="head")
@@ -139,7 +145,7 @@ class RepairPanel(Panel):
             update_modelValue="formats = $event",
             blur=self.set_formats,
             label="formats",
-            data_test="formats",
+            raw_attrs=['data-test="formats"'],
         )
         html.Div("Paths", classes="head")
         v3.VSelect(
@@ -159,7 +165,7 @@ class RepairPanel(Panel):
                 variant="tonal",
                 href="/download",
                 download=True,
-                data_test="download",
+                raw_attrs=['data-test="download"'],
             )
             v3.VBtn(
                 "open the folder",
@@ -287,7 +293,9 @@ class RepairPanel(Panel):
             put_faces(scene, tools[1], [*named, *((one, KEEP_OUT) for one in allowance.get("keep_out", []))])
         if results is not None and tool != "path":
             for number in results.output.site_numbers:
-                solid = results.read_solid("deposit", number) or results.read_solid("damage", number)
+                solid = results.read_solid("deposit", number)
+                if solid is None and tool == "export":  # the part as designed would cover the damage
+                    solid = results.read_solid("damage", number)
                 scene.put(f"deposit {number}", make_mesh(solid), colour=DEPOSIT)
         if tool == "path":
             self._put_path(scene)

@@ -23,13 +23,13 @@ class SeveralPanel(Panel):
                 label="doubtful ones",
                 color="primary",
                 hide_details=True,
-                data_test="only-doubtful",
+                raw_attrs=['data-test="only-doubtful"'],
             )
-            v3.VBtn("next", size="small", variant="tonal", click=self.open_next, data_test="next-job")
+            v3.VBtn("next", size="small", variant="tonal", click=self.open_next, raw_attrs=['data-test="next-job"'])
             v3.VBtn("look again", size="small", variant="text", click=self.look)
         with v3.VCard(
             v_for=("one in rows.filter(x => !only_doubtful || x.state === 'doubtful')",), key=("one.job",), classes="mb-2 pa-2",
-            variant=("one.job === job_name ? 'tonal' : 'outlined'",), click=(self.open_job, "[one.job]"), data_test="job-row",
+            variant=("one.job === job_name ? 'tonal' : 'outlined'",), click=(self.open_job, "[one.job]"), raw_attrs=['data-test="job-row"'],
         ):  # fmt: skip
             with html.Div(classes="d-flex align-center"):
                 html.Span("{{ one.job }}", classes="font-weight-medium mr-2")
@@ -41,7 +41,7 @@ class SeveralPanel(Panel):
             )
         v3.VBtn(
             "run those that were not", size="small", color="primary", variant="tonal", click=self.run_all,
-            disabled=("running || !rows.some(x => x.state === 'not run')",), data_test="run-all",
+            disabled=("running || !rows.some(x => x.state === 'not run')",), raw_attrs=['data-test="run-all"'],
         )  # fmt: skip
 
     def look(self) -> None:
