@@ -36,6 +36,11 @@ class OpenPanel(Panel):
         if len(jobs) == 1:
             self._opening = asyncio.ensure_future(self._open_first(jobs[0]))  # kept, or it may end early
 
+    def look(self) -> None:
+        """A tab was opened or loaded again: the folder may have other files."""
+        with self.state:
+            self.state.files = self.session.folder.list_files()
+
     async def _open_first(self, name: str) -> None:
         await self.session.open_job(name)
         self.state.flush()
