@@ -123,7 +123,7 @@ def _build_bar(session: Session) -> None:
 
 
 def _build_rail(session: Session) -> None:
-    with v3.VNavigationDrawer(permanent=True, width=132), v3.VList(density="compact", nav=True):
+    with v3.VNavigationDrawer(permanent=True, width=150), v3.VList(density="compact", nav=True):
         for name, icon in zip(STEPS, ICONS, strict=True):
             v3.VListItem(
                 title=name.capitalize(), prepend_icon=icon, active=(f"step === '{name}'",), color="primary",
