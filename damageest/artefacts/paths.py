@@ -59,6 +59,8 @@ class DepositPath(Checked):
     simulated beads; None where they were not simulated. ``notes`` are warnings. ``kinds``: what each pass is, by its
     number: row, ring, spiral, rim, or gap (between others); empty where not known. ``setup`` (4,4): takes a point
     to the frame in which the part is set up, its z along the tool, for a path of three axes; None for other paths.
+    ``channels``: names of what the process is given besides the speed, as power or powder, and ``values`` (N,C): of
+    each on the move that ends there, in the unit that the job has; None without channels.
     """
 
     points: Floats
@@ -85,10 +87,12 @@ class DepositPath(Checked):
     notes: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
     setup: Floats | None = None
+    channels: tuple[str, ...] = ()
+    values: Floats | None = None
     _dtypes: ClassVar[dict[str, Any]] = {
         "points": np.float64, "axes": np.float64, "normals": np.float64, "feed": np.float64, "on": np.bool_,
         "layer": np.int64, "number": np.int64, "part": np.int64, "directions": np.float64, "heights": np.float64,
-        "section": np.float64, "tightest": np.float64, "setup": np.float64,
+        "section": np.float64, "tightest": np.float64, "setup": np.float64, "values": np.float64,
     }  # fmt: skip
     _ranges: ClassVar[dict[str, Range]] = {
         "width": (0.0, MOST), "standoff": (0.0, MOST), "deposit_volume": (0.0, MOST),
@@ -114,6 +118,11 @@ class DepositPath(Checked):
         if self.setup is not None:
             require_shape("setup", self.setup, 4, 4)
             require_finite("setup", self.setup)
+        if (self.values is None) == bool(self.channels):
+            raise ArtefactError("channels, values: one without the other")
+        if self.values is not None:
+            require_shape("values", self.values, count, len(self.channels))
+            require_finite("values", self.values)
         with np.errstate(over="ignore"):
             is_unit = np.allclose(np.linalg.norm(self.axes, axis=1), 1, atol=1e-6)
         if not is_unit:

@@ -5,7 +5,7 @@ Only messages use this: what can be run is what was found, whoever provides it.
 
 from __future__ import annotations
 
-COMMANDS = {"app": "damageest-app", "evaluate": "damageest-evaluate"}
+COMMANDS = {"app": "damageest-app", "evaluate": "damageest-evaluate", "machine": "damageest-machines"}
 """Command to package."""
 
 CONVERSIONS = {"cadquery": "damageest-cadquery"}
@@ -13,6 +13,11 @@ CONVERSIONS = {"cadquery": "damageest-cadquery"}
 
 FORMATS = {"step": "damageest-cadquery", "qif": "damageest-qif"}
 """Format that `export` writes, to package."""
+
+PATH_FORMATS = dict.fromkeys(
+    ("krl", "rapid", "fanuc", "sinumerik", "heidenhain", "linuxcnc", "json"), "damageest-machines"
+)
+"""Format of deposition paths that `export` writes, to package."""
 
 IMPLEMENTATIONS = {
     ("part", "brep"): "damageest-cadquery",

@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement: six that add, four that only observe.
+"""The hooks a plugin may implement: seven that add, four that only observe.
 
 What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
 what they return is ignored.
@@ -14,6 +14,7 @@ import pluggy
 if TYPE_CHECKING:
     import typer
 
+    from damageest.artefacts import Floats
     from damageest.result import Conversion
     from damageest.rules import Rule
     from damageest.stages import Stage
@@ -38,6 +39,13 @@ def damageest_writers() -> Mapping[str, Writer]:  # type: ignore[empty-body]
 def damageest_path_writers() -> Mapping[str, PathWriter]:  # type: ignore[empty-body]
     """Gives the formats of deposition paths that this plugin can write, by the name that a job's
     `export: {paths: ...}` calls them by."""
+
+
+@hookspec(firstresult=True)
+def damageest_kinematics(machine: str, poses: Floats, turns: Floats) -> Floats | None:
+    """Gives the joints (N,J), in degrees, at which the robot that a machine file calls by this name has its flange at
+    each of the poses (N,4,4), in mm and in its base's frame, with its positioner at ``turns`` (N,E), in degrees; NaN in
+    the row of a pose that it cannot take. None for a robot that it does not know."""
 
 
 @hookspec

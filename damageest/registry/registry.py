@@ -161,6 +161,10 @@ class Registry:
         where no plugin of this project writes it."""
         return self.describe_plugin(bundled.FORMATS[name]) if name in bundled.FORMATS else ""
 
+    def describe_path_writer(self, name: str) -> str:
+        """The same for a format of paths."""
+        return self.describe_plugin(bundled.PATH_FORMATS[name]) if name in bundled.PATH_FORMATS else ""
+
     def missing(self) -> str:
         """A clause on plugins that are installed but broken, empty where there are none."""
         parts = [f"{b.provider} is broken ({b.reason.splitlines()[0]}; {b.remedy})" for b in self.broken]

@@ -161,7 +161,8 @@ class Writer:
 class PathSettings:
     """How a path is written. ``unit``: of its lengths, one of um, mm, cm, m, in, ft. ``title``: of job and site.
     ``header``, ``footer``: templates of the first and last lines, None for the writer's own. ``options``: what else the
-    job says for the writer, by name. ``site``: number of the site."""
+    job says for the writer, by name. ``site``: number of the site. ``machine``: the file that defines the machine, or
+    the name of one that a plugin brings, as a path; None for none."""
 
     unit: str
     title: str
@@ -169,16 +170,18 @@ class PathSettings:
     footer: str | None = None
     options: Mapping[str, str] = field(default_factory=dict)
     site: int = 1
+    machine: Path | None = None
 
 
 @dataclass(frozen=True)
 class PathWriter:
     """How a deposition path is written. ``write``: a function of ``file, path, settings``, a file to create, the
     path in the frame asked for, or in its set-up frame where it has one (`DepositPath.setup` then takes points of the
-    frame asked for to it), and a `PathSettings`; the same path gives the same bytes. It raises StageError for a
-    path that the format cannot hold. ``suffix``: of the file, without the dot."""
+    frame asked for to it), and a `PathSettings`; the same path gives the same bytes. It gives notes, of which the user
+    is told at the end of the run, or None, and raises StageError for a path that the format cannot hold or the machine
+    cannot run: then there is no file. ``suffix``: of the file, without the dot."""
 
-    write: Callable[[Path, DepositPath, PathSettings], None]
+    write: Callable[[Path, DepositPath, PathSettings], Sequence[str] | None]
     suffix: str
 
 

@@ -24,6 +24,8 @@ def _check_known_path(name: str, info: ValidationInfo) -> str:
     registry = (info.context or {}).get("registry")
     if registry is None or name in registry.path_writers:
         return name
+    if needed := registry.describe_path_writer(name):
+        raise _make_error(f"'{name}' needs {needed}")
     names = sorted(registry.path_writers)
     raise _make_error(
         f"no format of paths '{name}'{suggest(name, names)}; there are: {', '.join(names)}{registry.missing()}"

@@ -25,29 +25,33 @@ def write_paths(
     header: str | None,
     footer: str | None,
     options: Mapping[str, str],
+    machine: Path | None = None,
 ) -> ExportedFiles:
     """Writes each site's path in the formats ``names``, below ``place``.
 
     ``T`` (4,4) takes a point from the part's frame to that of the files; None for none. A path with a set-up frame is
-    written in that frame, and ``site-1.setup.json`` has the transform from the frame of the other files to it.
+    written in that frame, and ``site-1.setup.json`` has the transform from the frame of the other files to it. What a
+    writer says of a file is a warning, which begins with the file's name.
     """
-    files = []
+    files, said = [], []
     for site in result.sites:
         if site.path is None:
             continue
-        settings = PathSettings(result.units, f"{result.name} site {site.id}", header, footer, options, site.id)
+        settings = PathSettings(
+            result.units, f"{result.name} site {site.id}", header, footer, options, site.id, machine
+        )
         moved = _move_path(site.path, T)
         (folder / f"{place}path").mkdir(parents=True, exist_ok=True)
         for writer in (writers[name] for name in names):
             name = f"{place}path/site-{site.id}.{writer.suffix}"
-            writer.write(folder / name, moved, settings)
+            said += [f"{name}: {note}" for note in writer.write(folder / name, moved, settings) or ()]
             files.append(name)
         if names and moved.setup is not None and describe_setup(moved):
             name = f"{place}path/site-{site.id}.setup.json"
             values = {"units": result.units, "transform": np.add(moved.setup, 0.0).tolist()}
             (folder / name).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
             files.append(name)
-    return ExportedFiles(tuple(files))
+    return ExportedFiles(tuple(files), tuple(said), warnings=tuple(said))
 
 
 def _move_path(path: DepositPath, T: Floats | None) -> DepositPath:

@@ -83,7 +83,13 @@ class Files(Export):
 
     paths: PathFormats = Field(
         ("csv", "apt", "rs274"),
-        description="formats of deposition paths, where the job plans them: csv, apt (CLDATA), rs274 (G-code)",
+        description="formats of deposition paths, where the job plans them: csv, apt (CLDATA), rs274 (G-code); for a "
+        "machine, with the plugin machines: krl, rapid, fanuc, sinumerik, heidenhain, linuxcnc, json",
+    )
+    machine: JobPath | None = Field(
+        None,
+        description="file that defines the machine of the paths, or the name of one that the plugin machines brings "
+        "(damageest machine list)",
     )
     path_header: JobPath | None = Field(
         None, description="file with the first lines of G-code, in which $title, $units, $offset and $site are replaced"
@@ -120,7 +126,7 @@ class Files(Export):
             done.append(ready)
         for place, T in here.items():
             done += self._write_shapes(result, shapes, folder, place, T, writers, ready.files)
-            told = (_read_text(self.path_header), _read_text(self.path_footer), self.path_options)
+            told = (_read_text(self.path_header), _read_text(self.path_footer), self.path_options, self.machine)
             done.append(write_paths(result, folder, place, T, self.paths, path_writers, *told))
             if splines:
                 patches = {number: patch for number, (patch, _) in splines.items() if patch}

@@ -13,15 +13,20 @@ TO_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
 def write_apt(file: Path, path: DepositPath, settings: PathSettings) -> None:
     """Millimetres or inches. Deposition stands between INSERT/DEPOSIT ON and INSERT/DEPOSIT OFF. The first point is
-    approached in rapid traverse."""
+    approached in rapid traverse. A channel of the process is INSERT/ with its name and value, where that changes."""
     word, factor, speed = UNITS.get(settings.unit) or ("MM", TO_MM[settings.unit], "MMPM")
     lines = [f"PARTNO {settings.title.upper()}", f"UNITS/{word}", "MULTAX/ON", "LOADTL/1"]
     lines += [f"$$ {text}" for text in describe_setup(path, factor)]
     feed, on, layer = 0.0, False, 0
+    given: dict[str, str] = {}
     for k in range(len(path.points)):
         if path.layer[k] != layer:
             layer = int(path.layer[k])
             lines.append(f"$$ PART {path.part[k]} LAYER {layer}")
+        for name, value in zip(path.channels, () if path.values is None else path.values[k], strict=True):
+            if given.get(name) != (text := f"{value:.6g}") and path.on[k]:
+                given[name] = text
+                lines.append(f"INSERT/{name.upper()} {text}")
         if bool(path.on[k]) != on:
             on = bool(path.on[k])
             lines.append(f"INSERT/DEPOSIT {'ON' if on else 'OFF'}")
