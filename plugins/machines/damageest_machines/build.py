@@ -71,7 +71,7 @@ def _follow_table(machine: Machine, moves: Moves, at: Positions, standoff: float
     R, _ = turn_rotary(machine.rotary, rotary, "part")
     axes = np.einsum("nji,j->ni", R @ at.base[:3, :3], np.array([0.0, 0.0, 1.0]))
     cut = replace(cut, axes=np.where(cut.is_end[:, None], cut.axes, axes))
-    return cut, find_positions(machine, cut, standoff, rotary)
+    return cut, replace(find_positions(machine, cut, standoff, rotary), notes=at.notes)
 
 
 def _interpolate(values: Floats, counts: Ints) -> Floats:

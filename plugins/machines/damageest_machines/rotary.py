@@ -17,8 +17,9 @@ from scipy.spatial.transform import Rotation
 from damageest.artefacts import Flags, Floats, Ints
 from damageest_machines.definition import Rotary
 
-SINGULAR = np.radians(0.01)
-"""Angle between the tool axis and the rotary axis next to the part below which that axis may stand anywhere."""
+SINGULAR = np.radians(2e-4)
+"""Angle between the tool axis and the rotary axis next to the part below which that axis may stand anywhere: the tool
+is then off by twice the angle at most."""
 UNREACHED = np.inf
 TURNS = 12
 """Whole turns to each side of an axis that are looked at between its limits."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,6 +44,7 @@ def read(form: str, machine: str | Path, text: str) -> Read:
     return READERS[form](text, load(machine))
 
 
+@cache
 def load(machine: str | Path) -> dict[str, Any]:
     values: dict[str, Any] = YAML(typ="safe").load(find_file(Path(machine)))
     return values

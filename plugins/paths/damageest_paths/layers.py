@@ -12,6 +12,7 @@ from damageest.errors import StageError
 from damageest.options import Options
 from damageest.stages import JobPath
 from damageest.stages.path import Path
+from damageest_paths.channels import ProcessTable, apply_table
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -144,6 +145,11 @@ class Layers(Path):
     start_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="how far a pass begins before its start")
     stop_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="how far a pass goes on beyond its end")
     sites: tuple[int, ...] = Field((), description="numbers of the sites that are built up first, in this order")
+    process: ProcessTable = Field(
+        (),
+        description="table of the process: rows {layer, kind, first, set: {power: .., powder: .., speed: ..}}; of rows "
+        "that hold for a pass, the last counts",
+    )
     simulate: bool = Field(True, description="compare the union of the beads with the deposit, on voxels")
 
     @model_validator(mode="after")
@@ -215,7 +221,7 @@ class Layers(Path):
         if self.layers == "conformal" and not len(path.points):
             why = "; ".join(item.why for item in path.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")
-        return path
+        return apply_table(path, self.process)
 
     def _make_nozzle(self) -> Any:
         from damageest_paths import nozzle
