@@ -23,6 +23,7 @@ SITES = {
     "four_sites": 4,
     "worn_shaft": 1,
     "block_path": 1,
+    "block_kuka": 1,
 }
 STOCK = {"stock_uniform": 0.8, "stock_flanks": 0.3, "worn_bore": 0.5}
 """Millimetres of stock that the jobs ask for; each has as many sites as `DEPOSITS` says."""

@@ -161,8 +161,8 @@ class Writer:
 class PathSettings:
     """How a path is written. ``unit``: of its lengths, one of um, mm, cm, m, in, ft. ``title``: of job and site.
     ``header``, ``footer``: templates of the first and last lines, None for the writer's own. ``options``: what else the
-    job says for the writer, by name. ``site``: number of the site. ``machine``: the file that defines the machine, or
-    the name of one that a plugin brings, as a path; None for none."""
+    job says for the writer, by name. ``site``: number of the site. ``machine``: the file that defines
+    the machine, or the name, a text, of one that a plugin brings; None for none."""
 
     unit: str
     title: str
@@ -170,7 +170,7 @@ class PathSettings:
     footer: str | None = None
     options: Mapping[str, str] = field(default_factory=dict)
     site: int = 1
-    machine: Path | None = None
+    machine: Path | str | None = None
 
 
 @dataclass(frozen=True)

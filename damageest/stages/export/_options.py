@@ -8,6 +8,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from damageest.errors import suggest
+from damageest.stages import JobPath
 
 
 def _check_known(name: str, info: ValidationInfo) -> str:
@@ -66,6 +67,9 @@ PathFormats = Annotated[
     AfterValidator(lambda names: tuple(dict.fromkeys(names))),
 ]
 """Formats of deposition paths, without duplicates; none is allowed."""
+
+MachineFile = Annotated[str, Field(pattern="^[A-Za-z0-9_-]+$")] | JobPath
+"""A file beside the job, with its suffix, or a name, without one, of a file that a plugin brings."""
 
 PathOption = Annotated[
     str,

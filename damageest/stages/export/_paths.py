@@ -25,7 +25,7 @@ def write_paths(
     header: str | None,
     footer: str | None,
     options: Mapping[str, str],
-    machine: Path | None = None,
+    machine: Path | str | None = None,
 ) -> ExportedFiles:
     """Writes each site's path in the formats ``names``, below ``place``.
 

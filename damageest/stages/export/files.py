@@ -22,7 +22,7 @@ from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathWrit
 from damageest.stages.export._colours import DAMAGE, DEPOSIT, DOUBTFUL, SURPLUS, UNDAMAGED
 from damageest.stages.export._coverage import write_coverage
 from damageest.stages.export._nominal import map_to_nominal
-from damageest.stages.export._options import Formats, PathFormats, PathOption, check_spline_writer
+from damageest.stages.export._options import Formats, MachineFile, PathFormats, PathOption, check_spline_writer
 from damageest.stages.export._paths import write_paths
 from damageest.stages.export._scan_points import PointColours, write_scan
 
@@ -86,10 +86,10 @@ class Files(Export):
         description="formats of deposition paths, where the job plans them: csv, apt (CLDATA), rs274 (G-code); for a "
         "machine, with the plugin machines: krl, rapid, fanuc, sinumerik, heidenhain, linuxcnc, json",
     )
-    machine: JobPath | None = Field(
+    machine: MachineFile | None = Field(
         None,
-        description="file that defines the machine of the paths, or the name of one that the plugin machines brings "
-        "(damageest machine list)",
+        description="file that defines the machine of the paths, with its suffix, or the name of one that the plugin "
+        "machines brings (damageest machine list)",
     )
     path_header: JobPath | None = Field(
         None, description="file with the first lines of G-code, in which $title, $units, $offset and $site are replaced"

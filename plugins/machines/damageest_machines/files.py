@@ -20,18 +20,19 @@ def list_shipped() -> dict[str, Path]:
     return {file.stem: file for file in sorted(SHIPPED.glob("*.yaml"))}
 
 
-def find_file(machine: Path | None) -> Path:
+def find_file(machine: Path | str | None) -> Path:
     """The file that a job means: one beside it, or one of the package. Raises StageError where there is none."""
     shipped = list_shipped()
     known = f"the package has {', '.join(shipped)}"
     if machine is None:
         raise StageError("the format needs a machine", f"export.machine: a file, or a name; {known}")
-    if machine.is_file():
+    if isinstance(machine, Path) and machine.is_file():
         return machine
-    if machine.name in shipped:
-        return shipped[machine.name]
+    if str(machine) in shipped:
+        return shipped[str(machine)]
     raise StageError(
-        f"there is no machine file {machine}", f"{known}{suggest(machine.name, list(shipped))}; or give a file"
+        f"there is no machine '{machine}'{suggest(str(machine), list(shipped))}",
+        f"{known}; or give a file, as mine.yaml",
     )
 
 

@@ -36,7 +36,7 @@ def write(form: str, machine: str | Path, path: DepositPath, folder: Path, unit:
     """The program's text, and what the user is told."""
     writer = list_writers()[form]
     file = folder / f"site-1.{writer.suffix}"
-    notes = writer.write(file, path, PathSettings(unit, "block site 1", machine=Path(machine)))
+    notes = writer.write(file, path, PathSettings(unit, "block site 1", machine=machine))
     return file.read_bytes().decode("ascii"), list(notes or ())
 
 
@@ -46,7 +46,7 @@ def read(form: str, machine: str | Path, text: str) -> Read:
 
 @cache
 def load(machine: str | Path) -> dict[str, Any]:
-    values: dict[str, Any] = YAML(typ="safe").load(find_file(Path(machine)))
+    values: dict[str, Any] = YAML(typ="safe").load(find_file(machine))
     return values
 
 

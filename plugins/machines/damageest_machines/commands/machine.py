@@ -27,7 +27,7 @@ def show_machine(
     """Print a machine file, to begin one of your own with."""
     from damageest_machines.files import find_file
 
-    typer.echo(find_file(Path(name)).read_text(encoding="utf-8"), nl=False)
+    typer.echo(find_file(_find(name)).read_text(encoding="utf-8"), nl=False)
 
 
 @app.command("schema")
@@ -40,13 +40,17 @@ def print_schema() -> None:
 
 @app.command("check")
 def check_machine(
-    file: Annotated[Path, typer.Argument(help="Machine file, or the name of one that the package brings.")],
+    file: Annotated[str, typer.Argument(help="Machine file, or the name of one that the package brings.")],
 ) -> None:
     """Check a machine file, and say what kind of machine it defines."""
     from damageest_machines.files import find_file, read_machine
 
-    machine = read_machine(find_file(file))
+    machine = read_machine(find_file(_find(file)))
     kind = "robot" if machine.robot else "machine tool"
     names = [*(axis.name for axis in machine.linear), *(axis.name for axis in machine.rotary)]
     axes = ", ".join(names) or "no axes of its own"
     typer.echo(f"{machine.name}: {kind}; {axes}; channels: {', '.join(machine.process.channels) or 'none'}")
+
+
+def _find(name: str) -> Path | str:
+    return Path(name) if Path(name).is_file() else name
