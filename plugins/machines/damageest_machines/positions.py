@@ -114,9 +114,9 @@ def _check_flips(
         if slow.any():
             k = int(np.where(slow, turns / axis.speed - planned, 0.0).argmax())
             notes.append(
-                f"{slow.sum()} of {len(slow)} moves deposit slower than planned, because {axis.name} turns near the singular axis: by "
-                f"{turns[k]:.0f} degrees within {length[k]:.3g} mm, {turns[k] / axis.speed:.2g} s instead of "
-                f"{planned[k]:.2g} s: {moves.describe(k)}"
+                f"{slow.sum()} of {len(slow)} moves deposit slower than planned, because {axis.name} turns near the "
+                f"singular axis: by {turns[k]:.0f} degrees within {length[k]:.3g} mm, {turns[k] / axis.speed:.2g} s "
+                f"instead of {planned[k]:.2g} s: {moves.describe(k)}"
             )
 
 

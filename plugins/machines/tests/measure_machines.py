@@ -59,7 +59,7 @@ def draw_path(seed: int) -> tuple[DepositPath, str]:
     axes: Any = (3, "3+2", 5, 5)[int(rng.integers(4))]
     direction = np.array([*rng.uniform(-0.6, 0.6, 2), 1.0])
     path = plan(
-        loss, simulate=False, axes=axes, width=float(rng.uniform(1.8, 3)), height=float(rng.uniform(0.8, 1.4)),
+        loss, simulate=False, axes=axes, width=float(rng.uniform(3, 4.5)), height=float(rng.uniform(1.4, 2.2)),
         direction=tuple(direction if axes != 3 else [0.0, 0.0, 1.0]), overlap=float(rng.uniform(0.2, 0.4)),
         pattern=str(rng.choice(["zigzag", "contour", "spiral", "offset-zigzag"])), process=PROCESS,
     )  # fmt: skip
@@ -81,6 +81,7 @@ def check_table(rows: Floats, path: DepositPath, factor: float) -> tuple[float, 
 
 
 def read_neutral(form: str, path: DepositPath, unit: str, folder: Path) -> tuple[float, float]:
+    assert path.values is not None
     file, settings = folder / "neutral", PathSettings(unit, "a site 1", machine="kuka_positioner")
     if form == "csv":
         write_csv(file, path, settings)
