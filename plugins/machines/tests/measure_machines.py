@@ -7,6 +7,7 @@ Parts, settings and units are drawn from the seed. What a machine refuses is cou
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -31,7 +32,7 @@ from damageest.stages.export.path_apt import write_apt
 from damageest.stages.export.path_csv import write_csv
 from tests.path_shapes import BLOCK, Loss, corner, cut, dent, plan, slot
 
-PARSER = Path(__file__).parents[4] / "shared" / "controllers" / "krl_check.py"
+PARSER = Path(os.environ.get("DAMAGEEST_REAL_DATA", "")).parent / "controllers" / "krl_check.py"
 UNITS = {"mm": 1.0, "in": 25.4, "cm": 10.0}
 PROCESS = [
     {"set": {"power": 1200.0, "powder": 9.0, "gas": 12.0}},
@@ -118,7 +119,7 @@ def accept(form: str, text: str, folder: Path) -> str:
         said = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False).stdout
         moves = len(re.findall(r"STRAIGHT_(?:FEED|TRAVERSE)\(", said))
         homes = text.count("G53 ")
-        wanted = len(re.findall(r"^(?:G\d+ )*X", text, re.MULTILINE)) + homes
+        wanted = len(re.findall(r"^(?:G\d+ )*X\S+ Y\S+ Z", text, re.MULTILINE)) + homes
         return "" if moves == wanted and "PROGRAM_END" in said else f"{moves} of {wanted} moves"
     if form == "krl" and PARSER.is_file():
         (folder / "a.src").write_text(text)

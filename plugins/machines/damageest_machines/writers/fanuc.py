@@ -69,11 +69,11 @@ class Fanuc(Post):
         return f"UF : {self.machine.frames.work.number}, UT : {self.machine.frames.tool.number}"
 
     def _add(self, head: str, names: Sequence[tuple[str, str]], values: Floats, extra: Floats) -> int:
-        """The number of a new position; positions have three decimals."""
-        words = [f"\t{name} = {value:z.3f} {unit}" for (name, unit), value in zip(names, values, strict=True)]
+        """The number of a new position; positions have four decimals, more than the control shows."""
+        words = [f"\t{name} = {value:z.4f} {unit}" for (name, unit), value in zip(names, values, strict=True)]
         text = f"P[{len(self.places) + 1}]{{\n   GP1:\n\t{head}{','.join(words)}"
         if len(extra):
-            more = ",".join(f"\tJ{k} = {value:z.3f} deg" for k, value in enumerate(extra, 1))
+            more = ",".join(f"\tJ{k} = {value:z.4f} deg" for k, value in enumerate(extra, 1))
             text += f"\n   GP2:\n\t{self._frames()},{more}"
         self.places.append(text + "\n};")
         return len(self.places)
