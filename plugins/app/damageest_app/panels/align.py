@@ -16,6 +16,7 @@ from damageest_app.faces import Faces
 from damageest_app.panels.open import SCAN, place_beside
 from damageest_app.pick import Ray, find_point
 from damageest_app.scene import Scene, make_mesh, make_points
+from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 
 PAIR = ("#e0218a", "#00a3a3", "#7a3ff2", "#b58900", "#2f86d6", "#5a5a5a")
@@ -40,7 +41,7 @@ class AlignPanel(Panel):
     def build(self) -> None:
         with v3.VBtnToggle(v_model=("align_tool",), mandatory=True, color="primary", classes="mb-3", divided=True):
             for value, text in (("look", "deviation"), ("pairs", "pairs"), ("datum", "datum")):
-                v3.VBtn(text, value=value, size="small", data_test=f"tool-{value}")
+                v3.VBtn(text, value=value, size="small", raw_attrs=mark(f"tool-{value}"))
         with html.Div(v_if=("align_tool === 'look'",)):
             html.Div("Run the job to see how the scan lies on the part.", v_if=("!has_result",))
             html.Div("{{ one }}", v_for=("(one, k) in pose_words",), key=("k",), classes="text-body-2 mb-1")
@@ -48,19 +49,19 @@ class AlignPanel(Panel):
                 html.Div("{{ poses }} poses fit. Step through them; take the right one.", classes="fine")
                 with html.Div(classes="d-flex align-center"):
                     v3.VBtn(icon="mdi-chevron-left", variant="text", click="pose = (pose + poses - 1) % poses")
-                    html.Div("pose {{ pose + 1 }} of {{ poses }}", data_test="pose")
-                    v3.VBtn(icon="mdi-chevron-right", variant="text", click="pose = (pose + 1) % poses", data_test="next-pose")
+                    html.Div("pose {{ pose + 1 }} of {{ poses }}", raw_attrs=mark("pose"))
+                    v3.VBtn(icon="mdi-chevron-right", variant="text", click="pose = (pose + 1) % poses", raw_attrs=mark("next-pose"))
                     v3.VBtn("take it", size="small", color="primary", variant="tonal", click=self.take_pose, disabled=("pose === 0",))
         with html.Div(v_if=("align_tool === 'pairs'",)):
             html.Div("Click a place on the scan, then the same place on the part; three times or more.", classes="fine mb-2")
-            html.Div("{{ half ? 'now the same place on the part' : 'a place on the scan' }}", classes="text-primary", data_test="pair-next")
+            html.Div("{{ half ? 'now the same place on the part' : 'a place on the scan' }}", classes="text-primary", raw_attrs=mark("pair-next"))
             html.Div("{{ one }}", v_for=("(one, k) in pairs",), key=("k",), classes="text-body-2")
             with html.Div(classes="d-flex mt-2", style="gap: 8px"):
-                v3.VBtn("align by pairs", size="small", color="primary", variant="tonal", click=self.take_pairs, disabled=("pairs.length < 3",), data_test="take-pairs")
+                v3.VBtn("align by pairs", size="small", color="primary", variant="tonal", click=self.take_pairs, disabled=("pairs.length < 3",), raw_attrs=mark("take-pairs"))
                 v3.VBtn("take one back", size="small", variant="text", click=self.drop_pair, disabled=("!pairs.length && !half",))
         with html.Div(v_if=("align_tool === 'datum'",)):
             html.Div("Click faces of the part that are not worn. They fix the pose, as an inspector aligns on datums.", classes="fine mb-2")
-            html.Div("{{ one }}", v_for=("(one, k) in datum",), key=("k",), classes="text-body-2", data_test="datum-row")
+            html.Div("{{ one }}", v_for=("(one, k) in datum",), key=("k",), classes="text-body-2", raw_attrs=mark("datum-row"))
             html.Div("no datum: all of the skin is used", v_if=("!datum.length",), classes="fine")
         html.Div("align: {{ align_use }}", classes="fine mt-4")
         v3.VBtn("find the pose anew", v_if=("align_use !== 'register'",), size="small", variant="text", click=self.register)

@@ -13,7 +13,11 @@ from damageest_app import edits
 from damageest_app.pick import MeshPicker, Ray
 from damageest_app.scene import Scene, make_lines, make_mesh, make_points
 from damageest_app.section import HEIGHT, WIDTH, Cutter, Drawing, Plane, choose_plane, draw, measure_depth, to_space
+from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
+
+STOPPED = [("click_stop", "click.stop")]
+"""A click on a button of a card is no click on the card."""
 
 
 class JudgePanel(Panel):
@@ -43,7 +47,7 @@ class JudgePanel(Panel):
             html.Div("Layers", classes="head")
             with v3.VBtnToggle(v_model=("layers",), multiple=True, color="primary", divided=True):
                 for value, text in (("damage", "damage"), ("points", "scan"), ("unseen", "unseen"), ("surplus", "surplus")):
-                    v3.VBtn(text, value=value, size="x-small", data_test=f"layer-{value}")
+                    v3.VBtn(text, value=value, size="x-small", raw_attrs=mark(f"layer-{value}"))
             with html.Div(v_if=("notes.length",)):
                 html.Div("Notes of the run", classes="head")
                 with html.Div(v_for=("(one, k) in notes",), key=("k",), classes="fine mb-1"):
@@ -53,7 +57,7 @@ class JudgePanel(Panel):
     def _build_site(self) -> None:
         with v3.VCard(
             v_for=("one in sites",), key=("one.id",), variant=("site === one.id ? 'tonal' : 'outlined'",), classes="mb-2 pa-2",
-            click=(self.choose, "[one.id]"), tabindex=0, keydown_enter=(self.choose, "[one.id]"), data_test="site",
+            click=(self.choose, "[one.id]"), raw_attrs=mark("site", 'tabindex="0"'),
         ):  # fmt: skip
             with html.Div(classes="d-flex align-center"):
                 html.Span(classes="site-dot", style=("{background: one.colour}",))
@@ -67,9 +71,9 @@ class JudgePanel(Panel):
                     html.Div("{{ why.text }}", classes="words")
                     html.Div("→ {{ why.remedy }}", v_if=("why.remedy",))
                 with html.Div(classes="d-flex mt-2", style="gap: 6px"):
-                    v3.VBtn("accept", size="x-small", variant="tonal", color="success", data_test="accept", click=(self.decide, "[one.id, 'accept']"))
-                    v3.VBtn("drop", size="x-small", variant="tonal", color="error", data_test="drop", click=(self.decide, "[one.id, 'drop']"))
-                    v3.VBtn("as the criterion says", size="x-small", variant="text", v_if=("one.choice",), click=(self.decide, "[one.id, '']"))
+                    v3.VBtn("accept", size="x-small", variant="tonal", color="success", raw_attrs=mark("accept"), __events=STOPPED, click_stop=(self.decide, "[one.id, 'accept']"))
+                    v3.VBtn("drop", size="x-small", variant="tonal", color="error", raw_attrs=mark("drop"), __events=STOPPED, click_stop=(self.decide, "[one.id, 'drop']"))
+                    v3.VBtn("as the criterion says", size="x-small", variant="text", v_if=("one.choice",), __events=STOPPED, click_stop=(self.decide, "[one.id, '']"))
                     v3.VSelect(
                         items=("sites.filter(x => x.id !== one.id).map(x => x.id)",), label="merge with", v_if=("sites.length > 1",),
                         update_modelValue=(self.merge, "[one.id, $event]"), style="max-width: 130px",
@@ -78,17 +82,15 @@ class JudgePanel(Panel):
     def build_drawing(self) -> None:
         """The section, over the 3D view."""
         with v3.VSheet(classes="drawing", v_if=("step === 'judge' && section",), elevation=4):
-            html.Div(
-                v_html=("section",), data_test="section",
-                raw_attrs=['@click="(at => at && trigger(\'measure\', at))(utils.damageest.place($event))"'],
-            )  # fmt: skip
+            measure = "(at => at && trigger('measure', at))(utils.damageest.place($event))"
+            html.Div(v_html=("section",), raw_attrs=mark("section", f'@click="{measure}"'))
             with html.Div(classes="d-flex align-center"):
                 with v3.VBtnToggle(v_model=("section_axis",), mandatory=True, density="compact", divided=True, classes="mr-3"):
                     for value in ("auto", "x", "y", "z"):
                         v3.VBtn(value, value=value, size="x-small")
                 v3.VSlider(
                     v_model=("section_offset",), min=("-section_depth",), max=("section_depth",), step=("section_depth / 100",),
-                    hide_details=True, label="move", data_test="section-offset",
+                    hide_details=True, label="move", raw_attrs=mark("section-offset"),
                 )  # fmt: skip
             html.Div("{{ hint_measure }}", classes="fine")
         self.session.ctrl.trigger("measure")(self.measure)

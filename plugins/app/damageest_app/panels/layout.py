@@ -16,6 +16,7 @@ from damageest_app.panels.prepare import PreparePanel
 from damageest_app.panels.repair import RepairPanel
 from damageest_app.panels.several import SeveralPanel
 from damageest_app.pick import Ray
+from damageest_app.panels.marks import mark
 from damageest_app.session import STEPS, Session
 
 ICONS = ("mdi-folder-open-outline", "mdi-crop", "mdi-axis-arrow", "mdi-scale-balance", "mdi-layers-triple-outline",
@@ -44,7 +45,7 @@ def build(session: Session) -> None:
         _build_bar(session)
         with v3.VMain(style="height: 100vh"), html.Div(classes="shell"):
             _build_rail(session)
-            with html.Div(classes="side", v_show="true"):
+            with html.Div(classes="side"):
                 _build_messages(session)
                 for name in STEPS:
                     with html.Div(v_if=(f"step === '{name}'",)):
@@ -61,32 +62,32 @@ def _look() -> dict[str, Any]:
 def _build_bar(session: Session) -> None:
     with v3.VAppBar(density="compact", flat=True, border="b"):
         html.Div("damageest", classes="text-h6 ml-4 mr-4")
-        html.Div("{{ job_name || 'no job is open' }}", classes="text-body-2 mr-2", data_test="job-name")
+        html.Div("{{ job_name || 'no job is open' }}", classes="text-body-2 mr-2", raw_attrs=mark("job-name"))
         v3.VBtn(icon="mdi-file-code-outline", title="the job file (j)", click="show_job = !show_job", disabled=("!job_name",))
-        v3.VBtn(icon="mdi-undo", title="undo (Ctrl+Z)", click=session.step_back, disabled=("!can_undo || running",), data_test="undo")
-        v3.VBtn(icon="mdi-redo", title="redo (Ctrl+Y)", click=(session.step_back, "[true]"), disabled=("!can_redo || running",), data_test="redo")
+        v3.VBtn(icon="mdi-undo", title="undo (Ctrl+Z)", click=session.step_back, disabled=("!can_undo || running",), raw_attrs=mark("undo"))
+        v3.VBtn(icon="mdi-redo", title="redo (Ctrl+Y)", click=(session.step_back, "[true]"), disabled=("!can_redo || running",), raw_attrs=mark("redo"))
         v3.VChip("the job was changed since this result", v_if=("stale && !running",), color="warning", size="small", classes="ml-2")
         v3.VSpacer()
         with html.Div(v_if=("running",), style="width: 340px", classes="mr-4"):
             html.Div("{{ doing }} · {{ seconds }} s", classes="fine")
             v3.VProgressLinear(model_value=("100 * share",), color="primary", height=6, rounded=True)
         v3.VBtn(icon="mdi-format-list-checks", title="stages of the run", click="show_stages = !show_stages", disabled=("!stages.length",))
-        v3.VBtn("Stop", v_if=("running",), color="error", variant="tonal", prepend_icon="mdi-stop", click=session.stop, data_test="stop")
+        v3.VBtn("Stop", v_if=("running",), color="error", variant="tonal", prepend_icon="mdi-stop", click=session.stop, raw_attrs=mark("stop"))
         v3.VBtn(
             "Run", v_if=("!running",), color="primary", variant="flat", prepend_icon="mdi-play", title="run the job (r)",
-            click=session.run, disabled=("!job_name || !!busy",), data_test="run",
+            click=session.run, disabled=("!job_name || !!busy",), raw_attrs=mark("run"),
         )  # fmt: skip
-        v3.VBtn(icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",), title="dark or light", click="dark = !dark", data_test="dark")
+        v3.VBtn(icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",), title="dark or light", click="dark = !dark", raw_attrs=mark("dark"))
         v3.VBtn(icon="mdi-keyboard-outline", title="keys (?)", click="show_keys = true")
         v3.VProgressLinear(active=("!!busy",), indeterminate=True, absolute=True, location="bottom", color="primary")
 
 
 def _build_rail(session: Session) -> None:
-    with v3.VNavigationDrawer(permanent=True, width=132), v3.VList(density="compact", nav=True):
+    with v3.VNavigationDrawer(permanent=True, width=148), v3.VList(density="compact", nav=True):
         for number, (name, icon) in enumerate(zip(STEPS, ICONS, strict=True), 1):
             v3.VListItem(
                 title=name.capitalize(), prepend_icon=icon, active=(f"step === '{name}'",), color="primary",
-                title_attr=f"key {number}", click=(session.go, f"['{name}']"), data_test=f"step-{name}",
+                click=(session.go, f"['{name}']"), raw_attrs=mark(f"step-{name}", f'title="key {number}"'),
             )  # fmt: skip
 
 
@@ -94,10 +95,10 @@ def _build_messages(session: Session) -> None:
     html.Div("{{ busy }} …", v_if=("busy",), classes="fine mb-2")
     with v3.VAlert(
         v_if=("message",), type=("tone",), variant="tonal", density="compact", closable=True, classes="mb-3",
-        __events=[("close", "click:close")], close="message = ''", data_test="message",
+        __events=[("close", "click:close")], close="message = ''", raw_attrs=mark("message"),
     ):  # fmt: skip
         html.Div("{{ message }}", classes="words")
-        v3.VBtn("Reload", v_if=("conflict",), size="small", classes="mt-2", click=session.reload, data_test="reload")
+        v3.VBtn("Reload", v_if=("conflict",), size="small", classes="mt-2", click=session.reload, raw_attrs=mark("reload"))
     html.Div(
         "This folder cannot be written to, so no job can be made or changed here. Change its rights, or start the app "
         "with another folder.", v_if=("!writable",), classes="text-warning fine mb-2",
@@ -126,7 +127,7 @@ def _build_stage(session: Session, judge: JudgePanel) -> None:
 
 def _build_dialogs() -> None:
     with v3.VNavigationDrawer(v_model=("show_job",), location="right", temporary=True, width=520):
-        html.Div("{{ job_text }}", classes="yaml pa-4", data_test="job-text")
+        html.Div("{{ job_text }}", classes="yaml pa-4", raw_attrs=mark("job-text"))
     with v3.VNavigationDrawer(v_model=("show_stages",), location="right", temporary=True, width=380), v3.VTable(
         density="compact"
     ), html.Tbody(), html.Tr(v_for=("(one, k) in stages",), key=("k",)):

@@ -13,6 +13,7 @@ from damageest_app import edits
 from damageest_app.histogram import Histogram
 from damageest_app.panels.open import SCAN
 from damageest_app.scene import Scene, make_lines, make_points, thin
+from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 
 AXES = "xyz"
@@ -37,8 +38,8 @@ class PreparePanel(Panel):
         html.Div("{{ scan_facts }}", classes="text-body-2")
         html.Div("Crop", classes="head")
         with html.Div(classes="d-flex flex-wrap", style="gap: 8px"):
-            v3.VBtn("largest piece", size="small", variant="tonal", click=(self.crop, "['piece']"), disabled=("!has_inputs",), data_test="crop-piece")
-            v3.VBtn("box …", size="small", variant="tonal", click="show_box = !show_box", disabled=("!has_inputs",), data_test="box")
+            v3.VBtn("largest piece", size="small", variant="tonal", click=(self.crop, "['piece']"), disabled=("!has_inputs",), raw_attrs=mark("crop-piece"))
+            v3.VBtn("box …", size="small", variant="tonal", click="show_box = !show_box", disabled=("!has_inputs",), raw_attrs=mark("box"))
         with html.Div(v_if=("show_box",), classes="mt-2"):
             for k, axis in enumerate(AXES):
                 v3.VRangeSlider(
@@ -46,7 +47,7 @@ class PreparePanel(Panel):
                     update_modelValue=f"box[{k}] = $event; flushState('box')", label=axis, hide_details=True,
                 )  # fmt: skip
             with html.Div(classes="d-flex flex-wrap mt-1", style="gap: 8px"):
-                v3.VBtn("keep the box", size="small", color="primary", variant="tonal", click=(self.crop, "['keep']"), data_test="crop-keep")
+                v3.VBtn("keep the box", size="small", color="primary", variant="tonal", click=(self.crop, "['keep']"), raw_attrs=mark("crop-keep"))
                 v3.VBtn("drop the box", size="small", variant="tonal", click=(self.crop, "['drop']"))
                 v3.VBtn("below z of the box away", size="small", variant="tonal", click=(self.crop, "['above']"))
         with html.Div(v_for=("(one, k) in crops",), key=("k",), classes="fine"):
@@ -59,9 +60,9 @@ class PreparePanel(Panel):
             v3.VSlider(
                 v_model=("tolerance",), min=("tolerance_limits[0]",), max=("tolerance_limits[1]",),
                 step=("(tolerance_limits[1] - tolerance_limits[0]) / 400",), hide_details=True, end=self.set_tolerance,
-                data_test="tolerance",
+                raw_attrs=mark("tolerance"),
             )  # fmt: skip
-            html.Div("λ = {{ Number(tolerance).toPrecision(3) }} {{ unit }}; {{ intact_share }} of the points are nearer", data_test="share")
+            html.Div("λ = {{ Number(tolerance).toPrecision(3) }} {{ unit }}; {{ intact_share }} of the points are nearer", raw_attrs=mark("share"))
             v3.VBtn("auto", size="small", variant="text", click=self.set_auto)
         html.Div("The histogram needs a pose: run the job once.", v_if=("!histogram",), classes="fine")
 

@@ -16,6 +16,7 @@ from damageest_app.panels.align import put_faces
 from damageest_app.pathview import PathPlay, make_nozzle
 from damageest_app.pick import Ray
 from damageest_app.scene import Scene, make_lines, make_mesh
+from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 
 STOCK, KEEP_OUT = "#e0902f", "#c0392b"
@@ -25,6 +26,7 @@ NUMBERS = (
     ("width", "bead width"), ("height", "layer height"), ("feed", "feed a minute"), ("standoff", "standoff"),
     ("tip_radius", "nozzle tip radius"), ("body_radius", "nozzle body radius"), ("length", "nozzle length"),
 )  # fmt: skip
+SELECTED = [("update_menu", "update:menu")]
 OF_NOZZLE = ("tip_radius", "body_radius", "length", "cone_angle")
 
 
@@ -46,7 +48,7 @@ class RepairPanel(Panel):
     def build(self) -> None:
         with v3.VBtnToggle(v_model=("repair_tool",), mandatory=True, color="primary", classes="mb-3", divided=True):
             for value in ("stock", "path", "export"):
-                v3.VBtn(value, value=value, size="small", data_test=f"repair-{value}")
+                v3.VBtn(value, value=value, size="small", raw_attrs=mark(f"repair-{value}"))
         with html.Div(v_if=("repair_tool === 'stock'",)):
             self._build_stock()
         with html.Div(v_if=("repair_tool === 'path'",)):
@@ -56,13 +58,13 @@ class RepairPanel(Panel):
 
     def _build_stock(self) -> None:
         html.Div("Stock that is milled off after deposition.", classes="fine mb-2")
-        v3.VTextField(v_model=("outer",), type="number", step=0.1, min=0, label="stock on all skin", suffix=("unit",), change=self.set_outer, classes="mb-3", data_test="outer")
+        v3.VTextField(v_model=("outer",), type="number", step=0.1, min=0, label="stock on all skin", suffix=("unit",), __events=["change"], change=self.set_outer, classes="mb-3", raw_attrs=mark("outer"))
         html.Div("A click on a face of the part:", classes="fine")
         with v3.VRadioGroup(v_model=("face_action",), inline=True, hide_details=True):
             v3.VRadio(label="its own stock", value="stock")
             v3.VRadio(label="no stock (keep out)", value="keep out")
-        v3.VTextField(v_model=("face_stock",), v_if=("face_action === 'stock'",), type="number", step=0.1, min=0, label="stock on the face", suffix=("unit",), classes="mt-2", data_test="face-stock")
-        html.Div("{{ one }}", v_for=("(one, k) in targets",), key=("'t' + k",), classes="text-body-2 mt-1", data_test="target-row")
+        v3.VTextField(v_model=("face_stock",), v_if=("face_action === 'stock'",), type="number", step=0.1, min=0, label="stock on the face", suffix=("unit",), classes="mt-2", raw_attrs=mark("face-stock"))
+        html.Div("{{ one }}", v_for=("(one, k) in targets",), key=("'t' + k",), classes="text-body-2 mt-1", raw_attrs=mark("target-row"))
         html.Div("keep out: {{ one }}", v_for=("(one, k) in keep_out",), key=("'k' + k",), classes="text-body-2 mt-1")
         v3.VBtn("no allowance", v_if=("has_allowance",), size="small", variant="text", click=self.drop_allowance)
         html.Div("{{ one }}", v_for=("(one, k) in deposits",), key=("'d' + k",), classes="fine mt-2")
@@ -70,31 +72,31 @@ class RepairPanel(Panel):
     def _build_path(self) -> None:
         html.Div("Passes layer by layer that build the deposit up.", classes="fine mb-2")
         with html.Div(v_if=("!has_path",)):
-            v3.VBtn("plan a path", size="small", color="primary", variant="tonal", click=self.add_path, disabled=("!job_name",), data_test="add-path")
+            v3.VBtn("plan a path", size="small", color="primary", variant="tonal", click=self.add_path, disabled=("!job_name",), raw_attrs=mark("add-path"))
         with html.Div(v_if=("has_path",)):
             for name, label in NUMBERS:
                 v3.VTextField(
                     model_value=(f"path.{name}",), type="number", label=label, classes="mb-2",
-                    change=(self.set_path, f"['{name}', $event.target.value]"), data_test=f"path-{name}",
+                    __events=["change"], change=(self.set_path, f"['{name}', $event.target.value]"), raw_attrs=mark(f"path-{name}"),
                 )  # fmt: skip
             v3.VBtn("no path", size="small", variant="text", click=self.drop_path)
         with html.Div(v_if=("path_layers",), classes="mt-2"):
             v3.VSelect(v_model=("path_site",), items=("path_sites",), label="site", v_if=("path_sites.length > 1",), classes="mb-2")
-            v3.VSlider(v_model=("path_share",), min=0, max=1, step=0.002, label="time", hide_details=True, data_test="time")
+            v3.VSlider(v_model=("path_share",), min=0, max=1, step=0.002, label="time", hide_details=True, raw_attrs=mark("time"))
             v3.VSlider(
                 model_value=("path_layer",), min=1, max=("path_layers",), step=1, label="layer", hide_details=True,
-                update_modelValue=(self.go_to_layer, "[$event]"), data_test="layer",
+                update_modelValue=(self.go_to_layer, "[$event]"), raw_attrs=mark("layer"),
             )  # fmt: skip
-            html.Div("{{ path_words }}", classes="fine", data_test="path-words")
+            html.Div("{{ path_words }}", classes="fine", raw_attrs=mark("path-words"))
 
     def _build_export(self) -> None:
         html.Div("Solids", classes="head")
-        v3.VSelect(v_model=("formats",), items=("all_formats", list(FORMATS)), multiple=True, chips=True, update_modelValue="formats = $event", blur=self.set_formats, label="formats", data_test="formats")
+        v3.VSelect(v_model=("formats",), items=("all_formats", list(FORMATS)), multiple=True, chips=True, __events=SELECTED, update_menu=(self.set_formats, "[$event]"), label="formats", raw_attrs=mark("formats"))
         html.Div("Paths", classes="head")
-        v3.VSelect(v_model=("path_formats",), items=("all_paths", list(PATHS)), multiple=True, chips=True, blur=self.set_formats, label="formats")
+        v3.VSelect(v_model=("path_formats",), items=("all_paths", list(PATHS)), multiple=True, chips=True, __events=SELECTED, update_menu=(self.set_formats, "[$event]"), label="formats")
         html.Div("Formats are written by the next run.", classes="fine mt-1 mb-3")
         with html.Div(v_if=("has_result",)):
-            v3.VBtn("download one zip", prepend_icon="mdi-download", color="primary", variant="tonal", href="/download", download=True, data_test="download")
+            v3.VBtn("download one zip", prepend_icon="mdi-download", color="primary", variant="tonal", href="/download", download=True, raw_attrs=mark("download"))
             v3.VBtn("open the folder", prepend_icon="mdi-folder-open", variant="text", v_if=("can_show",), click=self.show_folder)
             html.Div("{{ one }}", v_for=("(one, k) in result_files",), key=("k",), classes="fine")
 
@@ -132,8 +134,10 @@ class RepairPanel(Panel):
 
         await self.session.apply(change)
 
-    async def set_formats(self) -> None:
-        """Writes the formats into the job, those that are not the default."""
+    async def set_formats(self, is_open: bool) -> None:
+        """Writes the formats into the job when the list is closed, those that are not the default."""
+        if is_open:
+            return
         formats, paths = list(self.state.formats) or ["stl"], list(self.state.path_formats)
 
         def change(tree: Any) -> None:

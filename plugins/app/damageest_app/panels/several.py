@@ -6,6 +6,7 @@ from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
 from damageest_app.scene import Scene
+from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 
 
@@ -18,12 +19,12 @@ class SeveralPanel(Panel):
 
     def build(self) -> None:
         with html.Div(classes="d-flex align-center mb-2", style="gap: 8px"):
-            v3.VSwitch(v_model=("only_doubtful",), label="doubtful ones", color="primary", hide_details=True, data_test="only-doubtful")
-            v3.VBtn("next", size="small", variant="tonal", click=self.open_next, data_test="next-job")
+            v3.VSwitch(v_model=("only_doubtful",), label="doubtful ones", color="primary", hide_details=True, raw_attrs=mark("only-doubtful"))
+            v3.VBtn("next", size="small", variant="tonal", click=self.open_next, raw_attrs=mark("next-job"))
             v3.VBtn("look again", size="small", variant="text", click=self.look)
         with v3.VCard(
             v_for=("one in rows.filter(x => !only_doubtful || x.state === 'doubtful')",), key=("one.job",), classes="mb-2 pa-2",
-            variant=("one.job === job_name ? 'tonal' : 'outlined'",), click=(self.open_job, "[one.job]"), data_test="job-row",
+            variant=("one.job === job_name ? 'tonal' : 'outlined'",), click=(self.open_job, "[one.job]"), raw_attrs=mark("job-row"),
         ):  # fmt: skip
             with html.Div(classes="d-flex align-center"):
                 html.Span("{{ one.job }}", classes="font-weight-medium mr-2")
@@ -31,7 +32,7 @@ class SeveralPanel(Panel):
             html.Div("{{ one.volume }}, 95 %: {{ one.interval }}; proven {{ one.proven }}, likely {{ one.likely }}, doubtful {{ one.doubtful }}", v_if=("one.volume",), classes="fine")
         v3.VBtn(
             "run those that were not", size="small", color="primary", variant="tonal", click=self.run_all,
-            disabled=("running || !rows.some(x => x.state === 'not run')",), data_test="run-all",
+            disabled=("running || !rows.some(x => x.state === 'not run')",), raw_attrs=mark("run-all"),
         )  # fmt: skip
 
     def look(self) -> None:
