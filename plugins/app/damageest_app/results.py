@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from damageest.artefacts import Floats, Mesh
 from damageest.io.colours import colour_site
 from damageest.output.folder import OutputFolder, open_output
 
@@ -37,6 +38,17 @@ class Results:
         if key not in self._solids:
             self._solids[key] = self.output.read_solid(kind, site)
         return self._solids[key]
+
+    def read_skin(self) -> tuple[Mesh, Floats] | None:
+        """The skin in cells, and the mean signed distance (F,) of the scan to each, NaN where there is none."""
+        path = self.output.place / "skin.ply"
+        if not path.is_file():
+            return None
+        import trimesh
+
+        mesh = self.output.read_mesh("skin.ply")
+        columns = trimesh.load(path, process=False).metadata["_ply_raw"]["face"]["data"]
+        return None if mesh is None else (mesh, np.asarray(columns["distance"], float).ravel())
 
     def find_site(self, number: int) -> Json | None:
         return next((site for site in self.content["sites"] if site["id"] == number), None)

@@ -141,6 +141,13 @@ def make_mesh(mesh: Mesh | None, colours: Colours | None = None) -> Any:
     return normals.GetOutput()
 
 
+def lift(mesh: Mesh | None, amount: float) -> Mesh | None:
+    """The mesh a little larger, so that it is drawn over a surface that it shares with another one."""
+    if mesh is None or not len(mesh.faces):
+        return None
+    return Mesh(mesh.vertices + amount * mesh.vertex_normals, mesh.faces)
+
+
 def thin(count: int, most: int = MOST_POINTS) -> NDArray[np.int64]:
     """The numbers of about ``most`` of ``count`` points, spread evenly over their order."""
     if count <= most:

@@ -13,11 +13,12 @@ from damageest.io.colours import PART
 from damageest_app import edits
 from damageest_app.colours import colour_deviation, make_legend
 from damageest_app.faces import Faces
-from damageest_app.panels.open import SCAN, place_beside
+from damageest_app.panels.open import SCAN, place_beside, put_scan
 from damageest_app.pick import Ray, find_point
 from damageest_app.scene import Scene, make_mesh, make_points
 from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
+from damageest_app.shade import tint
 
 PAIR = ("#e0218a", "#00a3a3", "#7a3ff2", "#b58900", "#2f86d6", "#5a5a5a")
 DATUM = "#2fa84f"
@@ -32,9 +33,9 @@ class AlignPanel(Panel):
         self.half: Floats | None = None
         self.state.update(
             {"align_tool": "look", "pose": 0, "poses": 1, "pose_words": [], "pairs": [], "datum": [], "align_use": "register",
-             "half": False}
+             "half": False, "align_view": "skin"}
         )  # fmt: skip
-        self.state.change("align_tool", "pose")(
+        self.state.change("align_tool", "pose", "align_view")(
             lambda **_: session.redraw(frame=self.state.align_tool == "pairs") if self.state.step == "align" else None
         )
 
@@ -44,6 +45,9 @@ class AlignPanel(Panel):
                 v3.VBtn(text, value=value, size="small", raw_attrs=mark(f"tool-{value}"))
         with html.Div(v_if=("align_tool === 'look'",)):
             html.Div("Run the job to see how the scan lies on the part.", v_if=("!has_result",))
+            with v3.VBtnToggle(v_model=("align_view",), v_if=("has_result",), mandatory=True, divided=True, classes="mb-2"):
+                v3.VBtn("on the skin", value="skin", size="x-small")
+                v3.VBtn("scan points", value="points", size="x-small")
             html.Div("{{ one }}", v_for=("(one, k) in pose_words",), key=("k",), classes="text-body-2 mb-1")
             with html.Div(v_if=("poses > 1",), classes="mt-2"):
                 html.Div("{{ poses }} poses fit. Step through them; take the right one.", classes="fine")
@@ -125,18 +129,17 @@ class AlignPanel(Panel):
         inputs, results = self.session.inputs, self.session.results
         assert inputs is not None
         assert results is not None
-        scan = results.output.scan
-        scene.put("part", make_mesh(inputs.part), colour=PART, opacity=0.25)
-        if scan is None:
+        poses, scan, skin = results.list_poses(), results.output.scan, results.read_skin()
+        if 0 < int(self.state.pose) < len(poses):
+            scene.put("part", make_mesh(inputs.part), colour=PART)
+            move = poses[int(self.state.pose)]
+            points = inputs.scan.points[inputs.shown] @ move[:3, :3].T + move[:3, 3]
+            scene.put("scan", make_points(points, tint(inputs.shade, SCAN)), size=2.5)
             return
-        points, poses = scan.points, results.list_poses()
-        colours = colour_deviation(scan.distance, results.tolerance)
-        if 0 < int(self.state.pose) < len(poses):  # from the part's frame by the first pose back, by the other forth
-            move = poses[int(self.state.pose)] @ np.linalg.inv(poses[0])
-            points = points @ move[:3, :3].T + move[:3, 3]
-            scene.put("scan", make_points(points), colour=SCAN)
-            return
-        scene.put("scan", make_points(points, colours), size=2.5)
+        if self.state.align_view == "points" and scan is not None:
+            scene.put("scan", make_points(scan.points, colour_deviation(scan.distance, results.tolerance)), size=2.5)
+        elif skin is not None:
+            scene.put("skin", make_mesh(skin[0], colour_deviation(skin[1], results.tolerance)))
         self.state.legend = make_legend(results.tolerance, results.unit)
 
     def _draw_pairs(self, scene: Scene) -> None:
@@ -144,7 +147,7 @@ class AlignPanel(Panel):
         assert inputs is not None
         offset = place_beside(inputs.part.bounds, inputs.scan.points)
         scene.put("part", make_mesh(inputs.part), colour=PART)
-        scene.put("scan", make_points(inputs.scan.points + offset), colour=SCAN)
+        put_scan(scene, inputs, offset)
         radius = 0.012 * inputs.part.diagonal
         for k, pair in enumerate([*self.pairs, *([(self.half, None)] if self.half is not None else [])]):
             colour = PAIR[k % len(PAIR)]

@@ -11,7 +11,7 @@ from trame.widgets import vuetify3 as v3
 from damageest.io.colours import PART, SURPLUS, UNSEEN, colour_site
 from damageest_app import edits
 from damageest_app.pick import MeshPicker, Ray
-from damageest_app.scene import Scene, make_lines, make_mesh, make_points
+from damageest_app.scene import Scene, lift, make_lines, make_mesh, make_points
 from damageest_app.section import HEIGHT, WIDTH, Cutter, Drawing, Plane, choose_plane, draw, measure_depth, to_space
 from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
@@ -71,9 +71,9 @@ class JudgePanel(Panel):
                     html.Div("{{ why.text }}", classes="words")
                     html.Div("→ {{ why.remedy }}", v_if=("why.remedy",))
                 with html.Div(classes="d-flex mt-2", style="gap: 6px"):
-                    v3.VBtn("accept", size="x-small", variant="tonal", color="success", raw_attrs=mark("accept"), __events=STOPPED, click_stop=(self.decide, "[one.id, 'accept']"))
-                    v3.VBtn("drop", size="x-small", variant="tonal", color="error", raw_attrs=mark("drop"), __events=STOPPED, click_stop=(self.decide, "[one.id, 'drop']"))
-                    v3.VBtn("as the criterion says", size="x-small", variant="text", v_if=("one.choice",), __events=STOPPED, click_stop=(self.decide, "[one.id, '']"))
+                    v3.VBtn("accept", size="small", variant="tonal", color="success", raw_attrs=mark("accept"), __events=STOPPED, click_stop=(self.decide, "[one.id, 'accept']"))
+                    v3.VBtn("drop", size="small", variant="tonal", color="error", raw_attrs=mark("drop"), __events=STOPPED, click_stop=(self.decide, "[one.id, 'drop']"))
+                    v3.VBtn("as the criterion says", size="small", variant="text", v_if=("one.choice",), __events=STOPPED, click_stop=(self.decide, "[one.id, '']"))
                     v3.VSelect(
                         items=("sites.filter(x => x.id !== one.id).map(x => x.id)",), label="merge with", v_if=("sites.length > 1",),
                         update_modelValue=(self.merge, "[one.id, $event]"), style="max-width: 130px",
@@ -85,12 +85,12 @@ class JudgePanel(Panel):
             measure = "(at => at && trigger('measure', at))(utils.damageest.place($event))"
             html.Div(v_html=("section",), raw_attrs=mark("section", f'@click="{measure}"'))
             with html.Div(classes="d-flex align-center"):
-                with v3.VBtnToggle(v_model=("section_axis",), mandatory=True, density="compact", divided=True, classes="mr-3"):
+                with v3.VBtnToggle(v_model=("section_axis",), mandatory=True, divided=True, classes="mr-3"):
                     for value in ("auto", "x", "y", "z"):
-                        v3.VBtn(value, value=value, size="x-small")
+                        v3.VBtn(value, value=value, size="x-small", style="min-width: 34px")
                 v3.VSlider(
                     v_model=("section_offset",), min=("-section_depth",), max=("section_depth",), step=("section_depth / 100",),
-                    hide_details=True, label="move", raw_attrs=mark("section-offset"),
+                    hide_details=True, raw_attrs=mark("section-offset"),
                 )  # fmt: skip
             html.Div("{{ hint_measure }}", classes="fine")
         self.session.ctrl.trigger("measure")(self.measure)
@@ -205,15 +205,18 @@ class JudgePanel(Panel):
             self.state.hint = "run the job first" if self.state.job_name else "open a job first"
             return
         layers = self.state.layers
-        scene.put("part", make_mesh(inputs.part), colour=PART, opacity=0.35)
+        body = results.read_solid("undamaged")
+        scene.put("part", make_mesh(body if body is not None else inputs.part), colour=PART, opacity=0.4)
+        over = 1e-3 * inputs.part.diagonal
         scan = results.output.scan
         if "points" in layers and scan is not None:
             scene.put("points", make_points(scan.points), colour="#5d6b78", size=1.5)
         if "damage" in layers:
             for number in results.output.site_numbers:
-                scene.put(f"damage {number}", make_mesh(results.read_solid("damage", number)), colour=colour_site(number))
+                solid = lift(results.read_solid("damage", number), over)
+                scene.put(f"damage {number}", make_mesh(solid), colour=colour_site(number))
         if "unseen" in layers:
-            scene.put("unseen", make_mesh(results.output.read_mesh("unseen.ply")), colour=UNSEEN)
+            scene.put("unseen", make_mesh(lift(results.output.read_mesh("unseen.ply"), over)), colour=UNSEEN)
         if "surplus" in layers:
             for one in results.content["surplus"]:
                 scene.put(f"surplus {one['id']}", make_mesh(results.read_solid("surplus", one["id"])), colour=SURPLUS)

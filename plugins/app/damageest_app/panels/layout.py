@@ -55,8 +55,10 @@ def build(session: Session) -> None:
 
 
 def _look() -> dict[str, Any]:
-    return {"defaults": {"global": {"density": "compact"}, "VTextField": {"variant": "outlined", "hideDetails": True},
-                         "VSelect": {"variant": "outlined", "hideDetails": True}}}  # fmt: skip
+    small = {"density": "compact", "hideDetails": True}
+    field = {**small, "variant": "outlined"}
+    kinds = {"VTextField": field, "VSelect": field, "VSlider": small, "VRangeSlider": small, "VSwitch": small}
+    return {"defaults": {**kinds, "VBtnToggle": {"density": "compact"}, "VRadioGroup": small}}
 
 
 def _build_bar(session: Session) -> None:
@@ -84,10 +86,10 @@ def _build_bar(session: Session) -> None:
 
 def _build_rail(session: Session) -> None:
     with v3.VNavigationDrawer(permanent=True, width=148), v3.VList(density="compact", nav=True):
-        for number, (name, icon) in enumerate(zip(STEPS, ICONS, strict=True), 1):
+        for name, icon in zip(STEPS, ICONS, strict=True):
             v3.VListItem(
                 title=name.capitalize(), prepend_icon=icon, active=(f"step === '{name}'",), color="primary",
-                click=(session.go, f"['{name}']"), raw_attrs=mark(f"step-{name}", f'title="key {number}"'),
+                click=(session.go, f"['{name}']"), raw_attrs=mark(f"step-{name}"),
             )  # fmt: skip
 
 

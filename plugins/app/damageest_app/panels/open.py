@@ -12,10 +12,11 @@ from trame.widgets import vuetify3 as v3
 from damageest.artefacts import Floats
 from damageest.io.colours import PART
 from damageest_app import edits
-from damageest_app.inputs import UNITS
+from damageest_app.inputs import UNITS, Inputs
 from damageest_app.scene import Scene, make_mesh, make_points
 from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
+from damageest_app.shade import tint
 
 SCAN = "#d97a34"
 
@@ -108,10 +109,13 @@ class OpenPanel(Panel):
             self.state.hint = "pick a part and its scan" if not self.state.job_name else ""
             return
         scene.put("part", make_mesh(inputs.part), colour=PART, opacity=1.0 if self.state.apart else 0.45)
-        points = inputs.scan.points
-        if self.state.apart:
-            points = points + place_beside(inputs.part.bounds, points)
-        scene.put("scan", make_points(points), colour=SCAN, size=2.0)
+        offset = place_beside(inputs.part.bounds, inputs.scan.points) if self.state.apart else np.zeros(3)
+        put_scan(scene, inputs, offset)
+
+
+def put_scan(scene: Scene, inputs: Inputs, offset: Floats) -> None:
+    """Shows the scan of a job, moved by ``offset`` (3,)."""
+    scene.put("scan", make_points(inputs.scan.points[inputs.shown] + offset, tint(inputs.shade, SCAN)), size=2.5)
 
 
 def place_beside(bounds: Floats, points: Floats) -> Floats:

@@ -11,8 +11,8 @@ from trame.widgets import vuetify3 as v3
 from damageest.artefacts import Floats
 from damageest_app import edits
 from damageest_app.histogram import Histogram
-from damageest_app.panels.open import SCAN
-from damageest_app.scene import Scene, make_lines, make_points, thin
+from damageest_app.panels.open import put_scan
+from damageest_app.scene import Scene, make_lines, thin
 from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 
@@ -129,7 +129,7 @@ class PreparePanel(Panel):
         if self.session.inputs is None:
             self.state.hint = "open a job first"
             return
-        scene.put("scan", make_points(self.session.inputs.scan.points), colour=SCAN)
+        put_scan(scene, self.session.inputs, np.zeros(3))
         self._put_box(scene)
 
     def _draw_box(self) -> None:

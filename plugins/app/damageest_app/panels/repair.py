@@ -15,7 +15,7 @@ from damageest_app import edits
 from damageest_app.panels.align import put_faces
 from damageest_app.pathview import PathPlay, make_nozzle
 from damageest_app.pick import Ray
-from damageest_app.scene import Scene, make_lines, make_mesh
+from damageest_app.scene import Scene, lift, make_lines, make_mesh
 from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 
@@ -216,10 +216,10 @@ class RepairPanel(Panel):
         else:
             named = [(one, STOCK) for one in reversed(allowance.get("targets", []))]
             put_faces(scene, tools[1], [*named, *((one, KEEP_OUT) for one in allowance.get("keep_out", []))])
-        if results is not None and tool != "path":
+        if results is not None and (tool == "export" or (tool == "stock" and allowance)):
             for number in results.output.site_numbers:
                 solid = results.read_solid("deposit", number) or results.read_solid("damage", number)
-                scene.put(f"deposit {number}", make_mesh(solid), colour=DEPOSIT)
+                scene.put(f"deposit {number}", make_mesh(lift(solid, 1e-3 * inputs.part.diagonal)), colour=DEPOSIT)
         if tool == "path":
             self._put_path(scene)
 
