@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,6 +45,9 @@ class Panel:
 
     def result(self) -> None:
         """There are other results."""
+
+    def warm(self) -> None:
+        """Prepares what a click will need, in a thread of its own."""
 
 
 class Session:
@@ -234,6 +238,13 @@ class Session:
         self.state.notes = self.results.list_notes() if self.results else []
         for panel in self.panels.values():
             panel.result()
+        if self.results is not None:
+            asyncio.get_running_loop().run_in_executor(None, self._warm)
+
+    def _warm(self) -> None:
+        with suppress(DamageestError, OSError, ValueError):  # a click says what is wrong
+            for panel in self.panels.values():
+                panel.warm()
 
     def _is_stale(self) -> bool:
         """Whether the results are those of another job than the one that is open now."""

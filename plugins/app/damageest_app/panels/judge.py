@@ -16,6 +16,8 @@ from damageest_app.section import HEIGHT, WIDTH, Cutter, Drawing, Plane, choose_
 from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 
+MOST_WARM = 20
+"""Sites whose section is prepared before a click asks for it."""
 STOPPED = [("click_stop", "click.stop")]
 """A click on a button of a card is no click on the card."""
 
@@ -198,6 +200,19 @@ class JudgePanel(Panel):
     def result(self) -> None:
         self._cutters, self.plane, self.measured = {}, None, []
         self.state.site, self.state.section = 0, ""
+
+    def warm(self) -> None:
+        results = self.session.results
+        for number in results.output.site_numbers[:MOST_WARM] if results else ():
+            damage = results.read_solid("damage", number) if results else None
+            if results is None or damage is None:
+                continue
+            plane = choose_plane(damage, results.output.read_surface(number))
+            for name in ("part", "damage", "deposit"):
+                if cutter := self._find_cutter(name, number):
+                    cutter.cut(plane)
+            if results.output.scan is not None:
+                draw(plane, {}, results.output.scan.points, results.tolerance, results.unit, "#000000")
 
     def draw(self, scene: Scene) -> None:
         inputs, results = self.session.inputs, self.session.results
