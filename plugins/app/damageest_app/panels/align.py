@@ -35,9 +35,12 @@ class AlignPanel(Panel):
             {"align_tool": "look", "pose": 0, "poses": 1, "pose_words": [], "pairs": [], "datum": [], "align_use": "register",
              "half": False, "align_view": "skin"}
         )  # fmt: skip
-        self.state.change("align_tool", "pose", "align_view")(
-            lambda **_: session.redraw(frame=self.state.align_tool == "pairs") if self.state.step == "align" else None
-        )
+        self.state.change("align_tool")(lambda **_: self._redraw(frame=True))
+        self.state.change("pose", "align_view")(lambda **_: self._redraw())
+
+    def _redraw(self, frame: bool = False) -> None:
+        if self.state.step == "align":
+            self.session.redraw(frame)
 
     def build(self) -> None:
         with v3.VBtnToggle(v_model=("align_tool",), mandatory=True, color="primary", classes="mb-3", divided=True):
@@ -139,7 +142,12 @@ class AlignPanel(Panel):
         if self.state.align_view == "points" and scan is not None:
             scene.put("scan", make_points(scan.points, colour_deviation(scan.distance, results.tolerance)), size=2.5)
         elif skin is not None:
-            scene.put("skin", make_mesh(skin[0], colour_deviation(skin[1], results.tolerance)))
+            seen = np.isfinite(skin[1])
+            shown = Mesh(skin[0].vertices, skin[0].faces[seen])
+            scene.put("skin", make_mesh(shown, colour_deviation(skin[1][seen], results.tolerance)))
+            if scan is not None:  # what lies off the skin, where it lies
+                off = np.abs(scan.distance) > results.tolerance
+                scene.put("off", make_points(scan.points[off], colour_deviation(scan.distance[off], results.tolerance)), size=3.0)
         self.state.legend = make_legend(results.tolerance, results.unit)
 
     def _draw_pairs(self, scene: Scene) -> None:
@@ -148,7 +156,7 @@ class AlignPanel(Panel):
         offset = place_beside(inputs.part.bounds, inputs.scan.points)
         scene.put("part", make_mesh(inputs.part), colour=PART)
         put_scan(scene, inputs, offset)
-        radius = 0.012 * inputs.part.diagonal
+        radius = 0.018 * inputs.part.diagonal
         for k, pair in enumerate([*self.pairs, *([(self.half, None)] if self.half is not None else [])]):
             colour = PAIR[k % len(PAIR)]
             scene.put(f"pair {k} scan", make_mesh(make_ball(pair[0] + offset, radius)), colour=colour)

@@ -35,7 +35,7 @@ class PreparePanel(Panel):
 
     def build(self) -> None:
         html.Div("The scan", classes="head")
-        html.Div("{{ scan_facts }}", classes="text-body-2")
+        html.Div("{{ scan_facts }}", classes="text-body-2", raw_attrs=mark("scan-facts"))
         html.Div("Crop", classes="head")
         with html.Div(classes="d-flex flex-wrap", style="gap: 8px"):
             v3.VBtn("largest piece", size="small", variant="tonal", click=(self.crop, "['piece']"), disabled=("!has_inputs",), raw_attrs=mark("crop-piece"))
