@@ -37,5 +37,7 @@ def make_legend(tolerance: float, unit: str) -> list[dict[str, str]]:
         red, green, blue = colour_deviation(np.array([step * tolerance]), tolerance)[0]
         edge = {5: "≥ ", -5: "≤ "}.get(step, "")
         value = f"{step * tolerance:+.3g} {unit}" if step else f"0 {unit}"
-        rows.append({"colour": f"rgb({red},{green},{blue})", "label": f"{edge}{step:+d} λ" if step else "0", "value": value})
+        rows.append(
+            {"colour": f"rgb({red},{green},{blue})", "label": f"{edge}{step:+d} λ" if step else "0", "value": value}
+        )
     return rows

@@ -155,9 +155,13 @@ def plain(value: Any) -> Any:
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
-    return float(value) if isinstance(value, float) else int(value) if type(value) is not bool and isinstance(
-        value, int
-    ) else value
+    return (
+        float(value)
+        if isinstance(value, float)
+        else int(value)
+        if type(value) is not bool and isinstance(value, int)
+        else value
+    )
 
 
 def choose_site(tree: Any, number: int, choice: str, is_doubtful: bool) -> None:

@@ -17,7 +17,9 @@ class Histogram:
         self.distance = distance[np.isfinite(distance)]
         self.noise = noise
         self.reach = 6 * max(tolerance, 2 * noise, 1e-12)
-        self.counts, self.edges = np.histogram(np.clip(self.distance, -self.reach, self.reach), BINS, (-self.reach, self.reach))
+        self.counts, self.edges = np.histogram(
+            np.clip(self.distance, -self.reach, self.reach), BINS, (-self.reach, self.reach)
+        )
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -40,8 +42,14 @@ class Histogram:
             bars[key] += f"M{k * width:.1f} {HEIGHT - 18}v{-tall:.1f}h{width - 0.6:.1f}v{tall:.1f}z"
         place = [WIDTH / 2 * (1 + sign * tolerance / self.reach) for sign in (-1, 1)]
         lines = "".join(f'<path class="limit" d="M{x:.1f} 0V{HEIGHT - 18}"/>' for x in place)
-        ends = [(f"{-self.reach:.3g}", 2, "start"), ("0", WIDTH / 2, "middle"), (f"{self.reach:.3g} {unit}", WIDTH - 2, "end")]
-        texts = "".join(f'<text x="{x:.1f}" y="{HEIGHT - 4}" text-anchor="{anchor}">{text}</text>' for text, x, anchor in ends)
+        ends = [
+            (f"{-self.reach:.3g}", 2, "start"),
+            ("0", WIDTH / 2, "middle"),
+            (f"{self.reach:.3g} {unit}", WIDTH - 2, "end"),
+        ]
+        texts = "".join(
+            f'<text x="{x:.1f}" y="{HEIGHT - 4}" text-anchor="{anchor}">{text}</text>' for text, x, anchor in ends
+        )
         return (
             f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" class="histogram" role="img" aria-label="distances to the part">'
             f'<path class="intact" d="{bars["in"]}"/><path class="off" d="{bars["out"]}"/>{lines}{texts}</svg>'

@@ -44,8 +44,9 @@ class Inputs:
     def describe_part(self) -> str:
         size = " × ".join(f"{edge:.4g}" for edge in np.ptp(self.part.bounds, axis=0))
         faces = f", {len(set(self.part.faces_brep))} CAD faces" if self.part.faces_brep is not None else ""
-        return f"{size} {self.part.unit}, {self.part.volume:.5g} {self.part.unit}³, {len(self.part.faces)} triangles" + (
-            faces
+        return (
+            f"{size} {self.part.unit}, {self.part.volume:.5g} {self.part.unit}³, {len(self.part.faces)} triangles"
+            + (faces)
         )
 
     def describe_scan(self) -> str:

@@ -92,7 +92,9 @@ class Results:
         content, unit = self.content, self.unit
         lines = [f"damage {content['damage_volume']:.5g} {unit}³ (95 %: {format_interval(content['volume_95'])})"]
         if content.get("coverage"):
-            lines.append(f"tolerance {self.tolerance:.4g} {unit}; {content['coverage']['seen']:.0%} of the skin is seen")
+            lines.append(
+                f"tolerance {self.tolerance:.4g} {unit}; {content['coverage']['seen']:.0%} of the skin is seen"
+            )
         if content.get("fit"):
             lines.append(f"fit: {content['fit']['words']}")
         return lines

@@ -54,7 +54,9 @@ def make_routes(folder: Folder, find_output: Any, tell: Any) -> list[Any]:
         except InputError as error:
             return web.Response(status=400, text=str(error))
         except OSError as error:
-            return web.Response(status=507, text=f"the file cannot be written: {error.strerror or error}; free some space")
+            return web.Response(
+                status=507, text=f"the file cannot be written: {error.strerror or error}; free some space"
+            )
         tell(name)
         return web.Response(text=name)
 

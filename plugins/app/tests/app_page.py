@@ -106,7 +106,9 @@ class Page:
 
         self.page.screenshot(path=str(path))
         with Image.open(path) as image:
-            image.convert("RGB").quantize(255, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(path, optimize=True)
+            image.convert("RGB").quantize(255, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
+                path, optimize=True
+            )
 
 
 def mark(name: str) -> str:

@@ -48,7 +48,9 @@ class AlignPanel(Panel):
                 v3.VBtn(text, value=value, size="small", raw_attrs=mark(f"tool-{value}"))
         with html.Div(v_if=("align_tool === 'look'",)):
             html.Div("Run the job to see how the scan lies on the part.", v_if=("!has_result",))
-            with v3.VBtnToggle(v_model=("align_view",), v_if=("has_result",), mandatory=True, divided=True, classes="mb-2"):
+            with v3.VBtnToggle(
+                v_model=("align_view",), v_if=("has_result",), mandatory=True, divided=True, classes="mb-2"
+            ):
                 v3.VBtn("on the skin", value="skin", size="x-small")
                 v3.VBtn("scan points", value="points", size="x-small")
             html.Div("{{ one }}", v_for=("(one, k) in pose_words",), key=("k",), classes="text-body-2 mb-1")
@@ -57,21 +59,64 @@ class AlignPanel(Panel):
                 with html.Div(classes="d-flex align-center"):
                     v3.VBtn(icon="mdi-chevron-left", variant="text", click="pose = (pose + poses - 1) % poses")
                     html.Div("pose {{ pose + 1 }} of {{ poses }}", raw_attrs=mark("pose"))
-                    v3.VBtn(icon="mdi-chevron-right", variant="text", click="pose = (pose + 1) % poses", raw_attrs=mark("next-pose"))
-                    v3.VBtn("take it", size="small", color="primary", variant="tonal", click=self.take_pose, disabled=("pose === 0",))
+                    v3.VBtn(
+                        icon="mdi-chevron-right",
+                        variant="text",
+                        click="pose = (pose + 1) % poses",
+                        raw_attrs=mark("next-pose"),
+                    )
+                    v3.VBtn(
+                        "take it",
+                        size="small",
+                        color="primary",
+                        variant="tonal",
+                        click=self.take_pose,
+                        disabled=("pose === 0",),
+                    )
         with html.Div(v_if=("align_tool === 'pairs'",)):
-            html.Div("Click a place on the scan, then the same place on the part; three times or more.", classes="fine mb-2")
-            html.Div("{{ half ? 'now the same place on the part' : 'a place on the scan' }}", classes="text-primary", raw_attrs=mark("pair-next"))
+            html.Div(
+                "Click a place on the scan, then the same place on the part; three times or more.", classes="fine mb-2"
+            )
+            html.Div(
+                "{{ half ? 'now the same place on the part' : 'a place on the scan' }}",
+                classes="text-primary",
+                raw_attrs=mark("pair-next"),
+            )
             html.Div("{{ one }}", v_for=("(one, k) in pairs",), key=("k",), classes="text-body-2")
             with html.Div(classes="d-flex mt-2", style="gap: 8px"):
-                v3.VBtn("align by pairs", size="small", color="primary", variant="tonal", click=self.take_pairs, disabled=("pairs.length < 3",), raw_attrs=mark("take-pairs"))
-                v3.VBtn("take one back", size="small", variant="text", click=self.drop_pair, disabled=("!pairs.length && !half",))
+                v3.VBtn(
+                    "align by pairs",
+                    size="small",
+                    color="primary",
+                    variant="tonal",
+                    click=self.take_pairs,
+                    disabled=("pairs.length < 3",),
+                    raw_attrs=mark("take-pairs"),
+                )
+                v3.VBtn(
+                    "take one back",
+                    size="small",
+                    variant="text",
+                    click=self.drop_pair,
+                    disabled=("!pairs.length && !half",),
+                )
         with html.Div(v_if=("align_tool === 'datum'",)):
-            html.Div("Click faces of the part that are not worn. They fix the pose, as an inspector aligns on datums.", classes="fine mb-2")
-            html.Div("{{ one }}", v_for=("(one, k) in datum",), key=("k",), classes="text-body-2", raw_attrs=mark("datum-row"))
+            html.Div(
+                "Click faces of the part that are not worn. They fix the pose, as an inspector aligns on datums.",
+                classes="fine mb-2",
+            )
+            html.Div(
+                "{{ one }}",
+                v_for=("(one, k) in datum",),
+                key=("k",),
+                classes="text-body-2",
+                raw_attrs=mark("datum-row"),
+            )
             html.Div("no datum: all of the skin is used", v_if=("!datum.length",), classes="fine")
         html.Div("align: {{ align_use }}", classes="fine mt-4")
-        v3.VBtn("find the pose anew", v_if=("align_use !== 'register'",), size="small", variant="text", click=self.register)
+        v3.VBtn(
+            "find the pose anew", v_if=("align_use !== 'register'",), size="small", variant="text", click=self.register
+        )
 
     async def register(self) -> None:
         await self.session.apply(edits.set_register)
@@ -111,7 +156,9 @@ class AlignPanel(Panel):
             return
         alignment = results.content["alignment"]
         self.state.poses = len(results.list_poses())
-        words = [f"intact points lie within {alignment['rms']:.3g} {results.unit} (rms); {alignment['inliers']:.1%} of the scan"]
+        words = [
+            f"intact points lie within {alignment['rms']:.3g} {results.unit} (rms); {alignment['inliers']:.1%} of the scan"
+        ]
         self.state.pose_words = [*words, *map(str, alignment["notes"]), *map(str, alignment["doubts"])]
 
     def draw(self, scene: Scene) -> None:
@@ -147,7 +194,11 @@ class AlignPanel(Panel):
             scene.put("skin", make_mesh(shown, colour_deviation(skin[1][seen], results.tolerance)))
             if scan is not None:  # what lies off the skin, where it lies
                 off = np.abs(scan.distance) > results.tolerance
-                scene.put("off", make_points(scan.points[off], colour_deviation(scan.distance[off], results.tolerance)), size=3.0)
+                scene.put(
+                    "off",
+                    make_points(scan.points[off], colour_deviation(scan.distance[off], results.tolerance)),
+                    size=3.0,
+                )
         self.state.legend = make_legend(results.tolerance, results.unit)
 
     def _draw_pairs(self, scene: Scene) -> None:

@@ -48,7 +48,12 @@ class JudgePanel(Panel):
             self._build_site()
             html.Div("Layers", classes="head")
             with v3.VBtnToggle(v_model=("layers",), multiple=True, color="primary", divided=True):
-                for value, text in (("damage", "damage"), ("points", "scan"), ("unseen", "unseen"), ("surplus", "surplus")):
+                for value, text in (
+                    ("damage", "damage"),
+                    ("points", "scan"),
+                    ("unseen", "unseen"),
+                    ("surplus", "surplus"),
+                ):
                     v3.VBtn(text, value=value, size="x-small", raw_attrs=mark(f"layer-{value}"))
             with html.Div(v_if=("notes.length",)):
                 html.Div("Notes of the run", classes="head")
@@ -65,17 +70,48 @@ class JudgePanel(Panel):
                 html.Span(classes="site-dot", style=("{background: one.colour}",))
                 html.Span("site {{ one.id }}", classes="font-weight-medium mr-2")
                 v3.VChip("{{ one.level }}", size="x-small", color=("one.tone",), prepend_icon=("one.icon",))
-                v3.VChip("{{ one.choice === 'drop' ? 'dropped' : 'accepted' }}", v_if=("one.choice",), size="x-small", classes="ml-1")
+                v3.VChip(
+                    "{{ one.choice === 'drop' ? 'dropped' : 'accepted' }}",
+                    v_if=("one.choice",),
+                    size="x-small",
+                    classes="ml-1",
+                )
                 v3.VChip("one with {{ one.merged }}", v_if=("one.merged",), size="x-small", classes="ml-1")
-            html.Div("{{ one.volume }} {{ unit }}³ (95 %: {{ one.interval }}), depth {{ one.depth }} {{ unit }}, area {{ one.area }} {{ unit }}²", classes="fine")
+            html.Div(
+                "{{ one.volume }} {{ unit }}³ (95 %: {{ one.interval }}), depth {{ one.depth }} {{ unit }}, area {{ one.area }} {{ unit }}²",
+                classes="fine",
+            )
             with html.Div(v_if=("site === one.id",)):
                 with html.Div(v_for=("(why, k) in one.reasons",), key=("k",), classes="fine mt-1"):
                     html.Div("{{ why.text }}", classes="words")
                     html.Div("→ {{ why.remedy }}", v_if=("why.remedy",))
                 with html.Div(classes="d-flex mt-2", style="gap: 6px"):
-                    v3.VBtn("accept", size="small", variant="tonal", color="success", raw_attrs=mark("accept"), __events=STOPPED, click_stop=(self.decide, "[one.id, 'accept']"))
-                    v3.VBtn("drop", size="small", variant="tonal", color="error", raw_attrs=mark("drop"), __events=STOPPED, click_stop=(self.decide, "[one.id, 'drop']"))
-                    v3.VBtn("as the criterion says", size="small", variant="text", v_if=("one.choice",), __events=STOPPED, click_stop=(self.decide, "[one.id, '']"))
+                    v3.VBtn(
+                        "accept",
+                        size="small",
+                        variant="tonal",
+                        color="success",
+                        raw_attrs=mark("accept"),
+                        __events=STOPPED,
+                        click_stop=(self.decide, "[one.id, 'accept']"),
+                    )
+                    v3.VBtn(
+                        "drop",
+                        size="small",
+                        variant="tonal",
+                        color="error",
+                        raw_attrs=mark("drop"),
+                        __events=STOPPED,
+                        click_stop=(self.decide, "[one.id, 'drop']"),
+                    )
+                    v3.VBtn(
+                        "as the criterion says",
+                        size="small",
+                        variant="text",
+                        v_if=("one.choice",),
+                        __events=STOPPED,
+                        click_stop=(self.decide, "[one.id, '']"),
+                    )
                     v3.VSelect(
                         items=("sites.filter(x => x.id !== one.id).map(x => x.id)",), label="merge with", v_if=("sites.length > 1",),
                         update_modelValue=(self.merge, "[one.id, $event]"), style="max-width: 130px",
@@ -129,7 +165,11 @@ class JudgePanel(Panel):
         if self.plane is None or results is None or not number:
             return
         plane = self.plane.shift(float(self.state.section_offset))
-        loops = {name: cutter.cut(plane) for name in ("part", "damage", "deposit") if (cutter := self._find_cutter(name, number))}
+        loops = {
+            name: cutter.cut(plane)
+            for name in ("part", "damage", "deposit")
+            if (cutter := self._find_cutter(name, number))
+        }
         scan = results.output.scan
         spacing = max(float(results.content["scan"]["spacing"]), results.tolerance / 2)
         points = scan.points if scan is not None else np.empty((0, 3))

@@ -65,21 +65,62 @@ def _build_bar(session: Session) -> None:
     with v3.VAppBar(density="compact", flat=True, border="b"):
         html.Div("damageest", classes="text-h6 ml-4 mr-4")
         html.Div("{{ job_name || 'no job is open' }}", classes="text-body-2 mr-2", raw_attrs=mark("job-name"))
-        v3.VBtn(icon="mdi-file-code-outline", title="the job file (j)", click="show_job = !show_job", disabled=("!job_name",))
-        v3.VBtn(icon="mdi-undo", title="undo (Ctrl+Z)", click=session.step_back, disabled=("!can_undo || running",), raw_attrs=mark("undo"))
-        v3.VBtn(icon="mdi-redo", title="redo (Ctrl+Y)", click=(session.step_back, "[true]"), disabled=("!can_redo || running",), raw_attrs=mark("redo"))
-        v3.VChip("the job was changed since this result", v_if=("stale && !running",), color="warning", size="small", classes="ml-2")
+        v3.VBtn(
+            icon="mdi-file-code-outline",
+            title="the job file (j)",
+            click="show_job = !show_job",
+            disabled=("!job_name",),
+        )
+        v3.VBtn(
+            icon="mdi-undo",
+            title="undo (Ctrl+Z)",
+            click=session.step_back,
+            disabled=("!can_undo || running",),
+            raw_attrs=mark("undo"),
+        )
+        v3.VBtn(
+            icon="mdi-redo",
+            title="redo (Ctrl+Y)",
+            click=(session.step_back, "[true]"),
+            disabled=("!can_redo || running",),
+            raw_attrs=mark("redo"),
+        )
+        v3.VChip(
+            "the job was changed since this result",
+            v_if=("stale && !running",),
+            color="warning",
+            size="small",
+            classes="ml-2",
+        )
         v3.VSpacer()
         with html.Div(v_if=("running",), style="width: 340px", classes="mr-4"):
             html.Div("{{ doing }} · {{ seconds }} s", classes="fine")
             v3.VProgressLinear(model_value=("100 * share",), color="primary", height=6, rounded=True)
-        v3.VBtn(icon="mdi-format-list-checks", title="stages of the run", click="show_stages = !show_stages", disabled=("!stages.length",))
-        v3.VBtn("Stop", v_if=("running",), color="error", variant="tonal", prepend_icon="mdi-stop", click=session.stop, raw_attrs=mark("stop"))
+        v3.VBtn(
+            icon="mdi-format-list-checks",
+            title="stages of the run",
+            click="show_stages = !show_stages",
+            disabled=("!stages.length",),
+        )
+        v3.VBtn(
+            "Stop",
+            v_if=("running",),
+            color="error",
+            variant="tonal",
+            prepend_icon="mdi-stop",
+            click=session.stop,
+            raw_attrs=mark("stop"),
+        )
         v3.VBtn(
             "Run", v_if=("!running",), color="primary", variant="flat", prepend_icon="mdi-play", title="run the job (r)",
             click=session.run, disabled=("!job_name || !!busy",), raw_attrs=mark("run"),
         )  # fmt: skip
-        v3.VBtn(icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",), title="dark or light", click="dark = !dark", raw_attrs=mark("dark"))
+        v3.VBtn(
+            icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",),
+            title="dark or light",
+            click="dark = !dark",
+            raw_attrs=mark("dark"),
+        )
         v3.VBtn(icon="mdi-keyboard-outline", title="keys (?)", click="show_keys = true")
         v3.VProgressLinear(active=("!!busy",), indeterminate=True, absolute=True, location="bottom", color="primary")
 
@@ -100,7 +141,9 @@ def _build_messages(session: Session) -> None:
         __events=[("close", "click:close")], close="message = ''", raw_attrs=mark("message"),
     ):  # fmt: skip
         html.Div("{{ message }}", classes="words")
-        v3.VBtn("Reload", v_if=("conflict",), size="small", classes="mt-2", click=session.reload, raw_attrs=mark("reload"))
+        v3.VBtn(
+            "Reload", v_if=("conflict",), size="small", classes="mt-2", click=session.reload, raw_attrs=mark("reload")
+        )
     html.Div(
         "This folder cannot be written to, so no job can be made or changed here. Change its rights, or start the app "
         "with another folder.", v_if=("!writable",), classes="text-warning fine mb-2",
@@ -130,12 +173,20 @@ def _build_stage(session: Session, judge: JudgePanel) -> None:
 def _build_dialogs() -> None:
     with v3.VNavigationDrawer(v_model=("show_job",), location="right", temporary=True, width=520):
         html.Div("{{ job_text }}", classes="yaml pa-4", raw_attrs=mark("job-text"))
-    with v3.VNavigationDrawer(v_model=("show_stages",), location="right", temporary=True, width=380), v3.VTable(
-        density="compact"
-    ), html.Tbody(), html.Tr(v_for=("(one, k) in stages",), key=("k",)):
+    with (
+        v3.VNavigationDrawer(v_model=("show_stages",), location="right", temporary=True, width=380),
+        v3.VTable(density="compact"),
+        html.Tbody(),
+        html.Tr(v_for=("(one, k) in stages",), key=("k",)),
+    ):
         html.Td("{{ one.name }}")
         html.Td("{{ one.cached ? 'from an earlier run' : one.seconds.toFixed(2) + ' s' }}", style="text-align: right")
-    with v3.VDialog(v_model=("show_keys",), width=420), v3.VCard(title="Keys"), v3.VTable(density="compact"), html.Tbody():
+    with (
+        v3.VDialog(v_model=("show_keys",), width=420),
+        v3.VCard(title="Keys"),
+        v3.VTable(density="compact"),
+        html.Tbody(),
+    ):
         for keys, what in KEYS:
             with html.Tr():
                 html.Td(keys, style="white-space: nowrap")

@@ -50,18 +50,49 @@ class OpenPanel(Panel):
             label="job", v_if=("files.jobs.length",), raw_attrs=mark("job"),
         )  # fmt: skip
         html.Div("A new job", classes="head")
-        v3.VSelect(v_model=("new_part",), items=("files.parts",), label="part as designed (CAD)", classes="mb-3", raw_attrs=mark("part"))
-        v3.VSelect(v_model=("new_scan",), items=("files.scans",), label="scan of the damaged part", classes="mb-3", raw_attrs=mark("scan"))
+        v3.VSelect(
+            v_model=("new_part",),
+            items=("files.parts",),
+            label="part as designed (CAD)",
+            classes="mb-3",
+            raw_attrs=mark("part"),
+        )
+        v3.VSelect(
+            v_model=("new_scan",),
+            items=("files.scans",),
+            label="scan of the damaged part",
+            classes="mb-3",
+            raw_attrs=mark("scan"),
+        )
         with html.Div(classes="d-flex align-center"):
-            v3.VSelect(v_model=("new_unit",), items=("units", list(UNITS)), label="unit of files that name none", classes="mr-3")
-            v3.VBtn("Open", color="primary", variant="tonal", click=self.make_job, disabled=("!new_part || !new_scan || !!busy || !writable",), raw_attrs=mark("make"))
+            v3.VSelect(
+                v_model=("new_unit",),
+                items=("units", list(UNITS)),
+                label="unit of files that name none",
+                classes="mr-3",
+            )
+            v3.VBtn(
+                "Open",
+                color="primary",
+                variant="tonal",
+                click=self.make_job,
+                disabled=("!new_part || !new_scan || !!busy || !writable",),
+                raw_attrs=mark("make"),
+            )
         html.Div("Or drop files on this page: they are copied to {{ folder }}.", classes="fine mt-3")
         with html.Div(v_if=("has_inputs",)):
             html.Div("Part", classes="head")
             html.Div("{{ part_facts }}", classes="text-body-2", raw_attrs=mark("part-facts"))
             html.Div("Scan", classes="head")
             html.Div("{{ scan_facts }}", classes="text-body-2", raw_attrs=mark("scan-facts"))
-            with v3.VAlert(v_if=("unit_doubt",), type="warning", variant="tonal", density="compact", classes="mt-3", raw_attrs=mark("unit-doubt")):
+            with v3.VAlert(
+                v_if=("unit_doubt",),
+                type="warning",
+                variant="tonal",
+                density="compact",
+                classes="mt-3",
+                raw_attrs=mark("unit-doubt"),
+            ):
                 html.Div("{{ unit_doubt }}", classes="words fine")
                 v3.VBtn(
                     "the {{ one.of }} is in {{ one.unit }}", v_for=("one in unit_offers",), key=("one.of + one.unit",),

@@ -38,8 +38,22 @@ class PreparePanel(Panel):
         html.Div("{{ scan_facts }}", classes="text-body-2", raw_attrs=mark("scan-facts"))
         html.Div("Crop", classes="head")
         with html.Div(classes="d-flex flex-wrap", style="gap: 8px"):
-            v3.VBtn("largest piece", size="small", variant="tonal", click=(self.crop, "['piece']"), disabled=("!has_inputs",), raw_attrs=mark("crop-piece"))
-            v3.VBtn("box …", size="small", variant="tonal", click="show_box = !show_box", disabled=("!has_inputs",), raw_attrs=mark("box"))
+            v3.VBtn(
+                "largest piece",
+                size="small",
+                variant="tonal",
+                click=(self.crop, "['piece']"),
+                disabled=("!has_inputs",),
+                raw_attrs=mark("crop-piece"),
+            )
+            v3.VBtn(
+                "box …",
+                size="small",
+                variant="tonal",
+                click="show_box = !show_box",
+                disabled=("!has_inputs",),
+                raw_attrs=mark("box"),
+            )
         with html.Div(v_if=("show_box",), classes="mt-2"):
             for k, axis in enumerate(AXES):
                 v3.VRangeSlider(
@@ -47,14 +61,24 @@ class PreparePanel(Panel):
                     update_modelValue=f"box[{k}] = $event; flushState('box')", label=axis, hide_details=True,
                 )  # fmt: skip
             with html.Div(classes="d-flex flex-wrap mt-1", style="gap: 8px"):
-                v3.VBtn("keep the box", size="small", color="primary", variant="tonal", click=(self.crop, "['keep']"), raw_attrs=mark("crop-keep"))
+                v3.VBtn(
+                    "keep the box",
+                    size="small",
+                    color="primary",
+                    variant="tonal",
+                    click=(self.crop, "['keep']"),
+                    raw_attrs=mark("crop-keep"),
+                )
                 v3.VBtn("drop the box", size="small", variant="tonal", click=(self.crop, "['drop']"))
                 v3.VBtn("below z of the box away", size="small", variant="tonal", click=(self.crop, "['above']"))
         with html.Div(v_for=("(one, k) in crops",), key=("k",), classes="fine"):
             html.Span("{{ k + 1 }}. {{ one }}")
         v3.VBtn("take the last crop back", v_if=("crops.length",), size="small", variant="text", click=self.uncrop)
         html.Div("Tolerance", classes="head")
-        html.Div("Nearer to the part than this is intact; {{ tolerance_auto ? 'auto, from the noise of the scan' : 'as the job says' }}.", classes="fine")
+        html.Div(
+            "Nearer to the part than this is intact; {{ tolerance_auto ? 'auto, from the noise of the scan' : 'as the job says' }}.",
+            classes="fine",
+        )
         with html.Div(v_if=("histogram",)):
             html.Div(v_html=("histogram",))
             v3.VSlider(
@@ -62,7 +86,10 @@ class PreparePanel(Panel):
                 step=("(tolerance_limits[1] - tolerance_limits[0]) / 400",), hide_details=True, end=self.set_tolerance,
                 raw_attrs=mark("tolerance"),
             )  # fmt: skip
-            html.Div("λ = {{ Number(tolerance).toPrecision(3) }} {{ unit }}; {{ intact_share }} of the points are nearer", raw_attrs=mark("share"))
+            html.Div(
+                "λ = {{ Number(tolerance).toPrecision(3) }} {{ unit }}; {{ intact_share }} of the points are nearer",
+                raw_attrs=mark("share"),
+            )
             v3.VBtn("auto", size="small", variant="text", click=self.set_auto)
         html.Div("The histogram needs a pose: run the job once.", v_if=("!histogram",), classes="fine")
 

@@ -58,13 +58,40 @@ class RepairPanel(Panel):
 
     def _build_stock(self) -> None:
         html.Div("Stock that is milled off after deposition.", classes="fine mb-2")
-        v3.VTextField(v_model=("outer",), type="number", step=0.1, min=0, label="stock on all skin", suffix=("unit",), __events=["change"], change=self.set_outer, classes="mb-3", raw_attrs=mark("outer"))
+        v3.VTextField(
+            v_model=("outer",),
+            type="number",
+            step=0.1,
+            min=0,
+            label="stock on all skin",
+            suffix=("unit",),
+            __events=["change"],
+            change=self.set_outer,
+            classes="mb-3",
+            raw_attrs=mark("outer"),
+        )
         html.Div("A click on a face of the part:", classes="fine")
         with v3.VRadioGroup(v_model=("face_action",), inline=True, hide_details=True):
             v3.VRadio(label="its own stock", value="stock")
             v3.VRadio(label="no stock (keep out)", value="keep out")
-        v3.VTextField(v_model=("face_stock",), v_if=("face_action === 'stock'",), type="number", step=0.1, min=0, label="stock on the face", suffix=("unit",), classes="mt-2", raw_attrs=mark("face-stock"))
-        html.Div("{{ one }}", v_for=("(one, k) in targets",), key=("'t' + k",), classes="text-body-2 mt-1", raw_attrs=mark("target-row"))
+        v3.VTextField(
+            v_model=("face_stock",),
+            v_if=("face_action === 'stock'",),
+            type="number",
+            step=0.1,
+            min=0,
+            label="stock on the face",
+            suffix=("unit",),
+            classes="mt-2",
+            raw_attrs=mark("face-stock"),
+        )
+        html.Div(
+            "{{ one }}",
+            v_for=("(one, k) in targets",),
+            key=("'t' + k",),
+            classes="text-body-2 mt-1",
+            raw_attrs=mark("target-row"),
+        )
         html.Div("keep out: {{ one }}", v_for=("(one, k) in keep_out",), key=("'k' + k",), classes="text-body-2 mt-1")
         v3.VBtn("no allowance", v_if=("has_allowance",), size="small", variant="text", click=self.drop_allowance)
         html.Div("{{ one }}", v_for=("(one, k) in deposits",), key=("'d' + k",), classes="fine mt-2")
@@ -72,7 +99,15 @@ class RepairPanel(Panel):
     def _build_path(self) -> None:
         html.Div("Passes layer by layer that build the deposit up.", classes="fine mb-2")
         with html.Div(v_if=("!has_path",)):
-            v3.VBtn("plan a path", size="small", color="primary", variant="tonal", click=self.add_path, disabled=("!job_name",), raw_attrs=mark("add-path"))
+            v3.VBtn(
+                "plan a path",
+                size="small",
+                color="primary",
+                variant="tonal",
+                click=self.add_path,
+                disabled=("!job_name",),
+                raw_attrs=mark("add-path"),
+            )
         with html.Div(v_if=("has_path",)):
             for name, label in NUMBERS:
                 v3.VTextField(
@@ -81,8 +116,22 @@ class RepairPanel(Panel):
                 )  # fmt: skip
             v3.VBtn("no path", size="small", variant="text", click=self.drop_path)
         with html.Div(v_if=("path_layers",), classes="mt-2"):
-            v3.VSelect(v_model=("path_site",), items=("path_sites",), label="site", v_if=("path_sites.length > 1",), classes="mb-2")
-            v3.VSlider(v_model=("path_share",), min=0, max=1, step=0.002, label="time", hide_details=True, raw_attrs=mark("time"))
+            v3.VSelect(
+                v_model=("path_site",),
+                items=("path_sites",),
+                label="site",
+                v_if=("path_sites.length > 1",),
+                classes="mb-2",
+            )
+            v3.VSlider(
+                v_model=("path_share",),
+                min=0,
+                max=1,
+                step=0.002,
+                label="time",
+                hide_details=True,
+                raw_attrs=mark("time"),
+            )
             v3.VSlider(
                 model_value=("path_layer",), min=1, max=("path_layers",), step=1, label="layer", hide_details=True,
                 update_modelValue=(self.go_to_layer, "[$event]"), raw_attrs=mark("layer"),
@@ -91,13 +140,44 @@ class RepairPanel(Panel):
 
     def _build_export(self) -> None:
         html.Div("Solids", classes="head")
-        v3.VSelect(v_model=("formats",), items=("all_formats", list(FORMATS)), multiple=True, chips=True, __events=SELECTED, update_menu=(self.set_formats, "[$event]"), label="formats", raw_attrs=mark("formats"))
+        v3.VSelect(
+            v_model=("formats",),
+            items=("all_formats", list(FORMATS)),
+            multiple=True,
+            chips=True,
+            __events=SELECTED,
+            update_menu=(self.set_formats, "[$event]"),
+            label="formats",
+            raw_attrs=mark("formats"),
+        )
         html.Div("Paths", classes="head")
-        v3.VSelect(v_model=("path_formats",), items=("all_paths", list(PATHS)), multiple=True, chips=True, __events=SELECTED, update_menu=(self.set_formats, "[$event]"), label="formats")
+        v3.VSelect(
+            v_model=("path_formats",),
+            items=("all_paths", list(PATHS)),
+            multiple=True,
+            chips=True,
+            __events=SELECTED,
+            update_menu=(self.set_formats, "[$event]"),
+            label="formats",
+        )
         html.Div("Formats are written by the next run.", classes="fine mt-1 mb-3")
         with html.Div(v_if=("has_result",)):
-            v3.VBtn("download one zip", prepend_icon="mdi-download", color="primary", variant="tonal", href="/download", download=True, raw_attrs=mark("download"))
-            v3.VBtn("open the folder", prepend_icon="mdi-folder-open", variant="text", v_if=("can_show",), click=self.show_folder)
+            v3.VBtn(
+                "download one zip",
+                prepend_icon="mdi-download",
+                color="primary",
+                variant="tonal",
+                href="/download",
+                download=True,
+                raw_attrs=mark("download"),
+            )
+            v3.VBtn(
+                "open the folder",
+                prepend_icon="mdi-folder-open",
+                variant="text",
+                v_if=("can_show",),
+                click=self.show_folder,
+            )
             html.Div("{{ one }}", v_for=("(one, k) in result_files",), key=("k",), classes="fine")
 
     async def set_outer(self) -> None:
@@ -239,13 +319,17 @@ class RepairPanel(Panel):
 
         end = play.at(float(self.state.path_share))
         pieces, layers = play.list_passes(end)
-        shades = (np.array(colormaps["viridis"](np.linspace(0.1, 1, int(play.layer.max()) + 1)))[:, :3] * 255).astype(np.uint8)
+        shades = (np.array(colormaps["viridis"](np.linspace(0.1, 1, int(play.layer.max()) + 1)))[:, :3] * 255).astype(
+            np.uint8
+        )
         colours = [np.repeat(shades[[layer]], len(piece), axis=0) for piece, layer in zip(pieces, layers, strict=True)]
         scene.put("passes", make_lines(pieces, colours), size=3.0)
         nozzle = make_nozzle(self.state.path, play.points[end], play.axes[end]) if self.state.has_path else None
         scene.put("nozzle", make_mesh(nozzle), colour="#c9a227", opacity=0.6)
         self.state.path_layer = int(play.layer[end])
-        self.state.path_words = f"{play.minutes[end]:.2f} of {play.minutes[-1]:.2f} min, layer {play.layer[end]} of {play.layer.max()}"
+        self.state.path_words = (
+            f"{play.minutes[end]:.2f} of {play.minutes[-1]:.2f} min, layer {play.layer[end]} of {play.layer.max()}"
+        )
 
 
 def _to_length(text: Any) -> float | None:

@@ -19,7 +19,13 @@ class SeveralPanel(Panel):
 
     def build(self) -> None:
         with html.Div(classes="d-flex align-center mb-2", style="gap: 8px"):
-            v3.VSwitch(v_model=("only_doubtful",), label="doubtful ones", color="primary", hide_details=True, raw_attrs=mark("only-doubtful"))
+            v3.VSwitch(
+                v_model=("only_doubtful",),
+                label="doubtful ones",
+                color="primary",
+                hide_details=True,
+                raw_attrs=mark("only-doubtful"),
+            )
             v3.VBtn("next", size="small", variant="tonal", click=self.open_next, raw_attrs=mark("next-job"))
             v3.VBtn("look again", size="small", variant="text", click=self.look)
         with v3.VCard(
@@ -29,7 +35,11 @@ class SeveralPanel(Panel):
             with html.Div(classes="d-flex align-center"):
                 html.Span("{{ one.job }}", classes="font-weight-medium mr-2")
                 v3.VChip("{{ one.state }}", size="x-small", color=("one.tone",))
-            html.Div("{{ one.volume }}, 95 %: {{ one.interval }}; proven {{ one.proven }}, likely {{ one.likely }}, doubtful {{ one.doubtful }}", v_if=("one.volume",), classes="fine")
+            html.Div(
+                "{{ one.volume }}, 95 %: {{ one.interval }}; proven {{ one.proven }}, likely {{ one.likely }}, doubtful {{ one.doubtful }}",
+                v_if=("one.volume",),
+                classes="fine",
+            )
         v3.VBtn(
             "run those that were not", size="small", color="primary", variant="tonal", click=self.run_all,
             disabled=("running || !rows.some(x => x.state === 'not run')",), raw_attrs=mark("run-all"),
