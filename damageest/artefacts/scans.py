@@ -199,6 +199,38 @@ class FreeMotion(Checked):
 
 
 @dataclass(frozen=True, eq=False)
+class DatumFit(Checked):
+    """How one datum of a datum system was fitted to the scan, in the order of precedence.
+
+    ``name``: its letter. ``kind``: its shape, as "plane", or "3 cylinders" for a pattern. ``faces``: numbers of its CAD
+    faces, empty where the part is a mesh. ``takes``: the degrees of freedom that it fixes, as text in the part's frame.
+    ``points``: scan points on it; ``contact``: the share of them on the fitted shape, ``inside``: below it, as where it
+    is worn. ``rms``: of the means of patches in contact, in the job's unit. ``nominal`` and ``measured``: the radius of
+    each cylinder and sphere, in the job's unit. ``shapes``: the kind of each of its shapes, with ``places`` on it (a
+    plane's middle, on the axis, the apex, the centre), ``axes`` (a plane's outward normal; 0 for a sphere), and whether
+    it is a ``bores`` face, with the outside toward the axis.
+    """
+
+    name: str
+    kind: str
+    faces: tuple[int, ...] = ()
+    takes: tuple[str, ...] = ()
+    points: int = 0
+    contact: float = 1.0
+    inside: float = 0.0
+    rms: float = 0.0
+    nominal: tuple[float, ...] = ()
+    measured: tuple[float, ...] = ()
+    shapes: tuple[str, ...] = ()
+    places: tuple[Vector, ...] = ()
+    axes: tuple[Vector, ...] = ()
+    bores: tuple[bool, ...] = ()
+    _ranges: ClassVar[dict[str, Range]] = {
+        "points": (0, MOST), "contact": (0.0, 1.0), "inside": (0.0, 1.0), "rms": (0.0, MOST),
+    }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
 class Pose(Checked):
     """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
 
@@ -208,6 +240,10 @@ class Pose(Checked):
     symmetries, only sites are concerned whose metal is another one in them.
     ``free``: motions that unworn skin does not exclude. ``is_held``: whether skin without wear holds the pose but for
     those; False where that was not tested.
+    ``datums``: how the datums of a datum system were fitted, and ``left``: motions that they leave free and that the
+    rest of the skin fixes, without a range. ``spread`` (6,K): the errors of a pose by datums, as columns of one
+    standard deviation each: rotation about the middle of the part's bounds, in radians, then shift, in the job's unit;
+    None where the pose was fitted to all of the skin.
     """
 
     T_part_scan: Floats
@@ -218,7 +254,10 @@ class Pose(Checked):
     doubts: tuple[Reason, ...] = ()
     free: tuple[FreeMotion, ...] = ()
     is_held: bool = False
-    _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64}
+    datums: tuple[DatumFit, ...] = ()
+    left: tuple[FreeMotion, ...] = ()
+    spread: Floats | None = None
+    _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64, "spread": np.float64}
     _ranges: ClassVar[dict[str, Range]] = {"rms": (0.0, MOST), "inliers": (0.0, 1.0)}
 
     def __post_init__(self) -> None:
@@ -228,6 +267,9 @@ class Pose(Checked):
         if self.alternatives is not None:
             require_shape("alternatives", self.alternatives, "K", 4, 4)
             require_rigid("alternatives", self.alternatives)
+        if self.spread is not None:
+            require_shape("spread", self.spread, 6, "K")
+            require_finite("spread", self.spread)
 
 
 @dataclass(frozen=True, eq=False)

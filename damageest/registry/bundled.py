@@ -11,7 +11,7 @@ COMMANDS = {"app": "damageest-app", "evaluate": "damageest-evaluate"}
 CONVERSIONS = {"cadquery": "damageest-cadquery"}
 """Kind of object that a result can be converted to, to package."""
 
-FORMATS = {"step": "damageest-cadquery"}
+FORMATS = {"step": "damageest-cadquery", "qif": "damageest-qif"}
 """Format that `export` writes, to package."""
 
 IMPLEMENTATIONS = {

@@ -36,6 +36,7 @@ from damageest.geometry import (
     pseudonormals,
     rays,
     refinement,
+    shapes,
     slivers,
     solids,
     stiff_modes,
@@ -122,6 +123,10 @@ CALLS: dict[str, Callable[[Rows], None]] = {
         (None,),
     ),
     "depth_steps.measure_depth_step": lambda r: expect(np.asarray(depth_steps.measure_depth_step(r.points)), ()),
+    "shapes.Shape": lambda r: expect(
+        shapes.Shape("cylinder", np.zeros(3), np.eye(3)[2], 1.0).find_slopes(r.points), (r.count, 6)
+    ),
+    "shapes.recognise_shape": lambda r: expect(np.asarray(shapes.recognise_shape(r.mesh.triangles) is None), ()),
     "stiff_modes.name_modes": lambda r: expect(np.asarray(stiff_modes.name_modes(r.points, r.points)[1]), ()),
     "undoing.undo": lambda r: expect(undoing.undo(STILL, r.points), (r.count, 3)),
     "undoing.cut_to_follow": lambda r: expect(undoing.cut_to_follow(r.mesh, np.copy, 1.0)[0], (None, 3)),

@@ -47,7 +47,7 @@ REASON = Reason("other_poses", "two fit", "contradicts", 0.2, "mm", (1.0, 2.0, 3
 FREE = FreeMotion((0.0, 0.6, 0.8), -0.1, 1 / 3, (1.0, 2.0, 3.0), 0.02, "a turn")
 UP = np.tile([0.0, 0.6, 0.8], (7, 1))
 UNREACHED = Unreached(1 / 3, "unsupported")
-FILL = BeadFill(0.1, 0.99, 1 / 3, 0.2, 0.3, 0.4, 0.5, 0.6)
+FILL = BeadFill(0.1, 0.99, 1 / 3, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
 PATH = DepositPath(
     POINTS, UP, -UP, np.arange(7) + 1 / 3, np.arange(7) > 2, np.arange(1, 8), np.arange(1, 8), np.ones(7, np.int64),
     UP[:1], POINTS[0, :1], 2.0, POINTS[1, :1], 1 / 3, 10.0, SOLID, 0.1, np.inf,
@@ -57,7 +57,14 @@ ARTEFACTS: list[Any] = [
     FILL,
     PATH,
     dataclasses.replace(
-        PATH, tightest=POINTS[:2], unreached=(UNREACHED, UNREACHED), missing=SOLID, fill=FILL, notes=("much travel",)
+        PATH,
+        tightest=POINTS[:2],
+        unreached=(UNREACHED, UNREACHED),
+        missing=SOLID,
+        fill=FILL,
+        notes=("much travel",),
+        kinds=("row",) * 7,
+        setup=TURN,
     ),
     FREE,
     Mesh(BOX.vertices, BOX.faces),

@@ -25,7 +25,7 @@ def _table() -> NDArray[np.uint8]:
 def colour_deviation(distance: Floats, tolerance: float) -> NDArray[np.uint8]:
     """(N,3) colours of signed distances to the nominal surface; grey where there is none (NaN)."""
     share = np.clip(np.nan_to_num(distance / tolerance) / (2 * REACH) + 0.5, 0, 1)
-    colours = _table()[(share * 255).astype(int)]
+    colours: NDArray[np.uint8] = _table()[(share * 255).astype(int)]
     colours[np.isnan(distance)] = 150
     return colours
 

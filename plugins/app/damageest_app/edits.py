@@ -46,12 +46,12 @@ def open_stage(tree: Any, stage: str, use: str) -> Any:
     replaced by it, and loses its options."""
     from ruamel.yaml.comments import CommentedMap
 
-    value = tree.get(stage)
-    if isinstance(value, Mapping):
+    value: Any = tree.get(stage)
+    if isinstance(value, dict):
         if value.get("use", use) != use:
             value.clear()
         if use and value.get("use") != use and stage not in ("part", "scan"):
-            value.insert(0, "use", use)
+            value.insert(0, "use", use)  # type: ignore[attr-defined]
         return value
     made = CommentedMap()
     if stage in ("part", "scan"):
@@ -88,8 +88,8 @@ def add_crop(tree: Any, crop: Mapping[str, Any]) -> None:
 
 def drop_last(tree: Any, stage: str, option: str) -> None:
     """Removes the last entry of a list of a stage, and the list with its last entry."""
-    mapping = tree.get(stage)
-    if isinstance(mapping, Mapping) and mapping.get(option):
+    mapping: Any = tree.get(stage)
+    if isinstance(mapping, dict) and mapping.get(option):
         mapping[option].pop()
         if not mapping[option]:
             del mapping[option]

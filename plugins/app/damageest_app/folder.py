@@ -86,7 +86,7 @@ class Folder:
     def _describe_job(self, name: str) -> dict[str, Any]:
         path = self.path / name
         row: dict[str, Any] = {"job": name, "state": "not run", "volume": "", "interval": "", "tone": ""}
-        row |= {level: 0 for level in ("proven", "likely", "doubtful")}
+        row |= dict.fromkeys(("proven", "likely", "doubtful"), 0)
         found = path.parent / "out" / path.stem / "result.json"
         try:
             content = json.loads(found.read_text(encoding="utf-8"))

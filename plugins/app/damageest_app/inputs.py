@@ -16,7 +16,6 @@ from damageest.geometry.crops import crop_points
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.units import diagnose_scale, diagnose_size, unit_factor
 from damageest.job import Job, load
-from damageest.pipeline.prepare import read_inputs
 from damageest.registry import Registry
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan

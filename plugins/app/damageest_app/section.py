@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
-from damageest.geometry.solids import to_manifold
 
 WIDTH, HEIGHT = 640.0, 420.0
 """Size of a drawing, in its own units."""
@@ -66,7 +65,7 @@ def measure_depth(damage: Mesh, plane: Plane) -> float:
 
 
 class Cutter:
-    """A solid that is cut by many planes."""
+    """A mesh that is cut by many planes. It need not be closed: files in single precision may not be."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
@@ -94,7 +93,8 @@ class Cutter:
 
 @dataclass(frozen=True)
 class Drawing:
-    """An SVG element and the frame that it shows: ``low`` is its left lower corner, ``scale`` drawing units a length."""
+    """An SVG element and the frame that it shows: ``low`` is its left lower corner, ``scale`` drawing units for
+    a length."""
 
     svg: str
     low: tuple[float, float]
@@ -114,8 +114,8 @@ def draw(
     colour: str,
     measured: list[tuple[float, float]] | None = None,
 ) -> Drawing:
-    """``loops``: outlines by name (part, damage, deposit); the damage decides what is shown. ``points`` (N,3): the scan;
-    those within ``spacing`` of the plane are drawn. ``measured``: up to two places in the plane."""
+    """``loops``: outlines by name (part, damage, deposit); the damage decides what is shown. ``points`` (N,3): the
+    scan; those within ``spacing`` of the plane are drawn. ``measured``: up to two places in the plane."""
     shown = loops.get("damage") or loops.get("part") or [np.zeros((1, 2))]
     ends = np.concatenate(shown)
     low, high = ends.min(axis=0), ends.max(axis=0)

@@ -196,10 +196,11 @@ def _build_dialogs() -> None:
 def _bind(session: Session) -> None:
     state, server, ctrl = session.state, session.server, session.ctrl
 
-    @state.change("dark")
     def set_dark(dark: bool, **_: Any) -> None:
         session.scene.set_dark(dark)
         session.push()
+
+    state.change("dark")(set_dark)
 
     async def pick(click: dict[str, Any]) -> None:
         panel = session.panels.get(state.step)
@@ -230,4 +231,5 @@ def _bind(session: Session) -> None:
     ctrl.trigger("key")(key)
     ctrl.trigger("refused")(lambda text: session.say(text, "error"))
     ctrl.on_server_ready.add(lambda **_: session.panels["open"].begin())  # type: ignore[attr-defined]
+    ctrl.on_client_connected.add(lambda **_: session.panels["open"].look())  # type: ignore[attr-defined]
     del server

@@ -36,7 +36,12 @@ class OpenPanel(Panel):
         """The server is up: a folder with one job opens it."""
         jobs = self.state.files["jobs"]
         if len(jobs) == 1:
-            asyncio.ensure_future(self._open_first(jobs[0]))
+            self._opening = asyncio.ensure_future(self._open_first(jobs[0]))  # kept, or it may end early
+
+    def look(self) -> None:
+        """A tab was opened or loaded again: the folder may have other files."""
+        with self.state:
+            self.state.files = self.session.folder.list_files()
 
     async def _open_first(self, name: str) -> None:
         await self.session.open_job(name)

@@ -258,7 +258,8 @@ class RepairPanel(Panel):
         self.state.targets = [f"{one['outer']:g} {self.state.unit} on {words(one)}" for one in targets]
         self.state.keep_out = [words(one) for one in allowance.get("keep_out", [])]
         self.state.has_path = isinstance(path, dict) and path.get("use") == "layers"
-        self.state.path = {**path, **(path.get("nozzle") or {})} if self.state.has_path else {}
+        path = path if isinstance(path, dict) and self.state.has_path else {}
+        self.state.path = {**path, **(path.get("nozzle") or {})}
         export = export if isinstance(export, dict) else {}
         formats = export.get("format", ["stl"])
         self.state.formats = [formats] if isinstance(formats, str) else list(formats)
