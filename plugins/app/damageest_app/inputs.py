@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from damageest import read_inputs
 from damageest.artefacts import Floats, Ints, Part, Scan
 from damageest.geometry.crops import crop_points
 from damageest.geometry.noise import measure_noise_and_spacing
@@ -28,9 +29,9 @@ UNITS = ("mm", "in", "cm", "m", "um", "ft")
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """``whole``: the scan as it was read; ``scan``: what crops leave of it; ``shown`` (M,): those of its points that the
-    browser draws, and ``shade`` (M,), how bright they are. ``doubt``: why the unit is doubtful, empty
-    where it is not; ``offers``: for `part` and `scan`, the units that would remove the doubt."""
+    """``whole``: the scan as it was read; ``scan``: what crops leave of it; ``shown`` (M,): those of its points that
+    the browser draws, and ``shade`` (M,), how bright they are. ``doubt``: why the unit is doubtful, empty where it is
+    not; ``offers``: for `part` and `scan`, the units that would remove the doubt."""
 
     part: Part
     whole: Scan
@@ -45,7 +46,7 @@ class Inputs:
         faces = f", {len(set(self.part.faces_brep))} CAD faces" if self.part.faces_brep is not None else ""
         return (
             f"{size} {self.part.unit}, {self.part.volume:.5g} {self.part.unit}³, {len(self.part.faces)} triangles"
-            + (faces)
+            + faces
         )
 
     def describe_scan(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,8 @@ class Results:
             self._solids[key] = self.output.read_solid(kind, site)
         return self._solids[key]
 
-    def read_skin(self) -> tuple[Mesh, Floats] | None:
+    @cached_property
+    def skin(self) -> tuple[Mesh, Floats] | None:
         """The skin in cells, and the mean signed distance (F,) of the scan to each, NaN where there is none."""
         path = self.output.place / "skin.ply"
         if not path.is_file():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -68,27 +67,17 @@ class Cutter:
     """A mesh that is cut by many planes. It need not be closed: files in single precision may not be."""
 
     def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
-        self._origin = mesh.bounds.mean(axis=0)
-        self._body: Any = None
-        with suppress(ValueError):  # one that a file of single precision has opened; it is cut as a surface
-            self._body = to_manifold(mesh, self._origin)
-
-    def cut(self, plane: Plane) -> list[Floats]:
-        """The closed outlines (K,2) in the plane."""
-        if self._body is None:
-            return self._cut_surface(plane)
-        turn = np.stack([plane.right, plane.up, plane.normal])
-        shift = turn @ (self._origin - plane.origin)
-        loops = self._body.transform(np.column_stack([turn, shift])).slice(0.0).to_polygons()
-        return [np.vstack([loop, loop[:1]]) for loop in loops]
-
-    def _cut_surface(self, plane: Plane) -> list[Floats]:
         import trimesh
 
-        body = trimesh.Trimesh(self._mesh.vertices, self._mesh.faces, process=True)
-        path = body.section(plane_normal=plane.normal, plane_origin=plane.origin)
-        return [] if path is None else [plane.project(np.asarray(line))[0] for line in path.discrete]
+        self._body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+
+    def cut(self, plane: Plane) -> list[Floats]:
+        """The outlines (K,2) in the plane."""
+        outline = self._body.section(plane.normal, plane.origin)
+        if outline is None:
+            return []
+        axes = np.stack([plane.right, plane.up], axis=1)
+        return [(np.asarray(line) - plane.origin) @ axes for line in outline.discrete]
 
 
 @dataclass(frozen=True)

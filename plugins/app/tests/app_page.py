@@ -21,9 +21,8 @@ NORMAL = ("/paraview/", "405 (Method Not Allowed)")
 def serve(folder: Path, *words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Starts `damageest app` and gives its process and address."""
     env = {**os.environ, "PYTHONUNBUFFERED": "1"}
-    process = subprocess.Popen(
-        [*COMMAND, "app", str(folder), "--no-browser", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
-    )  # fmt: skip
+    command = [*COMMAND, "app", str(folder), "--no-browser", *words]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env)
     try:
         assert process.stdout
         while not (found := re.search(r"http://\S+", line := process.stdout.readline())):

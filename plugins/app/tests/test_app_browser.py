@@ -5,8 +5,6 @@ With DAMAGEEST_PICTURES=FOLDER the pictures of docs/app.md are written there.
 
 from __future__ import annotations
 
-import io
-import json
 import os
 import re
 import shutil
@@ -14,7 +12,6 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -86,73 +83,6 @@ def app(tmp_path: Path) -> Iterator[App]:
                 yield App(folder, browser.new_page(viewport={"width": 1280, "height": 800}), address)
         finally:
             process.terminate()
-
-
-def test_from_open_to_export_and_the_same_in_the_terminal(app: App, tmp_path: Path) -> None:
-    app.find("part").wait_for(timeout=60_000)
-    app.choose("part", "block.stl")
-    app.choose("scan", "block_wedge.ply")
-    app.find("make").click()
-    app.find("part-facts").wait_for(timeout=60_000)
-    assert "80 × 60 × 30 mm" in app.find("part-facts").inner_text()
-    assert "110,000 points" in app.find("scan-facts").inner_text()
-    app.shoot("open")
-
-    app.find("step-prepare").click()
-    app.find("crop-piece").click()
-    app.page.get_by_text("1. keep largest piece").wait_for(timeout=60_000)
-    assert app.values()["scan"]["crop"] == [{"keep": "largest piece"}]
-    app.find("undo").click()
-    app.page.get_by_text("1. keep largest piece").wait_for(state="detached", timeout=60_000)
-    assert app.values()["scan"] == "block_wedge.ply"
-
-    app.run()
-    app.find("site").wait_for(timeout=60_000)
-    app.find("site").click()
-    app.find("section").wait_for(timeout=20_000)
-    assert "proven" in app.find("site").inner_text()
-    app.shoot("judge")
-    app.find("drop").click()
-    app.page.get_by_text("dropped").wait_for(timeout=20_000)
-    assert app.values()["sites"] == {"drop": [1]}
-    app.page.keyboard.press("Control+z")
-    app.page.get_by_text("dropped").wait_for(state="detached", timeout=60_000)
-    assert "sites" not in app.values()
-
-    app.find("step-prepare").click()
-    app.find("share").wait_for(timeout=20_000)
-    app.shoot("prepare")
-    app.find("step-align").click()
-    app.page.locator(".legend .row").first.wait_for(timeout=20_000)
-    app.shoot("align")
-
-    app.find("step-repair").click()
-    app.find("outer").locator("input").fill("0.5")
-    app.find("outer").locator("input").press("Tab")
-    app.page.get_by_text("no allowance").wait_for(timeout=20_000)
-    assert app.values()["allowance"] == {"use": "milling", "outer": 0.5}
-    app.run()
-    app.find("step-repair").click()
-    app.shoot("repair")
-    app.find("repair-export").click()
-    app.find("download").wait_for(timeout=20_000)
-
-    with urllib.request.urlopen(app.address.replace("/index.html", "/download")) as answer:
-        archive = zipfile.ZipFile(io.BytesIO(answer.read()))
-    (out,) = (app.folder / "out").iterdir()
-    names = {name.partition("/")[2] for name in archive.namelist()}
-    assert {"result.json", "damage/site-1.stl", "deposit/site-1.stl"} <= names
-    assert app.faults == []
-    assert app.others == []
-
-    (job,) = app.folder.glob("*.yaml")
-    again = tmp_path / "again"
-    words = ["run", str(job), "--output", str(again), "--no-cache", "--quiet"]
-    subprocess.run([sys.executable, "-c", "from damageest.cli import main; main()", *words], check=True)
-    for name in ("damage/site-1.stl", "deposit/site-1.stl", "undamaged.stl", "scan.ply", "surface/site-1.ply"):
-        assert (again / name).read_bytes() == (out / name).read_bytes(), name
-    first, second = (json.loads((place / "result.json").read_text())["sites"] for place in (out, again))
-    assert first == second
 
 
 def test_without_the_token_nothing_is_answered(app: App) -> None:

@@ -73,9 +73,8 @@ def test_from_open_to_export(tmp_path: Path, pictures: Path) -> None:
     check_job(job)
     assert "# lambda: points closer to the nominal surface are intact" in (folder / "block.yaml").read_text()
     other = folder / "out" / "again"
-    done = subprocess.run(
-        [*COMMAND, "run", "block.yaml", "-o", str(other), "--no-cache", "--quiet"], cwd=folder, capture_output=True, text=True, check=False
-    )  # fmt: skip
+    words = [*COMMAND, "run", "block.yaml", "-o", str(other), "--no-cache", "--quiet"]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert read_output(folder / "out" / "block") == read_output(other)
 

@@ -13,10 +13,10 @@ from damageest.io.colours import PART
 from damageest_app import edits
 from damageest_app.colours import colour_deviation, make_legend
 from damageest_app.faces import Faces
+from damageest_app.panels.marks import mark
 from damageest_app.panels.open import SCAN, place_beside, put_scan
 from damageest_app.pick import Ray, find_point
 from damageest_app.scene import Scene, make_mesh, make_points
-from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 from damageest_app.shade import tint
 
@@ -161,6 +161,11 @@ class AlignPanel(Panel):
         ]
         self.state.pose_words = [*words, *map(str, alignment["notes"]), *map(str, alignment["doubts"])]
 
+    def warm(self) -> None:
+        if self.session.results is not None:
+            _ = self.session.results.skin
+        self.session.find_tools()
+
     def draw(self, scene: Scene) -> None:
         inputs, results = self.session.inputs, self.session.results
         tool = self.state.align_tool
@@ -179,7 +184,7 @@ class AlignPanel(Panel):
         inputs, results = self.session.inputs, self.session.results
         assert inputs is not None
         assert results is not None
-        poses, scan, skin = results.list_poses(), results.output.scan, results.read_skin()
+        poses, scan, skin = results.list_poses(), results.output.scan, results.skin
         if 0 < int(self.state.pose) < len(poses):
             scene.put("part", make_mesh(inputs.part), colour=PART)
             move = poses[int(self.state.pose)]

@@ -10,10 +10,10 @@ from trame.widgets import vuetify3 as v3
 
 from damageest.io.colours import PART, SURPLUS, UNSEEN, colour_site
 from damageest_app import edits
+from damageest_app.panels.marks import mark
 from damageest_app.pick import MeshPicker, Ray
 from damageest_app.scene import Scene, lift, make_lines, make_mesh, make_points
 from damageest_app.section import HEIGHT, WIDTH, Cutter, Drawing, Plane, choose_plane, draw, measure_depth, to_space
-from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 
 MOST_WARM = 20
@@ -64,7 +64,7 @@ class JudgePanel(Panel):
     def _build_site(self) -> None:
         with v3.VCard(
             v_for=("one in sites",), key=("one.id",), variant=("site === one.id ? 'tonal' : 'outlined'",), classes="mb-2 pa-2",
-            click=(self.choose, "[one.id]"), raw_attrs=mark("site", 'tabindex="0"'),
+            click=(self.choose, "[one.id]"), raw_attrs=mark("site", 'tabindex="0"', '@keydown.enter="$event.currentTarget.click()"'),
         ):  # fmt: skip
             with html.Div(classes="d-flex align-center"):
                 html.Span(classes="site-dot", style=("{background: one.colour}",))

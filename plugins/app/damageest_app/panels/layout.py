@@ -11,12 +11,12 @@ from trame.widgets import vuetify3 as v3
 
 from damageest_app.panels.align import AlignPanel
 from damageest_app.panels.judge import JudgePanel
+from damageest_app.panels.marks import mark
 from damageest_app.panels.open import OpenPanel
 from damageest_app.panels.prepare import PreparePanel
 from damageest_app.panels.repair import RepairPanel
 from damageest_app.panels.several import SeveralPanel
 from damageest_app.pick import Ray
-from damageest_app.panels.marks import mark
 from damageest_app.session import STEPS, Session
 
 ICONS = ("mdi-folder-open-outline", "mdi-crop", "mdi-axis-arrow", "mdi-scale-balance", "mdi-layers-triple-outline",

@@ -13,8 +13,8 @@ from damageest.artefacts import Floats
 from damageest.io.colours import PART
 from damageest_app import edits
 from damageest_app.inputs import UNITS, Inputs
-from damageest_app.scene import Scene, make_mesh, make_points
 from damageest_app.panels.marks import mark
+from damageest_app.scene import Scene, make_mesh, make_points
 from damageest_app.session import Panel, Session
 from damageest_app.shade import tint
 

@@ -11,9 +11,9 @@ from trame.widgets import vuetify3 as v3
 from damageest.artefacts import Floats
 from damageest_app import edits
 from damageest_app.histogram import Histogram
+from damageest_app.panels.marks import mark
 from damageest_app.panels.open import put_scan
 from damageest_app.scene import Scene, make_lines, thin
-from damageest_app.panels.marks import mark
 from damageest_app.session import Panel, Session
 
 AXES = "xyz"

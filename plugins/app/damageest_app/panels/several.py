@@ -5,8 +5,8 @@ from __future__ import annotations
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
-from damageest_app.scene import Scene
 from damageest_app.panels.marks import mark
+from damageest_app.scene import Scene
 from damageest_app.session import Panel, Session
 
 
