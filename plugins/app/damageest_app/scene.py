@@ -72,7 +72,7 @@ class Scene:
     def clear(self) -> None:
         self.remove(*self.layers)
 
-    def frame(self, names: tuple[str, ...] = (), direction: Floats | None = None, near: float = 1.0) -> dict[str, Any]:
+    def frame(self, names: tuple[str, ...] = (), direction: Floats | None = None, near: float = 1.12) -> dict[str, Any]:
         """Puts the camera where it sees these layers, by default all; gives it as vtk.js takes it."""
         chosen = [self.bounds[name] for name in names if name in self.bounds] or list(self.bounds.values())
         if not chosen:

@@ -151,7 +151,7 @@ def _judge(page: Page, pictures: Path) -> None:
     for share in (0.4, 0.6):
         page.page.mouse.click(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
         page.at_rest(0.5)
-    assert "mm" in page.page.locator('[data-test="section"] .length').inner_text()
+    assert "mm" in page.page.locator('[data-test="section"] .length').text_content()
     page.shot(pictures / "judge.png")
     page.click("drop")
     page.wait("site", "dropped")
