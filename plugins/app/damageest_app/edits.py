@@ -54,6 +54,8 @@ def open_stage(tree: Any, stage: str, use: str) -> Any:
             value.insert(0, "use", use)  # type: ignore[attr-defined]
         return value
     made = CommentedMap()
+    if getattr(tree, "ca", None) is not None and stage in tree.ca.items:
+        made.fa.set_flow_style()  # the comment stands at the end of its line, and what follows it stays below
     if stage in ("part", "scan"):
         if value is not None:
             made["path"] = value

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Mesh
 
+COLUMNS = ("x", "y", "z", "i", "j", "k", "feed", "on", "layer")
+"""Those of the table that are played."""
+
 
 @dataclass(frozen=True, eq=False)
 class PathPlay:
@@ -29,7 +32,7 @@ class PathPlay:
         """Reads the table that `export: {paths: csv}` writes."""
         with path.open(newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
-        table = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+        table = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
         points = np.column_stack([table[name] for name in "xyz"])
         way = np.linalg.norm(np.diff(points, axis=0), axis=1)
         feed = np.maximum(table["feed"][1:], 1e-9)

@@ -236,8 +236,11 @@ class Session:
         self.state.has_result = self.results is not None
         self.state.summary = self.results.summarise() if self.results else []
         self.state.notes = self.results.list_notes() if self.results else []
-        for panel in self.panels.values():
-            panel.result()
+        for name, panel in self.panels.items():
+            try:
+                panel.result()
+            except (DamageestError, OSError, ValueError, KeyError, TypeError, IndexError) as error:
+                self.say(f"{name}: the result cannot be shown: {type(error).__name__}: {error}", "error")
         if self.results is not None:
             asyncio.get_running_loop().run_in_executor(None, self._warm)
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 COMMAND = [sys.executable, "-c", "from damageest.cli import main; main()"]
-NORMAL = ("/paraview/", "405 (Method Not Allowed)")
-"""The client of trame asks for a launcher first, which there is not."""
+NORMAL = ("/paraview/", "405 (Method Not Allowed)", "without a current renderer")
+"""The client of trame asks for a launcher first, which there is not; the mouse may move before anything is drawn."""
 
 
 @contextmanager
