@@ -39,6 +39,7 @@ class Shape:
 
     @property
     def has_radius(self) -> bool:
+        """Whether ``size`` is a radius."""
         return self.kind in ("cylinder", "sphere")
 
     def measure(self, points: Floats) -> tuple[Floats, Floats]:
@@ -105,7 +106,10 @@ def recognise_shape(triangles: Floats, deviation: float = 0.0) -> Shape | None:
             shape = replace(shape, sign=-shape.sign)
         distance, outward = shape.measure(corners - middle)
         turned = np.einsum("ij,ij->i", outward, np.repeat(normals, 3, axis=0))
-        if np.abs(distance).max() < limit and turned[np.repeat(area, 3) > 1e-6 * area.max()].min() > 0.5:
+        known = np.repeat(area, 3) > 1e-6 * area.max()
+        if shape.kind == "cone":  # its apex has no normal
+            known &= np.linalg.norm(corners - middle - shape.point, axis=1) > limit
+        if np.abs(distance).max() < limit and turned[known].min(initial=1.0) > 0.5:
             return replace(shape, point=shape.point + middle)
     return None
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from damageest.errors import DamageestError
-from damageest.job import yamlfile
+from damageest.job.yamlfile import parse, read
 
 Edit = Callable[[Any], None]
 """Changes the tree of a job (a mapping of ruamel.yaml, which keeps comments) in place."""
@@ -36,7 +36,7 @@ class JobFile:
 
     def reload(self) -> None:
         """Reads the file as it is now; a text of the app that it replaces can be restored by `undo`."""
-        yamlfile.read(self.path)  # its limits hold before a parser sees the text
+        read(self.path)  # its limits hold before a parser sees the text
         text = self.path.read_text(encoding="utf-8")
         before = getattr(self, "text", text)
         if text != before:
@@ -46,7 +46,7 @@ class JobFile:
     @property
     def values(self) -> dict[str, Any]:
         """The job as plain values."""
-        tree = yamlfile.parse(self.text, str(self.path))[0]
+        tree = parse(self.text, str(self.path))[0]
         return dict(tree) if isinstance(tree, dict) else {}
 
     def edit(self, change: Edit, check: Check) -> bool:
