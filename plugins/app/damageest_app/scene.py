@@ -34,6 +34,7 @@ class Scene:
         self.window.AddRenderer(self.renderer)
         self.layers: dict[str, Any] = {}
         self.bounds: dict[str, Floats] = {}
+        self._retired: list[Any] = []
         self.set_dark(False)
 
     def set_dark(self, dark: bool) -> None:
@@ -44,18 +45,16 @@ class Scene:
         self.remove(name)
         if data is None or not data.GetNumberOfPoints():
             return
-        mapper = vtkPolyDataMapper()
+        mapper, actor = vtkPolyDataMapper(), vtkActor()
         mapper.SetInputData(data)
         mapper.SetScalarVisibility(data.GetPointData().GetScalars() is not None)
-        actor = vtkActor()
         actor.SetMapper(mapper)
         look = actor.GetProperty()
         look.SetColor(*to_rgb(colour))
         look.SetOpacity(opacity)
         look.SetPointSize(size)
         look.SetLineWidth(size)
-        if data.GetNumberOfPolys() == 0:
-            look.SetLighting(False)
+        look.SetLighting(data.GetNumberOfPolys() > 0)
         look.SetAmbient(0.2)
         look.SetDiffuse(0.8)
         look.SetSpecular(0.1)
@@ -64,9 +63,13 @@ class Scene:
         self.bounds[name] = np.array(data.GetBounds()).reshape(3, 2).T
 
     def remove(self, *names: str) -> None:
+        """Hides layers. Their actors stay, without data: the browser knows objects by their addresses, and would draw
+        a mixture where another one is made at the address of one that was freed."""
         for name in names:
             if actor := self.layers.pop(name, None):
                 self.renderer.RemoveActor(actor)
+                actor.GetMapper().SetInputData(vtkPolyData())
+                self._retired.append(actor)
                 self.bounds.pop(name)
 
     def clear(self) -> None:

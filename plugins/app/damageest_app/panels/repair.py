@@ -43,6 +43,7 @@ class RepairPanel(Panel):
              "path_formats": list(PATHS), "deposits": [], "result_files": [], "can_show": bool(shutil.which("xdg-open"))}
         )  # fmt: skip
         self.state.change("path_share", "path_site")(lambda **_: self._play())
+        self.state.change("path_layer")(lambda **_: self._go_to_layer())
         self.state.change("repair_tool")(lambda **_: session.redraw() if self.state.step == "repair" else None)
 
     def build(self) -> None:
@@ -133,8 +134,8 @@ class RepairPanel(Panel):
                 raw_attrs=mark("time"),
             )
             v3.VSlider(
-                model_value=("path_layer",), min=1, max=("path_layers",), step=1, label="layer", hide_details=True,
-                update_modelValue=(self.go_to_layer, "[$event]"), raw_attrs=mark("layer"),
+                v_model=("path_layer",), min=1, max=("path_layers",), step=1, label="layer", hide_details=True,
+                raw_attrs=mark("layer"),
             )  # fmt: skip
             html.Div("{{ path_words }}", classes="fine", raw_attrs=mark("path-words"))
 
@@ -277,10 +278,11 @@ class RepairPanel(Panel):
         self.state.path_layers = int(play.layer.max()) if play is not None else 0
         self.state.path_share = 1.0
 
-    def go_to_layer(self, layer: int) -> None:
-        play = self.plays.get(int(self.state.path_site))
-        if play is not None:
-            self.state.path_share = play.share_of_layer(int(layer))
+    def _go_to_layer(self) -> None:
+        """The slider of layers was moved; where the one of the time moved it, both agree already."""
+        play, layer = self.plays.get(int(self.state.path_site)), int(self.state.path_layer)
+        if play is not None and layer and int(play.layer[play.at(float(self.state.path_share))]) != layer:
+            self.state.path_share = play.share_of_layer(layer)
 
     def draw(self, scene: Scene) -> None:
         inputs, results, tools = self.session.inputs, self.session.results, self.session.find_tools()
