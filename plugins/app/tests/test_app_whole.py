@@ -38,6 +38,9 @@ def read_output(folder: Path) -> dict[str, bytes]:
     content = json.loads(found.pop("result.json"))
     for key in ("stages", "steps"):
         content[key] = [{k: v for k, v in one.items() if k not in ("seconds", "cached")} for one in content[key]]
+    content["provenance"].pop("sha256")  # of the page as well
+    outputs = content["provenance"]["outputs"]
+    content["provenance"]["outputs"] = [one for one in outputs if one["path"] != "report.html"]
     found["result.json"] = json.dumps(content).encode()
     found.pop("report.html", None)  # it shows the seconds of the stages
     return found

@@ -39,6 +39,7 @@ window.damageest_page = {
     };
     window.addEventListener("keydown", (event) => {
       if (/^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName) && event.target.type !== "range") return;
+      if (document.querySelector(".v-overlay--active")) return; // a list or a dialog has its own keys
       const command = event.ctrlKey || event.metaKey;
       let name = command ? { z: event.shiftKey ? "redo" : "undo", Z: "redo", y: "redo" }[event.key] : keys[event.key];
       if (!name || event.altKey) return;
