@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -64,6 +65,9 @@ class Session:
         self.inputs: Inputs | None = None
         self.results: Results | None = None
         self.was_stopped = False
+        self.hold: Callable[[], None] = lambda: None
+        self.release: Callable[[], None] = lambda: None
+        self._tasks: set[asyncio.Future[None]] = set()
         self._tools: tuple[Any, MeshPicker, Faces] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self.state.update(
@@ -96,6 +100,26 @@ class Session:
             with self.state:
                 self.state.busy = ""
         return None
+
+    def spawn(self, work: Coroutine[Any, Any, object]) -> None:
+        """Goes on with this beside what the page asks for next: what a tab sends is answered in turn, so that nothing
+        could be stopped or looked at while a handler waits for a run."""
+
+        async def guard() -> None:
+            try:
+                await work
+            except Exception as error:
+                self.say(f"unexpected {type(error).__name__}: {error}", "error")
+                traceback.print_exception(error)
+            self.state.flush()
+
+        task = asyncio.ensure_future(guard())
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def start_run(self) -> None:
+        """Runs the job; the page stays alive."""
+        self.spawn(self.run())
 
     def redraw(self, frame: bool = False) -> None:
         """Fills the 3D view for the step that is shown; ``frame``: moves the camera to all of it."""
@@ -278,6 +302,7 @@ class Session:
             outcome = await asyncio.to_thread(self.runner.call, ["run", str(path), "--quiet"], self.folder.path)
         finally:
             clock.cancel()
+            self.release()
         with state:
             state.update({"running": False, "seconds": round(outcome.seconds, 1), "doing": self.runner.progress.doing})
             self._show_end(outcome, _read_stamp(output) != before, then)
@@ -302,6 +327,7 @@ class Session:
     async def _tick(self) -> None:
         while True:
             await asyncio.sleep(0.5)
+            self.hold()  # a run that nobody looks at goes on to its end
             with self.state:
                 self.state.seconds = round(self.state.seconds + 0.5, 1) if self.state.share else 0.5
                 self.state.share = max(self.state.share, 0.01)

@@ -113,7 +113,7 @@ def _build_bar(session: Session) -> None:
         )
         v3.VBtn(
             "Run", v_if=("!running",), color="primary", variant="flat", prepend_icon="mdi-play", title="run the job (r)",
-            click=session.run, disabled=("!job_name || !!busy",), raw_attrs=mark("run"),
+            click=session.start_run, disabled=("!job_name || !!busy",), raw_attrs=mark("run"),
         )  # fmt: skip
         v3.VBtn(
             icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",),
@@ -213,7 +213,7 @@ def _bind(session: Session) -> None:
             session.go(name)
         elif name == "run":
             if not state.running:
-                await session.run()
+                session.start_run()
         elif name == "stop":
             session.stop()
         elif name == "frame":

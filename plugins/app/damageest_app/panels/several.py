@@ -41,7 +41,7 @@ class SeveralPanel(Panel):
                 classes="fine",
             )
         v3.VBtn(
-            "run those that were not", size="small", color="primary", variant="tonal", click=self.run_all,
+            "run those that were not", size="small", color="primary", variant="tonal", click=self.start_all,
             disabled=("running || !rows.some(x => x.state === 'not run')",), raw_attrs=mark("run-all"),
         )  # fmt: skip
 
@@ -62,6 +62,9 @@ class SeveralPanel(Panel):
         here = names.index(self.state.job_name) if self.state.job_name in names else -1
         await self.session.open_job(names[(here + 1) % len(names)])
         self.session.redraw(frame=True)
+
+    def start_all(self) -> None:
+        self.session.spawn(self.run_all())
 
     async def run_all(self) -> None:
         """Runs the jobs without a result, one after the other; Stop ends the row of them."""
