@@ -16,9 +16,9 @@ def to_round(value: Any) -> Any:
     """Numbers with as many digits as a click deserves, as plain values of Python, lists of numbers on one line."""
     if isinstance(value, Mapping):
         return _flow({key: to_round(item) for key, item in value.items()})
-    if isinstance(value, (list, tuple)) or getattr(value, "ndim", 0):
+    if isinstance(value, (list, tuple)) or getattr(value, "ndim", False):
         return _flow([to_round(item) for item in value])
-    if isinstance(value, float) or getattr(value, "dtype", None) == float:
+    if isinstance(value, float) or (hasattr(value, "dtype") and value.dtype.kind == "f"):
         rounded = float(f"{float(value):.{DIGITS}g}")
         return rounded + 0.0  # no negative zero
     return value.item() if hasattr(value, "dtype") else value

@@ -18,7 +18,7 @@ from damageest_app.inputs import Inputs, Reader
 from damageest_app.jobfile import ConflictError, Edit, JobFile
 from damageest_app.pick import MeshPicker, Ray
 from damageest_app.results import Results
-from damageest_app.runner import Outcome, Progress, Runner, describe_end
+from damageest_app.runs import Runs
 from damageest_app.scene import Scene
 
 T = TypeVar("T")
@@ -58,18 +58,14 @@ class Session:
         self.server, self.state, self.ctrl = server, server.state, server.controller
         self.folder, self.registry = folder, registry
         self.reader = Reader(registry)
-        self.runner = Runner(self._tell_progress)
+        self.runs = Runs(self)
         self.scene = Scene()
         self.panels: dict[str, Panel] = {}
         self.job: JobFile | None = None
         self.inputs: Inputs | None = None
         self.results: Results | None = None
-        self.was_stopped = False
-        self.hold: Callable[[], None] = lambda: None
-        self.release: Callable[[], None] = lambda: None
         self._tasks: set[asyncio.Future[None]] = set()
         self._tools: tuple[Any, MeshPicker, Faces] | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
         self.state.update(
             {
                 "step": "open", "dark": False, "message": "", "tone": "info", "busy": "", "running": False,
@@ -116,10 +112,6 @@ class Session:
         task = asyncio.ensure_future(guard())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-
-    def start_run(self) -> None:
-        """Runs the job; the page stays alive."""
-        self.spawn(self.run())
 
     def redraw(self, frame: bool = False) -> None:
         """Fills the 3D view for the step that is shown; ``frame``: moves the camera to all of it."""
@@ -236,8 +228,6 @@ class Session:
         for panel in self.panels.values():
             panel.read(values)
 
-    # the run
-
     def find_output(self) -> Path | None:
         """The output folder of the open job; None where it lies outside of the folder of the app."""
         if self.job is None:
@@ -284,74 +274,7 @@ class Session:
             return True
         return bool(json.loads(json.dumps(values)) != (self.results.content.get("provenance") or {}).get("job"))
 
-    async def run(self, then: str = "judge") -> None:
-        """Runs the job as `damageest run` does, and shows step ``then`` when it is done."""
-        if self.job is None or self.runner.is_busy:
-            return
-        output = self.find_output()
-        if output is None:
-            self.say(f"the output of the job lies outside of {self.folder.path}; the app writes below it only", "error")
-            return
-        self._loop = asyncio.get_running_loop()
-        state, path = self.state, self.job.path
-        with state:
-            state.update({"running": True, "share": 0.0, "doing": "start of the program", "stages": [], "message": ""})
-        before = _read_stamp(output)
-        clock = asyncio.ensure_future(self._tick())
-        try:
-            outcome = await asyncio.to_thread(self.runner.call, ["run", str(path), "--quiet"], self.folder.path)
-        finally:
-            clock.cancel()
-            self.release()
-        with state:
-            state.update({"running": False, "seconds": round(outcome.seconds, 1), "doing": self.runner.progress.doing})
-            self._show_end(outcome, _read_stamp(output) != before, then)
-
-    def _show_end(self, outcome: Outcome, is_new: bool, then: str) -> None:
-        text = describe_end(outcome, self.runner.progress.doing)
-        self.was_stopped = outcome.stopped
-        if is_new:
-            self.load_results()
-            self.refresh()
-            self.go(then)
-        if text:
-            self.say(text, "warning" if outcome.stopped or is_new else "error")
-
-    def stop(self) -> None:
-        self.runner.stop()
-
-    def close(self) -> None:
-        """The server ends: nothing goes on."""
-        self.runner.stop()
-
-    async def _tick(self) -> None:
-        while True:
-            await asyncio.sleep(0.5)
-            self.hold()  # a run that nobody looks at goes on to its end
-            with self.state:
-                self.state.seconds = round(self.state.seconds + 0.5, 1) if self.state.share else 0.5
-                self.state.share = max(self.state.share, 0.01)
-
-    def _tell_progress(self, progress: Progress) -> None:
-        """Called from the thread that follows the run."""
-        if self._loop is not None:
-            self._loop.call_soon_threadsafe(self._show_progress, progress)
-
-    def _show_progress(self, progress: Progress) -> None:
-        with self.state:
-            self.state.doing = progress.doing
-            self.state.share = progress.share
-            self.state.stages = [dict(one) for one in progress.stages]
-
     def note_upload(self, name: str) -> None:
         with self.state:
             self.state.files = self.folder.list_files()
             self.say(f"{name} is in the folder now", "success")
-
-
-def _read_stamp(output: Path) -> int:
-    """When the result was written; 0 where there is none."""
-    try:
-        return (output / "result.json").stat().st_mtime_ns
-    except OSError:
-        return 0

@@ -36,7 +36,9 @@ def shop(tmp_path: Path) -> Path:
 def write_inputs(folder: Path, factor: float = 1.0) -> None:
     """A block with a bore and a step, and points on it; a corner of it is broken off."""
     part = trimesh.creation.box((40, 30, 12))
-    boss = trimesh.creation.cylinder(5, 8, sections=48, transform=trimesh.transformations.translation_matrix((-9, 5, 8)))
+    boss = trimesh.creation.cylinder(
+        5, 8, sections=48, transform=trimesh.transformations.translation_matrix((-9, 5, 8))
+    )
     part = trimesh.boolean.union([part, boss], engine="manifold")
     part.export(folder / "plate.stl")
     tool = trimesh.creation.icosphere(3, 9)
@@ -101,7 +103,7 @@ def test_a_scan_of_another_part_is_refused_with_a_remedy(shop: Path) -> None:
 
 
 def test_a_scan_that_lies_elsewhere_is_refused(shop: Path) -> None:
-    np.savetxt(shop / "far.xyz", np.loadtxt(shop / "scan.xyz") + (300, 0, 0), fmt="%.4f")
+    np.savetxt(shop / "far.xyz", np.loadtxt(shop / "scan.xyz") + np.array([300, 0, 0]), fmt="%.4f")
     with open_app(shop) as page:
         make(page, scan="far.xyz")
         page.wait("part-facts", "mm", 60)

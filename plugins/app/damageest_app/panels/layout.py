@@ -108,12 +108,12 @@ def _build_bar(session: Session) -> None:
             color="error",
             variant="tonal",
             prepend_icon="mdi-stop",
-            click=session.stop,
+            click=session.runs.stop,
             raw_attrs=mark("stop"),
         )
         v3.VBtn(
             "Run", v_if=("!running",), color="primary", variant="flat", prepend_icon="mdi-play", title="run the job (r)",
-            click=session.start_run, disabled=("!job_name || !!busy",), raw_attrs=mark("run"),
+            click=session.runs.start, disabled=("!job_name || !!busy",), raw_attrs=mark("run"),
         )  # fmt: skip
         v3.VBtn(
             icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",),
@@ -213,9 +213,9 @@ def _bind(session: Session) -> None:
             session.go(name)
         elif name == "run":
             if not state.running:
-                session.start_run()
+                session.runs.start()
         elif name == "stop":
-            session.stop()
+            session.runs.stop()
         elif name == "frame":
             session.push(session.scene.frame())
         elif name in ("undo", "redo"):

@@ -117,7 +117,7 @@ class OpenPanel(Panel):
             return
         name = folder.new_job(state.new_part)
         words = ["init", state.new_part, state.new_scan, "--job", name, "--units", state.new_unit]
-        outcome = await session.work("measuring part and scan", session.runner.call, words, folder.path)
+        outcome = await session.work("measuring part and scan", session.runs.runner.call, words, folder.path)
         if outcome is None:
             return
         if outcome.status or not (folder.path / name).is_file():

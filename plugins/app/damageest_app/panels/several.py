@@ -73,8 +73,8 @@ class SeveralPanel(Panel):
         for row in list(self.state.rows):
             if row["state"] == "not run":
                 await session.open_job(row["job"])
-                await session.run(then="several")
-                if session.was_stopped:
+                await session.runs.run(then="several")
+                if session.runs.was_stopped:
                     break
         self.look()
 
