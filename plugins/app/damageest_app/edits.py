@@ -77,9 +77,12 @@ def set_option(tree: Any, stage: str, use: str, option: str, value: Any) -> None
 
 
 def set_unit(tree: Any, of: str, unit: str) -> None:
-    """The unit of the file of ``part`` or ``scan``."""
+    """The unit of the file of ``part`` or ``scan``. A tolerance in figures becomes `auto`: it was measured with the
+    other unit."""
     stage = open_stage(tree, of, "file")
     stage["unit"] = unit
+    if isinstance(tree.get("tolerance"), (int, float)):
+        tree["tolerance"] = "auto"
 
 
 def add_crop(tree: Any, crop: Mapping[str, Any]) -> None:

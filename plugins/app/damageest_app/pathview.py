@@ -49,14 +49,16 @@ class PathPlay:
         last = np.flatnonzero(self.layer <= layer)
         return float(self.minutes[last[-1]] / max(self.minutes[-1], 1e-12)) if len(last) else 0.0
 
-    def list_passes(self, end: int) -> tuple[list[Floats], list[int]]:
-        """The pieces where metal flows, up to point ``end``, each with its layer."""
+    def list_passes(self, end: int, standoff: float = 0.0) -> tuple[list[Floats], list[int]]:
+        """The pieces where metal flows, up to point ``end``, each with its layer; ``standoff``: how far from the tip
+        the metal is laid, along the tool."""
+        laid = self.points - standoff * self.axes
         pieces, layers = [], []
         on = self.on[: end + 1].astype(np.int8)
         starts = np.flatnonzero(np.diff(np.concatenate([[0], on])) == 1)
         ends = np.flatnonzero(np.diff(np.concatenate([on, [0]])) == -1)
         for first, last in zip(starts, ends, strict=True):
-            pieces.append(self.points[max(first - 1, 0) : last + 1])
+            pieces.append(laid[max(first - 1, 0) : last + 1])
             layers.append(int(self.layer[first]))
         return pieces, layers
 

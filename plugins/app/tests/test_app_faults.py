@@ -87,7 +87,9 @@ def test_a_wrong_unit_is_put_right_with_one_click(shop: Path) -> None:
         page.page.locator(mark("unit-offer"), has_text="the scan is in cm").click()
         page.wait("scan-facts", "40", 30)
         page.page.locator(mark("unit-doubt")).wait_for(state="detached")
-    assert "unit: cm" in (shop / "plate.yaml").read_text()
+    text = (shop / "plate.yaml").read_text()
+    assert "unit: cm" in text
+    assert "tolerance: auto" in text  # init had measured it in the wrong unit
 
 
 def test_a_scan_of_another_part_is_refused_with_a_remedy(shop: Path) -> None:

@@ -129,7 +129,8 @@ class OpenPanel(Panel):
             session.say(outcome.messages, "warning")
 
     async def set_unit(self, of: str, unit: str) -> None:
-        await self.session.apply(lambda tree: edits.set_unit(tree, of, unit), reads=True)
+        if await self.session.apply(lambda tree: edits.set_unit(tree, of, unit), reads=True):
+            self.session.say(f"the {of} is read in {unit}; the tolerance is auto again", "success")
         self.session.push(self.session.scene.frame())
 
     def read(self, values: dict[str, Any]) -> None:

@@ -138,7 +138,8 @@ class PathTool(Panel):
         from matplotlib import colormaps
 
         end = play.at(float(self.state.path_share))
-        pieces, layers = play.list_passes(end)
+        standoff = float(self.state.path.get("standoff") or self.state.path.get("width") or 0.0)  # as `path: layers`
+        pieces, layers = play.list_passes(end, standoff)
         shades = (np.array(colormaps["viridis"](np.linspace(0.1, 1, int(play.layer.max()) + 1)))[:, :3] * 255).astype(
             np.uint8
         )
