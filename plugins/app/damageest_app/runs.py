@@ -71,6 +71,7 @@ class Runs:
             session.load_results()
             session.refresh()
             session.go(then)
+            session.warm()
         if text:
             session.say(text, "warning" if outcome.stopped or is_new else "error")
 

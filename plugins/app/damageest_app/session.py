@@ -157,6 +157,7 @@ class Session:
         self.load_results()
         self.refresh()
         await self.read_inputs(frame=True)
+        self.warm()
 
     async def read_inputs(self, frame: bool = False) -> None:
         """Reads part and scan as the job says now."""
@@ -255,6 +256,9 @@ class Session:
                 panel.result()
             except (DamageestError, OSError, ValueError, KeyError, TypeError, IndexError) as error:
                 self.say(f"{name}: the result cannot be shown: {type(error).__name__}: {error}", "error")
+
+    def warm(self) -> None:
+        """Prepares what clicks will need, beside everything else."""
         if self.results is not None:
             asyncio.get_running_loop().run_in_executor(None, self._warm)
 
