@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ COLUMNS = ("x", "y", "z", "i", "j", "k", "feed", "on", "layer")
 
 @dataclass(frozen=True, eq=False)
 class PathPlay:
-    """Points (N,3) of the tip with the tool axis (N,3); ``on``: whether metal flows on the way to each; ``layer`` and
+    """Points (N,3) on the top of the bead with the tool axis (N,3); ``on``: whether metal flows on the way to each; ``layer`` and
     ``minutes`` (N,), when each is reached."""
 
     points: Floats
@@ -29,7 +30,8 @@ class PathPlay:
 
     @classmethod
     def read(cls, path: Path) -> PathPlay:
-        """Reads the table that `export: {paths: csv}` writes."""
+        """Reads the table that `export: {paths: csv}` writes, in the part's frame: where the build direction is not z,
+        the table is in that of the set-up, and a file beside it has the transform."""
         with path.open(newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
         table = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
@@ -38,6 +40,10 @@ class PathPlay:
         feed = np.maximum(table["feed"][1:], 1e-9)
         minutes = np.concatenate([[0.0], np.cumsum(way / feed)])
         axes = np.column_stack([table[name] for name in "ijk"])
+        setup = path.with_name(f"{path.stem}.setup.json")
+        if setup.is_file():
+            back = np.linalg.inv(np.array(json.loads(setup.read_text())["transform"], float))
+            points, axes = points @ back[:3, :3].T + back[:3, 3], axes @ back[:3, :3].T
         return cls(points, axes, table["on"] > 0, table["layer"].astype(np.int64), minutes)
 
     def at(self, share: float) -> int:
@@ -49,16 +55,14 @@ class PathPlay:
         last = np.flatnonzero(self.layer <= layer)
         return float(self.minutes[last[-1]] / max(self.minutes[-1], 1e-12)) if len(last) else 0.0
 
-    def list_passes(self, end: int, standoff: float = 0.0) -> tuple[list[Floats], list[int]]:
-        """The pieces where metal flows, up to point ``end``, each with its layer; ``standoff``: how far from the tip
-        the metal is laid, along the tool."""
-        laid = self.points - standoff * self.axes
+    def list_passes(self, end: int) -> tuple[list[Floats], list[int]]:
+        """The pieces where metal flows, up to point ``end``, each with its layer."""
         pieces, layers = [], []
         on = self.on[: end + 1].astype(np.int8)
         starts = np.flatnonzero(np.diff(np.concatenate([[0], on])) == 1)
         ends = np.flatnonzero(np.diff(np.concatenate([on, [0]])) == -1)
         for first, last in zip(starts, ends, strict=True):
-            pieces.append(laid[max(first - 1, 0) : last + 1])
+            pieces.append(self.points[max(first - 1, 0) : last + 1])
             layers.append(int(self.layer[first]))
         return pieces, layers
 

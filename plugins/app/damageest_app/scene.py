@@ -11,7 +11,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkPolyDataNormals, vtkQuadricDecimation
-from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow
+from vtkmodules.vtkRenderingCore import vtkActor, vtkLight, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow
 
 from damageest.artefacts import Floats, Mesh
 
@@ -32,6 +32,9 @@ class Scene:
         self.window = vtkRenderWindow()
         self.window.SetOffScreenRendering(1)
         self.window.AddRenderer(self.renderer)
+        light = vtkLight()  # a view without layers and lights is not sent, and the browser would keep the last one
+        light.SetLightTypeToHeadlight()
+        self.renderer.AddLight(light)
         self.layers: dict[str, Any] = {}
         self.bounds: dict[str, Floats] = {}
         self._retired: list[Any] = []

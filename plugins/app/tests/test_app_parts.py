@@ -98,9 +98,9 @@ def test_a_path_is_laid_in_the_time_that_its_feeds_take(tmp_path: Path) -> None:
     assert play.minutes == pytest.approx([0, 1, 1.02, 2.02])
     assert play.at(0.5) == 1
     assert play.share_of_layer(1) == pytest.approx(1 / 2.02)
-    pieces, layers = play.list_passes(3, standoff=2.0)
+    pieces, layers = play.list_passes(3)
     assert layers == [1, 2]
-    assert pieces[0] == pytest.approx(np.array([[0, 0, 3.0], [10, 0, 3]]))
+    assert pieces[0] == pytest.approx(np.array([[0, 0, 5.0], [10, 0, 5]]))
     nozzle = make_nozzle(
         {"tip_radius": 1, "cone_angle": 45, "length": 20, "body_radius": 5}, play.points[1], play.axes[1]
     )

@@ -139,13 +139,14 @@ class PathTool(Panel):
 
         end = play.at(float(self.state.path_share))
         standoff = float(self.state.path.get("standoff") or self.state.path.get("width") or 0.0)  # as `path: layers`
-        pieces, layers = play.list_passes(end, standoff)
+        pieces, layers = play.list_passes(end)
         shades = (np.array(colormaps["viridis"](np.linspace(0.1, 1, int(play.layer.max()) + 1)))[:, :3] * 255).astype(
             np.uint8
         )
         colours = [np.repeat(shades[[layer]], len(piece), axis=0) for piece, layer in zip(pieces, layers, strict=True)]
         scene.put("passes", make_lines(pieces, colours), size=3.0)
-        nozzle = make_nozzle(self.state.path, play.points[end], play.axes[end]) if self.state.has_path else None
+        tip = play.points[end] + standoff * play.axes[end]
+        nozzle = make_nozzle(self.state.path, tip, play.axes[end]) if self.state.has_path else None
         scene.put("nozzle", make_mesh(nozzle), colour="#c9a227", opacity=0.6)
         self.state.path_layer = int(play.layer[end])
         self.state.path_words = (

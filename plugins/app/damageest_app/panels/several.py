@@ -83,5 +83,5 @@ class SeveralPanel(Panel):
             self.look()
 
     def draw(self, scene: Scene) -> None:
-        del scene
         self.look()
+        self.session.panels["judge"].draw(scene)  # the sites of the open job
