@@ -19,8 +19,8 @@ COLUMNS = ("x", "y", "z", "i", "j", "k", "feed", "on", "layer")
 
 @dataclass(frozen=True, eq=False)
 class PathPlay:
-    """Points (N,3) on the top of the bead with the tool axis (N,3); ``on``: whether metal flows on the way to each; ``layer`` and
-    ``minutes`` (N,), when each is reached."""
+    """Points (N,3) on the top of the bead with the tool axis (N,3); ``on``: whether metal flows on the way to each;
+    ``layer`` and ``minutes`` (N,), when each is reached."""
 
     points: Floats
     axes: Floats
