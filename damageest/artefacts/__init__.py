@@ -20,16 +20,14 @@ from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, Evid
 from damageest.artefacts.fields import ArtefactError
 from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
 from damageest.artefacts.paths import BeadFill, DepositPath, Unreached
+from damageest.artefacts.poses import DatumFit, FreeMotion, Pose
 from damageest.artefacts.reasons import Effect, Reason
 from damageest.artefacts.scans import (
     ADDED,
     DAMAGE,
     INTACT,
     OUTLIER,
-    DatumFit,
     Deviation,
-    FreeMotion,
-    Pose,
     Samples,
     Scan,
     Sites,

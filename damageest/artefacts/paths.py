@@ -57,7 +57,7 @@ class DepositPath(Checked):
     while it deposits, ``travel_clearance`` while it travels; inf without obstacles. ``tightest`` (2,3): point and axis
     where it is least. ``unreached``: what is not filled, by reason, and ``missing``: the same as a solid. ``fill``: the
     simulated beads; None where they were not simulated. ``notes`` are warnings. ``kinds``: what each pass is, by its
-    number: row, ring, spiral, or gap (between others); empty where that is not known. ``setup`` (4,4): takes a point
+    number: row, ring, spiral, rim, or gap (between others); empty where not known. ``setup`` (4,4): takes a point
     to the frame in which the part is set up, its z along the tool, for a path of three axes; None for other paths.
     """
 

@@ -36,8 +36,10 @@ from damageest.geometry import (
     pseudonormals,
     rays,
     refinement,
+    sampling,
     shapes,
     slivers,
+    smooth_faces,
     solids,
     stiff_modes,
     touching,
@@ -123,6 +125,12 @@ CALLS: dict[str, Callable[[Rows], None]] = {
         (None,),
     ),
     "depth_steps.measure_depth_step": lambda r: expect(np.asarray(depth_steps.measure_depth_step(r.points)), ()),
+    "smooth_faces.label_smooth_faces": lambda r: expect(
+        smooth_faces.label_smooth_faces(r.mesh.faces, r.mesh.face_normals, 0.9), (len(r.mesh.faces),)
+    ),
+    "sampling.place_along": lambda r: expect(
+        sampling.place_along(r.mesh.vertices, r.mesh.faces[:, :2], 0.1), (None, 3)
+    ),
     "shapes.Shape": lambda r: expect(
         shapes.Shape("cylinder", np.zeros(3), np.eye(3)[2], 1.0).find_slopes(r.points), (r.count, 6)
     ),

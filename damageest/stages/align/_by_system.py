@@ -11,7 +11,8 @@ from damageest.artefacts import Floats, FreeMotion, Ints, Reason
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align._datum import DatumSkin
-from damageest.stages.align._datum_fit import fit_datum, gather_points
+from damageest.stages.align._datum_fit import fit_datum
+from damageest.stages.align._datum_points import gather_points
 from damageest.stages.align._datum_words import REMEDY, Fits, describe_system, list_motions
 from damageest.stages.align._fine import Fit
 from damageest.stages.align._finish import MIN_PATCHES, MIN_STEP, Finish, Found, finish_pose, search_pose
@@ -32,6 +33,14 @@ RIM = 5.0
 """Distance from the rim of a datum, in tolerances, within which its points are left out: as deep as wear beside it."""
 FORM = 0.12
 """Standard deviation, in tolerances, that errors of form may give the mean of a patch."""
+OPEN = 0.02
+"""Movement of the part's skin by a motion, as a share of that by others, from which the motion is no symmetry."""
+APART = 0.5
+"""Movement of the skin, in tolerances, from which poses differ."""
+MIN_BETTER = 0.05
+"""Share of the skin by which more lies on the part in a pose, for it to be told that the datums exclude it."""
+MOST_OUTSIDE = 0.1
+"""Share of the skin that may lie outside, where the datums are right; added metal covers less."""
 
 
 def finish_by_datum(
@@ -138,16 +147,6 @@ def _fit_rest(
             break
         pose = make_motions((patches.basis @ motion)[None])[0] @ pose
     return pose, (patches, found)
-
-
-OPEN = 0.02
-"""Movement of the part's skin by a motion, as a share of that by others, from which the motion is no symmetry."""
-APART = 0.5
-"""Movement of the skin, in tolerances, from which poses differ."""
-MIN_BETTER = 0.05
-"""Share of the skin by which more lies on the part in a pose, for it to be told that the datums exclude it."""
-MOST_OUTSIDE = 0.1
-"""Share of the skin that may lie outside, where the datums are right; added metal covers less."""
 
 
 def _doubt_outside(frame: Frame, patches: Patches, band: Floats, tolerance: float, unit: str) -> tuple[Reason, ...]:

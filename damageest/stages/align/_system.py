@@ -12,8 +12,9 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part
 from damageest.errors import StageError
-from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.sampling import place_along, sample_by_area
 from damageest.geometry.shapes import Shape, recognise_shape
+from damageest.geometry.smooth_faces import label_smooth_faces
 from damageest.stages.align._datum import Datum, DatumFeature, DatumSkin, System
 
 SAMPLES = 20_000
@@ -152,13 +153,8 @@ def _trace_rim(part: Part, label: Ints) -> Floats:
     _, first, count = np.unique(
         key * (label.max() + 2) + np.tile(label[number], 3), return_index=True, return_counts=True
     )
-    ends = (part.vertices[edges[first[count == 1]]] - part.bounds.mean(axis=0)) / part.diagonal
-    steps = np.ceil(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / STEP).astype(np.int64) + 1
-    which = np.repeat(np.arange(len(ends)), steps)
-    share = (np.arange(len(which)) - np.repeat(np.cumsum(steps) - steps, steps)) / np.repeat(
-        np.maximum(steps - 1, 1), steps
-    )
-    return np.asarray(ends[which, 0] + share[:, None] * (ends[which, 1] - ends[which, 0]))
+    vertices = (part.vertices - part.bounds.mean(axis=0)) / part.diagonal
+    return place_along(vertices, edges[first[count == 1]], STEP)
 
 
 def split_faces(part: Part, chosen: Ints) -> list[Ints]:
@@ -166,18 +162,5 @@ def split_faces(part: Part, chosen: Ints) -> list[Ints]:
     if part.faces_brep is not None:
         number: Ints = part.faces_brep[chosen]
     else:
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        corners = part.faces[chosen]
-        edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
-        key = edges[:, 0] * len(part.vertices) + edges[:, 1]
-        order = np.argsort(key, kind="stable")
-        triangle = order % len(chosen)
-        same = np.flatnonzero(key[order][1:] == key[order][:-1])
-        first, second = triangle[same], triangle[same + 1]
-        normals = part.face_normals[chosen]
-        smooth = np.einsum("ij,ij->i", normals[first], normals[second]) > SMOOTH
-        joined = coo_array((np.ones(smooth.sum()), (first[smooth], second[smooth])), shape=(len(chosen),) * 2)
-        number = connected_components(joined, directed=False)[1].astype(np.int64)
+        number = label_smooth_faces(part.faces[chosen], part.face_normals[chosen], SMOOTH)
     return [chosen[number == one] for one in np.unique(number)]

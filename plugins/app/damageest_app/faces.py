@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from damageest.artefacts import Ints, Part
+from damageest.geometry.smooth_faces import label_smooth_faces
 
 SMOOTH = 12.0
 """Degrees between neighbouring triangles up to which they are one face."""
@@ -74,13 +73,4 @@ class Faces:
 
 def _find_smooth(part: Part) -> Ints:
     """Patches of triangles that meet at less than `SMOOTH`."""
-    edges = np.sort(part.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    code = edges[:, 0] * np.int64(len(part.vertices)) + edges[:, 1]
-    order = np.argsort(code, kind="stable")
-    same = code[order][1:] == code[order][:-1]
-    first, second = order[:-1][same] // 3, order[1:][same] // 3
-    cosine = (part.face_normals[first] * part.face_normals[second]).sum(axis=1)
-    joined = cosine > np.cos(np.radians(SMOOTH))
-    shape = (len(part.faces), len(part.faces))
-    graph = coo_matrix((np.ones(joined.sum(), np.int8), (first[joined], second[joined])), shape)
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+    return label_smooth_faces(part.faces, part.face_normals, float(np.cos(np.radians(SMOOTH))))

@@ -18,7 +18,6 @@ from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.units import diagnose_scale, diagnose_size, unit_factor
 from damageest.job import Job, load
 from damageest.registry import Registry
-from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 from damageest_app.scene import thin
 from damageest_app.shade import shade_points
@@ -92,12 +91,6 @@ class Reader:
             return scan
         noise, spacing = measure_noise_and_spacing(scan.points)
         return replace(scan, noise=noise, spacing=spacing)
-
-    def find_unit(self, job: Job) -> tuple[str, str]:
-        """The units that the job gives for the files of part and scan, or those of the job."""
-        names = (job.stages[ReadPart], job.stages[ReadScan])
-        first, second = (str(getattr(stage, "unit", None) or job.units) for stage in names)
-        return first, second
 
 
 def offer_units(part: Part, scan: Scan) -> tuple[tuple[str, str], ...]:

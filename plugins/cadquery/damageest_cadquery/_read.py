@@ -23,9 +23,9 @@ class Model:
     unit: str | None
     length: float
     name_of: Callable[[Any], str]
-    notes: tuple[str, ...] = ()
-    solid_names: tuple[str, ...] = ()
-    entity_of: Callable[[Any], int] = lambda face: -1
+    notes: tuple[str, ...]
+    solid_names: tuple[str, ...]
+    entity_of: Callable[[Any], int]
 
 
 def read(path: Path, suffix: str) -> Model:
@@ -41,9 +41,7 @@ def read(path: Path, suffix: str) -> Model:
         raise InputError("holds no shape; export the part again as a solid")
     solids, notes = _solids(shape)
     names = tuple(name_of(solid) for solid in solids)
-    return Model(
-        solids, unit, MILLIMETRES[unit] if unit else 1.0, name_of, notes, solid_names=names, entity_of=entity_of
-    )
+    return Model(solids, unit, MILLIMETRES[unit] if unit else 1.0, name_of, notes, names, entity_of)
 
 
 def read_shape(path: Path) -> Any:
@@ -92,6 +90,7 @@ def _step(path: Path) -> _Content:
         return transfer.EntityFromShapeResult(face, 1) or transfer.EntityFromShapeResult(unmoved, 1)
 
     face_entities: list[Any] = []
+    place: dict[int, int] = {}
 
     def entity_of(face: Any) -> int:
         from OCP.StepShape import StepShape_AdvancedFace
@@ -100,9 +99,9 @@ def _step(path: Path) -> _Content:
             model = reader.WS().Model()
             every = (model.Value(number + 1) for number in range(model.NbEntities()))
             face_entities.extend(one for one in every if isinstance(one, StepShape_AdvancedFace))
-        entity = find_entity(face)
-        # the model does not know an entity that came through Python; the same object is the same entity
-        return next((number for number, one in enumerate(face_entities) if one is entity), -1)
+            # the model does not know an entity that came through Python; the same object is the same entity
+            place.update({id(one): number for number, one in enumerate(face_entities)})
+        return place.get(id(find_entity(face)), -1)
 
     def name_of(face: Any) -> str:
         entity = find_entity(face)

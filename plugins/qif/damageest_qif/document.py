@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import uuid
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,7 +15,7 @@ from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 from damageest_qif.datums import add_datums
 from damageest_qif.elements import NAMESPACE, Element, Lists, attributes, clean, make, make_list, refer
-from damageest_qif.sites import add_site, find_faces, name_interval
+from damageest_qif.sites import Lost, add_site, find_lost, name_interval
 
 NAME = "result.qif"
 METRES = {"um": "0.000001", "mm": "0.001", "cm": "0.01", "m": "1", "in": "0.0254", "ft": "0.3048"}
@@ -47,10 +48,11 @@ def build_document(result: Result) -> Element:
     lists = Lists()
     numbers = [lists.numbers.take() for _ in range(9)]
     software, model, definition, part, component, path, results, actual, standard = numbers
-    _list_entities(lists, result)
+    lost = [find_lost(result, site) for site in result.sites]
+    _list_entities(lists, result, lost)
     add_datums(lists, result)
-    for site in result.sites:
-        add_site(lists, result, site)
+    for site, skin in zip(result.sites, lost, strict=True):
+        add_site(lists, result, site, skin)
     children = [
         make("QPId", text=_OPEN),
         _make_header(result),
@@ -100,9 +102,9 @@ def _make_standard(number: str) -> Element:
     return make("Standard", organization, make("Designator", text="1101"), make("Year", text="2017"), id=number)
 
 
-def _list_entities(lists: Lists, result: Result) -> None:
+def _list_entities(lists: Lists, result: Result, lost: Sequence[Lost]) -> None:
     """The CAD faces that sites and datums refer to, by the numbers that `damageest faces` lists."""
-    used = {face for site in result.sites for face in find_faces(result, site)}
+    used = {face for skin in lost for face in skin.faces}
     used |= {face for datum in result.pose.datums for face in datum.faces}
     names = result.part.face_names
     for face in sorted(used):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from damageest.artefacts import Mesh
@@ -15,10 +17,10 @@ STATUS = {"proven": "FAIL", "likely": "FAIL", "doubtful": "INDETERMINATE"}
 """A site that is lost is a deviation; of a doubtful one it is open."""
 
 
-def add_site(lists: Lists, result: Result, site: Site) -> None:
-    """Adds a site: its feature, its inner surface, and depth and area as characteristics with their uncertainty."""
+def add_site(lists: Lists, result: Result, site: Site, lost: Lost) -> None:
+    """Adds a site that removes the skin ``lost``: its feature, its inner surface, and depth and area as characteristics
+    with their uncertainty."""
     take = lists.numbers.take
-    faces = find_faces(result, site)
     definition, nominal, item, measured, points = (take() for _ in range(5))
     name = f"site-{site.id}"
     lists.feature_definitions.append(make("OtherSurfaceFeatureDefinition", id=definition))
@@ -27,7 +29,7 @@ def add_site(lists: Lists, result: Result, site: Site) -> None:
             "OtherSurfaceFeatureNominal",
             make("Name", text=name),
             make("FeatureDefinitionId", text=definition),
-            refer("EntityExternalIds", [lists.entities[face].attrib["id"] for face in faces if face in lists.entities]),
+            refer("EntityExternalIds", [lists.entities[face].attrib["id"] for face in lost.faces]),
             id=nominal,
         )
     )
@@ -61,10 +63,16 @@ def add_site(lists: Lists, result: Result, site: Site) -> None:
         lists, "Linear", f"{name} depth", "largest depth of the loss below the nominal surface", item, measured, status,
         site.max_depth, site.depth_95,
     )  # fmt: skip
-    lost = ~find_inner_faces(site.damage, result.part)
-    area = float(np.linalg.norm(site.damage.cross[lost], axis=1).sum() / 2)
     add_characteristic(
-        lists, "Area", f"{name} area", "area of the nominal surface that is lost", item, measured, status, area, None
+        lists,
+        "Area",
+        f"{name} area",
+        "area of the nominal surface that is lost",
+        item,
+        measured,
+        status,
+        lost.area,
+        None,
     )
 
 
@@ -120,15 +128,21 @@ def add_characteristic(
     )
 
 
-def find_faces(result: Result, site: Site) -> list[int]:
-    """The numbers of the CAD faces that a site removes skin of; none where the part is a mesh."""
-    if result.part.faces_brep is None:
-        return []
+class Lost(NamedTuple):
+    """The skin that a site removes: its ``area``, and the numbers of its CAD ``faces``; none where the part is a
+    mesh."""
+
+    area: float
+    faces: list[int]
+
+
+def find_lost(result: Result, site: Site) -> Lost:
     lost = np.flatnonzero(~find_inner_faces(site.damage, result.part))
-    if not len(lost):
-        return []
+    area = float(np.linalg.norm(site.damage.cross[lost], axis=1).sum() / 2)
+    if result.part.faces_brep is None or not len(lost):
+        return Lost(area, [])
     face = closest_on_mesh(site.damage.triangles[lost].mean(axis=1), result.part).face
-    return [int(one) for one in np.unique(result.part.faces_brep[face])]
+    return Lost(area, [int(one) for one in np.unique(result.part.faces_brep[face])])
 
 
 def name_interval(name: str, interval: Interval | None) -> list[tuple[str, float]]:

@@ -5,10 +5,12 @@ They share nothing with the planner, which compares outlines in a plane and the 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from damageest_paths.frames import make_frame
 
-from damageest.artefacts import DepositPath, Floats, Solid
+from damageest.artefacts import DepositPath, Floats, Ints, Solid
 from damageest.geometry.distance import is_inside
 from damageest.geometry.vectors import normalise
 
@@ -24,17 +26,25 @@ FLIP, UPRIGHT = 45.0, 5.0
 axis may turn freely, since it does not move the tool."""
 
 
-def _sample(path: DepositPath, step: float) -> tuple[Floats, Floats, Floats]:
-    """Points (N,3) on the tops of the beads, not farther apart than ``step``; the tool's axes and the beads' normals
-    (N,3) there."""
+class _Places(NamedTuple):
+    """Places on the tops of the beads: ``points``, the tool's ``axes`` there (N,3), the ``move`` (N,) of the path that
+    each lies on, and how much of it (N,) it stands for."""
+
+    points: Floats
+    axes: Floats
+    move: Ints
+    share: Floats
+
+
+def _sample(path: DepositPath, step: float) -> _Places:
+    """Places not farther apart than ``step``."""
     own = np.flatnonzero(path.on)
-    ends, starts = path.points[own], path.points[own - 1]
-    counts = np.maximum(np.ceil(np.linalg.norm(ends - starts, axis=1) / step).astype(int), 1)
-    number = np.repeat(np.arange(len(own)), counts)
+    counts = np.maximum(np.ceil(path.moves[own] / step).astype(int), 1)
+    move = np.repeat(own, counts)
     share = np.concatenate([(np.arange(count) + 0.5) / count for count in counts] or [np.empty(0)])[:, None]
-    points = starts[number] + share * (ends - starts)[number]
-    axes = path.axes[own - 1][number] * (1 - share) + share * path.axes[own][number]
-    return points, normalise(axes), path.normals[own][number]
+    points = path.points[move - 1] + share * (path.points[move] - path.points[move - 1])
+    axes = path.axes[move - 1] * (1 - share) + share * path.axes[move]
+    return _Places(points, normalise(axes), move, 1 / np.repeat(counts, counts))
 
 
 def measure_shaded(path: DepositPath, metal: Solid, step: float) -> float:
@@ -42,7 +52,7 @@ def measure_shaded(path: DepositPath, metal: Solid, step: float) -> float:
 
     Looked at are the beam's axis from the bead to the nozzle's tip, and its border from half a bead's width up.
     """
-    points, axes, _ = _sample(path, step)
+    points, axes, _, _ = _sample(path, step)
     if not len(points):
         return 0.0
     radius = path.width / 2
@@ -61,15 +71,13 @@ def measure_shaded(path: DepositPath, metal: Solid, step: float) -> float:
 def measure_sunk(path: DepositPath, metal: Solid, step: float) -> float:
     """The volume of the beads that lies in metal, by the share of points in each bead; where beads overlap, each
     counts."""
-    points, _, normals = _sample(path, step)
+    points, _, move, share = _sample(path, step)
     if not len(points):
         return 0.0
-    own = np.flatnonzero(path.on)
-    along = normalise(path.points[own] - path.points[own - 1])
-    counts = np.maximum(np.ceil(np.linalg.norm(path.points[own] - path.points[own - 1], axis=1) / step).astype(int), 1)
-    beside = normalise(np.cross(np.repeat(along, counts, axis=0), normals))
-    heights = np.repeat(path.heights[path.part[own] - 1], counts)[:, None]
-    weights = np.repeat(path.moves[own] * path.section[path.part[own] - 1] / counts, counts)
+    normals = path.normals[move]
+    beside = normalise(np.cross(path.points[move] - path.points[move - 1], normals))
+    heights = path.heights[path.part[move] - 1][:, None]
+    weights = path.moves[move] * path.section[path.part[move] - 1] * share
     total = 0.0
     for aside in (np.arange(ACROSS) + 0.5) / ACROSS - 0.5:
         for down in (np.arange(DEEP) + 0.5) / DEEP:
