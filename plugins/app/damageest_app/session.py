@@ -38,6 +38,12 @@ class Panel:
     def read(self, values: dict[str, Any]) -> None:
         """The job was opened or changed."""
 
+    def build(self) -> None:
+        """Makes its part of the page."""
+
+    def forget(self) -> None:
+        """Another job is opened: what was clicked for the last one, and is not in it, goes."""
+
     def draw(self, scene: Scene) -> None:
         """The step is shown, or what it shows has changed."""
 
@@ -72,7 +78,7 @@ class Session:
                 "share": 0.0, "doing": "", "stages": [], "seconds": 0, "job_name": "", "job_text": "",
                 "can_undo": False, "can_redo": False, "show_job": False, "has_inputs": False, "has_result": False,
                 "stale": False, "legend": [], "folder": str(folder.path), "writable": folder.is_writable,
-                "summary": [], "notes": [], "press": [0, 0], "conflict": False, "unit": "mm", "hint": "",
+                "summary": [], "notes": [], "conflict": False, "unit": "mm", "hint": "",
             }
         )  # fmt: skip
 
@@ -153,6 +159,8 @@ class Session:
             self.say(str(error), "error")
             return
         self.results, self.state.has_result = None, False
+        for panel in self.panels.values():
+            panel.forget()
         self.state.message, self.state.conflict = "", False
         self.load_results()
         self.refresh()

@@ -33,7 +33,7 @@ class JudgePanel(Panel):
         self._cutters: dict[tuple[str, int], Cutter] = {}
         self.state.update(
             {"sites": [], "site": 0, "section": "", "section_axis": "auto", "section_offset": 0.0, "section_depth": 1.0,
-             "layers": ["damage"], "merge_with": [], "hint_measure": "two clicks measure a distance"}
+             "layers": ["damage"], "hint_measure": "two clicks measure a distance"}
         )  # fmt: skip
         self.state.change("section_offset")(lambda **_: self._update_section())
         self.state.change("section_axis")(lambda **_: self._move_plane())

@@ -194,7 +194,7 @@ def _build_dialogs() -> None:
 
 
 def _bind(session: Session) -> None:
-    state, server, ctrl = session.state, session.server, session.ctrl
+    state, ctrl = session.state, session.ctrl
 
     def set_dark(dark: bool, **_: Any) -> None:
         session.scene.set_dark(dark)
@@ -232,4 +232,3 @@ def _bind(session: Session) -> None:
     ctrl.trigger("refused")(lambda text: session.say(text, "error"))
     ctrl.on_server_ready.add(lambda **_: session.panels["open"].begin())  # type: ignore[attr-defined]
     ctrl.on_client_connected.add(lambda **_: session.panels["open"].look())  # type: ignore[attr-defined]
-    del server

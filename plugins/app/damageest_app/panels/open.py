@@ -9,16 +9,13 @@ import numpy as np
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
-from damageest.artefacts import Floats
 from damageest.io.colours import PART
 from damageest_app import edits
-from damageest_app.inputs import UNITS, Inputs
+from damageest_app.inputs import UNITS
 from damageest_app.panels.marks import mark
-from damageest_app.scene import Scene, make_mesh, make_points
+from damageest_app.panels.shown import place_beside, put_scan
+from damageest_app.scene import Scene, make_mesh
 from damageest_app.session import Panel, Session
-from damageest_app.shade import tint
-
-SCAN = "#d97a34"
 
 
 class OpenPanel(Panel):
@@ -148,18 +145,3 @@ class OpenPanel(Panel):
         scene.put("part", make_mesh(inputs.part), colour=PART, opacity=1.0 if self.state.apart else 0.45)
         offset = place_beside(inputs.part.bounds, inputs.scan.points) if self.state.apart else np.zeros(3)
         put_scan(scene, inputs, offset)
-
-
-def put_scan(scene: Scene, inputs: Inputs, offset: Floats) -> None:
-    """Shows the scan of a job, moved by ``offset`` (3,)."""
-    scene.put("scan", make_points(inputs.scan.points[inputs.shown] + offset, tint(inputs.shade, SCAN)), size=2.5)
-
-
-def place_beside(bounds: Floats, points: Floats) -> Floats:
-    """By how much (3,) the scan is moved, so that it is seen beside the part."""
-    if not len(points):
-        return np.zeros(3)
-    low, high = points.min(axis=0), points.max(axis=0)
-    gap = 0.15 * float(np.linalg.norm(bounds[1] - bounds[0]))
-    middle = bounds.mean(axis=0) - (low + high) / 2
-    return np.array([bounds[1][0] + gap - low[0], middle[1], middle[2]])

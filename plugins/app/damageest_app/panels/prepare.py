@@ -11,8 +11,10 @@ from trame.widgets import vuetify3 as v3
 from damageest.artefacts import Floats
 from damageest_app import edits
 from damageest_app.histogram import Histogram
+from damageest_app.panels.cut import CutTool
 from damageest_app.panels.marks import mark
-from damageest_app.panels.open import put_scan
+from damageest_app.panels.shown import put_scan
+from damageest_app.pick import Ray
 from damageest_app.scene import Scene, make_lines, thin
 from damageest_app.session import Panel, Session
 
@@ -25,6 +27,7 @@ class PreparePanel(Panel):
     def __init__(self, session: Session) -> None:
         super().__init__(session)
         self.histogram: Histogram | None = None
+        self.cut = CutTool(session)
         self.state.update(
             {"crops": [], "box": [[0.0, 1.0]] * 3, "extent": [[0.0, 1.0]] * 3, "box_step": 0.01, "tolerance": 0.0,
              "tolerance_auto": True, "tolerance_limits": [0.0, 1.0], "histogram": "", "intact_share": "",
@@ -54,6 +57,15 @@ class PreparePanel(Panel):
                 disabled=("!has_inputs",),
                 raw_attrs=mark("box"),
             )
+            v3.VBtn(
+                "plane …",
+                size="small",
+                variant="tonal",
+                click=self.cut.begin,
+                disabled=("!has_inputs",),
+                raw_attrs=mark("cut"),
+            )
+        self.cut.build()
         with html.Div(v_if=("show_box",), classes="mt-2"):
             for k, axis in enumerate(AXES):
                 v3.VRangeSlider(
@@ -156,8 +168,15 @@ class PreparePanel(Panel):
         if self.session.inputs is None:
             self.state.hint = "open a job first"
             return
-        put_scan(scene, self.session.inputs, np.zeros(3))
+        inputs = self.session.inputs
+        put_scan(scene, inputs, np.zeros(3), self.cut.find_removed(inputs.scan.points[inputs.shown]))
         self._put_box(scene)
+
+    def pick(self, ray: Ray) -> None:
+        self.cut.pick(ray)
+
+    def forget(self) -> None:
+        self.cut.forget()
 
     def _draw_box(self) -> None:
         if self.state.step == "prepare":

@@ -11,9 +11,9 @@ from trame.widgets import vuetify3 as v3
 
 from damageest.io.colours import DEPOSIT, PART
 from damageest_app import edits
-from damageest_app.panels.align import put_faces
 from damageest_app.panels.marks import mark
 from damageest_app.panels.path import PathTool, to_length
+from damageest_app.panels.shown import put_faces
 from damageest_app.pick import Ray
 from damageest_app.scene import Scene, lift, make_mesh
 from damageest_app.session import Panel, Session
