@@ -198,18 +198,18 @@ def toggle(mapping: Any, option: str, value: Any) -> None:
 
 
 def plain(value: Any) -> Any:
-    """A value without what ruamel.yaml adds, to be compared."""
+    """A value without what ruamel.yaml and numpy add, to be compared."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
-    return (
-        float(value)
-        if isinstance(value, float)
-        else int(value)
-        if type(value) is not bool and isinstance(value, int)
-        else value
-    )
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, (int, float)):
+        return float(value) if isinstance(value, float) else int(value)
+    return value
 
 
 def choose_site(tree: Any, number: int, choice: str, is_doubtful: bool) -> None:

@@ -12,6 +12,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from tests.stages.report.browser import open_browser
+
+ROOT = Path(__file__).parents[3]
 COMMAND = [sys.executable, "-c", "from damageest.cli import main; main()"]
 NORMAL = ("/paraview/", "405 (Method Not Allowed)", "without a current renderer")
 """The client of trame asks for a launcher first, which there is not; the mouse may move before anything is drawn."""
@@ -35,6 +40,20 @@ def serve(folder: Path, *words: str) -> Iterator[tuple[subprocess.Popen[str], st
                 process.wait(10)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+@contextmanager
+def open_app(folder: Path) -> Iterator[Page]:
+    """The page of an app on a folder; at its end the app still answers. A test that fails leaves a picture beside the
+    folder."""
+    with serve(folder) as (process, address), open_browser() as browser:
+        page = Page(browser, address)
+        try:
+            yield page
+        except BaseException:
+            page.page.screenshot(path=str(folder.parent / "failed.png"))
+            raise
+        assert process.poll() is None, "the app has ended"
 
 
 class Page:
@@ -89,6 +108,18 @@ class Page:
         box = self.page.locator(".stage .view").bounding_box()
         self.page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
 
+    def click_at(self, place: Any) -> None:
+        """A click on a place (3,) of the 3D view."""
+        camera = self.page.evaluate("window.trame.refs.view.getCamera()")
+        box = self.page.locator(".stage .view").bounding_box()
+        eye, focal, up = (np.array(camera[name], float) for name in ("position", "focalPoint", "viewUp"))
+        ahead = (focal - eye) / np.linalg.norm(focal - eye)
+        right = np.cross(ahead, up) / np.linalg.norm(np.cross(ahead, up))
+        way = np.asarray(place, float) - eye
+        reach = (way @ ahead) * np.tan(np.radians(camera["viewAngle"]) / 2)
+        x, y = way @ right / reach * box["height"] / box["width"], way @ np.cross(right, ahead) / reach
+        self.click_view((1 + x) / 2, (1 - y) / 2)
+
     def run(self, seconds: float = 300) -> None:
         """Runs the job and waits for its end."""
         self.click("run")
@@ -98,6 +129,12 @@ class Page:
             assert time.monotonic() < end, "the run does not end"
             self.page.wait_for_timeout(200)
         self.at_rest()
+
+    def shoot(self, name: str) -> None:
+        """A picture for the documentation; where no pictures are wanted, none."""
+        self.at_rest()
+        if os.environ.get("DAMAGEEST_PICTURES"):
+            self.shot(ROOT / "docs" / "images" / "app" / f"{name}.png")
 
     def shot(self, path: Path) -> None:
         """A picture with few colours, so that it is small."""

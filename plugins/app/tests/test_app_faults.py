@@ -10,17 +10,16 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from app_page import Page, mark, serve
+from app_page import Page, mark, open_app, serve
+from app_shop import make_job, write_plate
 
 from tests.stages.report.browser import open_browser
 
-ROOT = Path(__file__).parents[3]
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 
@@ -29,48 +28,18 @@ def shop(tmp_path: Path) -> Path:
     """A folder with a plate and a scan of it that lacks a corner."""
     folder = tmp_path / "shop"
     folder.mkdir()
-    write_inputs(folder)
+    write_plate(folder)
     return folder
 
 
-def write_inputs(folder: Path, factor: float = 1.0) -> None:
-    """A block with a bore and a step, and points on it; a corner of it is broken off."""
-    part = trimesh.creation.box((40, 30, 12))
-    boss = trimesh.creation.cylinder(
-        5, 8, sections=48, transform=trimesh.transformations.translation_matrix((-9, 5, 8))
-    )
-    part = trimesh.boolean.union([part, boss], engine="manifold")
-    part.export(folder / "plate.stl")
-    tool = trimesh.creation.icosphere(3, 9)
-    tool.apply_translation((20, -15, 6))
-    points = trimesh.boolean.difference([part, tool], engine="manifold").sample(30_000, seed=1)
-    points += np.random.default_rng(0).normal(0, 0.02, points.shape)
-    np.savetxt(folder / "scan.xyz", points * factor, fmt="%.5f")
-
-
-@contextmanager
-def open_app(folder: Path) -> Iterator[Page]:
-    with serve(folder) as (process, address), open_browser() as browser:
-        yield Page(browser, address)
-        assert process.poll() is None, "the app has ended"
-
-
-def make(page: Page, part: str = "plate.stl", scan: str = "scan.xyz") -> None:
-    page.choose("part", part)
-    page.choose("scan", scan)
-    page.click("make")
-
-
 def shoot(page: Page, name: str) -> None:
-    page.at_rest(1)
-    if os.environ.get("DAMAGEEST_PICTURES"):
-        page.shot(ROOT / "docs" / "images" / "app" / f"fault-{name}.png")
+    page.shoot(f"fault-{name}")
 
 
 def test_a_broken_scan_is_named_and_another_one_opens(shop: Path) -> None:
     (shop / "broken.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 5\n")
     with open_app(shop) as page:
-        make(page, scan="broken.ply")
+        make_job(page, scan="broken.ply")
         page.wait("message", "broken.ply", 60)
         shoot(page, "broken")
         page.choose("scan", "scan.xyz")
@@ -79,9 +48,9 @@ def test_a_broken_scan_is_named_and_another_one_opens(shop: Path) -> None:
 
 
 def test_a_wrong_unit_is_put_right_with_one_click(shop: Path) -> None:
-    write_inputs(shop, 0.1)
+    write_plate(shop, 0.1)
     with open_app(shop) as page:
-        make(page)
+        make_job(page)
         page.wait("unit-doubt", "wrong unit", 60)
         shoot(page, "unit")
         page.page.locator(mark("unit-offer"), has_text="the scan is in cm").click()
@@ -96,7 +65,7 @@ def test_a_scan_of_another_part_is_refused_with_a_remedy(shop: Path) -> None:
     other = trimesh.creation.annulus(12, 20, 25).sample(20_000, seed=2)
     np.savetxt(shop / "other.xyz", other, fmt="%.4f")
     with open_app(shop) as page:
-        make(page, scan="other.xyz")
+        make_job(page, scan="other.xyz")
         page.wait("part-facts", "mm", 60)
         page.run(120)
         page.wait("message", "try:")
@@ -107,7 +76,7 @@ def test_a_scan_of_another_part_is_refused_with_a_remedy(shop: Path) -> None:
 def test_a_scan_that_lies_elsewhere_is_refused(shop: Path) -> None:
     np.savetxt(shop / "far.xyz", np.loadtxt(shop / "scan.xyz") + np.array([300, 0, 0]), fmt="%.4f")
     with open_app(shop) as page:
-        make(page, scan="far.xyz")
+        make_job(page, scan="far.xyz")
         page.wait("part-facts", "mm", 60)
         job = shop / "plate.yaml"
         job.write_text(job.read_text().replace("align: register", "align: none    "))
@@ -140,9 +109,9 @@ def mount(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
 
 def test_a_full_disk_is_named(mount: Callable[[str], Path]) -> None:
     disk = mount("size=2500k")
-    write_inputs(disk)
+    write_plate(disk)
     with open_app(disk) as page:
-        make(page)
+        make_job(page)
         page.wait("part-facts", "mm", 60)
         page.run(120)
         page.wait("message", "space")
@@ -151,7 +120,7 @@ def test_a_full_disk_is_named(mount: Callable[[str], Path]) -> None:
 
 def test_a_folder_without_rights_is_named(mount: Callable[[str], Path]) -> None:
     disk = mount("size=4m")
-    write_inputs(disk)
+    write_plate(disk)
     subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
     with open_app(disk) as page:
         page.page.get_by_text("This folder cannot be written to").wait_for()
@@ -162,7 +131,7 @@ def test_a_folder_without_rights_is_named(mount: Callable[[str], Path]) -> None:
 def test_stop_and_a_browser_that_closes_leave_the_app_and_the_run(shop: Path) -> None:
     with open_browser() as browser, serve(shop, "--idle", "2") as (process, address):
         page = Page(browser, address)
-        make(page)
+        make_job(page)
         page.wait("part-facts", "mm", 60)
         page.click("run")
         page.wait("stop")
@@ -182,7 +151,7 @@ def test_stop_and_a_browser_that_closes_leave_the_app_and_the_run(shop: Path) ->
 
 def test_a_run_that_is_killed_leaves_the_app(shop: Path) -> None:
     with open_app(shop) as page:
-        make(page)
+        make_job(page)
         page.wait("part-facts", "mm", 60)
         page.click("run")
         page.wait("stop")
@@ -215,18 +184,3 @@ def test_without_the_token_nothing_is_answered(shop: Path) -> None:
                 urllib.request.urlopen(urllib.request.Request(address, headers={name: value}))
         with urllib.request.urlopen(address) as answer:
             assert answer.headers["X-Frame-Options"] == "DENY"
-
-
-def test_a_file_is_sent_to_the_folder_and_listed(shop: Path, tmp_path: Path) -> None:
-    (shop / "scan.xyz").rename(tmp_path / "dropped.xyz")
-    text = (tmp_path / "dropped.xyz").read_text()
-    with open_app(shop) as page:
-        code = "([name, text]) => window.trame.utils.damageest.send([new File([text], name)])"
-        page.page.evaluate(code, ["../dropped.xyz", text])
-        page.wait("message", "dropped.xyz is in the folder")
-        assert (shop / "dropped.xyz").read_text() == text
-        page.page.evaluate(code, ["program.exe", "MZ"])
-        page.wait("message", "is no part and no scan")
-        make(page, scan="dropped.xyz")
-        page.wait("part-facts", "mm", 60)
-    assert sorted(path.name for path in shop.iterdir() if path.suffix != ".yaml") == ["dropped.xyz", "out", "plate.stl"]

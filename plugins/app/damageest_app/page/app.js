@@ -47,6 +47,12 @@ window.damageest_page = {
       event.stopPropagation();
       window.trame.trigger("key", [name]);
     }, true);
+    // a fault of the server while it answered a click: without this, nothing would be seen of it
+    window.addEventListener("unhandledrejection", (event) => {
+      const why = event.reason || {};
+      const words = (why.data && why.data.exception) || why.message || String(why);
+      window.trame.trigger("refused", [`unexpected fault: ${words}. The job file is as the last change left it`]);
+    });
     window.addEventListener("dragover", (event) => event.preventDefault());
     window.addEventListener("drop", (event) => {
       event.preventDefault();

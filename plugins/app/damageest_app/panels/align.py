@@ -80,7 +80,7 @@ class AlignPanel(Panel):
         for name, tool in self.tools.items():
             with html.Div(v_if=(f"align_tool === '{name}'",)):
                 tool.build()
-        html.Div("align: {{ align_use }}", classes="fine mt-4")
+        html.Div("align: {{ align_use }}", classes="fine mt-4", raw_attrs=mark("align-use"))
         v3.VBtn(
             "find the pose anew", v_if=("align_use !== 'register'",), size="small", variant="text", click=self.register
         )

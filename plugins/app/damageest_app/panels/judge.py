@@ -115,6 +115,7 @@ class JudgePanel(Panel):
                     v3.VSelect(
                         items=("sites.filter(x => x.id !== one.id).map(x => x.id)",), label="merge with", v_if=("sites.length > 1",),
                         update_modelValue=(self.merge, "[one.id, $event]"), style="max-width: 130px",
+                        raw_attrs=mark("merge", '@click.stop=""'),
                     )  # fmt: skip
 
     def build_drawing(self) -> None:

@@ -83,7 +83,13 @@ class RepairPanel(Panel):
             classes="text-body-2 mt-1",
             raw_attrs=mark("target-row"),
         )
-        html.Div("keep out: {{ one }}", v_for=("(one, k) in keep_out",), key=("'k' + k",), classes="text-body-2 mt-1")
+        html.Div(
+            "keep out: {{ one }}",
+            v_for=("(one, k) in keep_out",),
+            key=("'k' + k",),
+            classes="text-body-2 mt-1",
+            raw_attrs=mark("keep-out-row"),
+        )
         v3.VBtn("no allowance", v_if=("has_allowance",), size="small", variant="text", click=self.drop_allowance)
         html.Div("{{ one }}", v_for=("(one, k) in deposits",), key=("'d' + k",), classes="fine mt-2")
 
