@@ -68,7 +68,7 @@ def test_three_pairs_find_the_pose(shop: Path) -> None:
         for k, place in enumerate(places):
             page.click_at(trimesh.transform_points([place], TURN)[0] + offset)
             page.wait("pair-next", "now the same place on the part")
-            page.click_at(place * 0.999)
+            page.click_at(place)
             page.wait("pair", f"{k + 1}: scan")
         page.click_at(np.array([0, -15, 6]) * 0.99)  # no scan there: nothing is taken
         page.at_rest()
@@ -117,7 +117,7 @@ def test_datums_of_a_mesh_are_clicked_together_and_in_order(shop: Path) -> None:
     assert list(datum) == ["A", "B", "C"]
     ways = [one["facing"]["direction"] for (one,) in datum.values()]
     assert np.array(ways) == pytest.approx(np.array([[0, 0, 1], [0, -1, 0], [1, 0, 0]]))
-    assert "A" in str(read_result(shop)["alignment"]["datum"])
+    assert [one["name"] for one in read_result(shop)["alignment"]["datums"]] == ["A", "B", "C"]
 
 
 def test_datums_of_a_step_file_are_numbers_of_its_faces(shop: Path) -> None:
@@ -125,7 +125,7 @@ def test_datums_of_a_step_file_are_numbers_of_its_faces(shop: Path) -> None:
     write_plate(shop)
     body = cadquery.Workplane("XY").box(40, 30, 12).faces(">Z").workplane().center(-9, 5).circle(5).extrude(6)
     body.val().exportStep(str(shop / "plate.step"))
-    faces = body.val().Faces()
+    faces = cadquery.importers.importStep(str(shop / "plate.step")).val().Faces()
     with open_app(shop) as page:
         open_job(page, part="plate.step")
         page.wait("part-facts", "8 CAD faces")
@@ -143,7 +143,7 @@ def test_datums_of_a_step_file_are_numbers_of_its_faces(shop: Path) -> None:
     datum = read_job(shop)["align"]["datum"]
     assert list(datum) == ["A", "B", "C"]
     for (number,), axis, at in zip(datum.values(), (2, 1, 0), (6, -15, 20), strict=True):
-        box = faces[number - 1].BoundingBox()
+        box = faces[number].BoundingBox()
         low, high = (getattr(box, f"{'xyz'[axis]}{end}") for end in ("min", "max"))
         assert (low, high) == pytest.approx((at, at), abs=1e-6)
 

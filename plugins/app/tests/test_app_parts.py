@@ -42,6 +42,13 @@ def test_a_click_meets_the_place_that_is_seen_there(box: Part) -> None:
     assert MeshPicker(box).find(look(0.9, 0.9)) is None
 
 
+def test_a_click_a_few_pixels_beside_an_edge_meets_it(box: Part) -> None:
+    hit = MeshPicker(box).find(look(0.0, 15.5 / 90))  # the edge is at 15, 90 before the camera
+    assert hit is not None
+    assert hit[0] == pytest.approx([0, 15, 10], abs=0.6)
+    assert MeshPicker(box).find(look(0.0, 17 / 90)) is None
+
+
 def test_the_scan_point_in_front_is_picked() -> None:
     points = np.array([[9.0, 9.1, 10], [9.2, 9, 10], [9.9, 9.9, 1], [0, 0, 10]])
     assert find_point(points, look(0.05, 0.1)) == 0
