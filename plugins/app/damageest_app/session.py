@@ -250,15 +250,18 @@ class Session:
     def load_results(self) -> None:
         """Reads what the last run of the job has written, where it has."""
         output = self.find_output()
-        self.results = None
+        self.results, self.state.summary, self.state.notes = None, [], []
         if output is not None and (output / "result.json").is_file():
             try:
-                self.results = Results(output)
+                found = Results(output)
+                found.list_sites({})
+                self.state.summary, self.state.notes, self.results = found.summarise(), found.list_notes(), found
             except DamageestError as error:
                 self.say(str(error), "warning")
+            except (KeyError, TypeError, ValueError, IndexError) as error:
+                why = f"{type(error).__name__}: {error}"
+                self.say(f"the result in {output} is of another version ({why}); run the job again", "warning")
         self.state.has_result = self.results is not None
-        self.state.summary = self.results.summarise() if self.results else []
-        self.state.notes = self.results.list_notes() if self.results else []
         for name, panel in self.panels.items():
             try:
                 panel.result()

@@ -27,7 +27,7 @@ class SeveralPanel(Panel):
                 raw_attrs=mark("only-doubtful"),
             )
             v3.VBtn("next", size="small", variant="tonal", click=self.open_next, raw_attrs=mark("next-job"))
-            v3.VBtn("look again", size="small", variant="text", click=self.look)
+            v3.VBtn("look again", size="small", variant="text", click=self.look, raw_attrs=mark("look"))
         with v3.VCard(
             v_for=("one in rows.filter(x => !only_doubtful || x.state === 'doubtful')",), key=("one.job",), classes="mb-2 pa-2",
             variant=("one.job === job_name ? 'tonal' : 'outlined'",), click=(self.open_job, "[one.job]"), raw_attrs=mark("job-row"),
