@@ -16,7 +16,7 @@ from damageest.output.provenance import ProvenanceReport
 from damageest.output.reason_json import ReasonReport
 from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
 from damageest.output.skin_json import CoverageReport, SurplusReport, report_surplus
-from damageest.output.uncertainty_json import ReportedInterval
+from damageest.output.uncertainty_json import BudgetReport, ReportedInterval
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
@@ -140,6 +140,11 @@ class Report(JsonModel):
     volume_95: ReportedInterval | None = Field(
         description="95 % interval of `damage_volume`, its high end null where nothing limits it; null: there is none"
     )
+    budget: BudgetReport | None = Field(
+        description="budget of uncertainty of `damage_volume` (JCGM 100); null where there is no interval or no site"
+    )
+    not_in_budget: list[str] = Field(description="sources that the job does not tell: they are in no interval")
+    certificate: str = Field(description="scanner and standard of its certificate; empty where the job has none")
     undamaged_volume: float
     material: MaterialReport = Field(description="what the whole repair takes")
     truth: TruthReport | None
