@@ -21,6 +21,7 @@ from damageest.artefacts import (
     Pose,
     Reason,
     Scan,
+    Section,
     Solid,
     Surface,
 )
@@ -133,7 +134,9 @@ class Result:
     sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
     volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
     high end. ``adapted``: how ``part`` was deformed to follow
-    the scan; None: it is the part as designed. ``conversions``: what plugins can convert it to, see `convert`.
+    the scan; None: it is the part as designed. ``sections``: those
+    that the job asks for, of the part as designed, in the pose of the run. ``conversions``: what plugins can convert
+    it to, see `convert`.
     """
 
     name: str
@@ -159,6 +162,7 @@ class Result:
     adapted: AdaptedPart | None = None
     sensor: Sensor | None = None
     volume_95: Interval | None = None
+    sections: tuple[Section, ...] = ()
     conversions: Mapping[str, Conversion] = field(default_factory=dict, repr=False)
 
     @property

@@ -125,6 +125,7 @@ class _Check:
             source=self.source,
             sites=header.sites,
             accept=header.accept,
+            sections=header.sections,
             given=self.given,
             make_fault=self.make_fault,
         )

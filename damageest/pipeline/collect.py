@@ -23,6 +23,7 @@ from damageest.rules.notes import make_notes, rank_notes
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
         "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "conversions",
+        "sections",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -70,6 +71,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         fit=None if state.fitted is None else state.fitted.fit,
         sensor=state.sensor,
         conversions=state.conversions,
+        sections=state.sections,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
 

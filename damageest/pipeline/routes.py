@@ -32,6 +32,7 @@ from damageest.pipeline.prepare import (
     settle_tolerance,
     take_tolerance,
 )
+from damageest.pipeline.sections import cut_sections
 from damageest.pipeline.selections import check_selections
 from damageest.pipeline.sensor import fold_hidden, look_for_sheets, measure_sensor, set_explained_aside
 from damageest.pipeline.sites import (
@@ -45,7 +46,13 @@ from damageest.pipeline.sites import (
 from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
-from damageest.pipeline.writing import describe_output, keep_form, show_result, write_output
+from damageest.pipeline.writing import (
+    describe_output,
+    keep_form,
+    show_result,
+    write_output,
+    write_sections,
+)
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
 from damageest.stages.cluster import Cluster
@@ -134,12 +141,14 @@ CLOSE: Route = (
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
     sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted, folded,
     #     views -> volume_95
+    cut_sections,  # asked_sections, part, aligned, adapted, pose_error, sensor, tolerance, unit -> sections, +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
-    #     coverage, surplus, adapted, fitted, sensor, volume_95, conversions
+    #     coverage, surplus, adapted, fitted, sensor, volume_95, conversions, sections
     #     -> result
 )
 WRITE: Route = (
     Export,  # result, folder, writers, path_writers -> written
+    write_sections,  # written, result, folder -> written
     keep_form,  # written, adapted, aligned, tolerance, folder -> written
     describe_output,  # result, written, target -> result, content, job_text
     show_result,  # calls Report: written, result, folder, content, job_text -> result, written

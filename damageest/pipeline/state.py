@@ -29,6 +29,7 @@ from damageest.artefacts import (
     Rims,
     Samples,
     Scan,
+    Section,
     Sites,
     Solid,
     Surface,
@@ -44,6 +45,7 @@ from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
 from damageest.findings import Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict
 from damageest.job.model import Accept, SiteChoice
+from damageest.job.sections import SectionChoice
 from damageest.pipeline.cache import digest
 from damageest.result import Conversion, Result
 from damageest.rules import Rule, ScanFacts
@@ -192,7 +194,8 @@ class JobState(State):
     """The whole job, as it goes along the route.
 
     From the job and the registry: ``name``, ``unit``, ``asked_tolerance`` (None: `auto`), ``choice`` of sites,
-    ``accept``, the stages whose options steps read (None where the job's route has none), and ``rules``, ``writers``,
+    ``accept``, ``asked_sections``, the stages whose options steps read (None where the job's route has none), and
+    ``rules``, ``writers``,
     ``path_writers`` and ``conversions``.
     ``tolerance``: None until it is measured where the job says `auto`. ``depth_step``: of the scan's depth, 0 where it
     is continuous. ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a larger.
@@ -210,6 +213,7 @@ class JobState(State):
     asked_tolerance = Value[float | None]()
     choice = Value[SiteChoice]()
     accept = Value[Accept]()
+    asked_sections = Value[tuple[SectionChoice, ...]]()
     reader = Value[ReadScan | None]()
     aligner = Value[Align | None]()
     adapter = Value[Adapt | None]()
@@ -249,6 +253,7 @@ class JobState(State):
     explained = Value[Explained]()
     surplus = Value[tuple[Surplus, ...]]()
     volume_95 = Value[Interval | None]()
+    sections = Value[tuple[Section, ...]]()
     enclosures = Value[Enclosures]()
 
     wanted = Value[tuple[int, ...] | None]()
