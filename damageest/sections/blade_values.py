@@ -7,6 +7,8 @@ not show them.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from damageest.artefacts import Flags, Floats
@@ -40,68 +42,102 @@ def measure_as_blade(cut: Cut) -> tuple[tuple[SectionValue, ...], Marks, tuple[s
     if motion is None:
         why = "too few scan points here" if cut.seen < 0.5 else "the scan does not fix the outline"
         return (*_list_unknown(nominal, why), *_list_no_motion(nominal, why)), marks, tuple(notes)
-    found = measure_offsets(motion.undo(cut.flat.points), cut.loops)
+    back = motion.undo(cut.flat.points)
+    found = measure_offsets(back, cut.loops)
     own = found.loop == 0
-    fitted = compare(cut.loops[0], found.at[own], found.distance[own], cut.flat.slab)
+    fitted = compare(cut.loops[0], found.at[own], found.distance[own], cut.half)
     turn = _list_motion(cut, nominal, motion, fitted)
-    outline, shown = close_outline(cut, fitted)
-    shape = measure_blade(outline, nominal.leading - nominal.trailing) if len(outline) > 20 else None
+    outline = close_outline(cut, fitted, back[own & (found.distance < -cut.tolerance)])
+    shape = measure_blade(outline.places, nominal.leading - nominal.trailing)
     if shape is None:
         why = "the outline as scanned has no camber line"
         return (*_list_unknown(nominal, why), *turn), marks, tuple(notes)
     edges = {
-        "leading": _edge_error(cut, fitted, outline, shown, shape.leading),
-        "trailing": _edge_error(cut, fitted, outline, shown, shape.trailing),
+        "leading": _edge_error(cut, fitted, outline, shape.leading),
+        "trailing": _edge_error(cut, fitted, outline, shape.trailing),
     }
     for name, place in (("leading", shape.leading), ("trailing", shape.trailing)):
         if edges[name] is not None:
             marks = (*marks, _mark(f"{name} measured", motion.move(place[None])[0]))
-    values = (*_list_shape(cut, fitted, nominal, shape, edges, outline, shown), *turn)
+    values = (*_list_shape(cut, fitted, nominal, shape, edges, outline), *turn)
     return values, marks, tuple(notes)
 
 
-def close_outline(cut: Cut, fitted: SectionContour) -> tuple[Floats, Flags]:
-    """The outline as scanned (K,2), moved back onto that as designed, and which of its places the scan shows (K,).
+@dataclass(frozen=True, eq=False)
+class Closed:
+    """An outline as scanned: ``places`` (K,2), and whether each is ``shown`` (K,) by the scan, by the points of a
+    ``broken`` (K,) edge; or else as designed."""
 
-    Where the scan has no points, the outline as designed fills the gap. Where metal is missing beside a stretch and the
-    scan meets itself across it, as on a broken edge, that stretch is left out.
+    places: Floats
+    shown: Flags
+    broken: Flags
+
+
+def close_outline(cut: Cut, fitted: SectionContour, lost: Floats) -> Closed:
+    """The outline as scanned, moved back onto that as designed.
+
+    Where the scan has no points, the outline as designed fills the gap. Where the points ``lost`` (N,2), below the
+    outline, lead across a gap, as those of a broken edge do, it is closed by them.
     """
     loop, known = cut.loops[0], np.isfinite(fitted.distance)
     places = np.where(known[:, None], fitted.measured, fitted.nominal)
-    kept = np.ones(len(known), bool)
     seen = np.flatnonzero(known)
     if len(seen) < 3:
-        return places, known
-    lost = known & (np.where(known, fitted.distance, 0.0) < -cut.tolerance)
+        return Closed(places, known, np.zeros(len(known), bool))
     limit = CLOSED * cut.spacing
+    pieces: list[tuple[Floats, bool, bool]] = []
     for first, second in zip(seen, np.roll(seen, -1), strict=True):
-        between = (second - first) % len(known) - 1
-        if between < 1:
-            continue
-        gap = float(np.linalg.norm(places[second] - places[first]))
+        pieces.append((places[first : first + 1], True, False))
+        between = (first + 1 + np.arange((second - first - 1) % len(known))) % len(known)
         skipped = (loop.lengths[second] - loop.lengths[first]) % loop.length
-        if gap <= limit and (lost[first] or lost[second]) and skipped > gap:
-            kept[(first + 1 + np.arange(between)) % len(known)] = False
-    return places[kept], known[kept]
+        gap = float(np.linalg.norm(places[second] - places[first]))
+        if not len(between):
+            continue
+        bridge = _find_bridge(places[first], places[second], lost, limit) if skipped > 1.05 * gap else None
+        pieces.append((places[between], False, False) if bridge is None else (bridge, True, True))
+    counts = [len(piece) for piece, _, _ in pieces]
+    shown, broken = (np.repeat([piece[k] for piece in pieces], counts) for k in (1, 2))
+    return Closed(np.concatenate([piece for piece, _, _ in pieces]), shown, broken)
 
 
-def _edge_error(cut: Cut, fitted: SectionContour, outline: Floats, shown: Flags, edge: Floats) -> float | None:
+def _find_bridge(start: Floats, end: Floats, lost: Floats, limit: float) -> Floats | None:
+    """Places (K,2) of the points that lead from a place to another in steps of at most ``limit``, each the mean of
+    three; None where they do not."""
+    length = float(np.linalg.norm(end - start))
+    if len(lost) < 3 or not length > 0:
+        return None
+    way = (end - start) / length
+    off = lost - start
+    at, beside = off @ way, np.abs(off @ np.array([-way[1], way[0]]))
+    near = np.flatnonzero((at > 0) & (at < length) & (beside < max(length, limit)))
+    near = near[np.argsort(at[near], kind="stable")]
+    steps = np.diff(np.concatenate([[0.0], at[near], [length]]))
+    if len(near) < 3 or steps.max() > limit:
+        return None
+    chain = lost[near]
+    return np.asarray((chain[:-2] + chain[1:-1] + chain[2:]) / 3)
+
+
+def _edge_error(cut: Cut, fitted: SectionContour, outline: Closed, edge: Floats) -> float | None:
     """Standard uncertainty of an edge along the chord; None where the scan does not show it."""
-    near = int(np.linalg.norm(outline - edge, axis=1).argmin())
-    seen = np.flatnonzero(shown)
+    near = int(np.linalg.norm(outline.places - edge, axis=1).argmin())
+    seen = np.flatnonzero(outline.shown)
     sides = [seen[np.searchsorted(seen, near) % len(seen)], seen[np.searchsorted(seen, near, side="right") - 1]]
-    beside = max(float(np.linalg.norm(outline[side] - edge)) for side in sides)
+    beside = max(float(np.linalg.norm(outline.places[side] - edge)) for side in sides)
     if beside > TOUCHES * cut.spacing:
         return None
     known = np.flatnonzero(np.isfinite(fitted.distance))
     station = known[int(np.linalg.norm(fitted.measured[known] - edge, axis=1).argmin())]
     own = float(sum_errors(fitted.error[station : station + 1], cut.correlated)[0])
-    return float(np.hypot(own, 0.0 if shown[near] else BETWEEN * beside))
+    # a face that the outline as designed does not have is known to within its points
+    is_new = outline.broken[sides].any() or float(fitted.distance[station]) < -cut.tolerance
+    unsure = BETWEEN * (cut.spacing if is_new else 0.0 if outline.shown[near] else beside)
+    return float(np.hypot(own, unsure))
 
 
 def _list_shape(
     cut: Cut, fitted: SectionContour, nominal: BladeShape, shape: BladeShape, edges: dict[str, float | None],
-    outline: Floats, shown: Flags,
+    outline: Closed,
 ) -> tuple[SectionValue, ...]:  # fmt: skip
     values = []
     missing = [name for name, error in edges.items() if error is None]
@@ -119,9 +155,9 @@ def _list_shape(
             values.append(SectionValue(f"{name} edge", 0.0, None, note=f"the scan does not show the {name} edge"))
         else:
             values.append(SectionValue(f"{name} edge", 0.0, sign * float(off @ outward), edge))
-    touching = np.linalg.norm(outline - shape.middle, axis=1)
+    touching = np.linalg.norm(outline.places - shape.middle, axis=1)
     contact = touching <= shape.thickness / 2 + 0.02 * shape.thickness
-    if shown[contact].mean() < 0.7:
+    if outline.shown[contact].mean() < 0.7:
         values.append(SectionValue("thickness", nominal.thickness, None, note="not scanned where it is thickest"))
     else:
         known = np.isfinite(fitted.distance)
@@ -155,7 +191,7 @@ def _list_motion(
     along = (nominal.trailing - nominal.leading) / nominal.chord
     across = np.array([-along[1], along[0]])
     off = motion.move(middle[None])[0] - middle
-    left, known = fitted.distance, cut.reliable(fitted.error, np.isfinite(fitted.distance))
+    left, known = fitted.distance, cut.reliable(fitted.distance, fitted.error)
     shape = np.clip(left[known], -cut.tolerance, cut.tolerance)
     wave = np.sqrt(max(float((shape**2).mean() - np.median(fitted.error[known]) ** 2), 0.0)) if known.any() else 0.0
     covariance = motion.covariance * cut.inflate(motion.left, float(wave))

@@ -19,7 +19,7 @@ from damageest.geometry.solids import to_manifold
 from damageest.geometry.vectors import normalise
 from damageest.sections.planes import Place
 
-SLAB = 1.5
+SLAB, WINDOW = 2.0, 1.5
 """Half the thickness of the slab, and half the width of the window of a station along the outline, in spacings."""
 STEP = 0.25
 """Distance between stations, in spacings."""
@@ -27,7 +27,7 @@ MOST_STATIONS, FEWEST_STATIONS = 4000, 96
 """Stations of an outline."""
 FEWEST_POINTS = 4
 """Points that a station needs."""
-BEYOND = 0.35
+BEYOND = 0.2
 """Distance of a station from the last point, in half windows, up to which a line is continued beyond it."""
 STEEP = 0.9
 """Sine of the angle between plane and skin below which points of the skin say nothing about its outline."""
@@ -158,7 +158,8 @@ def _start_lengths(loops: list[Loop], loop: Ints, station: Ints) -> Floats:
 
 
 def flatten_scan(points: Floats, spacing: float, part: Mesh, place: Place, loops: list[Loop], reach: float) -> FlatScan:
-    """The scan ``points`` (N,3) near a plane, in it. Those farther than ``reach`` from the outlines are left out."""
+    """The scan ``points`` (N,3) near a plane, in it. Those farther than ``reach`` outside the outlines are left
+    out: they belong to what the part stands on."""
     slab = SLAB * spacing
     off = (points - place.origin) @ place.across
     near = points[np.abs(off) <= slab]
@@ -175,7 +176,7 @@ def flatten_scan(points: Floats, spacing: float, part: Mesh, place: Place, loops
         nothing = np.zeros(0)
         return FlatScan(flat, np.zeros(0, np.int64), nothing, nothing, slab)
     found = measure_offsets(flat, loops)
-    kept = np.abs(found.distance) <= reach
+    kept = found.distance <= reach
     return FlatScan(flat[kept], found.loop[kept], found.at[kept], found.distance[kept], slab)
 
 
@@ -201,8 +202,8 @@ def compare(loop: Loop, at: Floats, distance: Floats, half: float) -> SectionCon
     places = np.concatenate([place(at, "right", turn) for turn in (-1, 0, 1)])
     distance = np.tile(distance, 3)
     for _ in range(REFITS):  # the wall of a step, as at an edge that is too short, is no part of either side
-        off = np.abs(distance - fit_stations(places, distance, places, half)[0])
-        kept = ~(off > STRAY * max(1.4826 * float(np.nanmedian(off)), 1e-12))
+        off = np.nan_to_num(np.abs(distance - fit_stations(places, distance, places, half)[0]))
+        kept = off <= _limit_stray(off)
         places, distance = places[kept], distance[kept]
     value, error, count = fit_stations(places, distance, place(stations, "right"), half)
     if len(corners):
@@ -253,4 +254,13 @@ def _find_stray(distance: Floats) -> Flags:
     if len(distance) < NEIGHBOURS:
         return np.zeros(len(distance), bool)
     off = np.abs(distance - median_filter(distance, size=NEIGHBOURS, mode="wrap"))
-    return np.asarray(off > STRAY * max(1.4826 * float(np.median(off)), 1e-12))
+    return np.asarray(off > _limit_stray(off))
+
+
+def _limit_stray(off: Floats) -> Floats:
+    """Above which of the differences (N,), in order along the outline, a point is stray: by those of its neighbours,
+    since in a crater they are larger, and by those of all."""
+    from scipy.ndimage import median_filter
+
+    local = median_filter(off, size=2 * NEIGHBOURS + 1, mode="wrap")
+    return np.asarray(STRAY * 1.4826 * np.maximum(np.maximum(local, np.median(off)), 1e-12))

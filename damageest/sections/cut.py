@@ -9,13 +9,14 @@ import numpy as np
 from damageest.artefacts import Flags, Floats
 from damageest.artefacts.sections import SectionContour
 from damageest.checks.pose_error import PoseError
-from damageest.sections.contour import FlatScan, Loop
+from damageest.sections.contour import WINDOW, FlatScan, Loop
 from damageest.sections.planes import Place
 
 FORM_WAVE = 0.03
 """Length of a wave of form, in outlines: form that a fit leaves pulls it as errors do that such a piece shares."""
-UNSURE = 4.0
-"""Standard error of a station, in medians of all, from which its distance is no extreme."""
+UNSURE, OF_DISTANCE = 4.0, 0.15
+"""Standard error of a station, in medians of all and as a share of its distance, above both of which its distance is no
+extreme."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,11 @@ class Cut:
     pose: PoseError | None
     seen: float
 
+    @property
+    def half(self) -> float:
+        """Half the width of the window of a station along an outline."""
+        return WINDOW * self.spacing
+
     def find_leading(self) -> Floats | None:
         """The direction (2,) to the leading edge that the job gives."""
         leading = self.place.choice.leading
@@ -53,12 +59,14 @@ class Cut:
         shared = self.correlated**2 * self.alike / length + form**2 * FORM_WAVE
         return 1.0 + len(self.flat.points) * shared / left**2
 
-    def reliable(self, error: Floats, known: Flags) -> Flags:
-        """Which of the ``known`` stations (K,) say how far the scan is at most: not those beside a step, which hardly
-        have a distance."""
+    def reliable(self, distance: Floats, error: Floats) -> Flags:
+        """Which stations (K,) say how far the scan is at most: not those beside a step, which hardly have a
+        distance."""
+        known = np.isfinite(distance)
         if not known.any():
             return known
-        return np.asarray(known & (error <= UNSURE * max(float(np.median(error[known])), 1e-12)))
+        limit = np.maximum(UNSURE * float(np.median(error[known])), OF_DISTANCE * np.abs(distance))
+        return np.asarray(known & (error <= np.maximum(limit, 1e-12)))
 
     def pose_shift(self, flat: Floats, direction: Floats) -> float:
         """Standard deviation, by the pose, of a place (2,) of the plane along a direction (2,)."""

@@ -13,6 +13,8 @@ ROUNDS = 25
 """Rounds of the robust fit."""
 SCALE = 2.5
 """Distance, in standard deviations, from which a point counts less (Geman and McClure's weights)."""
+WIDE, NARROWS = 3.0, 0.75
+"""That distance in the first round, in units of the slack, and by how much it shrinks with each round."""
 MOST_POINTS = 6000
 """Points of a fit; more do not change it."""
 WEAKEST = 1e-3
@@ -43,10 +45,10 @@ def fit_motion(scan: FlatScan, loops: list[Loop], noise: float, along: Floats, s
     """The motion that takes the outlines onto the points; None where they do not fix it, as on a circle.
 
     Each stretch of the outline counts alike, however densely it was scanned. Points that a motion leaves far from the
-    outline count little, so that wear does not pull. Beside the motion the outline may be larger by an offset, and
-    longer ``along`` (2,) a direction: a thicker or shorter section is not taken for a moved one. Where the points do
-    not part these from the motion, as on one side of a wall, a standard deviation ``slack`` of each is in the
-    covariance.
+    outline count little, so that wear does not pull. Beside the motion the outline may be larger by an offset, longer
+    ``along`` (2,) a direction, and thicker across it: a thicker or shorter section is not taken for a moved one. Where
+    the points do not part these from the motion, as on one side of a wall, a standard deviation ``slack`` of each is in
+    the covariance.
     """
     if len(scan.points) < 30:
         return None
@@ -54,25 +56,29 @@ def fit_motion(scan: FlatScan, loops: list[Loop], noise: float, along: Floats, s
     points, weights = scan.points[::step], _weigh(scan, loops)[::step]
     centre = np.average(points, axis=0, weights=weights)
     size = float(np.sqrt(np.average(((points - centre) ** 2).sum(axis=1), weights=weights)))
-    shift, angle, grown = np.zeros(2), 0.0, np.zeros(2)
-    normal, left = np.eye(5), max(noise, 1e-9)
+    across = np.array([-along[1], along[0]])
+    shift, angle, grown = np.zeros(2), 0.0, np.zeros(3)
+    normal, left = np.eye(6), max(noise, 1e-9)
     for turn in range(ROUNDS):
         motion = PlaneMotion(centre, shift, angle, np.eye(3), 0.0)
         back = motion.undo(points)
         _, _, distance, foot, facing = measure_offsets(back, loops)
         arm = foot - centre
         longer = (arm @ along) / size * (facing @ along)
-        more = np.column_stack([np.ones(len(points)), longer])
+        height = arm @ across
+        thicker = height / np.sqrt(np.average(height**2, weights=weights)) * (facing @ across)
+        more = np.column_stack([np.ones(len(points)), longer, thicker])
         distance = distance - more @ grown
         middle = float(np.median(np.abs(distance)))
-        scale = max(SCALE * 1.4826 * middle, SCALE * noise, 1e-9)
+        # from wide to narrow: edges that a shorter section leaves off count until its length is known
+        scale = max(SCALE * 1.4826 * middle, SCALE * noise, WIDE * slack * NARROWS**turn, 1e-9)
         trust = weights / (1 + (distance / scale) ** 2) ** 2
         rows = np.column_stack([facing, (arm[:, 0] * facing[:, 1] - arm[:, 1] * facing[:, 0]) / size, more])
         normal = (rows * trust[:, None]).T @ rows
         rigid = np.linalg.eigvalsh(normal[:3, :3])
         if rigid[0] < WEAKEST * rigid[-1]:
             return None
-        prior = np.array([0, 0, 0, 1, 1]) * (left / slack) ** 2
+        prior = np.array([0, 0, 0, 1, 1, 1]) * (left / slack) ** 2
         normal = normal + np.diag(prior)
         asked = (rows * trust[:, None]).T @ distance - prior * np.array([0, 0, 0, *grown])
         change = np.linalg.solve(normal, asked)
@@ -80,7 +86,7 @@ def fit_motion(scan: FlatScan, loops: list[Loop], noise: float, along: Floats, s
         angle += float(change[2]) / size
         grown = grown + change[3:]
         left = float(np.sqrt(np.average(distance**2, weights=np.maximum(trust, 1e-12))))
-        if turn > 5 and np.abs(change).max() < 1e-4 * max(noise, 1e-6 * size):
+        if turn > 15 and np.abs(change).max() < 1e-4 * max(noise, 1e-6 * size):
             break
     to_angle = np.diag([1.0, 1.0, 1 / size])
     spread = (rows * trust[:, None] ** 2).T @ rows * left**2 + np.diag(prior) * left**2

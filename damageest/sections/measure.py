@@ -15,8 +15,8 @@ from damageest.sections.blade import is_blade, measure_blade
 from damageest.sections.blade_values import measure_as_blade
 from damageest.sections.circle import find_round
 from damageest.sections.contour import (
-    SLAB,
     STEP,
+    WINDOW,
     Loop,
     compare,
     cut_part,
@@ -29,7 +29,7 @@ from damageest.sections.planes import Place, list_places
 from damageest.sections.round_values import measure_as_round
 
 REACH = 0.1
-"""Largest distance of scan points from the outlines that are compared, in the longest side of the section."""
+"""Largest distance of scan points outside the outlines that are compared, in the longest side of the section."""
 UNSEEN = 0.02
 """Share of the outlines below which a section counts as not scanned."""
 
@@ -83,7 +83,7 @@ def _measure(number: int, place: Place, part: Mesh, scanned: Scanned, tolerance:
     longest = float(np.ptp(outlines[0], axis=0).max())
     reach = max(REACH * longest, 3 * tolerance)
     flat = flatten_scan(scanned.points, scanned.spacing, part, place, loops, reach)
-    half = SLAB * scanned.spacing
+    half = WINDOW * scanned.spacing
     contours = tuple(
         compare(loop, flat.at[flat.loop == k], flat.distance[flat.loop == k], half) for k, loop in enumerate(loops)
     )
@@ -145,7 +145,7 @@ def _measure_deviation(cut: Cut) -> tuple[SectionValue, ...]:
     """How far the scan is from the outlines as designed, in the pose of the run."""
     distance = np.concatenate([contour.distance for contour in cut.contours])
     error = np.concatenate([contour.error for contour in cut.contours])
-    known = cut.reliable(error, np.isfinite(distance))
+    known = cut.reliable(distance, error)
     if not known.any():
         why = "no scan points here"
         return tuple(SectionValue(name, None, None, note=why) for name in ("deepest", "highest", "line profile"))

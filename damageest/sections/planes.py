@@ -93,7 +93,7 @@ def find_axis(part: Mesh, along: str | tuple[float, float, float]) -> Floats:
     """The unit vector (3,) of an option `along`. ``axis``: that of a turned part, by its moments of inertia, else that
     in which the part is longest; it points to the positive side of the axis of the frame nearest to it."""
     if not isinstance(along, str):
-        return normalise(np.array([along]))[0]
+        return np.asarray(normalise(np.array([along]))[0])
     if along != "axis":
         return np.asarray(np.eye(3)["xyz".index(along)])
     import trimesh
@@ -107,4 +107,4 @@ def find_axis(part: Mesh, along: str | tuple[float, float, float]) -> Floats:
     largest = int(np.abs(axis).argmax())
     axis = axis if axis[largest] > 0 else -axis
     snapped: Floats = np.eye(3)[largest]
-    return snapped if axis[largest] > NEAR_AXIS else axis
+    return snapped if axis[largest] > NEAR_AXIS else np.asarray(axis)

@@ -70,14 +70,14 @@ def _measure_circle(
     assert circle is not None
     # one station is as good as its points; neighbouring ones share them, and errors of the sensor
     apart = float(np.median(np.diff(loop.lengths)))
-    shared = max(2 * cut.flat.slab / apart, 1.0)
+    shared = max(2 * cut.half / apart, 1.0)
     variance = float(np.median(error)) ** 2 * shared + cut.correlated**2 * max(cut.alike / apart, 1.0)
     spread = circle.covariance * variance
     off = circle.centre - nominal.centre
     distance = float(np.linalg.norm(off))
     way = off / distance if distance > 0 else np.array([1.0, 0.0])
     centre_error = float(np.hypot(np.sqrt(way @ spread[:2, :2] @ way), cut.pose_shift(nominal.centre, way)))
-    half = max(PASSED / 2 * 2 * np.pi * nominal.radius / UPR, cut.flat.slab)
+    half = max(PASSED / 2 * 2 * np.pi * nominal.radius / UPR, cut.half)
     own = (cut.flat.loop == number) & (np.abs(nominal.measure(cut.flat.points)) <= max(0.1 * nominal.radius, limit))
     waves = [_smooth(cut, loop, own, around, half) for around in (nominal, circle)]
     values = [
@@ -85,7 +85,7 @@ def _measure_circle(
         SectionValue(names[1], 0.0, distance, centre_error, note=seen),
     ]
     for name, (wave, errors), extra in zip(names[2:], waves, (2 * centre_error, 0.0), strict=True):
-        there = cut.reliable(errors, np.isfinite(wave) & on_circle)
+        there = cut.reliable(np.where(on_circle, wave, np.nan), errors)
         if not there.any():
             values.append(SectionValue(name, 0.0, None, note="too few scan points here"))
             continue
