@@ -78,7 +78,9 @@ def _measure_circle(
     way = off / distance if distance > 0 else np.array([1.0, 0.0])
     centre_error = float(np.hypot(np.sqrt(way @ spread[:2, :2] @ way), cut.pose_shift(nominal.centre, way)))
     half = max(PASSED / 2 * 2 * np.pi * nominal.radius / UPR, cut.half)
-    own = (cut.flat.loop == number) & (np.abs(nominal.measure(cut.flat.points)) <= max(0.1 * nominal.radius, limit))
+    station = np.searchsorted(loop.lengths[:-1], cut.flat.at, side="right") - 1
+    own = cut.flat.loop == number
+    own[own] = on_circle[station[own]] & on_circle[(station[own] + 1) % len(on_circle)]
     waves = [_smooth(cut, loop, own, around, half) for around in (nominal, circle)]
     values = [
         SectionValue(names[0], 2 * nominal.radius, 2 * circle.radius, 2 * float(np.sqrt(spread[2, 2])), note=seen),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from reportlab.lib.units import mm
 from reportlab.lib.utils import ImageReader
 from reportlab.platypus import BaseDocTemplate, Frame, KeepTogether, PageBreak, PageTemplate, Spacer, Table
 
-from damageest.artefacts import Section
+from damageest.artefacts import Mesh, Section
 from damageest.findings import Interval
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.views import View
@@ -43,6 +44,7 @@ from damageest.stages.report._pdf_parts import (
     style,
     write,
 )
+from damageest.stages.report._section import lay_out_site
 from damageest.stages.report._sections import choose_decimals
 from damageest.stages.report._sites import Remains, Shown
 from damageest.stages.report._thin import thin_mesh
@@ -77,6 +79,7 @@ class _Book:
 
     result: Result
     content: Mapping[str, Any]
+    job_text: str
     words: Words
     letterhead: Letterhead
 
@@ -94,16 +97,16 @@ class _Book:
 
 
 def write_pdf(
-    path: Path, result: Result, content: Mapping[str, Any], sites: Sequence[Shown], remains: Remains,
+    path: Path, result: Result, content: Mapping[str, Any], job_text: str, sites: Sequence[Shown], remains: Remains,
     direction: Any, letterhead: Letterhead, language: str,
 ) -> None:  # fmt: skip
     """Writes the PDF. The same result gives the same bytes: there is no date but those that are signed.
 
-    ``content``: that of result.json; ``sites``: as the page shows them; ``direction`` (3,): from which the part is
-    looked at. Raises OSError where the logo cannot be read.
+    ``content``: that of result.json; ``job_text``: that of job.yaml; ``sites``: as the page shows them; ``direction``
+    (3,): from which the part is looked at. Raises OSError where the logo cannot be read.
     """
     register_fonts()
-    book = _Book(result, content, Words(language), letterhead)
+    book = _Book(result, content, job_text, Words(language), letterhead)
     story: list[Any] = [*_summarise(book, _draw_part(result, remains, direction))]
     if result.sections:
         story += [PageBreak(), *_show_sections(book)]
@@ -222,10 +225,21 @@ def _describe_pose(book: _Book) -> list[tuple[str, str]]:
              + f"; rms {number(datum.rms, 2)} {book.unit}")
             for datum in pose.datums
         ]  # fmt: skip
+    elif count := _count_datums(book.job_text):
+        text = book.words.count("{number} selection of the skin", "{number} selections of the skin", count)
+        rows = [(tell("datums"), f"{text}; rms {number(pose.rms, 2)} {book.unit}")]
     else:
         rows = [(tell("datums"), tell("none: fitted to the skin, rms {rms} {unit}",
                                       rms=number(pose.rms, 2), unit=book.unit))]  # fmt: skip
     return rows + [(tell("not fixed"), motion.text) for motion in (*pose.free, *pose.left)]
+
+
+def _count_datums(job_text: str) -> int:
+    """How many selections of skin the job fits the pose to."""
+    from ruamel.yaml import YAML
+
+    align = YAML(typ="safe").load(job_text).get("align") or {}
+    return len(align.get("datum") or ()) if isinstance(align, Mapping) else 0
 
 
 def _list_sites(book: _Book) -> Table:
@@ -252,6 +266,7 @@ def _trace(book: _Book) -> Table:
         rows.append((f"{tell('scan')} {Path(path).name}", f"SHA-256 {known}"))
     versions = ", ".join(f"{name} {version}" for name, version in content["versions"].items())
     stages = dict.fromkeys((record.stage, record.use) for record in book.result.stages)
+    rows.append((tell("job"), f"SHA-256 {sha256(book.job_text.encode()).hexdigest()}"))
     rows += [(tell("versions"), versions), (tell("stages"), ", ".join(f"{stage}: {use}" for stage, use in stages))]
     return pair_table(rows, WIDTH, 0.22, 6.5)
 
@@ -353,6 +368,10 @@ def _show_site(book: _Book, site: Site, shown: Shown) -> list[Any]:
     both = Table([[left, right]], [0.57 * WIDTH, 0.43 * WIDTH])
     both.setStyle([("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)])
     story = [write(tell("Site {number}", number=site.id), 14, True, LEVELS[site.verdict.level], spaceAfter=4), both]
+    drawing = lay_out_site(result=book.result, site=site)
+    if drawing is not None:
+        legend = tell("section through the deepest point; grey: part as designed, red: damage, green: scan points")
+        story += [head(tell("Section")), Plot(drawing, 0.8 * WIDTH, clean_line(legend))]
     story.append(head(tell("Reasons")))
     reasons = shown.reasons or [tell("Nothing in the scan speaks against it.")]
     story += [write(f"– {text}", 8) for text in reasons]
@@ -367,9 +386,10 @@ def _draw_part(result: Result, remains: Remains, direction: Any) -> bytes:
     up = up - (up @ way) * way
     view = View(result.part.bounds.mean(axis=0), 0.5 * result.part.diagonal, way, up / np.linalg.norm(up))
     rays = remains.without_accepted(body)[1]
-    layers = [(rays, body, "#c3ccd2")]
+    layers: list[tuple[RayCaster, Mesh, str]] = [(rays, body, "#c3ccd2")]
     for site in result.sites:
         if len(site.surface.faces):
-            small = thin_mesh(site.surface, TRIANGLES)
+            small = thin_mesh(site.surface, TRIANGLES)  # a little nearer, so that the part does not hide it
+            small = Mesh(small.vertices + 2e-3 * result.part.diagonal * way, small.faces)
             layers.append((RayCaster(small), small, colours.colour_site(site.id)))
     return draw(view, layers, (420, 340), True)

@@ -68,7 +68,7 @@ class Html(Report):
             from damageest.stages.report._pdf import Letterhead, write_pdf
 
             head = Letterhead(self.company, self.logo)
-            write_pdf(folder / "report.pdf", result, content, sites, remains, start, head, self.language)
+            write_pdf(folder / "report.pdf", result, content, job_text, sites, remains, start, head, self.language)
             files.append("report.pdf")
         picture = next((site.picture for site in sites if site.picture), b"")
         return ReportFiles(tuple(files), picture=picture)
