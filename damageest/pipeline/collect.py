@@ -25,7 +25,7 @@ from damageest.rules.notes import make_notes, rank_notes
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
         "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "budget",
-        "scanner_errors", "conversions",
+        "scanner_errors", "conversions", "sections",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -76,6 +76,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         not_in_budget=tuple(UNKNOWN[name] for name in state.scanner_errors.unknown),
         certificate=state.scanner_errors.certificate,
         conversions=state.conversions,
+        sections=state.sections,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
 
