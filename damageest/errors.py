@@ -13,6 +13,17 @@ from dataclasses import dataclass
 
 MOST_TEXT = 2000
 """Characters of a message from a plugin or a library that are shown; the rest is cut."""
+EXTRAS = {
+    "pyvista": "vtk",
+    "vtkmodules": "vtk",
+    "pye57": "e57",
+    "k3d": "report",
+    "matplotlib": "report",
+    "PIL": "report",
+    "distributed": "batch",
+    "dask": "batch",
+}
+"""Python module to the extra of this package that brings it."""
 _UNSHOWN = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """What a terminal or a page does not show but obeys, and what no file can hold: control characters other than the end
 of a line, marks that turn the direction of writing, and halves of surrogate pairs."""
@@ -150,7 +161,8 @@ def describe_missing_library(error: BaseException) -> StageError | None:
         )
     if isinstance(error, ModuleNotFoundError) and error.name:
         module = error.name.partition(".")[0]
-        return StageError(f"the Python module {error.name} is not installed", f"pip install {module}")
+        wanted = f"'damageest[{EXTRAS[module]}]'" if module in EXTRAS else module
+        return StageError(f"the Python module {error.name} is not installed", f"pip install {wanted}")
     if isinstance(error, ImportError):
         text = " ".join(str(error).split())[:400]
         return StageError(f"a Python module cannot be loaded: {text}", "--debug shows which; install it again")

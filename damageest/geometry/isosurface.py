@@ -15,35 +15,25 @@ def extract_region(grid: Grid, field: GridValues) -> Solid | None:
         grid: the places of the field's nodes; the solid is in its unit and frame.
         field: (shape of the grid) values of any unit at the nodes.
 
-    By vtk's flying edges, a form of marching cubes (Schroeder et al. 2015). Values below 1e-5 of the largest count as
-    positive. Raises ArtefactError where rounding leaves a mesh that is not watertight.
+    By libigl's marching cubes. Values below 1e-5 of the largest count as positive. Raises ArtefactError where rounding
+    leaves a mesh that is not watertight.
     """
-    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-    from vtkmodules.vtkCommonDataModel import vtkImageData
-    from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
+    import igl
 
     scale = float(np.abs(field).max())
     if not scale > 0:
         return None
     # A zero level exactly at a node would give triangles without area, so values near zero are moved to one side.
     values = np.where(np.abs(field) < 1e-5 * scale, 1e-5 * scale, field)
-    values = np.pad(values, 1, constant_values=-scale).astype(np.float32)
-    image = vtkImageData()
-    image.SetDimensions(*values.shape)
-    image.SetOrigin(-1.0, -1.0, -1.0)
-    image.GetPointData().SetScalars(numpy_to_vtk(values.ravel(order="F"), deep=True))
-    edges = vtkFlyingEdges3D()
-    edges.SetInputData(image)
-    edges.SetValue(0, 0.0)
-    edges.ComputeNormalsOff()
-    edges.ComputeGradientsOff()
-    edges.ComputeScalarsOff()
-    edges.Update()
-    mesh = edges.GetOutput()
-    if not mesh.GetNumberOfPolys():
+    values = np.pad(values, 1, constant_values=-scale)
+    nodes = np.empty((*values.shape[::-1], 3))  # x runs first
+    for axis, count in enumerate(values.shape):
+        nodes[..., axis] = np.arange(-1.0, count - 1).reshape(-1, *[1] * axis)
+    found, faces, _ = igl.marching_cubes(values.ravel(order="F"), nodes.reshape(-1, 3), *values.shape, 0.0)
+    if not len(faces):
         return None
-    vertices = vtk_to_numpy(mesh.GetPoints().GetData()).astype(np.float64) * grid.cell + grid.origin
-    faces = vtk_to_numpy(mesh.GetPolys().GetConnectivityArray()).reshape(-1, 3).astype(np.int64)
+    vertices = np.asarray(found) * grid.cell + grid.origin
+    faces = np.asarray(faces, np.int64)
     corners = vertices[faces] - grid.origin
     if np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) < 0:
         faces = faces[:, ::-1]

@@ -62,7 +62,8 @@ def show_result(engine: Engine, state: JobState) -> tuple[Result, ExportedFiles]
     try:
         done = engine.call(Report, state).reported
     except StageError as error:
-        warning = Reason("report", f"{error.args[0]} (the run went on without a report)")
+        remedy = f"; try: {error.remedy}" if error.remedy else ""
+        warning = Reason("report", f"{error.args[0]} (the run went on without a report{remedy})")
         return replace(result, warnings=(*result.warnings, warning)), written
     result = replace(result, stages=tuple(engine.records), steps=tuple(engine.steps))
     return result, replace(written, files=(*written.files, *done.files), notes=(*written.notes, *done.notes))
