@@ -7,6 +7,9 @@ import numpy as np
 from damageest.artefacts import Solid
 from damageest.geometry.poisson import Grid, GridValues
 
+CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
+"""The corners of a cell in libigl's order."""
+
 
 def extract_region(grid: Grid, field: GridValues) -> Solid | None:
     """The solid where a field is positive, closed by the walls of the grid; None where the field is nowhere positive.
@@ -26,10 +29,18 @@ def extract_region(grid: Grid, field: GridValues) -> Solid | None:
     # A zero level exactly at a node would give triangles without area, so values near zero are moved to one side.
     values = np.where(np.abs(field) < 1e-5 * scale, 1e-5 * scale, field)
     values = np.pad(values, 1, constant_values=-scale)
-    nodes = np.empty((*values.shape[::-1], 3))  # x runs first
-    for axis, count in enumerate(values.shape):
-        nodes[..., axis] = np.arange(-1.0, count - 1).reshape(-1, *[1] * axis)
-    found, faces, _ = igl.marching_cubes(values.ravel(order="F"), nodes.reshape(-1, 3), *values.shape, 0.0)
+    inside = values > 0
+    first = inside[:-1, :-1, :-1]
+    crossed = np.zeros(first.shape, bool)
+    for x, y, z in CORNERS[1:]:
+        crossed |= first != inside[x : x - 1 or None, y : y - 1 or None, z : z - 1 or None]
+    cells = np.argwhere(crossed)
+    if not len(cells):
+        return None
+    number = np.ravel_multi_index((cells[:, None] + CORNERS).reshape(-1, 3).T, values.shape)
+    used, corners = np.unique(number, return_inverse=True)
+    nodes = np.stack(np.unravel_index(used, values.shape), axis=1) - 1.0
+    found, faces, _ = igl.marching_cubes(values.ravel()[used], nodes, corners.reshape(-1, 8), 0.0)
     if not len(faces):
         return None
     vertices = np.asarray(found) * grid.cell + grid.origin
