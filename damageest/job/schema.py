@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
+from damageest import __version__
 from damageest.job.model import Header
 from damageest.registry import Implementation, Registry
 from damageest.registry.contracts import DEFAULTS, STAGES
@@ -42,6 +43,7 @@ def job_schema(registry: Registry) -> dict[str, Any]:
         properties[stage] = {"description": _summary(items), "anyOf": choices + mappings}
     return {
         "$schema": DIALECT,
+        "$comment": f"written by damageest {__version__}",
         "title": "damageest job",
         "type": "object",
         "additionalProperties": False,

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from damageest import __version__
 from damageest.artefacts import Floats, Vector
 from damageest.output.adapt_json import AdaptReport, report_adapt
 from damageest.output.base import JsonModel
@@ -149,7 +150,13 @@ class Report(JsonModel):
 
 def result_schema() -> dict[str, Any]:
     """The JSON Schema of result.json."""
-    return {"$schema": DIALECT, **Report.model_json_schema(mode="serialization"), "title": "damageest result"}
+    comment = f"written by damageest {__version__}"
+    return {
+        "$schema": DIALECT,
+        "$comment": comment,
+        **Report.model_json_schema(mode="serialization"),
+        "title": "damageest result",
+    }
 
 
 def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: Any = str) -> dict[str, Any]:
