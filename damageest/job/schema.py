@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
-from damageest import __version__
 from damageest.job.model import Header
 from damageest.registry import Implementation, Registry
 from damageest.registry.contracts import DEFAULTS, STAGES
@@ -43,7 +43,7 @@ def job_schema(registry: Registry) -> dict[str, Any]:
         properties[stage] = {"description": _summary(items), "anyOf": choices + mappings}
     return {
         "$schema": DIALECT,
-        "$comment": f"written by damageest {__version__}",
+        "$comment": f"written by damageest {version('damageest')}",
         "title": "damageest job",
         "type": "object",
         "additionalProperties": False,

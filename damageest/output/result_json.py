@@ -6,7 +6,6 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from damageest import __version__
 from damageest.artefacts import Floats, Vector
 from damageest.output.adapt_json import AdaptReport, report_adapt
 from damageest.output.base import JsonModel
@@ -150,7 +149,9 @@ class Report(JsonModel):
 
 def result_schema() -> dict[str, Any]:
     """The JSON Schema of result.json."""
-    comment = f"written by damageest {__version__}"
+    from importlib.metadata import version
+
+    comment = f"written by damageest {version('damageest')}"
     return {
         "$schema": DIALECT,
         "$comment": comment,
