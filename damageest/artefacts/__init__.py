@@ -20,6 +20,7 @@ from damageest.artefacts.enclosures import Enclosure, Enclosures, Evidence, Evid
 from damageest.artefacts.fields import ArtefactError
 from damageest.artefacts.meshes import Deposit, Mesh, Part, Solid, Surface, open_edges
 from damageest.artefacts.paths import BeadFill, DepositPath, Unreached
+from damageest.artefacts.poses import DatumFit, FreeMotion, Pose
 from damageest.artefacts.reasons import Effect, Reason
 from damageest.artefacts.scans import (
     ADDED,
@@ -27,8 +28,6 @@ from damageest.artefacts.scans import (
     INTACT,
     OUTLIER,
     Deviation,
-    FreeMotion,
-    Pose,
     Samples,
     Scan,
     Sites,
@@ -45,6 +44,7 @@ __all__ = [
     "ArtefactError",
     "BeadFill",
     "Bytes",
+    "DatumFit",
     "Deposit",
     "DepositPath",
     "Deviation",

@@ -11,7 +11,7 @@ from damageest.artefacts.arrays import Floats
 from damageest.artefacts.displacement import DisplacementField
 from damageest.artefacts.fields import MOST, Checked, Range, require_finite, require_shape
 from damageest.artefacts.meshes import Part
-from damageest.artefacts.scans import require_rigid
+from damageest.artefacts.poses import require_rigid
 
 
 @dataclass(frozen=True)

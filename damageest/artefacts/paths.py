@@ -29,7 +29,8 @@ class BeadFill(Checked):
     ``filled``: share of the reachable deposit that is filled. ``gap``: volume of the reachable deposit that is not;
     ``largest_gap``: that of its largest connected piece; ``void``: diameter of the largest ball in it. ``spill``:
     volume of beads outside the deposit and the metal; ``spill_distance``: how far it reaches from the deposit.
-    ``sunk``: volume of beads where metal is already.
+    ``sunk``: volume of beads where metal is already. ``of_deposit``: share of the whole deposit that is filled, what is
+    listed as unreached included.
     """
 
     voxel: float
@@ -40,6 +41,7 @@ class BeadFill(Checked):
     spill: float
     spill_distance: float
     sunk: float
+    of_deposit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,9 @@ class DepositPath(Checked):
     it adds. ``nozzle``: its mesh, tip at 0, axis along z. ``clearance``: least distance of the nozzle from anything
     while it deposits, ``travel_clearance`` while it travels; inf without obstacles. ``tightest`` (2,3): point and axis
     where it is least. ``unreached``: what is not filled, by reason, and ``missing``: the same as a solid. ``fill``: the
-    simulated beads; None where they were not simulated. ``notes`` are warnings.
+    simulated beads; None where they were not simulated. ``notes`` are warnings. ``kinds``: what each pass is, by its
+    number: row, ring, spiral, rim, or gap (between others); empty where not known. ``setup`` (4,4): takes a point
+    to the frame in which the part is set up, its z along the tool, for a path of three axes; None for other paths.
     """
 
     points: Floats
@@ -79,10 +83,12 @@ class DepositPath(Checked):
     missing: Solid | None = None
     fill: BeadFill | None = None
     notes: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+    setup: Floats | None = None
     _dtypes: ClassVar[dict[str, Any]] = {
         "points": np.float64, "axes": np.float64, "normals": np.float64, "feed": np.float64, "on": np.bool_,
         "layer": np.int64, "number": np.int64, "part": np.int64, "directions": np.float64, "heights": np.float64,
-        "section": np.float64, "tightest": np.float64,
+        "section": np.float64, "tightest": np.float64, "setup": np.float64,
     }  # fmt: skip
     _ranges: ClassVar[dict[str, Range]] = {
         "width": (0.0, MOST), "standoff": (0.0, MOST), "deposit_volume": (0.0, MOST),
@@ -105,6 +111,9 @@ class DepositPath(Checked):
             require_finite(name, getattr(self, name))
         if self.tightest is not None:
             require_shape("tightest", self.tightest, 2, 3)
+        if self.setup is not None:
+            require_shape("setup", self.setup, 4, 4)
+            require_finite("setup", self.setup)
         with np.errstate(over="ignore"):
             is_unit = np.allclose(np.linalg.norm(self.axes, axis=1), 1, atol=1e-6)
         if not is_unit:
@@ -115,6 +124,8 @@ class DepositPath(Checked):
             raise ArtefactError("layer, number, part: expected numbers from 1 up")
         if count and self.part.max() > len(self.directions):
             raise ArtefactError(f"part: number {self.part.max()} of the {len(self.directions)} parts")
+        if self.kinds and len(self.kinds) != self.passes:
+            raise ArtefactError(f"kinds: {len(self.kinds)} for {self.passes} passes")
         if count and self.on[0]:
             raise ArtefactError("on: the first move has no start, so it cannot deposit")
 
@@ -152,6 +163,11 @@ class DepositPath(Checked):
     def bead_volume(self) -> float:
         """Volume that the passes add: length by section."""
         return float((self.moves * self.section[self.part - 1])[self.on].sum()) if len(self.points) else 0.0
+
+    @property
+    def surplus_volume(self) -> float:
+        """Volume that the passes add beyond what of the deposit is reached; 0 where they add less."""
+        return max(self.bead_volume - (self.deposit_volume - self.unreached_volume), 0.0)
 
     @property
     def unreached_volume(self) -> float:

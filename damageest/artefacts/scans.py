@@ -1,4 +1,4 @@
-"""A scan, where it lies on the part, and what its points are."""
+"""A scan, and what its points are."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts.arrays import Bytes, Flags, Floats, Ints, Singles, Vector
+from damageest.artefacts.arrays import Bytes, Flags, Floats, Ints, Singles
 from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
 from damageest.artefacts.meshes import Solid
+from damageest.artefacts.poses import require_rigid
 from damageest.artefacts.reasons import Reason
 
 INTACT, DAMAGE, ADDED, OUTLIER = 0, 1, 2, 3
@@ -24,22 +25,6 @@ OF_POINTS = ("points", "normals", "view", "cloud", "colours", "confidence")
 P = TypeVar("P")
 
 MOST_CLOUDS = 1 << 30
-RIGID = 1e-6
-"""Largest error of a pose's numbers, of the rotation and of the last row."""
-
-
-def require_rigid(name: str, poses: Floats) -> None:
-    """Raises ArtefactError where one of the poses (4,4) or (K,4,4) is no rotation and shift."""
-    require_finite(name, poses)
-    turn = poses[..., :3, :3]
-    if (np.abs(poses[..., 3, :] - [0.0, 0.0, 0.0, 1.0]) > RIGID).any():
-        raise ArtefactError(f"{name}: the last row of a pose is 0, 0, 0, 1")
-    with np.errstate(over="ignore", invalid="ignore"):
-        product = turn @ np.swapaxes(turn, -1, -2)
-        if not (np.abs(product - np.eye(3)) <= RIGID).all():
-            raise ArtefactError(f"{name}: not rigid: its upper left 3x3 has scale or shear")
-        if (np.linalg.det(turn) < 0).any():
-            raise ArtefactError(f"{name}: not rigid: its upper left 3x3 mirrors (its determinant is -1)")
 
 
 def take_points(of: P, index: Ints | Flags) -> P:
@@ -172,62 +157,6 @@ class Samples(Checked):
         require_index("kind", self.kind, 3, "kinds")
         if count and self.face.min() < 0:
             raise ArtefactError(f"face: expected numbers of triangles, got {self.face.min()}")
-
-
-@dataclass(frozen=True)
-class FreeMotion(Checked):
-    """A motion that unworn skin does not exclude: after it the scan fits the part as well.
-
-    ``direction``: unit vector of a shift, or of the axis of a turn through ``point`` (None: a shift), in the part's
-    frame. ``low``, ``high``: how far the scan can be moved, 0 being the pose found, in the job's unit; of a turn, the
-    movement of the skin that moves most. ``turn``: angle in radians for each unit of it, 0 for a shift. ``text``: the
-    same in words.
-    """
-
-    direction: Vector
-    low: float
-    high: float
-    point: Vector | None = None
-    turn: float = 0.0
-    text: str = ""
-
-    def move(self, points: Floats) -> Floats:
-        """How points (N,3) of the scan, in the part's frame, move for each unit of the motion (N,3)."""
-        if self.point is None:
-            return np.tile(np.array(self.direction), (len(points), 1))
-        return np.cross(self.turn * np.array(self.direction), points - np.array(self.point))
-
-
-@dataclass(frozen=True, eq=False)
-class Pose(Checked):
-    """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
-
-    ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is
-    one of several right ones. ``notes`` say so in words. ``doubts``: what speaks against the pose, and so against every
-    site, as a small share of the scan on the part. Of those with the code `other_poses`, that poses fit which are no
-    symmetries, only sites are concerned whose metal is another one in them.
-    ``free``: motions that unworn skin does not exclude. ``is_held``: whether skin without wear holds the pose but for
-    those; False where that was not tested.
-    """
-
-    T_part_scan: Floats
-    rms: float = 0.0
-    inliers: float = 1.0
-    alternatives: Floats | None = None
-    notes: tuple[str, ...] = ()
-    doubts: tuple[Reason, ...] = ()
-    free: tuple[FreeMotion, ...] = ()
-    is_held: bool = False
-    _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64}
-    _ranges: ClassVar[dict[str, Range]] = {"rms": (0.0, MOST), "inliers": (0.0, 1.0)}
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_shape("T_part_scan", self.T_part_scan, 4, 4)
-        require_rigid("T_part_scan", self.T_part_scan)
-        if self.alternatives is not None:
-            require_shape("alternatives", self.alternatives, "K", 4, 4)
-            require_rigid("alternatives", self.alternatives)
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,13 +68,19 @@ class PoseError:
 
 
 def measure_pose_error(
-    part: Part, aligned: Scan, deviation: Deviation, tolerance: float, form: float = 0.0
+    part: Part,
+    aligned: Scan,
+    deviation: Deviation,
+    tolerance: float,
+    form: float = 0.0,
+    spread: Floats | None = None,
 ) -> PoseError:
     """The error that the intact points leave to the pose.
 
     Args:
         aligned, deviation: the scan in the part's frame, N points. tolerance: in the job's unit.
         form: standard deviation by which the skin is known to deviate; the measured one where it is larger.
+        spread: (6,K) errors of a pose that was fitted to datums, as in `Pose`: not all of the skin fixes it.
 
     No direction of the pose is taken to be worse than the tolerance: a larger error would show as damage. Turning a
     part of revolution about its axis changes no volume, though no point fixes it.
@@ -85,8 +91,7 @@ def measure_pose_error(
     scale = np.diag([1 / radius] * 3 + [1.0] * 3)
     mean, places, rows, count = _average_patches(part, aligned, deviation, centre, edge)
     if len(mean) < FEWEST_PATCHES:
-        spread = tolerance * scale
-        return PoseError(centre, spread, max(form, 0.0), edge**2)
+        return PoseError(centre, tolerance * scale, max(form, 0.0), edge**2)
     rows = rows @ scale
     prior = np.eye(6) / tolerance**2
     variance = np.maximum(aligned.noise**2 / count, (1e-6 * part.diagonal) ** 2)
@@ -105,10 +110,12 @@ def measure_pose_error(
     information = (rows / (variance + systematic**2)[:, None]).T @ rows + prior
     covariance = np.linalg.inv(information)
     values, vectors = np.linalg.eigh(covariance)
-    spread = vectors * np.sqrt(np.maximum(values, 0))
+    errors = scale @ (vectors * np.sqrt(np.maximum(values, 0)))
     if motion @ information @ motion > SIGNIFICANT:
-        spread = np.column_stack([spread, motion])
-    return PoseError(centre, scale @ spread, systematic, area)
+        errors = np.column_stack([errors, scale @ motion])
+    if spread is not None:
+        errors = np.column_stack([errors, spread])
+    return PoseError(centre, errors, systematic, area)
 
 
 def _make_rows(places: Floats, normals: Floats) -> Floats:

@@ -53,6 +53,7 @@ def _add_commands() -> None:
         faces,
         init,
         nominal,
+        part,
         picture,
         plugins,
         run,
@@ -63,7 +64,22 @@ def _add_commands() -> None:
         view,
     )
 
-    for module in (run, batch, view, picture, nominal, verify, validate, init, explain, faces, stages, plugins, schema):
+    for module in (
+        run,
+        batch,
+        view,
+        picture,
+        nominal,
+        verify,
+        validate,
+        init,
+        explain,
+        faces,
+        part,
+        stages,
+        plugins,
+        schema,
+    ):
         app.command(module.__name__.rsplit(".", 1)[1])(module.command)
 
 

@@ -14,6 +14,7 @@ from damageest.cli._streams import say
 
 if TYPE_CHECKING:
     from damageest.artefacts import Part, Scan
+    from damageest.stages.part import CadPmi, CadTolerance
 
 SCHEMA = "schemas/job.schema.json"
 
@@ -29,6 +30,7 @@ def command(
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Write a commented job file with values measured from part and scan."""
+    from damageest.cli.part import read_pmi
     from damageest.errors import Fault, JobError
     from damageest.job import load
     from damageest.pipeline.prepare import inspect_inputs, keep_inputs
@@ -46,9 +48,10 @@ def command(
     if swapped := _find_swap(part, scan, solid, cloud):
         cautions = [swapped, *cautions]
     paths = [os.path.relpath(path.resolve(), target.resolve().parent) for path in (part, scan)]
+    pmi = read_pmi(part, units, registry)
     lines = [
         *_describe_inputs(part, scan, solid, cloud, units, cautions),
-        *_write_values(paths, units, tolerance),
+        *_write_values(paths, units, tolerance, pmi),
         *_write_examples(target.stem, registry.methods(), tolerance),
     ]
     target.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -72,14 +75,46 @@ def _describe_inputs(part: Path, scan: Path, solid: Part, cloud: Scan, units: st
     ]
 
 
-def _write_values(paths: list[str], units: str, tolerance: float) -> list[str]:
+def _write_values(paths: list[str], units: str, tolerance: float, pmi: CadPmi) -> list[str]:
+    said, profile = "", _choose_profile(pmi)
+    if profile is not None and profile.value is not None:
+        half = profile.value / 2
+        if half >= tolerance:
+            tolerance, said = half, f"; half of the profile tolerance '{profile.name}' of the CAD file"
+        else:
+            said = f"; the profile tolerance '{profile.name}' asks for {half:.4g}, which this scan is too noisy for"
     return [
         "version: 1",
         f"units: {units:<20} # of all lengths in this file, and of files without a unit",
-        f"tolerance: {tolerance:<16.4g} # lambda: points closer to the nominal surface are intact; or auto",
+        f"tolerance: {tolerance:<16.4g} # lambda: points closer to the nominal surface are intact; or auto{said}",
         f"part: {_quote(paths[0])}",
         f"scan: {_quote(paths[1])}",
-        "align: register             # for any start pose; icp or none if the scan is already in the part's frame",
+        *_write_align(pmi, profile),
+    ]
+
+
+def _choose_profile(pmi: CadPmi) -> CadTolerance | None:
+    """The profile tolerance with the most datums, and of those the narrowest; None where the CAD file has none."""
+    profiles = [one for one in pmi.tolerances if one.kind == "surface_profile" and one.value]
+    return min(profiles, key=lambda one: (-len(one.datums), one.value), default=None)
+
+
+def _write_align(pmi: CadPmi, profile: CadTolerance | None) -> list[str]:
+    """The alignment, by the datum system of the CAD file: that of the profile tolerance, or the one of most datums."""
+    pose = "align: register             # for any start pose; icp or none if the scan is already in the part's frame"
+    system = profile.datums if profile is not None else max(pmi.systems, key=len, default=())
+    faces = {one.name: one.faces for one in pmi.datums}
+    common = {name: [face for letter in name.split("-") for face in faces.get(letter, ())] for name in system}
+    if not system or not all(common.values()):
+        why = f"# the CAD file's datum system {' | '.join(system)} has datums without CAD faces: see damageest part"
+        return [pose, why] if system else [pose]
+    letters = [name if len(name) < 3 else name.replace("-", "")[:2] for name in system]
+    return [
+        "align:",
+        "  use: register             # for any start pose; icp if the scan is already near the part's frame",
+        "  datum:                    # of the CAD file, in the order of precedence, by the numbers of CAD faces;",
+        "                            # where one of them is worn, name others, or leave datum out",
+        *(f"    {letter}: {list(common[name])}" for letter, name in zip(letters, system, strict=True)),
     ]
 
 

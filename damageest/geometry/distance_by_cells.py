@@ -13,6 +13,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import order_integers
+from damageest.geometry.sampling import place_along
 from damageest.geometry.vectors import normalise
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid
 from damageest.isolation.memory import FEWER_POINTS, require_memory
@@ -60,7 +61,7 @@ def signed_distance_by_cells(points: Floats, part: Mesh, near: float, exact: Exa
     low, high = part.bounds
     size = max(2 * near, np.sqrt(PER_CELL * part.area / len(points)), float((high - low).max()) / MOST_ALONG)
     grid = VoxelGrid(low - PAD * size, size, np.ceil((high - low) / size).astype(np.int64) + 2 * PAD)
-    sharp, bent = (_place_along(part, edges, size / 4) for edges in _find_creases(part, near / size))
+    sharp, bent = (place_along(part.vertices, edges, size / 4) for edges in _find_creases(part, near / size))
     beside = grid.mark_around(sharp, 1)
     # any two points of a cell are at most 1.74 of its edges apart
     plane = ~grid.mark_around(np.concatenate([sharp, bent]), 2)
@@ -110,15 +111,6 @@ def _find_creases(part: Mesh, slope: float) -> tuple[Ints, Ints]:
     turn = np.linalg.norm(normal[one // 3] - normal[other // 3], axis=1)
     odd, flush = edges[order[start[~pair]]], edges[one]
     return np.concatenate([odd, flush[turn > SHARP]]), flush[(turn <= SHARP) & (turn > 1e-3 * slope)]
-
-
-def _place_along(part: Mesh, edges: Ints, step: float) -> Floats:
-    """Points (M,3) along edges (E,2), including both ends, at most ``step`` apart."""
-    a, b = part.vertices[edges[:, 0]], part.vertices[edges[:, 1]]
-    count = np.ceil(np.linalg.norm(b - a, axis=1) / step).astype(np.int64) + 1
-    of = np.repeat(np.arange(len(edges)), count)
-    share = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)) / np.maximum(count[of] - 1, 1)
-    return np.asarray(a[of] + share[:, None] * (b - a)[of])
 
 
 def _build_frames(part: Mesh) -> Floats:

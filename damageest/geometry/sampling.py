@@ -1,4 +1,4 @@
-"""Random points on the triangles of a mesh."""
+"""Points on a mesh: at random on its triangles, evenly along edges."""
 
 from __future__ import annotations
 
@@ -33,3 +33,12 @@ def sample_by_area(mesh: Mesh, count: int, rng: np.random.Generator, faces: Ints
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     a, b, c = np.moveaxis(mesh.triangles[face], 1, 0)
     return np.asarray(a + u * (b - a) + v * (c - a)), face
+
+
+def place_along(vertices: Floats, edges: Ints, step: float) -> Floats:
+    """Points (M,3) along edges (E,2) between ``vertices`` (V,3), including both ends, at most ``step`` apart."""
+    a, b = vertices[edges[:, 0]], vertices[edges[:, 1]]
+    count = np.ceil(np.linalg.norm(b - a, axis=1) / step).astype(np.int64) + 1
+    of = np.repeat(np.arange(len(edges)), count)
+    share = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)) / np.maximum(count[of] - 1, 1)
+    return np.asarray(a[of] + share[:, None] * (b - a)[of])

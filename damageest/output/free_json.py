@@ -1,4 +1,4 @@
-"""What result.json says of motions that unworn skin does not exclude."""
+"""What result.json says of the pose's datums, and of motions that they or unworn skin do not fix."""
 
 from __future__ import annotations
 
@@ -19,3 +19,26 @@ class FreeMotionReport(JsonModel):
     high: float = Field(description="how far forth")
     turn: float = Field(description="angle in radians for each unit of movement; 0 for a shift")
     text: str
+
+
+class LeftMotionReport(JsonModel):
+    """A motion that a datum system leaves free, and that the rest of the skin fixes."""
+
+    direction: Vector = Field(description="of a shift, or of the axis of a turn; unit vector in the part's frame")
+    point: Vector | None = Field(description="on the axis of a turn; null for a shift")
+    text: str
+
+
+class DatumReport(JsonModel):
+    """How a datum of a datum system was fitted."""
+
+    name: str = Field(description="its letter")
+    kind: str = Field(description="its shape, as `plane`, or `3 cylinders` for a pattern")
+    faces: list[int] = Field(description="numbers of its CAD faces; empty where the part is a mesh")
+    takes: list[str] = Field(description="degrees of freedom that it fixes, those of datums before it left out")
+    points: int = Field(description="scan points on it")
+    contact: float = Field(description="share of them on the fitted shape")
+    inside: float = Field(description="share of them below it, as where it is worn")
+    rms: float = Field(description="of the means of patches in contact, from the fitted shape")
+    nominal: list[float] = Field(description="radius of each cylinder and sphere, as designed")
+    measured: list[float] = Field(description="the same as fitted to the scan")

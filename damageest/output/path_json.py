@@ -26,6 +26,10 @@ class BeadFillReport(JsonModel):
     spill: float = Field(description="volume of beads outside the deposit and the metal")
     spill_distance: float = Field(description="how far beads reach out of the deposit, beside metal")
     sunk: float = Field(description="volume of beads where metal is already")
+    of_deposit: float = Field(
+        description="share of the whole deposit that beads fill: 1 without the shares of `unreachable_volume` and "
+        "`gap`, as far as the voxels resolve it"
+    )
 
 
 class PathReport(JsonModel):
@@ -40,6 +44,7 @@ class PathReport(JsonModel):
     minutes: float
     bead_volume: float = Field(description="volume that the passes add: length by section")
     deposit_volume: float
+    surplus_volume: float = Field(description="volume that the passes add beyond what of the deposit is reached")
     unreachable_volume: float = Field(description="of the deposit that no pass fills")
     unreached: list[UnreachedReport] = Field(description="the same by reason")
     clearance: Bound = Field(
@@ -47,6 +52,10 @@ class PathReport(JsonModel):
         "deposition; null: none is near"
     )
     travel_clearance: Bound = Field(description="the same between passes")
+    setup: list[list[float]] | None = Field(
+        description="with 3 axes: transform (4 rows) of a point of the part's frame to the frame in which the part is "
+        "set up, z along the tool; the path's files are in that frame. Null: they are in the part's frame"
+    )
     fill: BeadFillReport | None = Field(description="null where it was not simulated")
     files: list[str]
     notes: list[str]

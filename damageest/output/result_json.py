@@ -11,7 +11,7 @@ from damageest.output.adapt_json import AdaptReport, report_adapt
 from damageest.output.base import JsonModel
 from damageest.output.deviation_json import DeviationReport, report_deviation
 from damageest.output.fit_json import FitReport, report_fit
-from damageest.output.free_json import FreeMotionReport
+from damageest.output.free_json import DatumReport, FreeMotionReport, LeftMotionReport
 from damageest.output.provenance import ProvenanceReport
 from damageest.output.reason_json import ReasonReport
 from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
@@ -79,6 +79,10 @@ class AlignmentReport(JsonModel):
     doubts: list[ReasonReport] = Field(description="reasons against the pose, and so against every site")
     free: list[FreeMotionReport] = Field(
         description="motions after which the scan fits as well, since no unworn skin holds it"
+    )
+    datums: list[DatumReport] = Field(description="of a datum system, in the order of precedence; else empty")
+    left: list[LeftMotionReport] = Field(
+        description="motions that the datum system leaves free, and that the rest of the skin fixes"
     )
     held: bool = Field(description="whether unworn skin holds the pose, but for these motions")
 

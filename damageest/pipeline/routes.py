@@ -119,7 +119,8 @@ CLOSE: Route = (
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
     gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner, sheets, adapted
     #     -> facts
-    measure_sensor,  # part, aligned, deviation, sites, facts, explained, depth_step, tolerance -> pose_error, sensor
+    measure_sensor,  # part, aligned, deviation, sites, facts, explained, depth_step, tolerance, pose -> pose_error,
+    #     sensor
     measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
     #     tolerance, unit -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit,

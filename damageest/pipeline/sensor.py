@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Ints, Part, Reason, Scan, Sites
+from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Ints, Part, Pose, Reason, Scan, Sites
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.semivariogram import measure_semivariogram
 from damageest.checks.sensor import NEEDED, describe_sensor, measure_levels, measure_shown
@@ -38,16 +38,16 @@ UNSUPPORTED = {"intact_over", "intact_inside", "beyond_points", "off_boundary", 
 @step(gives=("pose_error", "sensor"))
 def measure_sensor(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, facts: ScanFacts, explained: Explained,
-    depth_step: float, tolerance: float,
+    depth_step: float, tolerance: float, pose: Pose,
 ) -> tuple[PoseError, Sensor]:  # fmt: skip
     """Measures noise and systematic errors of the intact skin, and what they hide."""
-    pose = measure_pose_error(part, aligned, deviation, tolerance)
+    error = measure_pose_error(part, aligned, deviation, tolerance, spread=pose.spread)
     levels = measure_levels(part, aligned, deviation)
     stray = (deviation.label == OUTLIER) | ((deviation.label == DAMAGE) & (sites.label == 0))
     share = (int(stray.sum()) - explained.points) / max(len(stray), 1)
     variogram = measure_semivariogram(part, aligned, deviation)
-    sensor = describe_sensor(levels, aligned, pose, facts.systematic, depth_step, tolerance, share, variogram)
-    return pose, sensor
+    sensor = describe_sensor(levels, aligned, error, facts.systematic, depth_step, tolerance, share, variogram)
+    return error, sensor
 
 
 @step(gives="sheets")

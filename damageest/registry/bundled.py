@@ -5,13 +5,13 @@ Only messages use this: what can be run is what was found, whoever provides it.
 
 from __future__ import annotations
 
-COMMANDS = {"evaluate": "damageest-evaluate"}
+COMMANDS = {"app": "damageest-app", "evaluate": "damageest-evaluate"}
 """Command to package."""
 
 CONVERSIONS = {"cadquery": "damageest-cadquery"}
 """Kind of object that a result can be converted to, to package."""
 
-FORMATS = {"step": "damageest-cadquery"}
+FORMATS = {"step": "damageest-cadquery", "qif": "damageest-qif"}
 """Format that `export` writes, to package."""
 
 IMPLEMENTATIONS = {

@@ -36,7 +36,10 @@ from damageest.geometry import (
     pseudonormals,
     rays,
     refinement,
+    sampling,
+    shapes,
     slivers,
+    smooth_faces,
     solids,
     stiff_modes,
     touching,
@@ -122,6 +125,16 @@ CALLS: dict[str, Callable[[Rows], None]] = {
         (None,),
     ),
     "depth_steps.measure_depth_step": lambda r: expect(np.asarray(depth_steps.measure_depth_step(r.points)), ()),
+    "smooth_faces.label_smooth_faces": lambda r: expect(
+        smooth_faces.label_smooth_faces(r.mesh.faces, r.mesh.face_normals, 0.9), (len(r.mesh.faces),)
+    ),
+    "sampling.place_along": lambda r: expect(
+        sampling.place_along(r.mesh.vertices, r.mesh.faces[:, :2], 0.1), (None, 3)
+    ),
+    "shapes.Shape": lambda r: expect(
+        shapes.Shape("cylinder", np.zeros(3), np.eye(3)[2], 1.0).find_slopes(r.points), (r.count, 6)
+    ),
+    "shapes.recognise_shape": lambda r: expect(np.asarray(shapes.recognise_shape(r.mesh.triangles) is None), ()),
     "stiff_modes.name_modes": lambda r: expect(np.asarray(stiff_modes.name_modes(r.points, r.points)[1]), ()),
     "undoing.undo": lambda r: expect(undoing.undo(STILL, r.points), (r.count, 3)),
     "undoing.cut_to_follow": lambda r: expect(undoing.cut_to_follow(r.mesh, np.copy, 1.0)[0], (None, 3)),

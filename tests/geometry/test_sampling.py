@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from damageest.geometry.distance import distance_to_mesh
-from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.sampling import place_along, sample_by_area
 from damageest.geometry.transforms import move_mesh
 from tests.geometry.shapes import FAR, box, torus
 
@@ -50,3 +50,19 @@ def test_far_from_the_origin_the_points_are_the_same() -> None:
     T[:3, 3] = FAR
     near, far = (sample_by_area(mesh, 500, np.random.default_rng(1))[0] for mesh in (torus(), move_mesh(torus(), T)))
     assert np.abs(far - FAR - near).max() < 1e-8
+
+
+@given(st.floats(0.05, 50.0))
+def test_places_along_edges_are_even_and_hold_both_ends(step: float) -> None:
+    block = box((20, 10, 5))
+    edges = block.faces[:, :2]
+    places = place_along(block.vertices, edges, step)
+    start = 0
+    for a, b in block.vertices[edges]:
+        stop = start + int(np.ceil(np.linalg.norm(b - a) / step)) + 1
+        own = places[start:stop]
+        assert np.allclose(own[[0, -1]], [a, b])
+        assert np.allclose(np.diff(own, axis=0), (b - a) / (len(own) - 1))
+        assert np.linalg.norm(np.diff(own, axis=0), axis=1).max() <= step * (1 + 1e-9)
+        start = stop
+    assert start == len(places)

@@ -14,6 +14,7 @@ from damageest import artefacts
 from damageest.artefacts import (
     AdaptedPart,
     BeadFill,
+    DatumFit,
     Deposit,
     DepositPath,
     Deviation,
@@ -45,9 +46,13 @@ POINTS = np.random.default_rng(0).normal(size=(7, 3))
 TURN = np.array([[0.0, -1, 0, 1 / 3], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]])
 REASON = Reason("other_poses", "two fit", "contradicts", 0.2, "mm", (1.0, 2.0, 3.0), "give it")
 FREE = FreeMotion((0.0, 0.6, 0.8), -0.1, 1 / 3, (1.0, 2.0, 3.0), 0.02, "a turn")
+DATUM = DatumFit(
+    "B", "2 cylinders", (3, 4), ("a turn",), 400, 0.9, 0.1, 1 / 3, (5.0, 5.0), (5.1, 4.9), ("cylinder", "cylinder"),
+    ((0.0, 1 / 3, 2.0), (1.0, 2.0, 3.0)), ((0.0, 0.6, 0.8), (0.0, 0.6, 0.8)), (True, False),
+)  # fmt: skip
 UP = np.tile([0.0, 0.6, 0.8], (7, 1))
 UNREACHED = Unreached(1 / 3, "unsupported")
-FILL = BeadFill(0.1, 0.99, 1 / 3, 0.2, 0.3, 0.4, 0.5, 0.6)
+FILL = BeadFill(0.1, 0.99, 1 / 3, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
 PATH = DepositPath(
     POINTS, UP, -UP, np.arange(7) + 1 / 3, np.arange(7) > 2, np.arange(1, 8), np.arange(1, 8), np.ones(7, np.int64),
     UP[:1], POINTS[0, :1], 2.0, POINTS[1, :1], 1 / 3, 10.0, SOLID, 0.1, np.inf,
@@ -57,7 +62,14 @@ ARTEFACTS: list[Any] = [
     FILL,
     PATH,
     dataclasses.replace(
-        PATH, tightest=POINTS[:2], unreached=(UNREACHED, UNREACHED), missing=SOLID, fill=FILL, notes=("much travel",)
+        PATH,
+        tightest=POINTS[:2],
+        unreached=(UNREACHED, UNREACHED),
+        missing=SOLID,
+        fill=FILL,
+        notes=("much travel",),
+        kinds=("row",) * 7,
+        setup=TURN,
     ),
     FREE,
     Mesh(BOX.vertices, BOX.faces),
@@ -88,6 +100,8 @@ ARTEFACTS: list[Any] = [
     Pose(TURN, 0.01, 0.9, np.stack([TURN, np.eye(4)]), ("two ways",)),
     FREE,
     Pose(TURN, free=(FREE, FREE), is_held=True),
+    DATUM,
+    Pose(TURN, datums=(DATUM, DATUM), left=(FREE,), spread=np.arange(12.0).reshape(6, 2) / 7),
     REASON,
     Pose(TURN, doubts=(REASON, Reason("pose_free", "free"))),
     Deviation(POINTS[:, 0], np.arange(7), np.array([0, 1, 2, 3, 0, 1, 2], np.uint8)),

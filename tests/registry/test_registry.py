@@ -74,10 +74,12 @@ def test_no_plugin_is_broken_but_for_a_missing_system_library(registry: Registry
 
 
 @pytest.mark.parametrize("plugin", [pytest.param(plugin, marks=needs_plugin(plugin)) for plugin in PLUGINS])
-def test_every_plugin_provides_stages_or_commands(plugin: str, registry: Registry) -> None:
-    """Tests made for each implementation found, as of conformance, include the plugins' own."""
+def test_every_plugin_provides_something(plugin: str, registry: Registry) -> None:
+    """Stages, commands or formats. Tests made for each implementation found, as of conformance, include the plugins'
+    own."""
     name = f"damageest-{plugin}"
-    assert any(item.provider.name == name for item in registry.implementations) or load_commands().get(name)
+    formats = any(provider.name == name for provider in registry.formats.values())
+    assert any(item.provider.name == name for item in registry.implementations) or load_commands().get(name) or formats
 
 
 def test_a_plugins_stage_runs(site: Site, tmp_path: Path) -> None:

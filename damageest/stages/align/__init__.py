@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from damageest.artefacts import Part, Pose, Samples, Scan
 from damageest.geometry.selectors import Selector
@@ -57,8 +58,17 @@ class Align(Stage, ABC):
 
     def find_selectors(self) -> list[tuple[tuple[str | int, ...], Selector]]:
         """Those of an option `datum` as well, which may name CAD faces without a selector."""
-        bare = [(("datum", k), Selector(faces=(face,))) for k, face in enumerate(getattr(self, "datum", ()))
-                if isinstance(face, (int, str))]  # fmt: skip
+        datum: Any = getattr(self, "datum", ())
+        lists: dict[tuple[str | int, ...], Any] = {("datum",): datum}
+        if isinstance(datum, Mapping):  # a system: datums by letter, each a list or a mapping with the list in it
+            lists = {
+                ("datum", name, "skin") if hasattr(one, "skin") else ("datum", name): getattr(one, "skin", one)
+                for name, one in datum.items()
+            }
+        bare = [
+            ((*place, k), Selector(faces=(face,)))
+            for place, faces in lists.items() for k, face in enumerate(faces) if isinstance(face, (int, str))
+        ]  # fmt: skip
         return [*super().find_selectors(), *bare]
 
     @asked_by_name

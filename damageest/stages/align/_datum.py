@@ -1,23 +1,45 @@
-"""The option `datum`: the faces that a pose is fitted to."""
+"""The option `datum`: the faces that a pose is fitted to, together or as a system with precedence."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field as Option
+from pydantic import StringConstraints
 
 from damageest.artefacts import Flags, Floats, Ints, Part
-from damageest.geometry.selectors import Selector
+from damageest.geometry.selectors import Selector, StrictMapping
 
-Datum = tuple[int | str | Selector, ...]
-"""Numbers or names of CAD faces, or conditions that select skin; skin that one of them selects is part of it."""
+Item = int | str | Selector
+Items = Annotated[tuple[Item, ...], Option(min_length=1)]
+
+
+class DatumFeature(StrictMapping):
+    """One datum of a system, with how it is fitted."""
+
+    skin: Items = Option(description="numbers or names of CAD faces, or selectors of skin")
+    fit: Literal["robust", "one_sided"] = Option(
+        "robust",
+        description="robust: by least squares to what is not worn; one_sided: from outside, as a surface plate lies on "
+        "a face, a ring on a shaft or a plug in a bore",
+    )
+
+
+Letter = Annotated[str, StringConstraints(pattern=r"^[A-Z]{1,2}$")]
+System = Annotated[dict[Letter, Items | DatumFeature], Option(min_length=1, max_length=3)]
+"""Datums by letter, in the order of precedence."""
+Datum = tuple[Item, ...] | System
+"""Numbers or names of CAD faces, or conditions that select skin; skin that one of them selects is part of it. Or
+several such lists by letter, the first of which fixes all that it can."""
 
 NO_DATUM: Datum = Option(
     (),
     description="faces that fix the pose in the last fit, as an inspector aligns on datums: numbers or names of CAD "
     "faces, or selectors of skin (box, half_space, facing, faces, kind); what they do not fix is fixed by the rest, "
-    "and reported; default: all of the skin",
+    "and reported; default: all of the skin. Or a datum system with precedence, {A: [...], B: [...], C: [...]}: A "
+    "fixes what its shape can, B what is left, C the rest (ISO 5459, ASME Y14.5)",
 )
 
 
@@ -29,10 +51,8 @@ class DatumSkin:
     selectors: tuple[Selector, ...]
 
     @classmethod
-    def find(cls, part: Part, datum: Datum) -> DatumSkin | None:
-        """The datum of a part, None where the job names none. Raises StageError where the part has no such face."""
-        if not datum:
-            return None
+    def find(cls, part: Part, datum: tuple[Item, ...]) -> DatumSkin:
+        """The datum of a part. Raises StageError where the part has no such face."""
         found = cls(part, tuple(one if isinstance(one, Selector) else Selector(faces=(one,)) for one in datum))
         found.choose(np.zeros((1, 3)), np.zeros(1, np.int64))
         return found

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, FreeMotion
+from damageest.artefacts import DatumFit, Flags, Floats, FreeMotion, Reason
 from damageest.errors import StageError
 from damageest.geometry.transforms import make_motions
 from damageest.stages.align._check_worn import MOST_OUTSIDE, measure_outside, measure_wear
@@ -49,7 +49,7 @@ class Finish:
 
     ``free``: motions that unworn skin does not exclude; ``is_held``: whether it holds the pose but for these.
     ``notes`` for the user. ``worn_depth``: how deep most of the skin lies inside, in diagonals, where nothing lies
-    outside; else 0.
+    outside; else 0. ``doubts``, ``datums``, ``left``, ``spread``: of a datum system, as in `Pose`.
     """
 
     fit: Fit
@@ -58,10 +58,14 @@ class Finish:
     worn_depth: float = 0.0
     is_changed: bool = False
     is_held: bool = False
+    doubts: tuple[Reason, ...] = ()
+    datums: tuple[DatumFit, ...] = ()
+    left: tuple[FreeMotion, ...] = ()
+    spread: Floats | None = None
 
 
 @dataclass(frozen=True)
-class _Found:
+class Found:
     """The best motion (K,) from the present pose, its gain of contact, and what it was chosen from."""
 
     patches: Patches
@@ -90,7 +94,7 @@ def finish_pose(
         if len(patches.weight) < MIN_PATCHES or not patches.basis.shape[1]:
             return Finish(best)
         on_datum = None if datum is None else _find_datum(frame, datum, patches)
-        found = _search(patches, on_datum, noise, tolerance, rng)
+        found = search_pose(patches, noise, tolerance, rng, on_datum)
         motion = found.motions[0]
         moved = float(np.quantile(np.abs(motion @ patches.slopes.T), MOST_MOVED))
         wanted = found.gain > MIN_GAIN and found.explains and moved > MIN_MOVED * tolerance
@@ -116,7 +120,7 @@ def _find_datum(frame: Frame, datum: DatumSkin, patches: Patches) -> Flags:
     return is_datum
 
 
-def _describe(frame: Frame, fitted: Fit, found: _Found, tolerance: float, unit: str, datum: Flags | None) -> Finish:
+def _describe(frame: Frame, fitted: Fit, found: Found, tolerance: float, unit: str, datum: Flags | None) -> Finish:
     """What the last fit left open, in the job's unit."""
     patches = found.patches
     notes: tuple[str, ...] = ()
@@ -130,7 +134,9 @@ def _describe(frame: Frame, fitted: Fit, found: _Found, tolerance: float, unit: 
     return Finish(fitted, free, (*notes, *(one.text for one in free)), depth, is_held=True)
 
 
-def _search(patches: Patches, datum: Flags | None, noise: float, tolerance: float, rng: np.random.Generator) -> _Found:
+def search_pose(
+    patches: Patches, noise: float, tolerance: float, rng: np.random.Generator, datum: Flags | None = None
+) -> Found:
     """Searches with errors of form of several sizes. Of those with which nothing lies outside, the one counts that
     explains the patches best: wear and large errors both leave skin inside, but errors leave as much outside."""
     if datum is not None:
@@ -154,7 +160,7 @@ def _search(patches: Patches, datum: Flags | None, noise: float, tolerance: floa
 
 def _search_with(
     weighted: Patches, patches: Patches, proposals: Proposals, error: float, noise: float, tolerance: float
-) -> _Found:
+) -> Found:
     """The best motion where errors of form have a standard deviation of ``error``, in tolerances. ``weighted``: the
     patches with the weights by which motions are searched."""
     band = measure_bands(patches, noise, error * tolerance)
@@ -163,4 +169,4 @@ def _search_with(
     outside = measure_outside(patches, offset, band, tolerance)
     contact = float(patches.weight[np.abs(offset) < band].sum() / patches.weight.sum())
     explains = outside < MOST_OUTSIDE and contact > MIN_CONTACT
-    return _Found(patches, band, searched.motions, float(searched.score[0]) - searched.start, explains)
+    return Found(patches, band, searched.motions, float(searched.score[0]) - searched.start, explains)

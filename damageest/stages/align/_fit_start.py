@@ -7,13 +7,15 @@ import numpy as np
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.stages.align._ambiguity import note_free_motion
+from damageest.stages.align._by_system import finish_by_datum
 from damageest.stages.align._check_worn import check_with_wear
-from damageest.stages.align._datum import Datum, DatumSkin
+from damageest.stages.align._datum import Datum
 from damageest.stages.align._fine import fit
-from damageest.stages.align._finish import Finish, finish_pose
+from damageest.stages.align._finish import Finish
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._largest_piece import prefer_largest_piece
 from damageest.stages.align._points import draw_evenly, orient_scan
+from damageest.stages.align._system import find_datum
 
 
 def fit_from_start(
@@ -26,7 +28,7 @@ def fit_from_start(
     what fixes the pose in the last fit. Raises StageError, with the ``remedy``, where its pose does not explain the
     scan, and where the fit does not converge.
     """
-    on_datum = DatumSkin.find(part, datum)
+    on_datum = find_datum(part, datum)
     frame = Frame.build(scan, part)
     noise = scan.noise / frame.size
     rng = np.random.default_rng(seed)
@@ -39,7 +41,7 @@ def fit_from_start(
         best = prefer_largest_piece(frame.target, points, best, noise)
     finish = Finish(best)
     if converged:
-        finish = finish_pose(frame, points, best, noise, tolerance / frame.size, part.unit, on_datum)
+        finish = finish_by_datum(frame, points, dense, best, noise, tolerance / frame.size, part.unit, on_datum)
         best = finish.fit
     result = check_with_wear(frame.target, best, points, dense, tolerance / frame.size, finish.worn_depth)
     if not result.is_acceptable:
@@ -50,12 +52,12 @@ def fit_from_start(
             f"of the scan points to the surface by {best.residue * frame.size:.3g} {part.unit} (rms)",
             "raise iterations, or use align: register",
         )
-    doubts = result.note_doubts()
-    if not finish.free:  # those have amounts, and are terms of the intervals
+    doubts = result.note_doubts() + finish.doubts
+    if not (finish.free or finish.datums):  # those have amounts, and are terms of the intervals
         doubts += note_free_motion(best.pose, frame.target, points, best.band)
     pose = frame.unscale_pose(best.pose)
     notes = (*map(str, doubts), *finish.notes)
     return Pose(
         pose, result.rms * frame.size, result.inliers, notes=notes, doubts=doubts,
-        free=finish.free, is_held=finish.is_held,
+        free=finish.free, is_held=finish.is_held, datums=finish.datums, left=finish.left, spread=finish.spread,
     )  # fmt: skip

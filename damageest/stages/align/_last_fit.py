@@ -5,20 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from damageest.artefacts import Floats
+from damageest.stages.align._by_system import finish_by_datum
 from damageest.stages.align._check_pose import PoseCheck
 from damageest.stages.align._check_worn import check_with_wear
 from damageest.stages.align._datum import DatumSkin
 from damageest.stages.align._fine import Fit
-from damageest.stages.align._finish import Finish, finish_pose
+from damageest.stages.align._finish import Finish
 from damageest.stages.align._frame import Frame
 from damageest.stages.align._largest_piece import prefer_largest_piece
 from damageest.stages.align._refine_pose import refine_pose
+from damageest.stages.align._system import DatumSystem
 
 
 @dataclass(frozen=True)
 class LastFit:
     """What a pose is fitted to. ``points`` (N,3): spread evenly over the scan, in random order; ``raw`` (M,3): any
-    unbiased subset of it; ``noise``, ``tolerance`` in diagonals; ``unit``: the job's; ``datum``: as for `finish_pose`.
+    unbiased subset of it; ``noise``, ``tolerance`` in diagonals; ``unit``: the job's; ``datum``: as for
+    `finish_by_datum`.
     """
 
     frame: Frame
@@ -27,11 +30,11 @@ class LastFit:
     noise: float
     tolerance: float
     unit: str
-    datum: DatumSkin | None
+    datum: DatumSkin | DatumSystem | None
 
     def run(self, start: Fit) -> tuple[Finish, PoseCheck]:
         """The last fit from ``start``, and how well its pose explains the scan."""
         target, points, noise = self.frame.target, self.points, self.noise
         best = refine_pose(target, points, prefer_largest_piece(target, points, start, noise))
-        finish = finish_pose(self.frame, points, best, noise, self.tolerance, self.unit, self.datum)
+        finish = finish_by_datum(self.frame, points, self.raw, best, noise, self.tolerance, self.unit, self.datum)
         return finish, check_with_wear(target, finish.fit, points, self.raw, self.tolerance, finish.worn_depth)

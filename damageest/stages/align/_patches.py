@@ -81,14 +81,15 @@ def measure_patches(target: PartSurface, points: Floats, pose: Floats, noise: fl
     is_flat = scatter < MAX_SCATTER * max(noise, usual)
     place = np.column_stack([average(column) for column in foot.T])
     weight = count[many].astype(float)
-    basis = _find_basis(jacobian[many], weight)
+    basis = find_basis(jacobian[many], weight)
     return Patches(mean[many], jacobian[many], weight, is_flat[many], basis, place[many], face[first][many])
 
 
-def _find_basis(jacobian: Floats, weight: Floats) -> Floats:
-    """The motions (6,K) that change the distances of the patches; none of those that the part's symmetry allows."""
+def find_basis(jacobian: Floats, weight: Floats) -> Floats:
+    """The motions (6,K) that change the distances of the patches, or (F,K) among F motions; none of those that the
+    part's symmetry allows."""
     if not len(weight):
-        return np.empty((6, 0))
+        return np.empty((jacobian.shape[1], 0))
     values, vectors = np.linalg.eigh((jacobian * weight[:, None]).T @ jacobian / weight.sum())
     kept = values > MIN_VALUE * max(float(values[-1]), 1e-300)
     return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))

@@ -45,11 +45,13 @@ def describe_open(frame: Frame, patches: Patches, datum: Flags, unit: str) -> tu
     left = vectors.T[values < MIN_HELD * patches.weight.sum()]
     if not len(left):
         return ()
-    named = "; ".join(_name(to_free_motion(frame, one, 0.0, 0.0, unit)) for one in _simplify(left @ patches.basis.T))
+    named = "; ".join(
+        name_motion(to_free_motion(frame, one, 0.0, 0.0, unit)) for one in simplify(left @ patches.basis.T)
+    )
     return (f"the datum does not fix {named}: the rest of the skin fixes it",)
 
 
-def _simplify(twists: Floats) -> Floats:
+def simplify(twists: Floats) -> Floats:
     """Twists (M,6) that span the same motions as the given ones, with shifts apart from turns, and each along an axis
     where that is possible (reduced row echelon form)."""
     rows = twists / np.abs(twists).max(axis=1, keepdims=True)
@@ -80,7 +82,7 @@ def _orient(vector: Floats, low: float, high: float) -> tuple[Vector, float, flo
     return (x, y, z), float(low) + 0.0, float(high) + 0.0
 
 
-def _name(motion: FreeMotion) -> str:
+def name_motion(motion: FreeMotion) -> str:
     x, y, z = motion.direction
     if motion.point is None:
         return f"a shift along ({x:.3f}, {y:.3f}, {z:.3f})"
@@ -96,13 +98,14 @@ _REMEDY = (
 
 def _describe_shift(direction: Vector, low: float, high: float, unit: str) -> str:
     return (
-        f"the pose is free for {_name(FreeMotion(direction, low, high))} of the part's frame, from {low:.3g} to "
+        f"the pose is free for {name_motion(FreeMotion(direction, low, high))} of the part's frame, from {low:.3g} to "
         f"{high:+.3g} {unit}: no unworn skin holds it there, {_REMEDY}"
     )
 
 
 def _describe_turn(direction: Vector, point: Vector, low: float, high: float, unit: str) -> str:
+    named = name_motion(FreeMotion(direction, low, high, point))
     return (
-        f"the pose is free for {_name(FreeMotion(direction, low, high, point))} of the part's frame, by which the skin "
+        f"the pose is free for {named} of the part's frame, by which the skin "
         f"moves from {low:.3g} to {high:+.3g}: no unworn skin holds it there, {_REMEDY}"
     )

@@ -40,7 +40,6 @@ class Register(Align):
         from damageest.errors import StageError
         from damageest.stages.align._ambiguity import describe_choice, note_ambiguity, note_free_motion
         from damageest.stages.align._choose import COARSE, Choice, choose_pose
-        from damageest.stages.align._datum import DatumSkin
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import MIN_POINTS, Frame
         from damageest.stages.align._last_fit import LastFit
@@ -50,8 +49,9 @@ class Register(Align):
         from damageest.stages.align._points import draw_evenly, draw_stratified, orient_scan
         from damageest.stages.align._prepare_part import prepare_part
         from damageest.stages.align._search import search
+        from damageest.stages.align._system import find_datum
 
-        datum = DatumSkin.find(part, self.datum)
+        datum = find_datum(part, self.datum)
         frame = Frame.build(scan, part)
         target, noise = frame.target, scan.noise / frame.size
         rng = np.random.default_rng(self.seed)
@@ -97,14 +97,17 @@ class Register(Align):
             turns = choice.others @ np.linalg.inv(choice.pose)
             poses = turns @ best.pose if finish.is_changed else choice.others
             others = np.array([frame.unscale_pose(pose) for pose in poses])
-        doubts = check.note_doubts() + doubts + note_ambiguity(choice, prepared)
-        if not finish.free:  # those have amounts, and are terms of the intervals
+        doubts = check.note_doubts() + finish.doubts + doubts + note_ambiguity(choice, prepared)
+        if not (finish.free or finish.datums):  # those have amounts, and are terms of the intervals
             doubts += note_free_motion(best.pose, target, fine, best.band)
         told = note_inward(target, frame, scan, best)
         notes = (*describe_choice(choice), *told, *map(str, doubts), *finish.notes)
         pose = frame.unscale_pose(best.pose)
         rms = check.rms * frame.size
-        return Pose(pose, rms, check.inliers, others, notes, doubts, finish.free, finish.is_held)
+        return Pose(
+            pose, rms, check.inliers, others, notes, doubts, finish.free, finish.is_held, finish.datums, finish.left,
+            finish.spread,
+        )  # fmt: skip
 
 
 def _advise(scan: Scan) -> str:

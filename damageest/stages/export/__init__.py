@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
+import numpy as np
+
 from damageest.artefacts import DepositPath, Floats, Solid
 from damageest.artefacts.fields import Checked
 from damageest.result import Result
@@ -127,6 +129,10 @@ ExactFunction = Callable[[Path, Result, Mapping[str, Body], Mapping[str, Floats 
 the stem, with the transform (4,4) of a point from the part's frame, None for none; ``seconds``: the time limit for each
 site. Gives the files that it wrote; those of other bodies are then written as usual."""
 
+DocumentFunction = Callable[[Path, Result], ExportedFiles]
+"""A function of ``folder, result`` that writes files about the whole result, in the part's frame. The same result gives
+the same bytes."""
+
 
 @dataclass(frozen=True)
 class Writer:
@@ -138,7 +144,8 @@ class Writer:
     for none; ``patch`` is None where the format cannot hold one. ``exact``: writes solids whose outer
     faces are those of the part's CAD file; None where the format has only facets.
     ``single``: whether readers round coordinates to single precision; it then gets solids that this does not open, with
-    the same triangles in each frame.
+    the same triangles in each frame. ``document``: for a format that holds the result as a whole: it is called once,
+    and ``write`` is not called for any solid.
     """
 
     write: WriteFunction
@@ -147,6 +154,7 @@ class Writer:
     patch: Callable[[Path, str, Patch, str], str | None] | None = None
     exact: ExactFunction | None = None
     single: bool = False
+    document: DocumentFunction | None = None
 
 
 @dataclass(frozen=True)
@@ -166,11 +174,23 @@ class PathSettings:
 @dataclass(frozen=True)
 class PathWriter:
     """How a deposition path is written. ``write``: a function of ``file, path, settings``, a file to create, the
-    path in the frame asked for, and a `PathSettings`; the same path gives the same bytes. It raises StageError for a
+    path in the frame asked for, or in its set-up frame where it has one (`DepositPath.setup` then takes points of the
+    frame asked for to it), and a `PathSettings`; the same path gives the same bytes. It raises StageError for a
     path that the format cannot hold. ``suffix``: of the file, without the dot."""
 
     write: Callable[[Path, DepositPath, PathSettings], None]
     suffix: str
+
+
+def describe_setup(path: DepositPath, factor: float = 1.0) -> list[str]:
+    """Lines for the head of a program that say how to set up the part; none for a path without a set-up frame.
+    ``factor``: from the path's unit to that of the file."""
+    if path.setup is None or np.array_equal(path.setup, np.eye(4)):
+        return []
+    T = path.setup.copy()
+    T[:3, 3] *= factor
+    rows = [" ".join(f"{value:.9g}" for value in row + 0.0) for row in T[:3]]
+    return ["set-up frame, z along the tool: x y z here = rows times x y z 1 of the part file's frame", *rows]
 
 
 class Export(Stage, ABC):

@@ -64,3 +64,12 @@ PathFormats = Annotated[
     AfterValidator(lambda names: tuple(dict.fromkeys(names))),
 ]
 """Formats of deposition paths, without duplicates; none is allowed."""
+
+PathOption = Annotated[
+    str,
+    BeforeValidator(
+        lambda value: f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else value,
+        json_schema_input_type=str | float,
+    ),
+]
+"""What a job says for a writer of paths: a text, or a number."""

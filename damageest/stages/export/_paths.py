@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from damageest.artefacts import DepositPath, Floats
 from damageest.geometry.transforms import move_points
 from damageest.result import Result
-from damageest.stages.export import ExportedFiles, PathSettings, PathWriter
+from damageest.stages.export import ExportedFiles, PathSettings, PathWriter, describe_setup
 
 
 def write_paths(
@@ -25,27 +28,41 @@ def write_paths(
 ) -> ExportedFiles:
     """Writes each site's path in the formats ``names``, below ``place``.
 
-    ``T`` (4,4) takes a point from the part's frame to that of the files; None for none.
+    ``T`` (4,4) takes a point from the part's frame to that of the files; None for none. A path with a set-up frame is
+    written in that frame, and ``site-1.setup.json`` has the transform from the frame of the other files to it.
     """
     files = []
     for site in result.sites:
         if site.path is None:
             continue
         settings = PathSettings(result.units, f"{result.name} site {site.id}", header, footer, options, site.id)
+        moved = _move_path(site.path, T)
+        (folder / f"{place}path").mkdir(parents=True, exist_ok=True)
         for writer in (writers[name] for name in names):
             name = f"{place}path/site-{site.id}.{writer.suffix}"
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            writer.write(folder / name, _move_path(site.path, T), settings)
+            writer.write(folder / name, moved, settings)
+            files.append(name)
+        if names and moved.setup is not None and describe_setup(moved):
+            name = f"{place}path/site-{site.id}.setup.json"
+            values = {"units": result.units, "transform": np.add(moved.setup, 0.0).tolist()}
+            (folder / name).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
             files.append(name)
     return ExportedFiles(tuple(files))
 
 
 def _move_path(path: DepositPath, T: Floats | None) -> DepositPath:
-    """The path moved by a rigid transform (4,4), as far as writers need it."""
+    """The path moved by a rigid transform (4,4), or into its set-up frame where it has one, as far as writers need
+    it."""
+    setup = path.setup
+    if setup is not None:
+        T, setup = setup, setup if T is None else setup @ np.linalg.inv(T)
     if T is None:
         return path
     turn = T[:3, :3].T
+    axes = path.axes @ turn
+    if setup is not None:  # without what rounding leaves
+        axes = np.where(np.abs(axes - np.round(axes)) < 1e-12, np.round(axes), axes)
     return replace(
-        path, points=move_points(path.points, T), axes=path.axes @ turn, normals=path.normals @ turn,
-        directions=path.directions @ turn, tightest=None, missing=None,
+        path, points=move_points(path.points, T), axes=axes, normals=path.normals @ turn,
+        directions=path.directions @ turn, tightest=None, missing=None, setup=setup,
     )  # fmt: skip

@@ -22,7 +22,7 @@ from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathWrit
 from damageest.stages.export._colours import DAMAGE, DEPOSIT, DOUBTFUL, SURPLUS, UNDAMAGED
 from damageest.stages.export._coverage import write_coverage
 from damageest.stages.export._nominal import map_to_nominal
-from damageest.stages.export._options import Formats, PathFormats, check_spline_writer
+from damageest.stages.export._options import Formats, PathFormats, PathOption, check_spline_writer
 from damageest.stages.export._paths import write_paths
 from damageest.stages.export._scan_points import PointColours, write_scan
 
@@ -45,7 +45,7 @@ class Files(Export):
         ("stl",),
         description="format of the solids, one or a list: stl (single precision; a solid that rounding opens is "
         "written as ply too), ply (double precision), 3mf (one file for all, with unit, names and colours), step "
-        "(plugin cadquery)",
+        "(plugin cadquery), qif (plugin qif: a QIF 3.0 document of the result)",
     )
     solids: Literal["auto", "exact", "faceted"] = Field(
         "auto",
@@ -86,13 +86,13 @@ class Files(Export):
         description="formats of deposition paths, where the job plans them: csv, apt (CLDATA), rs274 (G-code)",
     )
     path_header: JobPath | None = Field(
-        None, description="file with the first lines of G-code, in which $title, $units and $site are replaced"
+        None, description="file with the first lines of G-code, in which $title, $units, $offset and $site are replaced"
     )
     path_footer: JobPath | None = Field(None, description="file with the last lines of G-code, as path_header")
-    path_options: Mapping[str, str] = Field(
+    path_options: Mapping[str, PathOption] = Field(
         {},
-        description="for the writers of paths; rs274: on, off (default M3, M5), tcpm_on, tcpm_off (G43.4 H1, G49), "
-        "rotary (AC, BC, none, auto)",
+        description="for the writers of paths; rs274: on, off (default M3, M5), power (the S word), work_offset (G54), "
+        "rotary (AC, BC, none, auto), tcp (control, machine, table), tcpm_on, tcpm_off (G43.4 H1, G49), pivot",
     )
 
     def run(
@@ -130,6 +130,7 @@ class Files(Export):
             done += self._write_shapes(back.result, shapes, folder, NOMINAL, None, writers, ())
             done.append(back.tell(bool(splines), any(writers[name].exact for name in self.format)))
         done.append(self._write_truth(result, folder, writers))
+        done += [document(folder, result) for name in self.format if (document := writers[name].document)]
         files = dict.fromkeys(f for one in done for f in one.files)  # the writer of STL may have written a PLY already
         notes = tuple(n for one in done for n in one.notes)
         fits = {number: spline for number, (_, spline) in splines.items()}
@@ -167,6 +168,8 @@ class Files(Export):
         `_prepare` gives them."""
         done = []
         for name in self.format:
+            if writers[name].document:
+                continue
             kind = "simplify" if writers[name].simplify else "single" if writers[name].single else "all"
             left = {stem: body for stem, body in shapes[kind].items() if f"{place}{stem}.{name}" not in ready}
             done += _write_solids(writers[name], folder, place, left, T, result.units)

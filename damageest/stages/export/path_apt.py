@@ -5,16 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 from damageest.artefacts import DepositPath
-from damageest.stages.export import PathSettings
+from damageest.stages.export import PathSettings, describe_setup
 
 UNITS = {"in": ("INCHES", 1.0, "IPM"), "ft": ("INCHES", 12.0, "IPM")}
 TO_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
 
 def write_apt(file: Path, path: DepositPath, settings: PathSettings) -> None:
-    """Millimetres or inches. Deposition stands between INSERT/DEPOSIT ON and INSERT/DEPOSIT OFF."""
+    """Millimetres or inches. Deposition stands between INSERT/DEPOSIT ON and INSERT/DEPOSIT OFF. The first point is
+    approached in rapid traverse."""
     word, factor, speed = UNITS.get(settings.unit) or ("MM", TO_MM[settings.unit], "MMPM")
-    lines = [f"PARTNO/{settings.title.upper()}", f"UNITS/{word}", "MULTAX/ON", "LOADTL/1"]
+    lines = [f"PARTNO {settings.title.upper()}", f"UNITS/{word}", "MULTAX/ON", "LOADTL/1"]
+    lines += [f"$$ {text}" for text in describe_setup(path, factor)]
     feed, on, layer = 0.0, False, 0
     for k in range(len(path.points)):
         if path.layer[k] != layer:
@@ -23,7 +25,9 @@ def write_apt(file: Path, path: DepositPath, settings: PathSettings) -> None:
         if bool(path.on[k]) != on:
             on = bool(path.on[k])
             lines.append(f"INSERT/DEPOSIT {'ON' if on else 'OFF'}")
-        if path.feed[k] != feed:
+        if k == 0:
+            lines.append("RAPID")
+        elif path.feed[k] != feed:
             feed = float(path.feed[k])
             lines.append(f"FEDRAT/{feed * factor:.6g},{speed}")
         numbers = [*(path.points[k] * factor), *path.axes[k]]

@@ -9,15 +9,17 @@ import numpy as np
 from damageest.artefacts import DepositPath
 from damageest.stages.export import PathSettings
 
-HEAD = "x,y,z,i,j,k,feed,on,layer,pass"
+HEAD = "x,y,z,i,j,k,feed,on,layer,pass,part,width,height,kind"
 
 
 def write_csv(file: Path, path: DepositPath, settings: PathSettings) -> None:
-    """Point (x, y, z), tool axis (i, j, k), feed in lengths a minute, on (1: the move to this point deposits), layer
-    and pass. Lengths in the job's unit."""
+    """Point (x, y, z), tool axis (i, j, k), feed in lengths a minute, on (1: the move to this point deposits), layer,
+    pass, part of the deposit, width and height of the bead, and kind of the pass. Lengths in the job's unit."""
     rows = [HEAD]
-    columns = np.column_stack([path.points, path.axes, path.feed])
-    for row, on, layer, number in zip(columns, path.on, path.layer, path.number, strict=True):
+    columns = np.column_stack([path.points, path.axes, path.feed, path.heights[path.part - 1]])
+    numbers = np.column_stack([path.on, path.layer, path.number, path.part]).tolist()
+    for row, (on, layer, number, part) in zip(columns, numbers, strict=True):
         text = ",".join(f"{value:.6f}" for value in row[:6] + 0.0)
-        rows.append(f"{text},{row[6]:.6g},{int(on)},{layer},{number}")
+        kind = path.kinds[number - 1] if path.kinds else ""
+        rows.append(f"{text},{row[6]:.6g},{on},{layer},{number},{part},{path.width:.6g},{row[7]:.6g},{kind}")
     file.write_text("\n".join(rows) + "\n", encoding="utf-8")

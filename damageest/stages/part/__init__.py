@@ -34,6 +34,39 @@ class CadFace:
     hollow: bool | None = None
 
 
+@dataclass(frozen=True)
+class CadDatum:
+    """A datum of a CAD file: its letter, and the numbers of its CAD faces, as in `Part.faces_brep`."""
+
+    name: str
+    faces: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class CadTolerance:
+    """A tolerance of a CAD file. ``kind``: as "flatness", "surface_profile", or "diameter" of a size. ``value``: the
+    width of its zone; None where it could not be read. ``faces``: numbers of CAD faces. ``datums``: letters of its
+    datum system, in the order of precedence. ``limits``: of a size."""
+
+    kind: str
+    name: str
+    value: float | None
+    faces: tuple[int, ...] = ()
+    datums: tuple[str, ...] = ()
+    limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class CadPmi:
+    """The product and manufacturing information (PMI) of a CAD file that programs can read. ``systems``: letters of
+    each datum system. ``notes``: what is missing."""
+
+    datums: tuple[CadDatum, ...] = ()
+    systems: tuple[tuple[str, ...], ...] = ()
+    tolerances: tuple[CadTolerance, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
 class ReadPart(Stage, ABC):
     """Reads the part as designed.
 
@@ -93,3 +126,7 @@ class ReadPart(Stage, ABC):
             f"{getattr(self, 'path', 'this part')}: a mesh has triangles but no CAD faces; give the part as STEP, "
             "IGES or BREP (plugin damageest-cadquery), or choose skin by a box or by the direction of its normal"
         )
+
+    def cad_pmi(self, unit: str) -> CadPmi:
+        """Datums and tolerances of the CAD file, lengths in ``unit``; a note where its format has none."""
+        return CadPmi(notes=("a file of this format has no datums and no tolerances; STEP AP242 has",))

@@ -19,6 +19,16 @@ def list_faces(model: Model, scale: float) -> tuple[CadFace, ...]:
     return tuple(_describe_face(number, face, model.name_of(face), scale) for number, face in enumerate(found))
 
 
+def number_entities(model: Model) -> dict[int, int]:
+    """The number of the CAD face of each ADVANCED_FACE entity of a STEP file, by the entity's place among them."""
+    from OCP.TopAbs import TopAbs_FACE
+    from OCP.TopoDS import TopoDS
+
+    found = [TopoDS.Face_s(face) for solid in model.solids for face in explore(solid, TopAbs_FACE)]
+    entities = [model.entity_of(face) for face in found]
+    return {entity: number for number, entity in enumerate(entities) if entity >= 0}
+
+
 def _describe_face(number: int, face: Any, name: str, scale: float) -> CadFace:
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.BRepGProp import BRepGProp

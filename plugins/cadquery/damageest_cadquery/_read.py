@@ -15,15 +15,17 @@ from damageest_cadquery._system import check
 @dataclass(frozen=True)
 class Model:
     """``solids``: OpenCASCADE shapes. ``unit``: the file's, None where it has none. ``length``: how many of
-    OpenCASCADE's units of length are one of the file's. ``name_of`` gives a face's name in the file, or ''.
+    OpenCASCADE's units of length are one of the file's. ``name_of`` gives a face's name in the file, or '';
+    ``entity_of`` says which of the ADVANCED_FACE entities of a STEP file it is, from 0 in the file's order, or -1.
     """
 
     solids: list[Any]
     unit: str | None
     length: float
     name_of: Callable[[Any], str]
-    notes: tuple[str, ...] = ()
-    solid_names: tuple[str, ...] = ()
+    notes: tuple[str, ...]
+    solid_names: tuple[str, ...]
+    entity_of: Callable[[Any], int]
 
 
 def read(path: Path, suffix: str) -> Model:
@@ -34,12 +36,12 @@ def read(path: Path, suffix: str) -> Model:
 
     Message.DefaultMessenger_s().ChangePrinters().Clear()  # else OpenCASCADE writes into the program's own output
     reader = {".brep": _brep, ".iges": _iges, ".igs": _iges}.get(suffix, _step)
-    shape, unit, name_of = reader(path)
+    shape, unit, name_of, entity_of = reader(path)
     if shape is None or shape.IsNull():
         raise InputError("holds no shape; export the part again as a solid")
     solids, notes = _solids(shape)
     names = tuple(name_of(solid) for solid in solids)
-    return Model(solids, unit, MILLIMETRES[unit] if unit else 1.0, name_of, notes, solid_names=names)
+    return Model(solids, unit, MILLIMETRES[unit] if unit else 1.0, name_of, notes, names, entity_of)
 
 
 def read_shape(path: Path) -> Any:
@@ -47,17 +49,25 @@ def read_shape(path: Path) -> Any:
     from OCP.Message import Message
 
     Message.DefaultMessenger_s().ChangePrinters().Clear()
-    shape, _, _ = _step(path)
+    shape = _step(path)[0]
     if shape is None or shape.IsNull():
         raise InputError("holds no shape")
     return shape
+
+
+_Content = tuple[Any, str | None, Callable[[Any], str], Callable[[Any], int]]
+"""A shape, its unit, and what gives the name and the number of the entity of a face."""
 
 
 def _no_name(face: Any) -> str:
     return ""
 
 
-def _step(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
+def _no_entity(face: Any) -> int:
+    return -1
+
+
+def _step(path: Path) -> _Content:
     from OCP.IFSelect import IFSelect_RetDone
     from OCP.STEPControl import STEPControl_Reader
     from OCP.TColStd import TColStd_SequenceOfAsciiString
@@ -74,17 +84,34 @@ def _step(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
         units = {"mm"}  # OpenCASCADE converts each part of the file by its own unit, to millimetres
     reader.TransferRoots()
 
-    def name_of(face: Any) -> str:
+    def find_entity(face: Any) -> Any:
         transfer = reader.WS().TransferReader()  # asked anew: it forgets everything once its reader is gone
         unmoved = face.Located(TopLoc_Location())  # as it stands in the file, whatever the assembly does with it
-        entity = transfer.EntityFromShapeResult(face, 1) or transfer.EntityFromShapeResult(unmoved, 1)
+        return transfer.EntityFromShapeResult(face, 1) or transfer.EntityFromShapeResult(unmoved, 1)
+
+    face_entities: list[Any] = []
+    place: dict[int, int] = {}
+
+    def entity_of(face: Any) -> int:
+        from OCP.StepShape import StepShape_AdvancedFace
+
+        if not face_entities:
+            model = reader.WS().Model()
+            every = (model.Value(number + 1) for number in range(model.NbEntities()))
+            face_entities.extend(one for one in every if isinstance(one, StepShape_AdvancedFace))
+            # the model does not know an entity that came through Python; the same object is the same entity
+            place.update({id(one): number for number, one in enumerate(face_entities)})
+        return place.get(id(find_entity(face)), -1)
+
+    def name_of(face: Any) -> str:
+        entity = find_entity(face)
         name = entity.Name() if entity is not None and hasattr(entity, "Name") else None
         return name.ToCString() if name is not None else ""
 
-    return reader.OneShape(), units.pop() if units else "mm", name_of
+    return reader.OneShape(), units.pop() if units else "mm", name_of, entity_of
 
 
-def _iges(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
+def _iges(path: Path) -> _Content:
     from OCP.IFSelect import IFSelect_RetDone
     from OCP.IGESControl import IGESControl_Reader
 
@@ -93,10 +120,10 @@ def _iges(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
         raise InputError("not a readable IGES file; it may be cut short")
     name = reader.IGESModel().GlobalSection().UnitName()
     reader.TransferRoots()
-    return reader.OneShape(), (_unit(name.ToCString()) if name is not None else None) or "mm", _no_name
+    return reader.OneShape(), (_unit(name.ToCString()) if name is not None else None) or "mm", _no_name, _no_entity
 
 
-def _brep(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
+def _brep(path: Path) -> _Content:
     from OCP.BRep import BRep_Builder
     from OCP.BRepTools import BRepTools
     from OCP.TopoDS import TopoDS_Shape
@@ -107,7 +134,7 @@ def _brep(path: Path) -> tuple[Any, str | None, Callable[[Any], str]]:
     shape = TopoDS_Shape()
     if not BRepTools.Read_s(shape, str(path), BRep_Builder()):
         raise InputError("not a readable BREP file; it may be cut short")
-    return shape, None, _no_name
+    return shape, None, _no_name, _no_entity
 
 
 def _unit(name: str) -> str | None:

@@ -15,7 +15,7 @@ from damageest.geometry.make_part import SMALLEST, make_part
 from damageest.geometry.units import FARTHEST, UnitOption, canonical_unit, unit_factor
 from damageest.io.files import check_file, file_sha256, raise_environment_fault, shorten_error
 from damageest.stages import JobPath
-from damageest.stages.part import CadFace, ReadPart
+from damageest.stages.part import CadFace, CadPmi, ReadPart
 
 LEAST_CHORD = 1e-7
 """Least chord in diagonals of the part: OpenCASCADE's own tolerance for a part of one metre is 1e-7."""
@@ -96,6 +96,20 @@ class Brep(ReadPart):
             model = read(self.path, suffix)
             source = self.unit or model.unit or unit
             return list_faces(model, unit_factor(source, unit) / model.length)
+
+    def cad_pmi(self, unit: str) -> CadPmi:
+        """Datums and tolerances of a STEP file."""
+        suffix = check_file(self.path, self.reads, "a part")
+        if suffix not in (".step", ".stp"):
+            return super().cad_pmi(unit)
+        from damageest_cadquery._faces import number_entities
+        from damageest_cadquery._pmi import find_pmi
+        from damageest_cadquery._read import read
+
+        with _name_faults(self.path, suffix):
+            model = read(self.path, suffix)
+            text = self.path.read_text(encoding="latin-1")
+            return find_pmi(text, number_entities(model), unit_factor(self.unit or model.unit or unit, unit))
 
 
 @contextmanager

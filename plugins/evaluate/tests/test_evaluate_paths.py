@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from damageest_evaluate.paths.beam import count_flips, measure_shaded, measure_sunk
 from damageest_evaluate.paths.check import count_crossings, measure_nozzle
 from damageest_evaluate.paths.run import evaluate_scene, make_table
 from damageest_evaluate.paths.scenes import MAKERS, make_random
@@ -21,7 +22,10 @@ def test_a_tooth_is_built_up_with_five_axes_and_nothing_is_touched() -> None:
     assert row.unreached_5 <= row.unreached_3
     assert row.gap >= 0.75 * row.claimed > 0
     assert row.crossings == 0
-    assert row.spill <= 1
+    assert row.spill <= 1.1
+    assert row.shaded == 0
+    assert row.sunk <= 0.05
+    assert row.flips == 0
     assert "| tooth | 1 |" in make_table([row])
 
 
@@ -29,8 +33,30 @@ def test_the_check_sees_a_nozzle_in_metal() -> None:
     loss = dent()
     path = plan(loss, direction=(0.0, 0.0, 1.0), simulate=False)
     assert measure_nozzle(path, loss.left, 0.2) >= 0.75 * min(path.clearance, path.travel_clearance)
-    lower = replace(path, points=path.points - [0, 0, path.standoff + 0.01])
+    lower = replace(path, points=path.points - [0, 0, path.standoff + path.width])
     assert measure_nozzle(lower, loss.left, 5.0) == pytest.approx(0, abs=1e-9)
+
+
+def test_the_check_sees_beads_and_beam_in_metal() -> None:
+    loss = dent()
+    path = plan(loss, direction=(0.0, 0.0, 1.0), simulate=False)
+    assert measure_shaded(path, loss.left, path.width / 4) == 0
+    assert measure_sunk(path, loss.left, path.width / 4) <= 0.05 * loss.lost.volume
+    lower = replace(path, points=path.points - [0, 0, 6.0])  # the dent is 4 deep
+    assert measure_sunk(lower, loss.left, path.width / 4) == pytest.approx(lower.bead_volume, rel=0.02)
+    assert measure_shaded(lower, loss.left, path.width / 4) > 0.9
+    aside = np.array([0.96, 0.0, 0.28])  # the beam through the wall of the dent, the beads where they were
+    tilted = replace(path, axes=np.tile(aside, (len(path.axes), 1)))
+    assert measure_shaded(tilted, loss.left, path.width / 4) > 0.05
+
+
+def test_the_check_sees_a_rotary_axis_that_flips() -> None:
+    path = plan(dent(), direction=(0.0, 0.0, 1.0), simulate=False)
+    assert count_flips(path) == 0
+    axes = path.axes.copy()
+    axes[:] = [0.6, 0.0, 0.8]
+    axes[np.flatnonzero(path.on)[5] :] = [-0.6, 0.0, 0.8]
+    assert count_flips(replace(path, axes=axes)) == 1
 
 
 def test_the_check_sees_a_pass_that_crosses_itself() -> None:

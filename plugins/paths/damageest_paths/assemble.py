@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import BeadFill, DepositPath, Floats, Mesh, Solid, Unreached
 from damageest.geometry.simplification import simplify_within
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
+from damageest.geometry.transforms import turn_to_axis
 from damageest_paths.beads import SHARE, Beads, simulate_beads
 from damageest_paths.clearance import Clearance
 from damageest_paths.directions import Planner, gather_missing, list_directions, plan_parts
@@ -20,7 +21,7 @@ from damageest_paths.obstacles import Obstacles, draw_passes
 from damageest_paths.planar import Surroundings
 from damageest_paths.process import Pass, Plan, Process
 
-MUCH_TRAVEL = 0.2
+MUCH_TRAVEL, MUCH_SURPLUS, MUCH_SUNK = 0.2, 0.1, 0.05
 DETAIL = 0.01
 """Share of the bead's height or width by which the body that is sliced may differ from the deposit."""
 
@@ -62,14 +63,14 @@ def plan_path(
     origin: Floats = task.body.bounds.mean(axis=0)
     detail = DETAIL * min(process.bead.width, process.height)
     body = to_manifold(simplify_within(task.body, detail), origin)
-    clearance = Clearance(nozzle, standoff, None, detail)
+    clearance = Clearance(nozzle, standoff, None, detail, beam=process.beam)
     around = Surroundings(_take_metal(task.left, origin), _shift(task.others, origin), clearance)
     directions = list_directions(task.body, task.left, task.tolerance) if direction is None else [direction]
     plans = plan_parts(body, origin, directions, around, process, planner)
     groups = [[_to_relative(one, plan) for one in plan.passes] for plan in plans]
     near = _gather_obstacles(groups, plans, around, task.body.bounds - origin, process)
     moves = join_passes(
-        groups, clearance.with_obstacles(near), _choose_travel(task, clearance, speeds, process, origin)
+        groups, clearance.without_beam().with_obstacles(near), _choose_travel(task, clearance, speeds, process, origin)
     )
     missing = gather_missing(plans)
     solid = None if missing is None else to_solid(missing, origin)
@@ -90,8 +91,17 @@ def plan_path(
         unreached=_list_unreached(plans),
         missing=solid,
         fill=fill,
+        kinds=moves.kinds,
+        setup=_choose_setup(plans[0].frame.direction) if process.axes == 3 else None,
     )  # fmt: skip
     return _add_notes(path, moves, process)
+
+
+def _choose_setup(direction: Floats) -> Floats:
+    """The transform (4,4) into a frame about the same origin whose z is the build direction (3,)."""
+    setup = np.eye(4)
+    setup[:3, :3] = turn_to_axis(direction).T
+    return setup
 
 
 def _take_metal(left: Solid | None, origin: Floats) -> Any:
@@ -109,7 +119,7 @@ def _to_relative(one: Pass, plan: Plan) -> Pass:
     """A pass turned from the plan's local axes to those of the part, about the frame's origin."""
     turn = plan.frame.turn
     tightest = None if one.tightest is None else (one.tightest[0] @ turn, one.tightest[1] @ turn)
-    return Pass(one.points @ turn, one.axes @ turn, one.normals @ turn, one.layer, one.gap, tightest)
+    return Pass(one.points @ turn, one.axes @ turn, one.normals @ turn, one.layer, one.gap, tightest, one.kind)
 
 
 def _gather_obstacles(
@@ -156,6 +166,24 @@ def _list_unreached(plans: Sequence[Plan]) -> tuple[Unreached, ...]:
     return tuple(Unreached(volume, why) for why, volume in sorted(last.reasons.items()) if volume > 0)
 
 
+def _describe_surplus(path: DepositPath) -> list[str]:
+    """Notes on beads that add more than the deposit has, or lie in metal."""
+    notes = []
+    share = path.surplus_volume / path.deposit_volume
+    if share > MUCH_SURPLUS:
+        beside = "" if path.fill is None else f"; {path.fill.spill:.4g} lies beside the deposit"
+        notes.append(
+            f"the beads add {path.surplus_volume:.4g} ({share:.0%} of the deposit) more than what they fill{beside}: "
+            "it is to be milled off; thinner layers and narrower beads add less"
+        )
+    if path.fill is not None and path.fill.sunk > MUCH_SUNK * path.deposit_volume:
+        notes.append(
+            f"beads lie in {path.fill.sunk:.4g} of intact metal ({path.fill.sunk / path.deposit_volume:.0%} of the "
+            "deposit): a smaller path.penetration or thinner layers leave more of it"
+        )
+    return notes
+
+
 def _add_notes(path: DepositPath, moves: Moves, process: Process) -> DepositPath:
     from dataclasses import replace
 
@@ -168,6 +196,7 @@ def _add_notes(path: DepositPath, moves: Moves, process: Process) -> DepositPath
             )
     if share > 1e-3 and process.axes != 5:
         notes.append("more axes (path.axes: 5), another path.direction or a slimmer nozzle may reach more")
+    notes += _describe_surplus(path)
     total = path.length + path.travel
     if total and path.travel > MUCH_TRAVEL * total:
         mean = path.length / max(path.passes, 1)

@@ -74,6 +74,7 @@ def simulate_beads(
         float(spilled.sum() * cell),
         far,
         float(sunk.sum() * cell),
+        float((done & wanted).sum() / max(int(wanted.sum()), 1)),
     )
 
 

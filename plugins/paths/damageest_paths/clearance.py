@@ -8,6 +8,7 @@ once. Where the bounds do not decide, the FCL library gives the exact distance b
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from damageest.geometry.duplicates import list_distinct
 from damageest.geometry.transforms import turn_to_axis
 from damageest_paths.nozzle import Nozzle
 from damageest_paths.obstacles import MEMBERS, Obstacles
+from damageest_paths.sight import Beam
 
 CHUNK = 1024
 """Poses that are bounded at once, so that intermediate arrays fit in the processor's cache."""
@@ -34,7 +36,8 @@ class Clearance:
 
     ``standoff``: how far the tip is above the point that it works on. ``detail``: how far the obstacles may lie from
     what they stand for; it is taken off each distance. ``floor``: a height below which obstacles do not count;
-    ``until``: the last rank of those that stand already.
+    ``until``: the last rank of those that stand already. ``beam``: what has to be free between the tip and the bead
+    while the tool deposits; None: it is not checked.
     """
 
     nozzle: Nozzle
@@ -43,6 +46,7 @@ class Clearance:
     detail: float = 0.0
     floor: float = -np.inf
     until: int = 0
+    beam: Beam | None = None
 
     def with_obstacles(self, obstacles: Obstacles | None) -> Clearance:
         """The same nozzle among other obstacles."""
@@ -55,6 +59,26 @@ class Clearance:
     def after(self, rank: int) -> Clearance:
         """The same, among the obstacles of all ranks up to ``rank``."""
         return replace(self, until=rank)
+
+    def without_beam(self) -> Clearance:
+        """The same while nothing is deposited."""
+        return replace(self, beam=None)
+
+    @cached_property
+    def beams(self) -> list[Clearance]:
+        """The bodies of the beam among the same obstacles."""
+        if self.beam is None:
+            return []
+        bodies = self.beam.draw(self.standoff)
+        return [replace(self, nozzle=body, standoff=self.beam.lift, beam=None) for body in bodies]
+
+    def find_shaded(self, points: Floats, axes: Floats) -> Flags:
+        """Whether something stands in the beam (N,) at poses along a path, ``points`` and ``axes`` (N,3)."""
+        shaded = np.zeros(len(points), bool)
+        for each in self.beams:
+            assert self.beam is not None
+            shaded |= each.measure_poses(points, axes, self.beam.needed) < self.beam.needed
+        return shaded
 
     @property
     def reach(self) -> float:
@@ -85,8 +109,21 @@ class Clearance:
         """Two distances (N,) for the poses at ``points`` (N,3) with ``axes`` (N,3): the true one lies between them.
 
         They are only as near to each other as it takes to see whether the nozzle keeps the distance ``needed``.
-        ``near`` takes the poses and the ranks (K,2) of what may be nearer than ``ENOUGH`` times that.
+        ``near`` takes the poses and the ranks (K,2) of what may be nearer than ``ENOUGH`` times that. Both are 0 where
+        something stands in the beam, and the lower one where that may be.
         """
+        low, high = self._bound_body(points, axes, needed, near)
+        for each in self.beams:
+            assert self.beam is not None
+            least, most = each.bound(points, axes, self.beam.needed)
+            low[least < self.beam.needed] = 0.0
+            high[most < self.beam.needed] = 0.0
+        return low, high
+
+    def _bound_body(
+        self, points: Floats, axes: Floats, needed: float, near: list[Ints] | None = None
+    ) -> tuple[Floats, Floats]:
+        """As `bound`, without the beam."""
         low, high = np.full(len(points), np.inf), np.full(len(points), np.inf)
         if self.obstacles is None or not self.obstacles.levels:
             return low, high
@@ -166,8 +203,16 @@ class Clearance:
     def measure_poses(self, points: Floats, axes: Floats, needed: float) -> Floats:
         """For each pose (N,) a distance that the nozzle keeps at least; below ``needed`` only where it really is.
 
-        ``points``, ``axes`` (N,3): as in `bound`.
+        ``points``, ``axes`` (N,3): as in `bound`. 0 where something stands in the beam.
         """
+        found = self._measure_body(points, axes, needed)
+        open_ = np.flatnonzero(found >= needed)
+        if self.beam is not None and len(open_):
+            found[open_[self.find_shaded(points[open_], axes[open_])]] = 0.0
+        return found
+
+    def _measure_body(self, points: Floats, axes: Floats, needed: float) -> Floats:
+        """As `measure_poses`, without the beam."""
         moves = np.linalg.norm(np.diff(points, axis=0), axis=1) + self.bound_turns(axes)
         far = np.concatenate([[0.0], np.cumsum(moves)])
         found = np.full(len(points), -np.inf)
@@ -184,7 +229,7 @@ class Clearance:
     def _measure_some(self, points: Floats, axes: Floats, far: Floats, needed: float) -> Floats:
         """As `measure_poses`; ``far`` (N,): the way to each pose."""
         near: list[Ints] = []
-        low, high = self.bound(points, axes, needed, near)
+        low, high = self._bound_body(points, axes, needed, near)
         found = np.where(high < needed, high, low)
         undecided = np.flatnonzero((low < needed) & (high >= needed))
         if not len(undecided):

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh
 from damageest.geometry.solids import to_arrays
-from damageest_paths.fill import fill_region
+from damageest_paths.fill import Line, list_lines
 from damageest_paths.floor import Floor, find_floor
-from damageest_paths.follow import follow_line, make_pass
+from damageest_paths.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.patches import NotFollowedError, Patch, list_patches
-from damageest_paths.planar import COLLIDES, SHORT, UNSUPPORTED, Surroundings
-from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes, resample
-from damageest_paths.regions import cover, measure_length, shift_border
+from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings
+from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes
+from damageest_paths.regions import cover, measure_length, resample, shift_border
 from damageest_paths.sheets import (
     FINE,
     Grid,
@@ -156,36 +156,47 @@ class _Work:
         wider = shift_border(wanted, GROWN * process.bead.width)
         if not wider.is_empty():
             self.covered.append(patch.fill_below(wider, self.height * (1 + DEEPER), process))
-        lines = fill_region(held, process.pattern, process.bead, process.angle + layer * process.turn)
-        long = [line for line in lines if measure_length(line) >= process.shortest]
-        short = [line for line in lines if measure_length(line) < process.shortest]
-        done, dropped = [], []
+        angle = process.angle + layer * process.turn
+        lines = list_lines(held, process.pattern, process.bead, angle, None, process.shortest)
+        long = [line for line in lines if measure_length(line.points) >= process.shortest]
+        short = [line.points for line in lines if measure_length(line.points) < process.shortest]
+        done: list[Floats] = []
+        dropped: dict[str, list[Floats]] = {COLLIDES: [], SHADED: [], SHORT: short}
         for line in long:
             made, left = self._place(patch, line, layer, around)
             done += made
-            dropped += left
-        filled = cover(done, process.bead.width)
-        unreached = cover(dropped, process.bead.width)
-        left_out = {
-            UNSUPPORTED: wanted - held,
-            COLLIDES: (unreached ^ held) - filled,
-            SHORT: (cover(short, process.bead.width) ^ held) - filled - unreached,
-        }
+            for why, piece in left:
+                dropped[why].append(piece)
+        gaps = held - cover(done, process.bead.width)
+        left_out = {UNSUPPORTED: wanted - held}
+        for why, lines_left in dropped.items():
+            left_out[why] = cover(lines_left, process.bead.width) ^ gaps
+            gaps -= left_out[why]
         for why, region in left_out.items():
             self._add_missing(patch, region, layer, why)
 
     def _place(
-        self, patch: Patch, line: Floats, layer: int, around: Sequence[Sweeps]
-    ) -> tuple[list[Floats], list[Floats]]:
-        """Adds the passes along a line (K,2) of the plane. Gives the pieces with a bead (K,2), and those without."""
+        self, patch: Patch, line: Line, layer: int, around: Sequence[Sweeps]
+    ) -> tuple[list[Floats], list[tuple[str, Floats]]]:
+        """Adds the passes along a line of the plane. Gives the pieces with a bead (K,2), and those without, each with
+        the reason."""
         process = self.process
-        places, _ = resample(extend_line(line, *process.extend), process.step)
+        places, _ = resample(extend_line(line.points, *process.extend), process.step)
         points, normals, _ = patch.tree.find(places)
         least = min(int(np.ceil(process.shortest / process.step)) + 2, len(points))
         runs = follow_line(points, normals, around, process, least)
-        self.layer += [make_pass(points, normals, run, layer, process, self.standing.clearance.reach) for run in runs]
+        runs = [run for run in runs if measure_length(points[run.start : run.stop]) >= process.shortest]
+        reach = self.standing.clearance.reach
+        made = [make_pass(points, normals, run, layer, process, reach) for run in runs]
+        self.layer += [replace(one, kind=line.kind) for one in made]
         stops = [0, *(k for run in runs for k in (run.start, run.stop)), len(places)]
-        left = [places[max(a - 1, 0) : b + 1] for a, b in zip(stops[::2], stops[1::2], strict=True) if b > a]
+        spans = [(max(a - 1, 0), b + 1) for a, b in zip(stops[::2], stops[1::2], strict=True) if b > a]
+        left = []
+        for a, b in spans:
+            body = [part.clearance.without_beam() for part in around]
+            upright = limit_tilt(normals[a:b], process.tilt if process.axes == 5 else 0.0)
+            free = all((one.bound(points[a:b], upright, process.gap)[0] >= process.gap).mean() > 0.5 for one in body)
+            left.append((SHADED if free else COLLIDES, places[a:b]))
         return [places[run.start : run.stop] for run in runs], left
 
     def _add_missing(self, patch: Patch, region: Any, layer: int, why: str) -> None:

@@ -12,11 +12,13 @@ from damageest.artefacts import Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
 from damageest_paths.frames import Frame, make_frame, make_unit
 from damageest_paths.obstacles import draw_passes
-from damageest_paths.planar import Surroundings
+from damageest_paths.planar import SUNK, Surroundings
 from damageest_paths.process import Plan, Process
 
 ENOUGH = 1e-3
 """Share of a body's volume below which what is missing is not worth another direction."""
+THIN = 0.1
+"""Share of a body's volume up to which what is too thin over metal for a bead does not ask for other directions."""
 MOST_PARTS, MOST_DIRECTIONS = 4, 6
 COARSE = 2.0
 """Factor of layer height and bead width for the trials of directions."""
@@ -65,7 +67,7 @@ def choose_direction(
     larger beads. At least one direction is needed."""
     first = planner(body, make_frame(directions[0], origin), around, process)
     volume = float(body.volume())
-    if len(directions) == 1 or first.missing_volume <= ENOUGH * volume:
+    if len(directions) == 1 or first.missing_volume - _measure_thin(first, volume) <= ENOUGH * volume:
         return first
     coarse = process.coarsen(COARSE)
     rough = body.simplify(ROUGH * process.height)
@@ -75,6 +77,11 @@ def choose_direction(
         return first
     best = planner(body, make_frame(directions[order[0]], origin), around, process)
     return best if best.missing_volume < first.missing_volume else first
+
+
+def _measure_thin(plan: Plan, volume: float) -> float:
+    """What is missing of a body since it is thin over metal: it is with other directions too."""
+    return min(plan.reasons.get(SUNK, 0.0), THIN * volume)
 
 
 def plan_parts(
@@ -89,7 +96,9 @@ def plan_parts(
         return plans
     within = [one for one in directions if one @ plans[0].frame.direction >= np.cos(process.tilt) - 1e-9]
     volume, smallest = float(body.volume()), process.bead.width**2 * process.height
-    while len(plans) < MOST_PARTS and plans[-1].missing_volume > max(ENOUGH * volume, smallest):
+    while len(plans) < MOST_PARTS:
+        if plans[-1].missing_volume - _measure_thin(plans[-1], volume) <= max(ENOUGH * volume, smallest):
+            break
         left = plans[-1].missing
         left_local = left.transform(np.hstack([plans[-1].frame.turn.T, np.zeros((3, 1))]))
         standing = around.metal + (body - left_local)

@@ -3,64 +3,155 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.regions import cover, find_main_angle, measure_length, shift_border
+from damageest_paths.regions import cover, find_main_angle, measure_length, shift_border, unite_regions
 from damageest_paths.stripes import Bead, fill_with_rows
+from damageest_paths.trim import cut_ring, follow_rim, join_lines, lengthen_line, trim_line
 
 Pattern = Literal["zigzag", "contour", "spiral", "offset-zigzag"]
+Kind = Literal["row", "ring", "spiral", "rim", "gap"]
+"""What a pass is: a row or rows to and fro, a ring, rings that are linked, a piece of the outermost ring beside
+rows, or a row in a gap between others."""
 
 SLIVER = 0.04
 """Area of a gap, in squares of the bead's width, from which it gets a pass of its own."""
+FINE_SLIVER = 0.01
+"""The same beside which a piece of the outermost ring is laid: the ends of rows leave many of them along a rim."""
+WAY = 6.0
+"""Bead widths of travel that a pass more costs, where a ring beside rows is compared with pieces of it."""
+NEARER = 0.85
+"""Share of a step from a ring to the border of the rows within it: their ends are round."""
 ROUNDS = 2
 """How often gaps between passes are looked for and filled."""
 
 
+class Line(NamedTuple):
+    """The middle line of a pass (K,2), and what it is."""
+
+    points: Floats
+    kind: Kind
+
+
 def fill_region(region: Any, pattern: Pattern, bead: Bead, angle: float) -> list[Floats]:
     """Polylines (K,2) whose beads cover a region. ``angle`` in radians: of the rows of a zigzag."""
+    return [line.points for line in list_lines(region, pattern, bead, angle)]
+
+
+def list_lines(
+    region: Any, pattern: Pattern, bead: Bead, angle: float, free: Any = None, shortest: float = 0.0
+) -> list[Line]:
+    """Lines whose beads cover a region, as far as their middles may lie in the region ``free``, None for everywhere.
+
+    ``shortest``: lines that are shorter are lengthened where there is room; the others are given as they are.
+    """
     if region.is_empty():
         return []
-    lines = {"zigzag": _fill_zigzag, "contour": _fill_contour, "spiral": _fill_spiral, "offset-zigzag": _fill_both}[
-        pattern
-    ](region, bead, angle)
+    if pattern == "zigzag" and free is not None:
+        pieces = sorted(region.decompose(), key=lambda each: each.bounds())
+        lines = [line for piece in pieces for line in _fill_piece(piece, bead, angle, free, shortest)]
+    else:
+        fill = {
+            "zigzag": _fill_zigzag, "contour": _fill_contour, "spiral": _fill_spiral, "offset-zigzag": _fill_both
+        }  # fmt: skip
+        lines = _finish(fill[pattern](region, bead, angle), region, bead, free, shortest)
+        if free is not None:
+            lines += _fill_rim(region, lines, bead, free, shortest)
     for _ in range(ROUNDS):
-        added = _fill_gaps(region, lines, bead)
-        if not added:
+        gaps = _list_gaps(region, lines, bead)
+        rows = [row for gap in gaps for row in fill_with_rows(gap, bead, find_main_angle(gap), linked=False)]
+        if not rows:
             break
-        lines += added
+        lines += _finish([Line(row, "gap") for row in rows], region, bead, free, shortest)
     return lines
 
 
-def _fill_gaps(region: Any, lines: Sequence[Floats], bead: Bead) -> list[Floats]:
-    """Rows in what the beads leave of a region, along the longer side of each gap."""
-    gaps = (region - cover(lines, bead.width)).decompose()
-    large = [gap for gap in gaps if gap.area() > SLIVER * bead.width**2]
-    large.sort(key=lambda gap: gap.bounds())
-    return [line for gap in large for line in fill_with_rows(gap, bead, find_main_angle(gap), linked=False)]
+def _fill_piece(region: Any, bead: Bead, angle: float, free: Any, shortest: float) -> list[Line]:
+    """Rows, and what of the outermost ring they need beside them; or all of that ring, and rows within it. That with
+    the fewer and shorter passes is taken: many short pieces of the ring cost more travel than the whole of it."""
+    rows = [Line(row, "row") for row in fill_with_rows(region, bead, angle, True, free)]
+    rows = _finish(rows, region, bead, free, shortest)
+    rim = _fill_rim(region, rows, bead, free, shortest)
+    if not rim:
+        return rows
+    plain = _join([*rows, *rim], free, bead)
+    rings = _read_rings(shift_border(region, -bead.width / 2), bead)
+    border = [Line(piece, "rim") for ring in rings for piece in cut_ring(ring, free, bead.width)]
+    inner = shift_border(shift_border(region, -bead.width / 2 - NEARER * bead.step), bead.width / 2)
+    rows_within = [] if inner.is_empty() else fill_with_rows(inner, bead, angle, True, free)
+    within = [Line(row, "row") for row in rows_within]
+    ringed = _join(_finish([*border, *within], region, bead, free, shortest), free, bead)
+    missed = [_measure_gaps(region, lines, bead) for lines in (plain, ringed)]
+    if not border or missed[1] > missed[0] + SLIVER * bead.width**2:
+        return plain
+    return min(plain, ringed, key=lambda lines: _estimate(lines, bead))
 
 
-def _fill_zigzag(region: Any, bead: Bead, angle: float) -> list[Floats]:
-    return fill_with_rows(region, bead, angle)
+def _fill_rim(region: Any, lines: Sequence[Line], bead: Bead, free: Any, shortest: float) -> list[Line]:
+    """The pieces of the outermost ring that lie beside gaps which the lines leave."""
+    gaps = _list_gaps(region, lines, bead, FINE_SLIVER)
+    rings = _read_rings(shift_border(region, -bead.width / 2), bead) if gaps else []
+    rim = [Line(piece, "rim") for piece in follow_rim(rings, unite_regions(gaps), bead.width)]
+    return _finish(rim, region, bead, free, shortest)
 
 
-def _fill_contour(region: Any, bead: Bead, angle: float) -> list[Floats]:
-    return [_close(ring) for ring in _find_rings(region, bead)]
+def _join(lines: Sequence[Line], free: Any, bead: Bead) -> list[Line]:
+    """The lines, joined where their ends meet; what has a piece of a ring and rows is of kind row."""
+    rows = [line.points for line in lines if line.kind == "row"]
+    joined = join_lines([line.points for line in lines], free, bead.width)
+    ends = {tuple(point) for row in rows for point in row.tolist()}
+    return [Line(line, "row" if any(tuple(point) in ends for point in line.tolist()) else "rim") for line in joined]
 
 
-def _fill_both(region: Any, bead: Bead, angle: float) -> list[Floats]:
+def _estimate(lines: Sequence[Line], bead: Bead) -> float:
+    """The way along the lines and between them, in bead widths."""
+    return WAY * len(lines) + sum(measure_length(line.points) for line in lines) / bead.width
+
+
+def _measure_gaps(region: Any, lines: Sequence[Line], bead: Bead) -> float:
+    """The area of the gaps worth a piece of the ring."""
+    return float(sum(gap.area() for gap in _list_gaps(region, lines, bead, FINE_SLIVER)))
+
+
+def _finish(lines: Sequence[Line], region: Any, bead: Bead, free: Any, shortest: float) -> list[Line]:
+    """The lines, trimmed and lengthened."""
+    pieces = [
+        Line(piece, line.kind)
+        for line in lines
+        for piece in ([line.points] if free is None else trim_line(line.points, free, bead.width))
+    ]
+    return [Line(lengthen_line(line.points, shortest, region, free, bead.width), line.kind) for line in pieces]
+
+
+def _list_gaps(region: Any, lines: Sequence[Line], bead: Bead, least: float = SLIVER) -> list[Any]:
+    """What the beads leave of a region, without what is smaller than ``least`` squares of the bead's width."""
+    gaps = (region - cover([line.points for line in lines], bead.width)).decompose()
+    large = [gap for gap in gaps if gap.area() > least * bead.width**2]
+    return sorted(large, key=lambda gap: gap.bounds())
+
+
+def _fill_zigzag(region: Any, bead: Bead, angle: float) -> list[Line]:
+    return [Line(row, "row") for row in fill_with_rows(region, bead, angle)]
+
+
+def _fill_contour(region: Any, bead: Bead, angle: float) -> list[Line]:
+    return [Line(_close(ring), "ring") for ring in _find_rings(region, bead)]
+
+
+def _fill_both(region: Any, bead: Bead, angle: float) -> list[Line]:
     rings = shift_border(region, -bead.width / 2)
-    outer = [_close(ring) for ring in _read_rings(rings, bead)]
+    outer = [Line(_close(ring), "ring") for ring in _read_rings(rings, bead)]
     inner = shift_border(shift_border(region, -bead.width / 2 - bead.step), bead.width / 2) if outer else region
-    return [*outer, *(fill_with_rows(inner, bead, angle) if not inner.is_empty() else [])]
+    return [*outer, *(_fill_zigzag(inner, bead, angle) if not inner.is_empty() else [])]
 
 
-def _fill_spiral(region: Any, bead: Bead, angle: float) -> list[Floats]:
+def _fill_spiral(region: Any, bead: Bead, angle: float) -> list[Line]:
     """Rings, each linked with the one inside it: it ends a step before it closes, and goes on at the nearest point."""
     rings = _find_rings(region, bead)
-    lines: list[Floats] = []
+    lines: list[Line] = []
     while rings:
         line = rings.pop(0)
         closed = True
@@ -76,7 +167,7 @@ def _fill_spiral(region: Any, bead: Bead, angle: float) -> list[Floats]:
                 corner = int(np.argmin(np.linalg.norm(ring - line[-1], axis=1)))
                 closed = False
             line = np.concatenate([line, _open(np.roll(ring, -corner, axis=0), bead.step)])
-        lines.append(_close(line) if closed else line)
+        lines.append(Line(_close(line) if closed else line, "spiral"))
     return lines
 
 

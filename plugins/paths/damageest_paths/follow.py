@@ -83,7 +83,7 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
     number of points of a run.
     """
     ways, around = list_ways(normals, process), LeastGauge(parts)
-    tried = [_measure(points, ways[0], around, process)]
+    tried = [_measure(points, ways[0], normals, around, process)]
     if not (tried[0].gaps >= process.gap).all() and len(ways) > 1:
         sparse = np.unique(np.linspace(0, len(points) - 1, SPARSE).round().astype(int))
         rest = np.array([way[sparse] for way in ways[1:]])
@@ -95,7 +95,7 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
         for k in np.lexsort([np.arange(len(rest)), narrow, -free])[:BEST]:
             if not free[k]:
                 break
-            tried.append(_measure(points, ways[k + 1], around, process))
+            tried.append(_measure(points, ways[k + 1], normals, around, process))
             if (tried[-1].gaps >= process.gap).all():
                 tried = tried[-1:]
                 break
@@ -120,7 +120,8 @@ class _Try(NamedTuple):
     turned: Floats
 
 
-def _measure(points: Floats, axes: Floats, around: Gauge, process: Process) -> _Try:
+def _measure(points: Floats, axes: Floats, normals: Floats, around: Gauge, process: Process) -> _Try:
+    """The gaps along a way; 0 where the tool would turn too fast, or stand too obliquely on the layer."""
     moves = np.linalg.norm(np.diff(points, axis=0), axis=1) + around.bound_turns(axes)
     counts = np.maximum(np.ceil(moves / process.step - 1e-9).astype(int), 1)
     share = np.concatenate([*(np.arange(count) / count for count in counts), [1.0]])[:, None]
@@ -135,6 +136,9 @@ def _measure(points: Floats, axes: Floats, around: Gauge, process: Process) -> _
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     angle = np.linalg.norm(np.diff(axes, axis=0), axis=1)
     least[angle > process.turn_rate * length + STILL] = 0.0
+    if process.beam is not None:
+        oblique = np.einsum("ij,ij->i", axes, normals) < np.cos(process.beam.incidence) - STILL
+        least[oblique[1:] | oblique[:-1]] = 0.0
     where = np.array([low + int(np.argmin(gaps[low : high + 1])) for low, high in pairwise(starts)])
     return _Try(axes, least, poses[where], turned[where])
 

@@ -22,6 +22,13 @@ def _check_direction(value: Literal["auto", "normal"] | Vector) -> Literal["auto
     return value
 
 
+class BeamShape(Options):
+    """What goes from the nozzle's tip to the bead: light, powder, wire or arc."""
+
+    radius: Length | None = Field(None, description="at the bead, in the job's unit; default: half the bead's width")
+    cone: float = Field(0.0, ge=0, lt=60, description="half the angle by which it widens towards the tip, in degrees")
+
+
 class Nozzle(Options):
     """A nozzle that is a solid of revolution, or a closed mesh with its tip at 0 and its axis along z."""
 
@@ -30,6 +37,11 @@ class Nozzle(Options):
     length: Length | None = Field(None, description="of the whole nozzle from the tip, in the job's unit")
     body_radius: Length | None = Field(None, description="of the cylinder above the cone, in the job's unit")
     mesh: JobPath | None = Field(None, description="file of a closed mesh, in the job's unit, instead of the others")
+    beam: BeamShape = Field(
+        BeamShape(),
+        description="{radius, cone}: what has to be free between tip and bead; radius at the bead, default half its "
+        "width; cone: half the angle by which it widens towards the tip, in degrees",
+    )
 
     @model_validator(mode="after")
     def _check_shape(self) -> Nozzle:
@@ -100,7 +112,21 @@ class Layers(Path):
     overhang: float = Field(
         45.0, ge=0, lt=90, description="largest angle between build direction and an overhanging side, in degrees"
     )
-    min_length: float = Field(0.0, ge=0, allow_inf_nan=False, description="passes shorter than this are left out")
+    min_length: float | None = Field(
+        None,
+        ge=0,
+        allow_inf_nan=False,
+        description="shorter passes are lengthened where there is room, else left out; default: half the bead's width",
+    )
+    incidence: float = Field(
+        60.0, gt=0, lt=90, description="largest angle between the tool and the normal of the layer, in degrees"
+    )
+    penetration: float | None = Field(
+        None,
+        ge=0,
+        allow_inf_nan=False,
+        description="depth to which a bead may lie in intact metal, which melts; default: 0.45 of a layer's height",
+    )
     standoff: Length | None = Field(
         None, description="distance from the nozzle's tip to the top of the bead; default: the bead's width"
     )
@@ -144,6 +170,7 @@ class Layers(Path):
         from damageest_paths.directions import find_open_normal
         from damageest_paths.planar import plan_planar
         from damageest_paths.process import Process
+        from damageest_paths.sight import Beam
         from damageest_paths.stripes import Bead
 
         process = Process(
@@ -153,12 +180,18 @@ class Layers(Path):
             angle=float(np.radians(self.angle)),
             turn=float(np.radians(self.turn)),
             overhang=float(np.radians(self.overhang)),
-            shortest=self.min_length,
+            shortest=self.width / 2 if self.min_length is None else self.min_length,
             gap=self._gap,
             axes=self.axes,
             tilt=float(np.radians(self.machine.tilt)),
             extend=(self.start_overlap, self.stop_overlap),
             turn_rate=float(np.radians(self.machine.turn)) / self.width,
+            beam=Beam(
+                self.nozzle.beam.radius or self.width / 2,
+                float(np.radians(self.nozzle.beam.cone)),
+                float(np.radians(self.incidence)),
+            ),
+            sink=self.penetration,
         )
         direction: Floats | None = None
         if self.direction == "normal":

@@ -45,7 +45,7 @@ class Exit(NamedTuple):
 class Moves(NamedTuple):
     """Points (N,3), tool axes (N,3), normals (N,3), speed (N,), whether the move that ends there deposits (N,), layer
     (N,), pass (N,) and part (N,). ``gap``: least distance of the nozzle during travel; ``blocked``: travels for which
-    no clear way was found."""
+    no clear way was found. ``kinds``: of the passes, in their order."""
 
     points: Floats
     axes: Floats
@@ -57,6 +57,7 @@ class Moves(NamedTuple):
     part: Ints
     gap: float
     blocked: int
+    kinds: tuple[str, ...] = ()
 
 
 def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: Travel) -> Moves:
@@ -96,11 +97,12 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
         gap = min(gap, found)
         for point, axis in zip(way, way_axes, strict=True):
             rows.append((point, axis, before.normals[-1], travel.fast, False, rows[-1][5], number, rows[-1][7]))
+    kinds = tuple(one.kind for passes in groups for one in passes)
     columns: list[Any] = list(zip(*rows, strict=True)) or [()] * 8
     points, axes, normals = (np.array(column, float).reshape(-1, 3) for column in columns[:3])
     layer, numbers, parts = (np.array(column, np.int64) for column in columns[5:])
     feed, on = np.array(columns[3], float), np.array(columns[4], bool)
-    return Moves(points, axes, normals, feed, on, layer, numbers, parts, max(gap, 0.0), blocked)
+    return Moves(points, axes, normals, feed, on, layer, numbers, parts, max(gap, 0.0), blocked, kinds)
 
 
 def rank_layers(groups: Sequence[Sequence[Pass]]) -> dict[tuple[int, int], int]:

@@ -10,19 +10,24 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
+from damageest_paths.aims import find_aims, find_sink
 from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
-from damageest_paths.fill import fill_region
+from damageest_paths.fill import Kind, Line, list_lines
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
-from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes, resample
-from damageest_paths.regions import cover, make_region, measure_length, shift_border, unite_regions
+from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes
+from damageest_paths.regions import cover, make_region, measure_length, resample, shift_border, unite_regions
 
-UNSUPPORTED, COLLIDES, SHORT = (
+UNSUPPORTED, COLLIDES, SHORT, SUNK, SHADED = (
     "stands on nothing within the permitted overhang",
     "the nozzle would come too near to something",
     "shorter than the shortest pass",
+    "so thin over intact metal that a bead would lie in it",
+    "no line of sight: something stands between nozzle and bead, or the tool would be too oblique",
 )
+OFF = 0.1
+"""Bead widths by which the middle of a bead may lie beside what a layer has to fill."""
 Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -57,32 +62,54 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     missing: list[Any] = []
     reasons: dict[str, float] = {}
     choice = _AxisChoice(process, clearance)
+    width = process.bead.width
     for number in range(count):
         floor, top = low + number * height, low + (number + 1) * height
         slab = _cut_slab(local, floor, top)
         wanted = _cast_shadow(slab, process)
-        ground = _cast_shadow(_cut_slab(near, floor - height / 4, top), process)
+        # below, where the layer before was too thin over metal for a bead, metal is that much lower
+        under = max(height / 4, height - find_sink(height, process))
+        ground = _cast_shadow(_cut_slab(near, floor - under, top), process)
         held = wanted ^ shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
-        lines = fill_region(held, process.pattern, process.bead, process.angle + number * process.turn)
-        long = [line for line in lines if measure_length(line) >= process.shortest]
-        short = [line for line in lines if measure_length(line) < process.shortest]
-        made, dropped = choice.place(long, top, number)
+        aims = find_aims(metal, wanted, (floor, top), around.clearance.standoff, process)
+        free = None if aims.free is None else aims.free ^ shift_border(held, OFF * width)
+        angle = process.angle + number * process.turn
+        lines = list_lines(held ^ aims.drawn, process.pattern, process.bead, angle, free, process.shortest)
+        long = [line for line in lines if measure_length(line.points) >= process.shortest]
+        short = cover([line.points for line in lines if measure_length(line.points) < process.shortest], width)
+        made, dropped, shaded = choice.place(long, top, number)
         made = order_passes(made, passes[-1].points[-1] if passes else None)
-        done = cover([one.points[:, :2] for one in made], process.bead.width)
+        done = cover([one.points[:, :2] for one in made], width)
+        causes = [cover(dropped, width), cover(shaded, width), short if made else wanted]
+        lost = _share_out((held ^ aims.reached) - done, causes)
         left = {
             UNSUPPORTED: wanted - held,
-            COLLIDES: (cover(long, process.bead.width) ^ held) - done if dropped else make_region([]),
-            SHORT: (cover(short, process.bead.width) ^ held) - done - cover(long, process.bead.width),
+            SUNK: held - aims.flush,
+            SHADED: unite_regions([held ^ (aims.flush - aims.reached), lost[1]]),
+            COLLIDES: lost[0],
+            SHORT: lost[2],
         }
         for why, region in left.items():
-            if region.is_empty():
+            rest = region - done
+            if rest.is_empty():
                 continue
-            piece = slab ^ region.extrude(top - floor).translate((0, 0, floor))
+            piece = slab ^ rest.extrude(top - floor).translate((0, 0, floor))
             if piece.volume() > 0:
                 missing.append(piece)
                 reasons[why] = reasons.get(why, 0.0) + piece.volume()
         passes += made
     return Plan(frame, height, tuple(passes), _gather(missing), reasons)
+
+
+def _share_out(gaps: Any, causes: Sequence[Any]) -> list[Any]:
+    """The pieces of ``gaps``, a region, for each of the regions ``causes`` the ones that it is the first to meet."""
+    found: list[list[Any]] = [[] for _ in causes]
+    for piece in gaps.decompose():
+        for own, cause in zip(found, causes, strict=True):
+            if not (piece ^ cause).is_empty():
+                own.append(piece)
+                break
+    return [unite_regions(own) for own in found]
 
 
 def _gather(pieces: list[Any]) -> Any:
@@ -116,6 +143,7 @@ class _AxisChoice:
     def __init__(self, process: Process, clearance: Clearance) -> None:
         self.process, self.clearance = process, clearance
         tilt = process.tilt if process.axes == 5 else 0.0
+        tilt = min(tilt, process.beam.incidence) if process.beam else tilt
         axes = list_axes(tilt, np.radians(30.0), 6) if process.is_trial else list_axes(tilt)
         # everything up to the top of the layer stays below the nozzle's lowest point
         self.lowest = np.array([_find_lowest(clearance, axis) for axis in axes])
@@ -123,35 +151,51 @@ class _AxisChoice:
         self.lowest = self.lowest[self.lowest >= process.gap * (1 - 1e-9)]
         self.last = 0
 
-    def place(self, lines: Sequence[Floats], top: float, layer: int) -> tuple[list[Pass], list[Floats]]:
-        """Passes along the lines (K,2) at a height, and the pieces of lines (K,2) that the nozzle does not reach."""
+    def place(self, lines: Sequence[Line], top: float, layer: int) -> tuple[list[Pass], list[Floats], list[Floats]]:
+        """Passes along the lines at a height; the pieces of lines (K,2) that the nozzle does not reach, and those that
+        it reaches but its beam does not."""
         clearance, needed = self.clearance.above(top), self.process.gap
         made: list[Pass] = []
         dropped: list[Floats] = []
         if not len(self.axes) or not lines:
-            return made, list(lines)
+            return made, [line.points for line in lines], dropped
         process = self.process
         least = int(np.ceil(process.shortest / process.step)) + 2
         limits = Limits(needed, process.step, process.turn_rate, least)
         sampled = []
         for line in lines:
-            line = extend_line(line, *process.extend)
-            sampled.append(resample(np.column_stack([line, np.full(len(line), top)]), process.step))
+            flat = extend_line(line.points, *process.extend)
+            sampled.append(resample(np.column_stack([flat, np.full(len(flat), top)]), process.step))
         chosen = choose_axes([points for points, _ in sampled], self.axes, self.last, clearance, limits)
-        for (points, corner), pieces in zip(sampled, chosen, strict=True):
+        for (points, corner), pieces, line in zip(sampled, chosen, lines, strict=True):
             at = 0
-            for piece in pieces:
+            long = [each for each in pieces if measure_length(points[each.start : each.stop]) >= process.shortest]
+            for piece in long:
                 if piece.start > at:
-                    dropped.append(points[at : piece.start, :2])
+                    dropped.append(points[at : piece.start])
                 at = piece.stop
-                made.append(self._make_pass(points, corner, piece, layer))
+                made.append(self._make_pass(points, corner, piece, layer, line.kind))
             if at < len(points):
-                dropped.append(points[at:, :2])
-            if pieces:
-                self.last = int(np.argmax(self.axes @ pieces[-1].axes[-1]))
-        return made, dropped
+                dropped.append(points[at:])
+            if long:
+                self.last = int(np.argmax(self.axes @ long[-1].axes[-1]))
+        body = clearance.without_beam()
+        shaded = [self._is_free(points, body) for points in dropped]
+        flat_pieces = [points[:, :2] for points in dropped]
+        return (
+            made,
+            [piece for piece, dark in zip(flat_pieces, shaded, strict=True) if not dark],
+            [piece for piece, dark in zip(flat_pieces, shaded, strict=True) if dark],
+        )
 
-    def _make_pass(self, points: Floats, corner: Floats, piece: Piece, layer: int) -> Pass:
+    def _is_free(self, points: Floats, body: Clearance) -> bool:
+        """Whether the nozzle's body alone is free at most of the points (N,3), with an axis each."""
+        count = len(self.axes)
+        poses = np.repeat(points, count, axis=0), np.tile(self.axes, (len(points), 1))
+        low, _ = body.bound(*poses, self.process.gap)
+        return bool((low.reshape(-1, count).max(axis=1) >= self.process.gap).mean() > 0.5)
+
+    def _make_pass(self, points: Floats, corner: Floats, piece: Piece, layer: int, kind: Kind) -> Pass:
         start, stop, axes, gaps = piece
         turns = np.zeros(stop - start, bool)
         turns[1:] = np.abs(np.diff(axes, axis=0)).max(axis=1) > 1e-9
@@ -169,6 +213,7 @@ class _AxisChoice:
             layer,
             min(lowest, float(gaps.min()) - self.process.step / 2),
             (points[start + tightest], axes[tightest]),
+            kind,
         )
 
 

@@ -9,11 +9,14 @@ from typing import Any, Literal
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.fill import Pattern
+from damageest_paths.fill import Kind, Pattern
 from damageest_paths.frames import Frame
+from damageest_paths.sight import Beam
 from damageest_paths.stripes import Bead
 
 Axes = Literal[3, "3+2", 5]
+LESS = 1e-6
+"""Share of the extent of a pass by which the ways have to become shorter where passes are put in another order."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,8 @@ class Process:
     build direction and an overhanging side. ``shortest``: least length of a pass. ``gap``: distance that the nozzle has
     to keep. ``tilt``: largest of the tool axis against the build direction. ``extend``: how far a pass begins before
     its start and goes on beyond its end. ``turn_rate``: largest turn of the tool axis per length along a pass.
-    ``is_trial``: few axes are tried.
+    ``is_trial``: few axes are tried. ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact metal; None:
+    a share of the height of a layer.
     """
 
     height: float
@@ -40,6 +44,8 @@ class Process:
     extend: tuple[float, float] = (0.0, 0.0)
     turn_rate: float = 0.0
     is_trial: bool = False
+    beam: Beam | None = None
+    sink: float | None = None
 
     @property
     def step(self) -> float:
@@ -49,13 +55,18 @@ class Process:
     def coarsen(self, factor: float) -> Process:
         """The same with larger layers and beads, for a quick trial."""
         bead = Bead(factor * self.bead.width, factor * self.bead.step)
-        return replace(self, height=factor * self.height, bead=bead, pattern="zigzag", extend=(0.0, 0.0), is_trial=True)
+        beam = None if self.beam is None else replace(self.beam, radius=factor * self.beam.radius)
+        return replace(
+            self, height=factor * self.height, bead=bead, pattern="zigzag", extend=(0.0, 0.0), is_trial=True,
+            shortest=factor * self.shortest, beam=beam, sink=None if self.sink is None else factor * self.sink,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Pass:
     """One pass: ``points`` (K,3) on the top of the bead, ``axes`` (K,3) from the tip away from the work, ``normals``
-    (K,3) of the layer, ``gap``: least distance of the nozzle, ``tightest``: the point (3,) and axis (3,) there."""
+    (K,3) of the layer, ``gap``: least distance of the nozzle, ``tightest``: the point (3,) and axis (3,) there,
+    ``kind``: see `fill.Kind`."""
 
     points: Floats
     axes: Floats
@@ -63,6 +74,7 @@ class Pass:
     layer: int
     gap: float = np.inf
     tightest: tuple[Floats, Floats] | None = None
+    kind: Kind = "row"
 
     def reverse(self) -> Pass:
         """The same pass, run the other way."""
@@ -87,17 +99,6 @@ class Plan:
         return float(self.missing.volume()) if self.missing is not None else 0.0
 
 
-def resample(line: Floats, longest: float) -> tuple[Floats, Floats]:
-    """Points (N,3) along a polyline (K,3), no farther from each other than ``longest``, with its corners; and the
-    number of the corner (N,) that each is, -1 for one between corners."""
-    sides = np.diff(line, axis=0)
-    counts = np.maximum(np.ceil(np.linalg.norm(sides, axis=1) / longest - 1e-9).astype(int), 1)
-    share = np.concatenate([np.arange(count) / count for count in counts] or [np.empty(0)])
-    points = np.repeat(line[:-1], counts, axis=0) + share[:, None] * np.repeat(sides, counts, axis=0)
-    corner = np.where(share == 0, np.repeat(np.arange(len(sides)), counts), -1)
-    return np.concatenate([points, line[-1:]]), np.append(corner, len(line) - 1)
-
-
 def measure_along(points: Floats) -> Floats:
     """The way (N,) along a polyline to each of its points (N,K)."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
@@ -119,7 +120,11 @@ def extend_line(line: Floats, before: float, after: float) -> Floats:
 
 
 def order_passes(passes: Sequence[Pass], start: Floats | None) -> list[Pass]:
-    """The passes of one layer, each the nearest to the end of the one before, some of them the other way round."""
+    """The passes of one layer, some of them the other way round, so that the ways between them are short.
+
+    Each is the nearest to the end of the one before; then stretches of the sequence are run the other way round as
+    long as that makes the ways shorter (2-opt, Croes 1958).
+    """
     left, ordered = list(passes), []
     at = start
     while left:
@@ -129,4 +134,29 @@ def order_passes(passes: Sequence[Pass], start: Floats | None) -> list[Pass]:
         one = left.pop(int(number))
         ordered.append(one.reverse() if end else one)
         at = ordered[-1].points[-1]
+    for _ in range(len(ordered) ** 2):
+        low, high, gain = _find_turn(ordered, start)
+        if gain <= LESS * ordered[0].points.std():
+            break
+        ordered[low : high + 1] = [one.reverse() for one in ordered[low : high + 1][::-1]]
     return ordered
+
+
+def _find_turn(passes: Sequence[Pass], start: Floats | None) -> tuple[int, int, float]:
+    """The first and last pass of the stretch that is best run the other way round, and by how much that is shorter."""
+    if len(passes) < 2:
+        return 0, 0, 0.0
+    first = np.array([one.points[0] for one in passes])
+    last = np.array([one.points[-1] for one in passes])
+    before = np.concatenate([first[:1] if start is None else start[None], last[:-1]])
+    # before a stretch, its first pass is now reached at its last point, and what follows from its first
+    into = np.linalg.norm(before[:, None] - last[None], axis=2)
+    out = np.zeros((len(passes), len(passes)))
+    out[:, :-1] = np.linalg.norm(first[:, None] - first[None, 1:], axis=2)
+    was_in = np.linalg.norm(before - first, axis=1)
+    was_out = np.append(np.linalg.norm(last[:-1] - first[1:], axis=1), 0.0)
+    if start is None:
+        into[0], was_in[0] = 0.0, 0.0
+    gain = np.triu(was_in[:, None] + was_out[None] - into - out)
+    low, high = np.unravel_index(int(np.argmax(np.round(gain, 9))), gain.shape)
+    return int(low), int(high), float(gain[low, high])

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Flags, Floats
 
 ROUND = 24
 """Corners of a full circle where a bead's end is drawn as a polygon."""
+CHUNK = 1000
+"""Points that are compared with all sides of a region at once."""
 
 
 def make_region(polygons: Sequence[Floats]) -> Any:
@@ -84,3 +86,29 @@ def find_main_angle(region: Any) -> float:
         if width * height < best * (1 - 1e-9):
             best, found = width * height, float(angle) + (0.0 if width >= height else np.pi / 2)
     return found
+
+
+def resample(line: Floats, longest: float) -> tuple[Floats, Floats]:
+    """Points (N,3) along a polyline (K,3), no farther from each other than ``longest``, with its corners; and the
+    number of the corner (N,) that each is, -1 for one between corners."""
+    sides = np.diff(line, axis=0)
+    counts = np.maximum(np.ceil(np.linalg.norm(sides, axis=1) / longest - 1e-9).astype(int), 1)
+    share = np.concatenate([np.arange(count) / count for count in counts] or [np.empty(0)])
+    points = np.repeat(line[:-1], counts, axis=0) + share[:, None] * np.repeat(sides, counts, axis=0)
+    corner = np.where(share == 0, np.repeat(np.arange(len(sides)), counts), -1)
+    return np.concatenate([points, line[-1:]]), np.append(corner, len(line) - 1)
+
+
+def is_within(points: Floats, region: Any) -> Flags:
+    """Whether each of ``points`` (N,2) lies in a region (N,): where a ray from it crosses an odd number of sides."""
+    inside = np.zeros(len(points), bool)
+    for ring in region.to_polygons():
+        start = np.asarray(ring, dtype=np.float64)
+        stop = np.roll(start, -1, axis=0)
+        rise = np.where(stop[:, 1] == start[:, 1], 1.0, stop[:, 1] - start[:, 1])
+        for first in range(0, len(points), CHUNK):
+            x, y = points[first : first + CHUNK].T[:, :, None]
+            spans = (start[:, 1] > y) != (stop[:, 1] > y)
+            at = start[:, 0] + (y - start[:, 1]) / rise * (stop[:, 0] - start[:, 0])
+            inside[first : first + CHUNK] ^= ((spans & (x < at)).sum(axis=1) % 2).astype(bool)
+    return inside

@@ -9,6 +9,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest_paths.regions import cover, turn_points
+from damageest_paths.trim import trim_line
 
 NEAR, FAR = 1.0, 6.0
 """Bead widths along the rows up to which the end of one row is linked with the end of the next: in any case, and where
@@ -47,17 +48,23 @@ class _Row:
     used: bool = False
 
 
-def fill_with_rows(region: Any, bead: Bead, angle: float, linked: bool = True) -> list[Floats]:
+def fill_with_rows(region: Any, bead: Bead, angle: float, linked: bool = True, free: Any = None) -> list[Floats]:
     """Polylines (K,2) along an ``angle`` in radians whose beads cover the whole region.
 
     Rows are evenly spaced, by the bead's step at most. Each row covers a stripe, and reaches as far as any point of the
     region within the stripe does. ``linked``: whether neighbouring rows are one polyline, to and fro, where they lie
-    side by side.
+    side by side. ``free``: the region in which rows and links have to lie, None for everywhere.
     """
     turned = region.rotate(float(-np.degrees(angle)))
+    within = None if free is None else free.rotate(float(-np.degrees(angle)))
     lines: list[Floats] = []
     for piece in sorted(turned.decompose(), key=lambda each: each.bounds()):
-        lines += _link(_find_rows(piece, bead), bead, piece.offset(BESIDE * bead.width) if linked else None)
+        rows = _find_rows(piece, bead)
+        around = piece.offset(BESIDE * bead.width)
+        if within is not None:
+            rows = [part for row in rows for part in _trim(row, within, bead)]
+            around = within
+        lines += _link(rows, bead, around if linked else None, NEAR if within is None else 0.0)
     return [turn_points(line, angle) for line in lines]
 
 
@@ -101,8 +108,15 @@ def _shorten(number: int, height: float, low: float, high: float, bead: Bead, re
     return _Row(number, float(height), low + inset, high - inset)
 
 
-def _link(rows: list[_Row], bead: Bead, around: Any) -> list[Floats]:
-    """Rows as polylines, to and fro where their links lie in the region ``around``; each its own where that is None."""
+def _trim(row: _Row, free: Any, bead: Bead) -> list[_Row]:
+    """The pieces of a row that lie in a region."""
+    pieces = trim_line(np.array([[row.low, row.height], [row.high, row.height]]), free, bead.width)
+    return [_Row(row.number, row.height, float(piece[0, 0]), float(piece[-1, 0])) for piece in pieces]
+
+
+def _link(rows: list[_Row], bead: Bead, around: Any, near: float) -> list[Floats]:
+    """Rows as polylines, to and fro where their links lie in the region ``around``, or are not longer than ``near`` in
+    bead widths; each its own where that is None."""
     by_number: dict[int, list[_Row]] = {}
     for row in rows:
         by_number.setdefault(row.number, []).append(row)
@@ -116,7 +130,7 @@ def _link(rows: list[_Row], bead: Bead, around: Any) -> list[Floats]:
             ends = (row.low, row.high) if forward else (row.high, row.low)
             points += [(ends[0], row.height), (ends[1], row.height)]
             above = by_number.get(row.number + 1, []) if around is not None else []
-            found = _find_next(row, ends[1], above, forward, bead, around)
+            found = _find_next(row, ends[1], above, forward, bead, around, near)
             if found is None:
                 break
             row, forward = found, not forward
@@ -124,7 +138,9 @@ def _link(rows: list[_Row], bead: Bead, around: Any) -> list[Floats]:
     return lines
 
 
-def _find_next(row: _Row, end: float, above: list[_Row], forward: bool, bead: Bead, around: Any) -> _Row | None:
+def _find_next(
+    row: _Row, end: float, above: list[_Row], forward: bool, bead: Bead, around: Any, near: float
+) -> _Row | None:
     """The row above that goes on where this one ends; None where it is not beside it, or another lies between."""
     beside = [other for other in above if other.low <= row.high and row.low <= other.high]
     if not beside:
@@ -133,7 +149,7 @@ def _find_next(row: _Row, end: float, above: list[_Row], forward: bool, bead: Be
     goal = other.high if forward else other.low
     if other.used or abs(goal - end) > FAR * bead.width:
         return None
-    if abs(goal - end) > NEAR * bead.width:
+    if not near or abs(goal - end) > near * bead.width:
         strip = cover([np.array([[end, row.height], [goal, other.height]])], 1e-3 * bead.width)
         if (strip - around).area() > 1e-7 * bead.width**2:
             return None

@@ -40,6 +40,7 @@ class Sweeps:
             return np.full(len(points), np.inf)
         if clearance.nozzle.profile is None:
             return clearance.measure_poses(points, axes, needed)
+        body = clearance.without_beam()
         gone = measure_along(points)
         turned = np.concatenate([[0.0], np.cumsum(_measure_turns(axes))])
         found = np.full(len(points), -np.inf)
@@ -58,7 +59,10 @@ class Sweeps:
                     found[first : last + 1] = np.maximum(found[first : last + 1], least)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], (found == -np.inf).astype(int), [0]])))
         for first, last in zip(edges[::2], edges[1::2], strict=True):
-            found[first:last] = clearance.measure_poses(points[first:last], axes[first:last], needed)
+            found[first:last] = body.measure_poses(points[first:last], axes[first:last], needed)
+        open_ = np.flatnonzero(found >= needed)
+        if clearance.beam is not None and len(open_):
+            found[open_[clearance.find_shaded(points[open_], axes[open_])]] = 0.0
         return found
 
 

@@ -192,7 +192,10 @@ def test_nothing_lost_and_nothing_left(tmp_path: Path, registry: Registry) -> No
             "export: {format: stel}\n",
             r"job\.yaml:4:\d+: export\.format.*no format 'stel' \(did you mean 'ste?[lp]'\?\)",
         ),
-        ("export: {format: [stl, obj]}\n", r"export\.format\.1: no format 'obj'; there are: 3mf, ply, (step, )?stl"),
+        (
+            "export: {format: [stl, obj]}\n",
+            r"export\.format\.1: no format 'obj'; there are: 3mf, ply, (qif, )?(step, )?stl",
+        ),
         ("export: {format: []}\n", r"export\.format: .*at least 1"),
         ("export: {format: 3}\n", r"export\.format"),
         (

@@ -10,6 +10,7 @@ import numpy as np
 from damageest_paths.layers import Layers
 
 from damageest.artefacts import DepositPath, Solid
+from damageest_evaluate.paths.beam import count_flips, measure_shaded, measure_sunk
 from damageest_evaluate.paths.check import count_crossings, measure_built, measure_nozzle
 from damageest_evaluate.paths.scenes import Scene
 
@@ -23,8 +24,10 @@ SUFFICES = 0.01
 class PathRow:
     """One deposit. Lengths in the part's unit; ``gap``: least distance of the nozzle from metal by the independent
     check; ``built``: the same from beads that were laid before; ``claimed``: by the planner. All three in bead widths.
-    Shares of the deposit: ``unreached_3``, ``unreached_5``; of the reachable: ``filled``. ``seconds_3``, ``seconds_5``:
-    of the processor."""
+    Shares of the deposit: ``unreached_3``, ``unreached_5``, ``surplus`` (what the beads add beyond it), and ``sunk``
+    (what of the beads lies in metal, by the independent check); of the reachable: ``filled``; of the way along passes:
+    ``shaded`` (metal in the beam). ``flips``: jumps of the rotary axis. ``seconds_3``, ``seconds_5``: of the
+    processor."""
 
     kind: str
     name: str
@@ -40,6 +43,10 @@ class PathRow:
     gap: float
     built: float
     claimed: float
+    shaded: float
+    sunk: float
+    surplus: float
+    flips: int
     crossings: int
     passes: int
     layers: int
@@ -85,6 +92,10 @@ def evaluate_scene(scene: Scene) -> PathRow:
         gap=gap / width,
         built=(measure_built(path, path.width / 4 / 2) if path.on.any() else np.inf) / width,
         claimed=min(path.clearance, path.travel_clearance) / width,
+        shaded=measure_shaded(path, scene.left, width / 4),
+        sunk=measure_sunk(path, scene.left, width / 4) / scene.body.volume,
+        surplus=path.surplus_volume / scene.body.volume,
+        flips=count_flips(path),
         crossings=count_crossings(path),
         passes=path.passes,
         layers=path.layers,
@@ -120,7 +131,8 @@ def make_table(rows: Sequence[PathRow]) -> str:
 
     head = [
         "deposits", "number", "out of reach, 3 axes", "5 axes", "5 needed", "filled, least", "spill, largest",
-        "void, largest", "nozzle gap, least", "from beads", "travel, median", "time 3 axes", "5 axes",
+        "void, largest", "nozzle gap, least", "from beads", "in the beam", "sunk, largest", "travel, median",
+        "time 3 axes", "5 axes",
     ]  # fmt: skip
     lines = [head]
     for kind in [*dict.fromkeys(row.kind for row in rows), "all"]:
@@ -138,6 +150,8 @@ def make_table(rows: Sequence[PathRow]) -> str:
                 f"{np.nanmax([row.void for row in own]):.2f}",
                 f"{min(row.gap for row in own):.2f}",
                 f"{min(row.built for row in own):.2f}",
+                f"{max(row.shaded for row in own):.1%}",
+                f"{max(row.sunk for row in own):.1%}",
                 f"{np.median([row.travel for row in own]):.0%}",
                 f"{np.median([row.seconds_3 for row in own]):.1f} s",
                 f"{np.median([row.seconds_5 for row in own]):.1f} s",

@@ -1,0 +1,90 @@
+"""`damageest part`: prints the datums and tolerances that a CAD file has for programs (semantic PMI)."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from damageest.cli import _process
+from damageest.cli._process import end_with
+from damageest.cli._streams import keep_for_results, say, say_result
+
+if TYPE_CHECKING:
+    from damageest.registry import Registry
+    from damageest.stages.part import CadPmi, CadTolerance
+
+
+def command(
+    part: Annotated[Path, typer.Argument(help="CAD file of the part: STEP AP242.")],
+    units: Annotated[str, typer.Option(help="Unit of the printed lengths: um, mm, cm, m, in, ft.")] = "mm",
+    as_json: Annotated[bool, typer.Option("--json", help="Print them as JSON.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
+) -> None:
+    """List a part's datums, datum systems and tolerances, with the CAD faces that they refer to."""
+    end_with(lambda: _list_clean(part, units, as_json))
+
+
+def _list_clean(part: Path, units: str, as_json: bool) -> int:
+    with keep_for_results(as_json, for_good=_process.is_command):
+        return _list_pmi(part, units, as_json)
+
+
+def read_pmi(part: Path, unit: str, registry: Registry) -> CadPmi:
+    """Datums and tolerances of a part's file, lengths in ``unit``. Raises JobError or InputError as a run would."""
+    from damageest.errors import JobError
+    from damageest.isolation import Limits
+    from damageest.job import load
+    from damageest.pipeline.calls import call_implementation
+    from damageest.stages.part import CadPmi, ReadPart
+    from damageest.stages.scan import ReadScan
+
+    try:  # the part is checked in the same way as in a job; no scan is needed
+        job = load({"version": 1, "units": unit, "part": str(part)}, registry, given={ReadScan: None})
+    except JobError as error:
+        raise JobError(error.faults, str(part)) from None
+    reader, item = job.stages[ReadPart], job.implementations[ReadPart]
+    assert isinstance(reader, ReadPart)
+    found = call_implementation(reader.cad_pmi, {"unit": unit}, reader, item, Limits())
+    assert isinstance(found, CadPmi)
+    return found
+
+
+def _list_pmi(part: Path, units: str, as_json: bool) -> int:
+    from damageest.geometry.units import canonical_unit
+    from damageest.registry import Registry
+
+    unit = canonical_unit(units)
+    found = read_pmi(part, unit, Registry.discover())
+    if as_json:
+        say_result(json.dumps({"part": str(part), "units": unit, **asdict(found)}, indent=1))
+        return 0
+    for datum in found.datums:
+        say_result(f"datum {datum.name}: {_name_faces(datum.faces)}")
+    for system in found.systems:
+        say_result(f"datum system {' | '.join(system)}")
+    for tolerance in found.tolerances:
+        say_result(_describe(tolerance, unit))
+    for note in found.notes:
+        say(f"note: {note}")
+    return 0
+
+
+def _describe(tolerance: CadTolerance, unit: str) -> str:
+    from damageest.errors import clean_message
+
+    value = "?" if tolerance.value is None else f"{tolerance.value:.6g} {unit}"
+    if tolerance.limits:
+        value = f"{tolerance.limits[0]:.6g} to {tolerance.limits[1]:.6g} {unit}"
+    system = f" to {' | '.join(tolerance.datums)}" if tolerance.datums else ""
+    name = f" ({clean_message(tolerance.name, 100)})" if tolerance.name else ""
+    return f"{tolerance.kind.replace('_', ' ')} {value}{system}: {_name_faces(tolerance.faces)}{name}"
+
+
+def _name_faces(faces: tuple[int, ...]) -> str:
+    if not faces:
+        return "no CAD face"
+    return f"CAD face{'s' * (len(faces) > 1)} {', '.join(map(str, faces))}"

@@ -1,0 +1,67 @@
+"""Where a click meets the part or the scan: on the full data, not on what the browser draws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from damageest.artefacts import Floats, Mesh
+from damageest.geometry.rays import RayCaster
+
+NEAR = 0.01
+"""Largest angle, in radians, between the ray and a scan point that it picks: a few pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ray:
+    """A ray of the view from ``origin`` (3,) in unit ``direction`` (3,)."""
+
+    origin: Floats
+    direction: Floats
+
+    @classmethod
+    def of_click(cls, click: dict[str, Any]) -> Ray:
+        """``click``: ``x`` and ``y`` from -1 to 1 (right and up), ``aspect``, and the camera as vtk.js gives it."""
+        camera = click["camera"]
+        origin, focal, up = (np.array(camera[name], float) for name in ("position", "focalPoint", "viewUp"))
+        ahead = focal - origin
+        ahead /= np.linalg.norm(ahead)
+        right = np.cross(ahead, up)
+        right /= np.linalg.norm(right)
+        top = np.cross(right, ahead)
+        slope = np.tan(np.radians(float(camera["viewAngle"])) / 2)
+        way = ahead + slope * (float(click["x"]) * float(click["aspect"]) * right + float(click["y"]) * top)
+        return cls(origin, way / np.linalg.norm(way))
+
+    def move(self, offset: Floats) -> Ray:
+        """The ray as seen from things that are shown moved by ``offset``."""
+        return Ray(self.origin - offset, self.direction)
+
+
+class MeshPicker:
+    """Finds where rays meet a mesh."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._caster = RayCaster(mesh)
+
+    def find(self, ray: Ray) -> tuple[Floats, int] | None:
+        """Place (3,) and triangle; None where the ray meets nothing."""
+        distance, face = self._caster.find_first(ray.origin[None], ray.direction[None])
+        if face[0] < 0:
+            return None
+        return ray.origin + distance[0] * ray.direction, int(face[0])
+
+
+def find_point(points: Floats, ray: Ray) -> int | None:
+    """The point (N,3) of the scan that a ray picks: of those within a few pixels of it, the one in front."""
+    local = points - ray.origin
+    along = local @ ray.direction
+    off = np.linalg.norm(local - along[:, None] * ray.direction, axis=1)
+    angle = np.where(along > 0, off / np.maximum(along, 1e-300), np.inf)
+    near = np.flatnonzero(angle < NEAR)
+    if not len(near):
+        return None
+    front = along[near] < along[near].min() * 1.02
+    return int(near[front][angle[near[front]].argmin()])
