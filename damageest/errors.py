@@ -109,7 +109,8 @@ class StageError(DamageestError):
 
     Raise it with what is wrong and, as ``remedy``, what the user may try; ``method``: another method of the job that
     may do it, which is added to the remedy; ``topic``: of `damageest explain`. The engine adds stage and site; for
-    points that are no site yet, a description of their ``place``.
+    points that are no site yet, a description of their ``place``. ``extra``: of this package, where what is missing
+    comes with it.
     """
 
     exit_status = 1
@@ -118,6 +119,7 @@ class StageError(DamageestError):
         self.message, self.own_remedy, self.method = message, remedy, method
         self.remedy = ", or ".join(part for part in (remedy, f"method: {method}" if method else "") if part)
         self.stage, self.use, self.site, self.place, self.topic = "", "", 0, "", topic
+        self.extra = ""
         super().__init__(message)
 
     def __str__(self) -> str:
@@ -161,8 +163,15 @@ def describe_missing_library(error: BaseException) -> StageError | None:
         )
     if isinstance(error, ModuleNotFoundError) and error.name:
         module = error.name.partition(".")[0]
-        wanted = f"'damageest[{EXTRAS[module]}]'" if module in EXTRAS else module
-        return StageError(f"the Python module {error.name} is not installed", f"pip install {wanted}")
+        if module not in EXTRAS:
+            return StageError(f"the Python module {error.name} is not installed", f"pip install {module}")
+        extra = EXTRAS[module]
+        missing = StageError(
+            f"the Python module {error.name} is not installed; the extra '{extra}' brings it",
+            f'pip install "damageest[{extra}]"',
+        )
+        missing.extra = extra
+        return missing
     if isinstance(error, ImportError):
         text = " ".join(str(error).split())[:400]
         return StageError(f"a Python module cannot be loaded: {text}", "--debug shows which; install it again")

@@ -13,9 +13,8 @@ from damageest.errors import InputError
 
 try:
     import resource
-except (
-    ModuleNotFoundError
-):  # as on Windows: there --memory is compared with what is needed, but the system limits nothing
+except ModuleNotFoundError:
+    # As on Windows: --memory is compared with what work will need, but the system limits nothing.
     resource = None  # type: ignore[assignment]
 
 STAGE_SECONDS = 3600.0
