@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Deviation, Floats, Part, Pose, Scan, Solid
+from damageest.geometry.remaining import subtract_from_part
 from damageest.geometry.skin import extract_ids
-from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid, unite
+from damageest.geometry.solids import iou, to_solid, unite
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState
@@ -58,7 +59,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         site_label=label,
         sites=sites,
         damage=damage,
-        undamaged=to_solid(subtract_lost(to_manifold(part, origin), lost), origin) if sites else part,
+        undamaged=subtract_from_part(part, [site.damage for site in sites if site.accepted]),
         warnings=rank_notes(state.warnings),
         failures=tuple(str(error) for error in state.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance, state.adapted is not None),

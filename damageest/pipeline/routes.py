@@ -21,6 +21,7 @@ from damageest.pipeline.large_scans import add_points_near_damage, where_thinned
 from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.paths import plan_paths
 from damageest.pipeline.prepare import (
+    check_clusters,
     check_intact,
     crop_scan,
     gather_intact,
@@ -85,6 +86,7 @@ ACQUIRE: Route = (
     check_intact,  # deviation, tolerance, part, segmenter ->
     inspect_skin,  # part, aligned, deviation, tolerance -> skin, deviation
     Cluster,  # aligned, deviation, tolerance -> sites
+    check_clusters,  # sites, deviation, tolerance, part ->
     look_for_sheets,  # part, aligned, deviation, tolerance -> sheets
     find_surplus,  # calls Cluster, EncloseAll: unit, sheets, aligned, deviation, tolerance, part, sites, samples
     #     -> surplus, deviation, +warnings
