@@ -18,7 +18,6 @@ EXTRAS = {
     "vtkmodules": "vtk",
     "pye57": "e57",
     "k3d": "report",
-    "matplotlib": "report",
     "PIL": "report",
     "distributed": "batch",
     "dask": "batch",
