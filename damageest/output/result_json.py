@@ -17,7 +17,7 @@ from damageest.output.reason_json import ReasonReport
 from damageest.output.section_json import SectionReport, report_section
 from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
 from damageest.output.skin_json import CoverageReport, SurplusReport, report_surplus
-from damageest.output.uncertainty_json import ReportedInterval
+from damageest.output.uncertainty_json import BudgetReport, ReportedInterval
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
@@ -142,6 +142,11 @@ class Report(JsonModel):
     volume_95: ReportedInterval | None = Field(
         description="95 % interval of `damage_volume`, its high end null where nothing limits it; null: there is none"
     )
+    budget: BudgetReport | None = Field(
+        description="budget of uncertainty of `damage_volume` (JCGM 100); null where there is no interval or no site"
+    )
+    not_in_budget: list[str] = Field(description="sources that the job does not tell: they are in no interval")
+    certificate: str = Field(description="scanner and standard of its certificate; empty where the job has none")
     undamaged_volume: float
     material: MaterialReport = Field(description="what the whole repair takes")
     truth: TruthReport | None
@@ -155,7 +160,15 @@ class Report(JsonModel):
 
 def result_schema() -> dict[str, Any]:
     """The JSON Schema of result.json."""
-    return {"$schema": DIALECT, **Report.model_json_schema(mode="serialization"), "title": "damageest result"}
+    from importlib.metadata import version
+
+    comment = f"written by damageest {version('damageest')}"
+    return {
+        "$schema": DIALECT,
+        "$comment": comment,
+        **Report.model_json_schema(mode="serialization"),
+        "title": "damageest result",
+    }
 
 
 def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: Any = str) -> dict[str, Any]:

@@ -33,6 +33,7 @@ RUN_CODES: dict[str, RunCode] = {
     "few_points": RunCode("the scan has too few points to show the skin between them", 0),
     "fell_back": RunCode("method auto took the route surface, since implicit failed", 1),
     "below_noise": RunCode("shallow places that errors of the scan explain are no sites", 0),
+    "certificate": RunCode("the scan contradicts the scanner's certificate or the part's temperature", 1),
     "depth_steps": RunCode("the scan's depth has steps, as of a depth camera", 1),
     "sparse_scan": RunCode("the points lie far apart for the tolerance", 1),
     "coarse_part": RunCode("the part's triangles deviate from its CAD surface by more than half the tolerance", 1),

@@ -11,8 +11,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from damageest.artefacts import Floats
 from damageest.errors import StageError
 from damageest.io import colours
@@ -177,10 +175,7 @@ def _read_library() -> str:
 
 def _sample_map() -> str:
     """The colour bar as stops of a CSS gradient."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return ", ".join(to_hex(colormaps[colours.DEVIATION](x)) for x in np.linspace(0, 1, 9))
+    return ", ".join(colours.COOLWARM)
 
 
 def _hash_scans(result: Result, content: Mapping[str, Any]) -> dict[str, str]:
