@@ -46,7 +46,9 @@ def read_aim(folder: Path, step: Step) -> Aim:
         raise InputError(f"{folder}: was changed after the run: {changed[0]}; inspect what the run wrote, or run again")
     if output.place != folder:
         raise InputError(f"{folder}: its files are not in the part's frame; run the job again with frame: part")
-    deposits, stock, refused = {}, {}, []
+    deposits: dict[int, Solid] = {}
+    stock: dict[int, float] = {}
+    refused: list[int] = []
     for site in output.content["sites"]:
         body = output.read_solid("deposit", site["id"]) or output.read_solid("damage", site["id"])
         if not site["accepted"] or body is None:

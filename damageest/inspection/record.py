@@ -12,10 +12,10 @@ import json
 import math
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from damageest import __version__
 from damageest.errors import InputError
 from damageest.inspection.aim import Aim
 from damageest.inspection.compare import Inspection
@@ -89,7 +89,7 @@ def describe_inspection(aim: Aim, found: Inspection, scan: Path, time: datetime,
         "findings": [vars(one) for one in found.findings],
         "verdicts": [vars(one) for one in found.verdicts],
         "notes": list(found.notes),
-        "damageest": __version__,
+        "damageest": version("damageest"),
         "previous": previous,
     }  # fmt: skip
     plain: dict[str, Any] = json.loads(json.dumps(entry))
