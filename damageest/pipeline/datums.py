@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from contextlib import suppress
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from damageest.artefacts import AdaptedPart, Flags, Floats, Ints, Part, Pose, Reason, Scan
 from damageest.errors import StageError
 from damageest.geometry.selectors import Selector
-from damageest.geometry.transforms import move_points
+from damageest.geometry.transforms import invert_pose, move_points
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState, Reasons
@@ -33,7 +34,7 @@ def hold_datums(engine: Engine, state: JobState) -> tuple[Pose, Scan, Reasons]:
     views, pose = state.views, state.pose
     if not has_datums(state.aligner) or views is None or not any(one.is_corrected for one in views.views):
         return pose, state.aligned, state.warnings
-    corrected = state.aligned.move(np.linalg.inv(pose.T_part_scan))
+    corrected = state.aligned.move(invert_pose(pose))
     moved = state.with_value(JobState.scan, corrected, digest("corrected views", state.key("aligned")))
     with suppress(StageError):
         again: Pose = engine.make_silent().call(Align, moved).get(Align.gives)
@@ -60,10 +61,10 @@ def has_datums(aligner: Align | None) -> bool:
 
 def choose_on_datums(aligner: Align | None, part: Part, places: Floats, face: Ints) -> Flags | None:
     """Which places (N,3) on the triangles ``face`` (N,) of the part lie on the job's datums; None without datums."""
-    datum = getattr(aligner, "datum", ())
+    datum: Any = getattr(aligner, "datum", ())
     if not datum:
         return None
-    groups = [getattr(one, "skin", one) for one in datum.values()] if isinstance(datum, dict) else [datum]
+    groups: list[Any] = [getattr(one, "skin", one) for one in datum.values()] if isinstance(datum, dict) else [datum]
     items = [one if isinstance(one, Selector) else Selector(faces=(one,)) for group in groups for one in group]
     normals = part.face_normals[face]
     return np.asarray(np.any([one.matches(places, normals, face, part) for one in items], axis=0))
