@@ -21,6 +21,7 @@ from damageest.artefacts import (
     Pose,
     Reason,
     Scan,
+    Section,
     Solid,
     Surface,
 )
@@ -134,7 +135,8 @@ class Result:
     volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
     high end. ``budget``: the uncertainty of that volume, source by source; ``not_in_budget``: sources that the job does
     not tell, in words; ``certificate``: scanner and standard, as the job has them. ``adapted``: how ``part`` was
-    deformed to follow the scan; None: it is the part as designed. ``conversions``: what plugins can convert it to, see
+    deformed to follow the scan; None: it is the part as designed. ``sections``: those that the job asks
+    for, of the part as designed, in the pose of the run. ``conversions``: what plugins can convert it to, see
     `convert`.
     """
 
@@ -164,6 +166,7 @@ class Result:
     budget: Budget | None = None
     not_in_budget: tuple[str, ...] = ()
     certificate: str = ""
+    sections: tuple[Section, ...] = ()
     conversions: Mapping[str, Conversion] = field(default_factory=dict, repr=False)
 
     @property

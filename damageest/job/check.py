@@ -127,6 +127,7 @@ class _Check:
             accept=header.accept,
             scanner=header.scanner,
             temperature=header.temperature,
+            sections=header.sections,
             given=self.given,
             make_fault=self.make_fault,
         )

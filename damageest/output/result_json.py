@@ -14,6 +14,7 @@ from damageest.output.fit_json import FitReport, report_fit
 from damageest.output.free_json import DatumReport, FreeMotionReport, LeftMotionReport
 from damageest.output.provenance import ProvenanceReport
 from damageest.output.reason_json import ReasonReport
+from damageest.output.section_json import SectionReport, report_section
 from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
 from damageest.output.skin_json import CoverageReport, SurplusReport, report_surplus
 from damageest.output.uncertainty_json import BudgetReport, ReportedInterval
@@ -135,6 +136,7 @@ class Report(JsonModel):
     fit: FitReport | None = Field(description="null where too few points lie near the skin")
     sites: list[SiteReport]
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
+    sections: list[SectionReport] = Field(description="those that the job asks for")
     export: ExportReport
     damage_volume: float
     volume_95: ReportedInterval | None = Field(
@@ -192,6 +194,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
         fit=report_fit(result.fit),
         sites=sites,
         surplus=[report_surplus(item, result, written) for item in result.surplus],
+        sections=[report_section(section, written) for section in result.sections],
         export=ExportReport.read(written),
         material=sum_material([site.deposit for site in sites if site.deposit]),
         truth=_report_truth(result),

@@ -22,6 +22,7 @@ from damageest.pipeline.large_scans import add_points_near_damage, where_thinned
 from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.paths import plan_paths
 from damageest.pipeline.prepare import (
+    check_clusters,
     check_intact,
     crop_scan,
     gather_intact,
@@ -34,6 +35,7 @@ from damageest.pipeline.prepare import (
     take_tolerance,
 )
 from damageest.pipeline.scanner import correct_temperature, weigh_scanner
+from damageest.pipeline.sections import cut_sections
 from damageest.pipeline.selections import check_selections
 from damageest.pipeline.sensor import fold_hidden, look_for_sheets, measure_sensor, set_explained_aside
 from damageest.pipeline.sites import (
@@ -47,7 +49,13 @@ from damageest.pipeline.sites import (
 from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_budget, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
-from damageest.pipeline.writing import describe_output, keep_form, show_result, write_output
+from damageest.pipeline.writing import (
+    describe_output,
+    keep_form,
+    show_result,
+    write_output,
+    write_sections,
+)
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
 from damageest.stages.cluster import Cluster
@@ -91,6 +99,7 @@ ACQUIRE: Route = (
     check_intact,  # deviation, tolerance, part, segmenter ->
     inspect_skin,  # part, aligned, deviation, tolerance -> skin, deviation
     Cluster,  # aligned, deviation, tolerance -> sites
+    check_clusters,  # sites, deviation, tolerance, part ->
     look_for_sheets,  # part, aligned, deviation, tolerance -> sheets
     find_surplus,  # calls Cluster, EncloseAll: unit, sheets, aligned, deviation, tolerance, part, sites, samples
     #     -> surplus, deviation, +warnings
@@ -143,12 +152,14 @@ CLOSE: Route = (
     sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted, folded,
     #     views -> volume_95
     sum_budget,  # found, volume_95, scanner_errors, aligned, part, unit, adapted, folded, views -> budget
+    cut_sections,  # asked_sections, part, aligned, adapted, pose_error, sensor, tolerance, unit -> sections, +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
-    #     coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions
+    #     coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions, sections
     #     -> result
 )
 WRITE: Route = (
     Export,  # result, folder, writers, path_writers -> written
+    write_sections,  # written, result, folder -> written
     keep_form,  # written, adapted, aligned, tolerance, folder -> written
     describe_output,  # result, written, target -> result, content, job_text
     show_result,  # calls Report: written, result, folder, content, job_text -> result, written

@@ -29,6 +29,7 @@ from damageest.artefacts import (
     Rims,
     Samples,
     Scan,
+    Section,
     Sites,
     Solid,
     Surface,
@@ -46,6 +47,7 @@ from damageest.errors import StageError
 from damageest.findings import Budget, Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict
 from damageest.job.model import Accept, SiteChoice
 from damageest.job.scanner import ScannerInfo, Temperature
+from damageest.job.sections import SectionChoice
 from damageest.pipeline.cache import digest
 from damageest.result import Conversion, Result
 from damageest.rules import Rule, ScanFacts
@@ -194,8 +196,9 @@ class JobState(State):
     """The whole job, as it goes along the route.
 
     From the job and the registry: ``name``, ``unit``, ``asked_tolerance`` (None: `auto`), ``choice`` of sites,
-    ``accept``, ``scanner`` and ``temperature`` (None: the job does not tell), the stages whose options steps read (None
-    where the job's route has none), and ``rules``, ``writers``, ``path_writers`` and ``conversions``. ``tolerance``:
+    ``accept``, ``asked_sections``, ``scanner`` and ``temperature`` (None: the job does not tell), the stages whose
+    options steps read (None where the job's route has none), and ``rules``, ``writers``, ``path_writers`` and
+    ``conversions``. ``tolerance``:
     None until it is measured where the job says `auto`. ``depth_step``: of the scan's depth, 0 where it is continuous.
     ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a larger. ``aligned``: the scan in
     the part's frame. ``adapted``: the part deformed to follow the scan, which is ``part`` from then on; None: it is as
@@ -213,6 +216,7 @@ class JobState(State):
     asked_tolerance = Value[float | None]()
     choice = Value[SiteChoice]()
     accept = Value[Accept]()
+    asked_sections = Value[tuple[SectionChoice, ...]]()
     reader = Value[ReadScan | None]()
     scanner = Value[ScannerInfo | None]()
     temperature = Value[Temperature | None]()
@@ -257,6 +261,7 @@ class JobState(State):
     surplus = Value[tuple[Surplus, ...]]()
     volume_95 = Value[Interval | None]()
     budget = Value[Budget | None]()
+    sections = Value[tuple[Section, ...]]()
     enclosures = Value[Enclosures]()
 
     wanted = Value[tuple[int, ...] | None]()

@@ -49,6 +49,7 @@ RUN_CODES: dict[str, RunCode] = {
     "site_dropped": RunCode("a site was dropped, as the job says", 2),
     "sites_merged": RunCode("sites were merged, as the job says", 2),
     "cluster": RunCode("what the stage cluster says about how it grouped points", 2),
+    "section": RunCode("what a section could not show or measure", 1),
     "export": RunCode("a file was not written as the job asks for, or not at all", 1),
     "report": RunCode("the report failed, and the run went on without it", 1),
 }

@@ -43,7 +43,7 @@ Axes = Annotated[tuple[Axis, ...], AfterValidator(_check_axes)]
 class RegionWeight(StrictMapping):
     """How much a region of the skin counts."""
 
-    skin: Selector = Option(description="box, half_space, facing, faces, kind: skin of the region")
+    skin: Selector = Option(description="box, half_space, facing, faces, at, kind: skin of the region")
     weight: float = Option(ge=0, le=1000, description="against 1 of skin in no region; 0: it does not count")
 
 
