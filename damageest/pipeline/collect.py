@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Deviation, Floats, Part, Pose, Scan, Solid
+from damageest.checks.budget import UNKNOWN
 from damageest.geometry.remaining import subtract_from_part
 from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import iou, to_solid, unite
@@ -23,7 +24,8 @@ from damageest.rules.notes import make_notes, rank_notes
     gives="result",
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
-        "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "conversions",
+        "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "budget",
+        "scanner_errors", "conversions", "sections",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -70,7 +72,11 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         adapted=state.adapted,
         fit=None if state.fitted is None else state.fitted.fit,
         sensor=state.sensor,
+        budget=state.budget,
+        not_in_budget=tuple(UNKNOWN[name] for name in state.scanner_errors.unknown),
+        certificate=state.scanner_errors.certificate,
         conversions=state.conversions,
+        sections=state.sections,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
 

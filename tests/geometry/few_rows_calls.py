@@ -343,9 +343,6 @@ REFUSALS: dict[str, str] = {
     "open_surfaces.trim_surface": r"no inner damage surface near the points",
     "sampling.sample_by_area": r"no place for \d points on \d triangles",
     "solids.to_manifold": r"manifold3d rejects the mesh",
-    "remaining.lift_faces": lambda r: expect(
-        remaining.lift_faces(r.mesh, np.zeros(len(r.mesh.faces), bool), 0.1).faces, (len(r.mesh.faces), 3)
-    ),
     "solids.iou": r"manifold3d rejects the mesh",
     "voxels.measure_bounds": r"there are no points, and so no bounds",
 }

@@ -20,6 +20,7 @@ from damageest.rules.notes import fold_notes, qualify_nothing
 from damageest.stages.report import _style as style
 from damageest.stages.report._scene import EXAGGERATED, LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
+from damageest.stages.report._sections import draw_sections, group_sections
 from damageest.stages.report._sites import MOST_DRAWN, Shown
 from damageest.stages.report._values import list_fit, list_freedom, list_sensor, show_total_interval
 
@@ -95,6 +96,8 @@ def fill_page(
         map_colours=_sample_map(),
         histogram=draw_histogram(result),
         labels=LABELS,
+        sections=group_sections(result),
+        drawings=draw_sections(result),
         fit=list_fit(result),
         freedom=list_freedom(result),
         sensor=list_sensor(result),

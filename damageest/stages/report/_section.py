@@ -10,6 +10,7 @@ import numpy as np
 from damageest.artefacts import INTACT, Floats, Mesh
 from damageest.geometry.solids import to_manifold
 from damageest.io import colours
+from damageest.io.section_files import Drawing as Layout
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._svg import GROUND, INK, METAL, NO_FILL, SOFT, Drawing, choose_ticks
@@ -103,6 +104,44 @@ def draw_section(result: Result, site: Site, plane: Plane, part: Any) -> tuple[s
     drawing.draw_lines("deepest-point", cross, f"stroke:{INK};stroke-width:1.2")
     _draw_ruler(drawing, low, high, result.units)
     return drawing.to_svg(), slab
+
+
+def lay_out_site(result: Result, site: Site) -> Layout | None:
+    """The section through a site's deepest point on paper, for a PDF: the part, the damage volume, and scan points as
+    short lines. None where the plane meets neither."""
+    plane = choose_plane(result, site)
+    origin = site.damage.bounds.mean(axis=0)
+    lost = _cut(to_manifold(site.damage, origin), plane, origin)
+    middle = result.part.bounds.mean(axis=0)
+    part = _cut(to_manifold(result.part, middle), plane, middle)
+    if not lost or not part:
+        return None
+    ends = np.vstack(lost)
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    margin = 0.3 * float((high - low).max()) + 4 * result.tolerance
+    low, high = _widen(low - margin, high + margin, WIDTH / HEIGHT)
+    width, height = 480.0, 480.0 * HEIGHT / WIDTH
+    scale = width / (high[0] - low[0])
+
+    def place(points: Floats) -> Floats:
+        return np.asarray(np.array([0.0, height]) + scale * (points - low) * np.array([1.0, -1.0]))
+
+    from manifold3d import CrossSection
+
+    frame = CrossSection([np.array([low, [high[0], low[1]], high, [low[0], high[1]]])])
+    shown = [(CrossSection([loop[:-1] for loop in loops]) ^ frame).to_polygons() for loops in (part, lost)]
+    areas, damage = ([place(np.vstack([loop, loop[:1]])) for loop in loops] for loops in shown)
+    slab = max(float(result.scan.spacing), 0.5 * result.tolerance)
+    flat, off = plane.project(result.aligned.points)
+    near = (np.abs(off) <= slab) & ((flat > low) & (flat < high)).all(axis=1)
+    points = place(flat[near])
+    points = points[:: max(1, -(-len(points) // MOST_POINTS))]
+    dots = [("within", point + np.array([[-0.7, 0.0], [0.7, 0.0]])) for point in points]
+    length = style.round_nice(0.25 * (high[0] - low[0]))
+    ruler = np.array([[10.0, height - 10.0], [10.0 + scale * length, height - 10.0]])
+    lines = [*(("above", loop) for loop in damage), *dots]
+    text = f"{length:g} {result.units}"
+    return Layout((width, height), 1.0, tuple(areas), tuple(areas), (), tuple(lines), (), (ruler, text))
 
 
 def draw_histogram(result: Result) -> str:

@@ -51,6 +51,8 @@ class Shown:
     faces: str
     deposit: list[tuple[str, str]]
     path: list[tuple[str, str]]
+    budget: Mapping[str, Any] | None
+    depth_budget: Mapping[str, Any] | None
     files: list[tuple[str, str, bytes]] = field(default_factory=list)
     picture: bytes = b""
     section: str = ""
@@ -132,6 +134,8 @@ def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
         faces=name_faces(result.part, site.damage, result.tolerance),
         deposit=rows,
         path=list_path(site, unit),
+        budget=told["uncertainty"] and told["uncertainty"]["budget"],
+        depth_budget=told["uncertainty"] and told["uncertainty"]["depth_budget"],
     )
 
 
