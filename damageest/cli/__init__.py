@@ -49,6 +49,7 @@ def _options(
 def _add_commands() -> None:
     from damageest.cli import (
         batch,
+        doctor,
         explain,
         faces,
         init,
@@ -74,6 +75,7 @@ def _add_commands() -> None:
         validate,
         init,
         explain,
+        doctor,
         faces,
         part,
         stages,
