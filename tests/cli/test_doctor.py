@@ -1,8 +1,12 @@
-"""`damageest doctor`: what it finds is there, and what is wrong ends with exit status 1."""
+"""`damageest doctor`: what it finds is there, and what is wrong ends with exit status 1. Completion by the shell."""
 
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -29,3 +33,12 @@ def test_a_wrong_volume_and_a_missing_extra_are_said(monkeypatch: pytest.MonkeyP
     assert done.exit_code == 1
     assert "fault: the self-test gave a wrong volume" in done.output
     assert 'extra report: not installed; pip install "damageest[report]"' in done.output
+
+
+def test_the_shell_is_told_the_commands_that_a_word_begins(tmp_path: Path) -> None:
+    asked = {"COMP_WORDS": "damageest do", "COMP_CWORD": "1", "_DAMAGEEST_COMPLETE": "complete_bash"}
+    command = [sys.executable, "-c", "import sys; sys.argv[0] = 'damageest'; from damageest.cli import main; main()"]
+    done = subprocess.run(
+        command, env={**os.environ, **asked}, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["doctor"]
