@@ -26,7 +26,7 @@ app = typer.Typer(
     cls=Commands,
     help="From a CAD part and a 3D scan of the damaged one to the watertight volume of the missing metal.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -49,6 +49,7 @@ def _options(
 def _add_commands() -> None:
     from damageest.cli import (
         batch,
+        doctor,
         explain,
         faces,
         init,
@@ -76,6 +77,7 @@ def _add_commands() -> None:
         validate,
         init,
         explain,
+        doctor,
         faces,
         part,
         stages,
