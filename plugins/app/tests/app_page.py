@@ -100,8 +100,9 @@ class Page:
         field.press("Tab")
 
     def at_rest(self, seconds: float = 1.2) -> None:
-        """Waits until what was asked for is drawn."""
+        """Waits until what was asked for is read and drawn."""
         self.page.wait_for_timeout(seconds * 1000)
+        self.page.locator(mark("busy")).wait_for(state="detached")
 
     def click_view(self, x: float, y: float) -> None:
         """A click into the 3D view, from 0 to 1."""

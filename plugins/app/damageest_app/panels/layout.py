@@ -135,7 +135,7 @@ def _build_rail(session: Session) -> None:
 
 
 def _build_messages(session: Session) -> None:
-    html.Div("{{ busy }} …", v_if=("busy",), classes="fine mb-2")
+    html.Div("{{ busy }} …", v_if=("busy",), classes="fine mb-2", raw_attrs=mark("busy"))
     with v3.VAlert(
         v_if=("message",), type=("tone",), variant="tonal", density="compact", closable=True, classes="mb-3",
         __events=[("close", "click:close")], close="message = ''", raw_attrs=mark("message"),

@@ -50,14 +50,14 @@ class RepairPanel(Panel):
     def _build_stock(self) -> None:
         html.Div("Stock that is milled off after deposition.", classes="fine mb-2")
         v3.VTextField(
-            v_model=("outer",),
+            model_value=("outer",),
             type="number",
             step=0.1,
             min=0,
             label="stock on all skin",
             suffix=("unit",),
             __events=["change"],
-            change=self.set_outer,
+            change=(self.set_outer, "[$event.target.value]"),
             classes="mb-3",
             raw_attrs=mark("outer"),
         )
@@ -135,8 +135,8 @@ class RepairPanel(Panel):
             )
             html.Div("{{ one }}", v_for=("(one, k) in result_files",), key=("k",), classes="fine")
 
-    async def set_outer(self) -> None:
-        value = to_length(self.state.outer)
+    async def set_outer(self, text: Any) -> None:
+        value = to_length(text)
         if value is not None:
             await self.session.apply(lambda tree: edits.set_stock(tree, value))
 
