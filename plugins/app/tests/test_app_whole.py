@@ -135,13 +135,11 @@ def _align(page: Page, pictures: Path) -> None:
     page.click_view(0.25, 0.5)
     page.wait("pair-next", "a place on the scan")
     page.at_rest()
-    page.shot(pictures / "pairs.png")
     page.click("tool-datum")
     page.at_rest()
     page.click_view(0.45, 0.62)
     page.wait("datum-row", "skin facing")
     page.at_rest()
-    page.shot(pictures / "datum.png")
 
 
 def _judge(page: Page, pictures: Path) -> None:

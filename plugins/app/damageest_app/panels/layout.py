@@ -231,4 +231,4 @@ def _bind(session: Session) -> None:
     ctrl.trigger("key")(key)
     ctrl.trigger("refused")(lambda text: session.say(text, "error"))
     ctrl.on_server_ready.add(lambda **_: session.panels["open"].begin())  # type: ignore[attr-defined]
-    ctrl.on_client_connected.add(lambda **_: session.panels["open"].look())  # type: ignore[attr-defined]
+    ctrl.on_client_connected.add(lambda **_: session.panels["open"].look())
