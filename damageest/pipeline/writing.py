@@ -12,6 +12,7 @@ import numpy as np
 from damageest.artefacts import AdaptedPart, Reason, Scan
 from damageest.errors import StageError
 from damageest.io.forms import FORM, MeasuredForm, hash_scan, mark_scan, write_form
+from damageest.io.section_files import write_section_files
 from damageest.output.files import describe_job, describe_result, write_report
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState
@@ -42,6 +43,13 @@ def keep_form(
     )
     write_form(folder / FORM, form)
     return replace(written, files=(*written.files, FORM))
+
+
+@step(gives="written")
+def write_sections(written: ExportedFiles, result: Result, folder: Path) -> ExportedFiles:
+    """Writes the tables and drawings of sections."""
+    files = write_section_files(folder, result.sections, result.tolerance, result.units)
+    return replace(written, files=(*written.files, *files)) if files else written
 
 
 @step(gives=("result", "content", "job_text"))
