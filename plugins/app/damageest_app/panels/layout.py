@@ -94,7 +94,7 @@ def _build_bar(session: Session) -> None:
         )
         v3.VSpacer()
         with html.Div(v_if=("running",), style="width: 340px", classes="mr-4"):
-            html.Div("{{ doing }} · {{ seconds }} s", classes="fine")
+            html.Div("{{ doing }} · {{ seconds }} s", classes="fine", raw_attrs=mark("doing"))
             v3.VProgressLinear(model_value=("100 * share",), color="primary", height=6, rounded=True)
         v3.VBtn(
             icon="mdi-format-list-checks",
@@ -161,7 +161,7 @@ def _build_stage(session: Session, judge: JudgePanel) -> None:
         ):
             view = vtk_widgets.VtkLocalView(session.scene.window, ref="view")
             session.ctrl.view_update = view.update
-        with v3.VSheet(classes="legend", v_if=("legend.length",), elevation=2):
+        with v3.VSheet(classes="legend", v_if=("legend.length",), elevation=2, raw_attrs=mark("legend")):
             with html.Div(v_for=("one in legend",), classes="row", key=("one.label",)):
                 html.Div(classes="swatch", style=("{background: one.colour}",))
                 html.Span("{{ one.label }}")
