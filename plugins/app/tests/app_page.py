@@ -67,7 +67,7 @@ class Page:
         self.page.on("request", lambda r: self._check(r.url))
         self.page.on("response", lambda r: self.note(f"{r.status} {r.url}") if r.status >= 400 else None)
         self.page.goto(address)
-        self.page.wait_for_selector(mark("step-open"), timeout=30_000)
+        self.page.wait_for_selector(mark("step-open"), timeout=60_000)
 
     def note(self, fault: str) -> None:
         if not any(word in fault for word in NORMAL):

@@ -129,7 +129,7 @@ def test_a_folder_without_rights_is_named(mount: Callable[[str], Path]) -> None:
 
 
 def test_stop_and_a_browser_that_closes_leave_the_app_and_the_run(shop: Path) -> None:
-    with open_browser() as browser, serve(shop, "--idle", "15") as (process, address):
+    with open_browser() as browser, serve(shop, "--idle", "2") as (process, address):
         page = Page(browser, address)
         make_job(page)
         page.wait("part-facts", "mm", 60)
@@ -169,7 +169,7 @@ def test_a_run_that_is_killed_leaves_the_app(shop: Path) -> None:
 
 
 def test_the_server_ends_after_its_last_tab(shop: Path) -> None:
-    with open_browser() as browser, serve(shop, "--idle", "15") as (process, address):
+    with open_browser() as browser, serve(shop, "--idle", "2") as (process, address):
         Page(browser, address).page.close()
         end = time.monotonic() + 30
         while process.poll() is None and time.monotonic() < end:
