@@ -255,7 +255,8 @@ def _print_table(result: Result, target: Path) -> None:
         show(text)
     for text in result.failures:
         show(f" {text}", "failed:", "red")
-    for text in cap_notes(list_notes(result)):
+    told = [str(note) for note in result.warnings if note.code == "report"]  # a file that is looked for: always said
+    for text in [*cap_notes([text for text in list_notes(result) if text not in told]), *told]:
         show(f" {text}", "note:", "yellow")
     if topics := list_topics(result):
         show(f"help: damageest explain {' '.join(topics)}")

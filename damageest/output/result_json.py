@@ -160,7 +160,15 @@ class Report(JsonModel):
 
 def result_schema() -> dict[str, Any]:
     """The JSON Schema of result.json."""
-    return {"$schema": DIALECT, **Report.model_json_schema(mode="serialization"), "title": "damageest result"}
+    from importlib.metadata import version
+
+    comment = f"written by damageest {version('damageest')}"
+    return {
+        "$schema": DIALECT,
+        "$comment": comment,
+        **Report.model_json_schema(mode="serialization"),
+        "title": "damageest result",
+    }
 
 
 def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: Any = str) -> dict[str, Any]:

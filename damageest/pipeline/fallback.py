@@ -42,6 +42,9 @@ def fall_back(first: Route, second: Route) -> Branch:
         again = follow(second, engine, again.with_value(JobState.wanted, wanted))
         sites = merge_sites(tried.found, again.found)
         done = {cluster for site in sites for cluster in site.clusters}
+        lacking = next((error for error in again.failures if error.extra), None)
+        if lacking is not None and any(error.site in done for error in again.failures):
+            again = again.with_value(JobState.warnings, (*again.warnings, _tell_missing(lacking)))
         failures = tuple(drop_tried(error) for error in again.failures if error.site not in done)
         left = tuple(number for number in left if number not in done)
         failures += (say_used_up(state.sites, left),) if left else ()
@@ -73,9 +76,19 @@ def say_used_up(sites: Sites, left: tuple[int, ...]) -> StageError:
 
 def drop_tried(error: StageError) -> StageError:
     """The error without the remedy that was tried already: the other method."""
+    if error.extra:
+        error.message = f"method implicit gave no site, and method surface cannot be tried: {error.message}"
+        error.args = (error.message,)
+        return error
     tried = "a smaller tolerance, or a denser scan of this place; both methods were tried"
     error.remedy, error.method = error.own_remedy or tried, ""
     return error
+
+
+def _tell_missing(error: StageError) -> Reason:
+    """What a result lacks where the second route could not be tried, as it would be with all extras."""
+    text = f"the scan contradicts a site of method implicit, and method surface cannot be tried: {error.message}"
+    return Reason("fell_back", text, remedy=error.remedy)
 
 
 def merge_sites(first: tuple[FoundSite, ...], second: tuple[FoundSite, ...]) -> tuple[FoundSite, ...]:

@@ -70,7 +70,10 @@ def show_result(engine: Engine, state: JobState) -> tuple[Result, ExportedFiles]
     try:
         done = engine.call(Report, state).reported
     except StageError as error:
-        warning = Reason("report", f"{error.args[0]} (the run went on without a report)")
+        text = f"{error.args[0]} (the run went on without a report)"
+        if error.extra:
+            text = f"report.html was not written: {error.message}"
+        warning = Reason("report", text, remedy=error.remedy)
         return replace(result, warnings=(*result.warnings, warning)), written
     result = replace(result, stages=tuple(engine.records), steps=tuple(engine.steps))
     return result, replace(written, files=(*written.files, *done.files), notes=(*written.notes, *done.notes))
