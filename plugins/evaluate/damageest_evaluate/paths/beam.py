@@ -103,7 +103,7 @@ def measure_sunk(path: DepositPath, metal: Solid, step: float) -> float:
     middle = points - heights / 2 * normals
     inside = np.repeat(is_inside(middle, metal)[:, None], ACROSS * DEEP, axis=1)
     near = np.flatnonzero(distance_to_mesh(middle, metal) < np.hypot(path.width, heights[:, 0]) / 2)
-    inside[near] = is_inside(places[near].reshape(-1, 3), metal).reshape(len(near), -1)
+    inside[near] = is_inside(places[near].reshape(-1, 3), metal).reshape(len(near), ACROSS * DEEP)
     return float((weights * inside.mean(axis=1)).sum())
 
 

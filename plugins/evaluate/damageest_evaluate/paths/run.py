@@ -104,9 +104,9 @@ def evaluate_scene(scene: Scene, axes: int) -> PathRow:
 
 
 def run_scenes(scenes: Sequence[Scene]) -> Iterator[PathRow]:
-    """The rows of all scenes, one after the other, with 3 and with 5 axes."""
-    for scene in scenes:
-        for axes in (3, 5):
+    """The rows of all scenes, first with 5 axes, then with 3."""
+    for axes in (5, 3):
+        for scene in scenes:
             yield evaluate_scene(scene, axes)
 
 
