@@ -20,7 +20,7 @@ _OURS = re.compile(
 )
 """What a run writes, by its path in the output folder. Other files are the user's and stay, unless the
 old result.json lists them, as those that a plugin wrote in another format."""
-FOLDERS = ("stages", "damage", "surface", "deposit", "path", "surplus", "doubtful", "truth",
+FOLDERS = ("stages", "damage", "surface", "deposit", "milled", "path", "surplus", "doubtful", "truth",
            "scan_frame", "nominal_frame")  # fmt: skip
 FILES = ("result.json", "report.html", "job.yaml", "adapt.npz", "scan.ply", "skin.ply", "unseen.ply", "result.3mf",
          *(f"{name}.{kind}" for name in ("damage", "undamaged") for kind in ("stl", "ply", "step")))  # fmt: skip
