@@ -57,8 +57,9 @@ class Milling(Allowance):
     prepare: Prepare | None = Field(
         None,
         description="{min_radius, wall_angle, undercut: remove, depth}: the cavity is opened before deposition, so "
-        "that cutter and beam reach all of it: walls lean outward by wall_angle (degrees) at least, undercuts are removed, "
-        "what is narrower than the radius is widened, depth is added below; default: as it is. The damage volume stays",
+        "that cutter and beam reach all of it: walls lean outward by wall_angle (degrees) at least, undercuts are "
+        "removed, what is narrower than the radius is widened, depth is added below; default: as it is. The damage "
+        "volume stays",
     )
     crowded: Literal["refuse", "clip"] = Field(
         "refuse",
