@@ -13,6 +13,16 @@ from dataclasses import dataclass
 
 MOST_TEXT = 2000
 """Characters of a message from a plugin or a library that are shown; the rest is cut."""
+EXTRAS = {
+    "pyvista": "vtk",
+    "vtkmodules": "vtk",
+    "pye57": "e57",
+    "k3d": "report",
+    "PIL": "report",
+    "distributed": "batch",
+    "dask": "batch",
+}
+"""Python module to the extra of this package that brings it."""
 _UNSHOWN = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """What a terminal or a page does not show but obeys, and what no file can hold: control characters other than the end
 of a line, marks that turn the direction of writing, and halves of surrogate pairs."""
@@ -98,7 +108,8 @@ class StageError(DamageestError):
 
     Raise it with what is wrong and, as ``remedy``, what the user may try; ``method``: another method of the job that
     may do it, which is added to the remedy; ``topic``: of `damageest explain`. The engine adds stage and site; for
-    points that are no site yet, a description of their ``place``.
+    points that are no site yet, a description of their ``place``. ``extra``: of this package, where what is missing
+    comes with it.
     """
 
     exit_status = 1
@@ -107,6 +118,7 @@ class StageError(DamageestError):
         self.message, self.own_remedy, self.method = message, remedy, method
         self.remedy = ", or ".join(part for part in (remedy, f"method: {method}" if method else "") if part)
         self.stage, self.use, self.site, self.place, self.topic = "", "", 0, "", topic
+        self.extra = ""
         super().__init__(message)
 
     def __str__(self) -> str:
@@ -150,7 +162,15 @@ def describe_missing_library(error: BaseException) -> StageError | None:
         )
     if isinstance(error, ModuleNotFoundError) and error.name:
         module = error.name.partition(".")[0]
-        return StageError(f"the Python module {error.name} is not installed", f"pip install {module}")
+        if module not in EXTRAS:
+            return StageError(f"the Python module {error.name} is not installed", f"pip install {module}")
+        extra = EXTRAS[module]
+        missing = StageError(
+            f"the Python module {error.name} is not installed; the extra '{extra}' brings it",
+            f'pip install "damageest[{extra}]"',
+        )
+        missing.extra = extra
+        return missing
     if isinstance(error, ImportError):
         text = " ".join(str(error).split())[:400]
         return StageError(f"a Python module cannot be loaded: {text}", "--debug shows which; install it again")

@@ -187,6 +187,48 @@ def describe_interval(interval: Interval | None) -> str:
 
 
 @dataclass(frozen=True)
+class BudgetRow:
+    """One source of a budget of uncertainty, as JCGM 100 has them: ``source``, ``text`` in words; ``type``: A, from the
+    scan by statistics, or B, from other knowledge. ``uncertainty``: standard uncertainty of the source, in ``unit`` (""
+    for a share); ``sensitivity``: change of the result for each unit of it; ``contribution``: standard uncertainty of
+    the result by it; ``share`` of the variance."""
+
+    source: str
+    text: str
+    type: Literal["A", "B"]
+    distribution: Literal["normal", "rectangular"]
+    uncertainty: float
+    unit: str
+    sensitivity: float
+    contribution: float
+    share: float
+
+
+@dataclass(frozen=True)
+class BudgetBound:
+    """What moves an end of the interval beyond the expanded uncertainty: ``low`` and ``high``, at most."""
+
+    source: str
+    text: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Budget:
+    """A budget of uncertainty of a volume or of a depth: its ``rows``, the ``combined`` standard uncertainty, and the
+    ``expanded`` one with the coverage factor ``k``. ``correction``: of the mean error, to be added to the value.
+    ``bounds`` are no part of it: they move the ends of the 95 % interval."""
+
+    rows: tuple[BudgetRow, ...]
+    combined: float
+    k: float
+    expanded: float
+    correction: float = 0.0
+    bounds: tuple[BudgetBound, ...] = ()
+
+
+@dataclass(frozen=True)
 class Fading:
     """A shallow loss whose edge fades out: its volume where it is deeper than ``half`` the tolerance, than the
     tolerance, ``at``, and than ``twice`` the tolerance; ``beyond``: what is lost beyond the rim of the site."""
@@ -210,7 +252,9 @@ class Uncertainty:
     differ.
     ``free``: change of the volume at the ends of motions that the scan does not exclude. ``inside``, ``beside``: by how
     much the loss may be larger at most where no points show the inner surface, and the skin beside it. ``fading``: None
-    for a loss that is not shallow.
+    for a loss that is not shallow. ``probing_form``, ``scanner``: by the scanner's certificate, and by its other
+    figures and the temperature together. ``budget``, ``depth_budget``: the same as tables; None where there is no
+    interval.
     """
 
     volume_95: Interval | None
@@ -230,6 +274,10 @@ class Uncertainty:
     inside: float = 0.0
     beside: float = 0.0
     fading: Fading | None = None
+    probing_form: float = 0.0
+    scanner: float = 0.0
+    budget: Budget | None = None
+    depth_budget: Budget | None = None
 
     @property
     def is_open(self) -> bool:

@@ -21,11 +21,12 @@ from damageest.artefacts import (
     Pose,
     Reason,
     Scan,
+    Section,
     Solid,
     Surface,
 )
 from damageest.errors import InputError
-from damageest.findings import Coverage, Fading, Interval, ModelFit, Sensor, Surplus, Uncertainty, Verdict
+from damageest.findings import Budget, Coverage, Fading, Interval, ModelFit, Sensor, Surplus, Uncertainty, Verdict
 from damageest.geometry.transforms import invert_pose
 from damageest.io.conversions import as_manifold, as_trimesh
 
@@ -132,8 +133,11 @@ class Result:
     accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
     sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
     volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
-    high end. ``adapted``: how ``part`` was deformed to follow
-    the scan; None: it is the part as designed. ``conversions``: what plugins can convert it to, see `convert`.
+    high end. ``budget``: the uncertainty of that volume, source by source; ``not_in_budget``: sources that the job does
+    not tell, in words; ``certificate``: scanner and standard, as the job has them. ``adapted``: how ``part`` was
+    deformed to follow the scan; None: it is the part as designed. ``sections``: those that the job asks
+    for, of the part as designed, in the pose of the run. ``conversions``: what plugins can convert it to, see
+    `convert`.
     """
 
     name: str
@@ -159,6 +163,10 @@ class Result:
     adapted: AdaptedPart | None = None
     sensor: Sensor | None = None
     volume_95: Interval | None = None
+    budget: Budget | None = None
+    not_in_budget: tuple[str, ...] = ()
+    certificate: str = ""
+    sections: tuple[Section, ...] = ()
     conversions: Mapping[str, Conversion] = field(default_factory=dict, repr=False)
 
     @property

@@ -35,7 +35,7 @@ def commands(page: Path) -> list[list[str]]:
     """The words of each `damageest` command in the page's blocks, without `damageest` itself."""
     lines = [line for block in (*blocks(page, "sh"), *blocks(page, "")) for line in block.splitlines()]
     parts = [part.strip() for line in lines for part in line.split("&&")]
-    calls = [re.match(r"(?:\S*uv run (?:--\S+ )*)?damageest (.*)", part) for part in parts]
+    calls = [re.match(r"(?:\S*uv run (?:--extra \w+ |--\S+ )*)?damageest (.*)", part) for part in parts]
     return [shlex.split(call[1], comments=True) for call in calls if call]
 
 

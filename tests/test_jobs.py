@@ -16,6 +16,7 @@ from tests.needs import needs_plugin
 JOBS = Path(__file__).parents[1] / "jobs"
 SITES = {
     "block_wedge": 1,
+    "block_certified": 1,
     "gear_teeth": 4,
     "gear_exact": 3,
     "cylinder_two_sides": 2,

@@ -34,12 +34,14 @@ from damageest.artefacts.scans import (
     Truth,
     take_points,
 )
+from damageest.artefacts.sections import SECTION_KINDS, Section, SectionContour, SectionValue
 
 __all__ = [
     "ADDED",
     "DAMAGE",
     "INTACT",
     "OUTLIER",
+    "SECTION_KINDS",
     "AdaptedPart",
     "ArtefactError",
     "BeadFill",
@@ -66,6 +68,9 @@ __all__ = [
     "Rims",
     "Samples",
     "Scan",
+    "Section",
+    "SectionContour",
+    "SectionValue",
     "Singles",
     "Sites",
     "Solid",

@@ -25,7 +25,7 @@ def require_dask() -> None:
         import distributed  # noqa: F401
     except ImportError:
         raise InputError(
-            "damageest batch needs dask distributed, which is not installed\n  try: pip install 'damageest[batch]'"
+            'damageest batch needs dask distributed, which is not installed\n  try: pip install "damageest[batch]"'
         ) from None
 
 

@@ -6,7 +6,7 @@ form of the part, or of the scanner. It limits the pose as well, since a patch t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -40,13 +40,17 @@ class PoseError:
     ``spread`` (6,K): columns of independent errors, one standard deviation each, of a small motion of the scan in the
     part's frame: rotation about ``centre`` (3,) in radians, then shift. ``systematic``: standard deviation of the mean
     distances of patches of intact skin that noise does not explain; ``patch_area``: area over which it is common, from
-    the correlation of patches with their distance (as of a semivariogram).
+    the correlation of patches with their distance (as of a semivariogram). ``by_offset``, ``by_scale`` (6,): the motion
+    that the fit finds for each unit by which all of the scan lies outside, and for each share by which it is scaled
+    about ``centre``; 0 for a pose that was given.
     """
 
     centre: Floats
     spread: Floats
     systematic: float
     patch_area: float
+    by_offset: Floats = field(default_factory=lambda: np.zeros(6))
+    by_scale: Floats = field(default_factory=lambda: np.zeros(6))
 
     def of_volume(self, damage_skin: Floats, normals: Floats, areas: Floats) -> Floats:
         """The errors (K,) of a volume, one for each column of ``spread``.
@@ -61,6 +65,15 @@ class PoseError:
         rows = _make_rows(damage_skin - self.centre, normals)
         return np.asarray(-(areas @ rows) @ self.spread)
 
+    def of_motion(self, motion: Floats, damage_skin: Floats, normals: Floats, areas: Floats) -> float:
+        """Change of a volume by a small ``motion`` (6,) of the scan; the others as in `of_volume`."""
+        return -float(areas @ _make_rows(damage_skin - self.centre, normals) @ motion)
+
+    def move_distance(self, motion: Floats, place: Floats, normal: Floats) -> float:
+        """Change of the signed distance of a place (3,) to the skin with the outward ``normal`` (3,) by a small
+        ``motion`` (6,) of the scan."""
+        return float(_make_rows(place[None] - self.centre, normal[None])[0] @ motion)
+
     def of_distance(self, place: Floats, normal: Floats) -> float:
         """Standard deviation of the signed distance of a place (3,) to the skin with the outward ``normal`` (3,)."""
         row = _make_rows(place[None] - self.centre, normal[None])[0]
@@ -74,6 +87,7 @@ def measure_pose_error(
     tolerance: float,
     form: float = 0.0,
     spread: Floats | None = None,
+    held: bool = False,
 ) -> PoseError:
     """The error that the intact points leave to the pose.
 
@@ -81,6 +95,7 @@ def measure_pose_error(
         aligned, deviation: the scan in the part's frame, N points. tolerance: in the job's unit.
         form: standard deviation by which the skin is known to deviate; the measured one where it is larger.
         spread: (6,K) errors of a pose that was fitted to datums, as in `Pose`: not all of the skin fixes it.
+        held: whether the pose was given: no error of the scan moves it.
 
     No direction of the pose is taken to be worse than the tolerance: a larger error would show as damage. Turning a
     part of revolution about its axis changes no volume, though no point fixes it.
@@ -89,7 +104,7 @@ def measure_pose_error(
     edge = PATCH * part.diagonal
     radius = max(part.diagonal / 4, 1e-12)
     scale = np.diag([1 / radius] * 3 + [1.0] * 3)
-    mean, places, rows, count = _average_patches(part, aligned, deviation, centre, edge)
+    mean, places, rows, height, count = _average_patches(part, aligned, deviation, centre, edge)
     if len(mean) < FEWEST_PATCHES:
         return PoseError(centre, tolerance * scale, max(form, 0.0), edge**2)
     rows = rows @ scale
@@ -107,6 +122,13 @@ def measure_pose_error(
         weights = np.minimum(1, limit / np.maximum(np.abs(left), 1e-300))
     area = _measure_area_alike(left, places, systematic, edge)
     systematic = max(systematic, form)
+    answers: Floats = np.zeros((2, 6))
+    if not held:
+        trust = weights / (variance + systematic**2)
+        weighted = (rows * trust[:, None]).T
+        # the distance of a patch grows by 1 with the offset, and by its height over the centre with the scale
+        heights = np.stack([np.ones(len(rows)), height])
+        answers = np.asarray(np.linalg.solve(weighted @ rows + prior, weighted @ heights.T).T @ scale)
     information = (rows / (variance + systematic**2)[:, None]).T @ rows + prior
     covariance = np.linalg.inv(information)
     values, vectors = np.linalg.eigh(covariance)
@@ -115,7 +137,7 @@ def measure_pose_error(
         errors = np.column_stack([errors, scale @ motion])
     if spread is not None:
         errors = np.column_stack([errors, spread])
-    return PoseError(centre, errors, systematic, area)
+    return PoseError(centre, errors, systematic, area, *answers)
 
 
 def _make_rows(places: Floats, normals: Floats) -> Floats:
@@ -125,26 +147,30 @@ def _make_rows(places: Floats, normals: Floats) -> Floats:
 
 def _average_patches(
     part: Part, aligned: Scan, deviation: Deviation, centre: Floats, edge: float
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Mean distance (P,) of patches of intact skin, their places (P,3), mean rows (P,6) of `_make_rows`, and number of
-    points (P,)."""
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Mean distance (P,) of patches of intact skin, their places (P,3), mean rows (P,6) of `_make_rows`, mean height
+    (P,) along the normal over the centre, and number of points (P,)."""
     index = np.flatnonzero(deviation.label == INTACT)
     step = max(1, -(-len(index) // MOST_POINTS))
     index = index[::step]
     if not len(index):
-        return np.empty(0), np.empty((0, 3)), np.empty((0, 6)), np.empty(0)
+        return np.empty(0), np.empty((0, 3)), np.empty((0, 6)), np.empty(0), np.empty(0)
     normals = part.face_normals[deviation.face[index]]
     places = aligned.points[index] - centre
     _, number = number_faced_cubes(places, normals, edge)
     _, group, count = group_integers(number)
     rows = _make_rows(places, normals)
     mean = np.bincount(group, weights=deviation.distance[index]) / count
+    height = np.bincount(group, weights=np.einsum("ij,ij->i", places, normals)) / count
     mean_places, mean_rows = (
         np.stack([np.bincount(group, weights=column) for column in values.T], axis=1) / count[:, None]
         for values in (places, rows)
     )
     enough: Flags = count >= FEWEST_POINTS
-    return mean[enough], mean_places[enough], mean_rows[enough], step * count[enough].astype(np.float64)
+    return (
+        mean[enough], mean_places[enough], mean_rows[enough], height[enough],
+        step * count[enough].astype(np.float64),
+    )  # fmt: skip
 
 
 def _measure_excess(left: Floats, variance: Floats) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Floats, Part, Reason, Scan
+from damageest.artefacts import Deviation, Floats, Part, Reason, Scan, Sites
 from damageest.errors import InputError, StageError
 from damageest.geometry.noise import AUTO_STEPS, AUTO_TOLERANCE
 
@@ -25,6 +25,15 @@ MIN_INTACT = 0.25
 
 MOST_OUTSIDE = 0.02
 """Share of these points that may lie outside the part where wear explains that few are intact."""
+
+MOST_SPURIOUS = 100
+"""Clusters no deeper than the scatter of the points reaches, up to which a scan is gone on with."""
+
+REACH = 4.5
+"""Standard deviations up to which scatter alone reaches, in a scan of some 100,000 points."""
+
+ALIKE = 0.5
+"""Least number of points beyond the tolerance outside, for each of those inside, where scatter puts them there."""
 
 
 def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float = 0.0) -> tuple[float, list[Reason]]:
@@ -145,6 +154,34 @@ def require_tolerance(tolerance: float, distance: Floats, part: Part, noise: flo
     raise InputError(
         f"tolerance: the noise of the scan is {noise:.2g} {unit}, and the tolerance {tolerance:.3g} {unit}: damage "
         f"cannot be told from noise; give at least {least:.2g} {unit}, or auto, or a scan with less noise",
+        topic="noise",
+    )
+
+
+def require_real_clusters(sites: Sites, deviation: Deviation, tolerance: float, part: Part) -> None:
+    """Raises InputError where scatter about the skin alone makes very many clusters of points labelled as damage.
+
+    Three things have to hold together: the clusters are many, none of these is deeper than the scatter reaches, and
+    nearly as many points lie as far outside, where there is no damage. The scatter is that of the points in the pose.
+    """
+    if sites.count <= MOST_SPURIOUS:
+        return
+    distance = deviation.distance
+    outside, inside = np.count_nonzero(distance > tolerance), np.count_nonzero(distance < -tolerance)
+    scatter = measure_form_deviation(distance, NEAR_PART * part.diagonal)
+    deepest = np.zeros(sites.count + 1)
+    np.maximum.at(deepest, sites.label, -distance)
+    spurious = int((deepest[1:] <= REACH * scatter).sum())
+    if spurious <= MOST_SPURIOUS or outside < ALIKE * inside:
+        return
+    unit = part.unit
+    deeper = sites.count - spurious
+    kept = f"; {deeper} deeper place{'s' * (deeper > 1)} may be damage" if deeper else ""
+    raise InputError(
+        f"tolerance: the points scatter by {scatter:.2g} {unit} about the skin, and the tolerance is {tolerance:.3g} "
+        f"{unit}: {outside / len(distance):.0%} of them lie farther outside than that, and {spurious} places below the "
+        f"skin are no deeper than the scatter reaches{kept}; give at least {AUTO_TOLERANCE * scatter:.2g} {unit}, or "
+        "auto, or a scan with less noise",
         topic="noise",
     )
 

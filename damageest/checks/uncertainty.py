@@ -8,7 +8,7 @@ hide, and what fades out, makes a volume larger and never smaller.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -16,8 +16,9 @@ import numpy as np
 
 from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Part, Scan, Solid
 from damageest.checks.beyond_points import BeyondPoints
-from damageest.checks.inner_surface import measure_inner_surface, pair_faces
+from damageest.checks.inner_surface import DEPTH_GAP, DEPTH_NOISE, measure_inner_surface, pair_faces
 from damageest.checks.pose_error import PoseError
+from damageest.checks.scanner import ScannerErrors, find_shares
 from damageest.findings import Coverage, Interval
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
@@ -65,6 +66,9 @@ class SiteError:
     how much it may be smaller, since the inner surface was closed across what was not seen. ``depth``: of the damage
     volume, corrected for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free
     motions. ``measured``: the largest depth of a scan point, with what its noise, the pose and the skin may be off.
+    ``probing_form``, ``scanner`` (T,): by the certificate and the temperature, signed, by the terms of `ScannerErrors`;
+    ``depth_scanner`` (T,): the same of the depth, and ``depth_by``: the other causes of ``depth_error``, by name.
+    ``exposed``: the area that is moved against the skin by what deviates; ``curved``: that of skin made of chords.
     """
 
     volume: float
@@ -88,6 +92,12 @@ class SiteError:
     depth_error: float = 0.0
     measured: float = np.inf
     depth_free: float = 0.0
+    probing_form: float = 0.0
+    scanner: Floats = field(default_factory=lambda: np.empty(0))
+    depth_scanner: Floats = field(default_factory=lambda: np.empty(0))
+    depth_by: Mapping[str, float] = field(default_factory=dict)
+    exposed: float = 0.0
+    curved: float = 0.0
 
     @property
     def free(self) -> Interval:
@@ -98,7 +108,7 @@ class SiteError:
 def measure_site_error(
     damage: Solid, inner: Flags, part: Part, aligned: Scan, members: Floats, evidence: Evidence, pose: PoseError,
     scan: ScanFacts, beyond: BeyondPoints, form: float = 0.0, free: Sequence[FreeMotion] = (),
-    adapted: AdaptedPart | None = None,
+    adapted: AdaptedPart | None = None, scanner: ScannerErrors | None = None,
 ) -> SiteError | None:  # fmt: skip
     """The errors of one site; None where no scan point lies on its inner surface.
 
@@ -110,7 +120,9 @@ def measure_site_error(
         form: standard deviation by which the skin deviates systematically, in the job's unit, as a fit of the model
             gives it; where it is less than what the intact skin shows, the latter counts.
         free: motions that the scan does not exclude.
+        scanner: what its certificate and the temperature say.
     """
+    scanner = scanner or ScannerErrors()
     tolerance = scan.tolerance
     surface = measure_inner_surface(damage, inner, members, aligned.noise, aligned.spacing, tolerance)
     if surface is None or inner.all():
@@ -123,7 +135,7 @@ def measure_site_error(
     patches = max(1.0, exposed / max(pose.patch_area, 1e-300))
     systematic = max(pose.systematic, scan.systematic)
     outward = _limit_outward(scan, skin_area)
-    chord = part.tessellation_error * _measure_curved(damage, skin, area) if part.tessellation_error else 0.0
+    curved = _measure_curved(damage, skin, area) if part.tessellation_error else 0.0
     hole = evidence.ids_gap if evidence.ids_gap > GAP * max(tolerance, aligned.spacing) ** 2 else 0.0
     deepest = _find_deepest(damage, inner, part, members, 3 * max(surface.gap, tolerance))
     by_pose = pose.of_distance(deepest.at, deepest.normal)
@@ -132,7 +144,18 @@ def measure_site_error(
     rates = bent[-1:] if has_other else np.empty(0)
     if adapted is not None and adapted.growth:  # of the part, or of the scan's scale: then the loss is of another size
         rates = np.append(rates, damage.volume * ((1 + adapted.growth) ** -3 - 1))
-    beside = by_pose**2 + bent_depth**2 + max(form, systematic) ** 2 + part.tessellation_error**2 / 3
+    shares = find_shares(scanner, damage, inner, (deepest.at, deepest.normal), pose, adapted is not None)
+    depth_by = {
+        "spacing": DEPTH_GAP * surface.gap,
+        "noise": DEPTH_NOISE * aligned.noise,
+        "pose": by_pose,
+        "adapt": bent_depth,
+        "form": max(form, systematic),
+        "tessellation": part.tessellation_error / 3**0.5,
+        "probing_form": scanner.form,
+    }
+    told = float((shares.depth**2).sum())
+    beside = sum(depth_by[name] ** 2 for name in depth_by if name not in ("spacing", "noise")) + told
     by_point = float(np.sqrt(aligned.noise**2 + beside))
     return SiteError(
         volume=damage.volume,
@@ -141,7 +164,7 @@ def measure_site_error(
         rim=surface.rim,
         excess=surface.excess,
         pose=pose.of_volume(damage.triangles[skin].mean(axis=1), damage.face_normals[skin], area[skin]),
-        tessellation=chord / np.sqrt(3),
+        tessellation=part.tessellation_error * curved / np.sqrt(3),
         # a form that a fit gives is common to the whole site; that of patches is different in each
         form=float(max(form, systematic / np.sqrt(patches), AVERAGED * tolerance) * exposed),
         outward=outward * exposed / WIDTH,
@@ -157,6 +180,13 @@ def measure_site_error(
         depth_free=sum(
             max(-one.low, one.high) * abs(float(one.move(deepest.at[None])[0] @ deepest.normal)) for one in free
         ),
+        # what were common to more than a patch would show in the patches of intact skin
+        probing_form=float(scanner.form * exposed / np.sqrt(patches)),
+        scanner=shares.volume,
+        depth_scanner=shares.depth,
+        depth_by=depth_by,
+        exposed=exposed,
+        curved=curved,
     )
 
 
@@ -197,18 +227,25 @@ def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 
     """
     if not errors:
         return volume, volume + doubtful
-    alone = np.array([[one.noise, one.spacing, one.rim] for one in errors])
+    alone = np.array([[one.noise, one.spacing, one.rim, one.probing_form] for one in errors])
     shared = np.array([[one.form, one.tessellation, one.outward, one.views] for one in errors]).sum(axis=0)
+    told = np.sum([one.scanner for one in errors if len(one.scanner)], axis=0)
     moved = np.sum([one.pose for one in errors], axis=0)
     bent = np.sum([one.adapt for one in errors if len(one.adapt)], axis=0)
-    deviation = float(np.sqrt((alone**2).sum() + (shared**2).sum() + (moved**2).sum() + (bent**2).sum()))
+    squares = [(one**2).sum() for one in (alone, shared, moved, bent, told)]
+    deviation = float(np.sqrt(sum(squares)))
     more = sum(one.inside + one.beside + one.fading for one in errors)
-    moving = [one for one in errors if len(one.rates)]  # a whole body that is lost has none
-    free = _sweep(np.sum([one.rates for one in moving], axis=0), moving[0].motions) if moving else (0.0, 0.0)
+    free = sum_free(errors)
     middle = volume - sum(one.excess for one in errors)
     low = min(middle - WIDTH * deviation, volume) + free[0] - sum(one.less for one in errors)
     high = max(middle + WIDTH * deviation, volume) + free[1] + more
     return max(low, 0.0), high + doubtful
+
+
+def sum_free(errors: Sequence[SiteError]) -> Interval:
+    """Least and largest change of the sites' volume together by the free motions."""
+    moving = [one for one in errors if len(one.rates)]  # a whole body that is lost has none
+    return _sweep(np.sum([one.rates for one in moving], axis=0), moving[0].motions) if moving else (0.0, 0.0)
 
 
 def _sweep(rates: Floats, motions: Floats) -> Interval:

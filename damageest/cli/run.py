@@ -238,6 +238,8 @@ def _print_table(result: Result, target: Path) -> None:
         console.print(table)
         known = "" if result.volume_95 is None else f" (95 %: {describe_interval(result.volume_95)})"
         show(f"damage volume: {result.damage_volume:.6g} {unit}³{known}; part volume: {result.part.volume:.6g} {unit}³")
+        if result.not_in_budget:
+            show(f"not known, and in no interval: {', '.join(result.not_in_budget)}")
     elif not result.failures:
         where = f"{_on_seen(result)}{qualify_nothing(result.warnings)}"
         show(f"no damage deeper than the tolerance of {result.tolerance:.4g} {unit} was found{where}")
@@ -253,7 +255,8 @@ def _print_table(result: Result, target: Path) -> None:
         show(text)
     for text in result.failures:
         show(f" {text}", "failed:", "red")
-    for text in cap_notes(list_notes(result)):
+    told = [str(note) for note in result.warnings if note.code == "report"]  # a file that is looked for: always said
+    for text in [*cap_notes([text for text in list_notes(result) if text not in told]), *told]:
         show(f" {text}", "note:", "yellow")
     if topics := list_topics(result):
         show(f"help: damageest explain {' '.join(topics)}")

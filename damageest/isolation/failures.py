@@ -8,13 +8,14 @@ from typing import Any
 from damageest.errors import StageError
 from damageest.isolation.limits import Limits, format_bytes
 
-_SIGNALS = {
-    int(signal.SIGSEGV): "a segmentation fault",
-    int(signal.SIGABRT): "an abort",
-    int(signal.SIGBUS): "a bus error",
-    int(signal.SIGFPE): "an arithmetic error",
-    int(signal.SIGILL): "an illegal instruction",
+_NAMES = {
+    "SIGSEGV": "a segmentation fault",
+    "SIGABRT": "an abort",
+    "SIGBUS": "a bus error",
+    "SIGFPE": "an arithmetic error",
+    "SIGILL": "an illegal instruction",
 }
+_SIGNALS = {int(getattr(signal, name)): text for name, text in _NAMES.items() if hasattr(signal, name)}
 
 
 class ProcessError(StageError):
@@ -56,7 +57,7 @@ def describe_end(status: int | None, output: str, memory: int, limits: Limits, o
 
 def describe_signal(number: int) -> tuple[str, str]:
     """What a signal that ended a process means, and what to do where that is not for the authors of the code."""
-    if number == signal.SIGKILL:
+    if number == getattr(signal, "SIGKILL", None):
         return (
             "its process was killed (SIGKILL), as the system does where memory runs out",
             "a larger tolerance, fewer scan points, or a --memory that the machine has",

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import math
 import re
-import resource
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from damageest.errors import InputError
 
+try:
+    import resource
+except ModuleNotFoundError:
+    # As on Windows: --memory is compared with what work will need, but the system limits nothing.
+    resource = None  # type: ignore[assignment]
+
 STAGE_SECONDS = 3600.0
 """Default time limit of one isolated call."""
 _UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12, "KI": 2**10, "MI": 2**20, "GI": 2**30, "TI": 2**40}
+_own_limit: int | None = None
+"""What `limit_this_process` was given where the system does not keep it."""
 _PROC = Path("/proc")
 _CGROUP = Path("/sys/fs/cgroup")
 
@@ -53,10 +60,13 @@ def measure_free_memory() -> int:
 
     held = psutil.Process().memory_info()
     known = [int(psutil.virtual_memory().available), *_group_free()]
-    for limit, used in ((resource.RLIMIT_AS, held.vms), (resource.RLIMIT_DATA, getattr(held, "data", held.rss))):
-        most = resource.getrlimit(limit)[0]
-        if most != resource.RLIM_INFINITY:
-            known.append(most - int(used))
+    if resource is not None:
+        for limit, used in ((resource.RLIMIT_AS, held.vms), (resource.RLIMIT_DATA, getattr(held, "data", held.rss))):
+            most = resource.getrlimit(limit)[0]
+            if most != resource.RLIM_INFINITY:
+                known.append(most - int(used))
+    if _own_limit is not None:
+        known.append(_own_limit - int(held.rss))
     return max(0, min(known))
 
 
@@ -68,24 +78,39 @@ def own_memory() -> int:
 
 
 def limit_this_process(memory: int | None) -> None:
-    """Lets allocations of this process fail, as MemoryError, where its data would pass ``memory`` bytes."""
+    """Lets allocations of this process fail, as MemoryError, where its data would pass ``memory`` bytes.
+
+    Where the system has no such limit, or does not keep it, the limit counts in `measure_free_memory` alone.
+    """
+    global _own_limit
     if memory is None:
+        return
+    if resource is None:
+        _own_limit = memory
         return
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
     if hard != resource.RLIM_INFINITY:
         memory = min(memory, hard)
-    resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
+    try:
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
+    except (ValueError, OSError):  # macOS refuses what is less than the process holds
+        _own_limit = memory
 
 
 @contextmanager
 def limited(memory: int | None) -> Iterator[None]:
     """Limits this process as `limit_this_process` does, until the end of the ``with`` block."""
-    before = resource.getrlimit(resource.RLIMIT_DATA)
+    global _own_limit
+    before = resource.getrlimit(resource.RLIMIT_DATA) if resource is not None else None
+    own = _own_limit
     limit_this_process(memory)
     try:
         yield
     finally:
-        resource.setrlimit(resource.RLIMIT_DATA, before)
+        _own_limit = own
+        if before is not None:
+            with suppress(ValueError, OSError):
+                resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
 def _group_free() -> list[int]:

@@ -14,9 +14,11 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from damageest.errors import StageError
+from damageest.isolation import portable, transfer
 from damageest.isolation.clock import TICK, Clock
 from damageest.isolation.limits import Limits
 from damageest.isolation.notes import Page
@@ -30,6 +32,7 @@ _CODE = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1])\n"
     "from damageest.isolation.serve import main; main(*map(int, sys.argv[2:]))"
 )
+_Selector = getattr(selectors, "PollSelector", selectors.SelectSelector)
 _MOST_OUTPUT = 1 << 16
 """Bytes of a worker's output that are kept until the call ends."""
 
@@ -69,10 +72,24 @@ class WorkerProcess:
     """A process, which has started when this is made. ``page``: what it notes."""
 
     def __init__(self) -> None:
+        self._output = bytearray()
+        self._leash = -1
+        self._channel: socket.socket | None = None
+        self._named: Path | None = None
+        if transfer.SHARES_FILES:
+            self._start()
+        else:
+            self.page, self._named = portable.make_page()
+            self._process, self._accept = portable.start(self._named)
+        self._reader = threading.Thread(target=self._collect, args=(self._process, self._output), daemon=True)
+        self._reader.start()
+        self._is_open = True
+
+    def _start(self) -> None:
+        """Starts a process that is given the open files that it needs."""
         self._channel, other = socket.socketpair()
         leash, self._leash = os.pipe()
         self.page = Page()
-        self._output = bytearray()
         files = (other.fileno(), leash, self.page.file)
         with other:
             self._process = subprocess.Popen(
@@ -85,15 +102,14 @@ class WorkerProcess:
                 start_new_session=True,  # Ctrl-C reaches the caller alone, which then ends the worker
             )
         os.close(leash)
-        self._reader = threading.Thread(target=self._collect, args=(self._process, self._output), daemon=True)
-        self._reader.start()
-        self._is_open = True
 
     def wait_for_start(self) -> None:
         """Raises StageError where it does not start."""
         try:
+            if self._named is not None:
+                self._channel = self._accept(START_SECONDS)
             self._wait(START_SECONDS)
-            receive(self._channel, copy=True)
+            receive(self._open_channel, copy=True)
         except (Ended, EOFError):
             self.kill()
             last = _last_line(self.take_output())
@@ -103,6 +119,11 @@ class WorkerProcess:
             raise
 
     @property
+    def _open_channel(self) -> socket.socket:
+        assert self._channel is not None, "wait_for_start comes first"
+        return self._channel
+
+    @property
     def is_running(self) -> bool:
         return self._process.poll() is None
 
@@ -110,10 +131,10 @@ class WorkerProcess:
         """What it answers. Raises Ended where it gives no answer."""
         clock = Clock(self.page, self._process.pid if call.processor_time else None)
         try:
-            send(self._channel, (sys.path, memory, call.nested))
-            send(self._channel, (call.function, dict(call.arguments)))
+            send(self._open_channel, (sys.path, memory, call.nested))
+            send(self._open_channel, (call.function, dict(call.arguments)))
             self._wait(call.limits.seconds, clock)
-            kind, value, what, usage = receive(self._channel, copy=True)
+            kind, value, what, usage = receive(self._open_channel, copy=True)
         except (EOFError, ConnectionError):
             raise Ended from None
         return Answer(kind, value, what, usage, memory)
@@ -121,8 +142,8 @@ class WorkerProcess:
     def _wait(self, seconds: float, clock: Clock | None = None) -> None:
         """Waits for an answer. Raises Ended where there is none in time, or the process has ended."""
         end = time.monotonic() + seconds if seconds else float("inf")
-        with selectors.PollSelector() as selector:  # not select(): it takes no file numbers above 1023
-            selector.register(self._channel, selectors.EVENT_READ)
+        with _Selector() as selector:  # not select(): it takes no file numbers above 1023
+            selector.register(self._open_channel, selectors.EVENT_READ)
             while True:
                 left = end - time.monotonic()
                 if selector.select(max(0.0, min(left, TICK))):
@@ -138,20 +159,32 @@ class WorkerProcess:
     def interrupt(self) -> None:
         """Kills the process and what it started, from any thread; who waits for it finds that it has ended."""
         if self.is_running:
-            with contextlib.suppress(OSError):
-                os.killpg(self._process.pid, signal.SIGKILL)
+            self._kill()
+
+    def _kill(self) -> None:
+        if not hasattr(os, "killpg"):
+            portable.kill_tree(self._process.pid)
+            return
+        with contextlib.suppress(OSError):
+            os.killpg(self._process.pid, signal.SIGKILL)
 
     def kill(self) -> None:
         """Ends the process and what it started."""
-        with contextlib.suppress(OSError):
-            os.killpg(self._process.pid, signal.SIGKILL)
+        self._kill()
         self._process.wait()
         self._reader.join(timeout=1)
         if self._is_open:
             self._is_open = False
-            self._channel.close()
-            os.close(self._leash)
+            if self._channel is not None:
+                self._channel.close()
+            if self._leash >= 0:
+                os.close(self._leash)
             self.page.close()
+            if self._named is not None:
+                with contextlib.suppress(OSError):
+                    self._named.unlink()
+                if self._process.stdin:
+                    self._process.stdin.close()
 
     def wait_for_end(self) -> int | None:
         """The exit status of a process that ends by itself; None where it does not."""

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from damageest.isolation import portable, transfer
 from damageest.isolation.limits import limited
 from damageest.isolation.notes import Page, find_place, note_on
 from damageest.isolation.parent import end_with_parent
@@ -39,10 +40,20 @@ class Usage:
 def main(channel_file: int, leash: int, page: int) -> None:
     """Serves until the channel closes. What stages print goes to the error stream, as what libraries print does."""
     end_with_parent(leash)
-    note_on(Page(page))
+    _serve(socket.socket(fileno=channel_file), Page(page))
+
+
+def main_connected(port: int, page: str) -> None:
+    """As `main`, for a worker that was given no open files."""
+    transfer.SHARES_FILES = False
+    channel = portable.connect(port)
+    _serve(channel, Page(os.open(page, os.O_RDWR | getattr(os, "O_BINARY", 0))))
+
+
+def _serve(channel: socket.socket, page: Page) -> None:
+    note_on(page)
     os.dup2(2, 1)
     faulthandler.enable()
-    channel = socket.socket(fileno=channel_file)
     try:
         send(channel, "ready")
         while True:

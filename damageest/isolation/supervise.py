@@ -25,9 +25,9 @@ from damageest.isolation.limits import Limits
 from damageest.isolation.notes import Entry, Page, close_entry, note_on
 from damageest.isolation.parent import end_with_parent
 
-PASSED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+PASSED = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name))
 """Signals that are passed on to the fork."""
-IS_POSSIBLE = hasattr(os, "fork") and hasattr(signal, "sigtimedwait")
+IS_POSSIBLE = hasattr(os, "fork") and hasattr(signal, "sigtimedwait")  # not on Windows, nor on macOS
 END_SECONDS = 10.0
 """Seconds from the end of the work, when all is written, to that of its process. Until then threads that a plugin has
 left, and what libraries do at the end, may finish; then the process is ended."""

@@ -19,6 +19,8 @@ from typing import Any
 
 _ALIGNED = 64
 """Bytes to which the arrays are aligned."""
+SHARES_FILES = os.name == "posix" and hasattr(socket, "send_fds") and hasattr(os, "preadv")
+"""Whether an open file can be given to another process; where not, values are sent as bytes."""
 LARGE = 1 << 24
 """Bytes of a value from which on it is mapped and not copied."""
 
@@ -30,6 +32,11 @@ def send(channel: socket.socket, value: Any) -> None:
     _Pickler(stream, protocol=5, buffer_callback=buffers.append).dump(value)
     parts = [stream.getbuffer(), *(buffer.raw() for buffer in buffers)]
     starts = _place([part.nbytes for part in parts])
+    if not SHARES_FILES:
+        channel.sendall(struct.pack(f"<{len(parts) + 1}Q", len(parts), *(part.nbytes for part in parts)))
+        for part in parts:
+            channel.sendall(part)
+        return
     file = make_shared_file()
     try:
         os.ftruncate(file, starts[-1])
@@ -53,6 +60,9 @@ def receive(channel: socket.socket, copy: bool) -> Any:
 
 def receive_parts(channel: socket.socket, copy: bool) -> list[Any]:
     """The parts of the next value, for `load`. Raises EOFError where the other process has ended."""
+    if not SHARES_FILES:
+        count = struct.unpack("<Q", receive_bytes(channel, 8))[0]
+        return [receive_bytes(channel, size) for size in struct.unpack(f"<{count}Q", receive_bytes(channel, 8 * count))]
     try:
         word, files, _, _ = socket.recv_fds(channel, 1, 1)
     except ConnectionError:
@@ -75,6 +85,21 @@ def receive_parts(channel: socket.socket, copy: bool) -> list[Any]:
         return [view[start : start + size] for start, size in zip(starts, sizes, strict=False)]
     finally:
         os.close(file)
+
+
+def receive_bytes(channel: socket.socket, size: int) -> bytearray:
+    """So many bytes. Raises EOFError where the other process has ended."""
+    data = bytearray(size)
+    view, done = memoryview(data), 0
+    while done < size:
+        try:
+            got = channel.recv_into(view[done : done + (1 << 24)])
+        except ConnectionError:
+            got = 0
+        if not got:
+            raise EOFError
+        done += got
+    return data
 
 
 def _write(file: int, part: memoryview, start: int) -> None:

@@ -125,6 +125,9 @@ class _Check:
             source=self.source,
             sites=header.sites,
             accept=header.accept,
+            scanner=header.scanner,
+            temperature=header.temperature,
+            sections=header.sections,
             given=self.given,
             make_fault=self.make_fault,
         )
@@ -158,8 +161,17 @@ class _Check:
         try:
             return Header.model_validate(values)
         except ValidationError as error:
-            self.add_faults([((str(item["loc"][0]),), describe_fault(item, values)) for item in error.errors()])
+            self.add_faults([(self.find_place(item["loc"]), describe_fault(item, values)) for item in error.errors()])
             return None
+
+    def find_place(self, location: Sequence[str | int]) -> tuple[str | int, ...]:
+        """Where a fault of a field is, as far as the job file has it; of a value with several kinds, the kind's name is
+        no place."""
+        place: tuple[str | int, ...] = tuple(location[:1])
+        for step in location[1:]:
+            if (*place, step) in self.positions:
+                place = (*place, step)
+        return place
 
     def find_named(self, key: str) -> Chosen | None:
         """The implementation a stage's value names, and its options still unchecked; None where that is at fault."""

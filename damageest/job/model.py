@@ -11,6 +11,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, FiniteFloat, PositiveInt
 
 from damageest.errors import Fault
+from damageest.job.scanner import ScannerInfo, Temperature
+from damageest.job.sections import SectionChoice
 from damageest.options import Options, require_number
 from damageest.registry.contracts import DEFAULTS, SURFACE_ONLY, Contract
 from damageest.registry.registry import Implementation
@@ -60,10 +62,19 @@ class Header(Options):
         "sites that it fails on or that the scan contradicts; plugins may add others",
     )
     sites: SiteChoice = Field(SiteChoice(), description="sites to drop, to merge and to keep")
+    sections: tuple[SectionChoice, ...] = Field(
+        (), description="sections of part and scan, as of blades and shafts, and depth of wear along lines"
+    )
     accept: Accept = Field(
         "likely",
         description="which sites are damage: proven, likely (and proven) or all; or numbers of doubtful sites to take "
         "beside those that are likely",
+    )
+    scanner: ScannerInfo | None = Field(
+        None, description="the scanner and its certificate, for the budget of uncertainty; default: not known"
+    )
+    temperature: Temperature | None = Field(
+        None, description="of the part at the scan: the scan is scaled to 20 °C; default: not known, no correction"
     )
     output: Path | None = Field(None, description="output folder; default: out/<name>, beside the job file")
 
@@ -88,6 +99,9 @@ class Job:
     source: str
     sites: SiteChoice = field(default_factory=SiteChoice)
     accept: Accept = "likely"
+    scanner: ScannerInfo | None = None
+    temperature: Temperature | None = None
+    sections: tuple[SectionChoice, ...] = ()
     given: Mapping[Contract, Any] = field(default_factory=dict)
     make_fault: Callable[..., Fault] = field(default=_make_fault, compare=False)
 
@@ -95,7 +109,11 @@ class Job:
         """The job as plain values with every default, its paths relative to the folder ``beside``."""
         head = {"version": 1, "name": self.name, "units": self.units, "tolerance": self.tolerance or "auto"}
         head |= {"method": self.method, "sites": to_plain(self.sites.model_dump(), beside)}
+        head |= {"sections": [to_plain(one.model_dump(exclude_defaults=True), beside) for one in self.sections]}
         head |= {"accept": to_plain(self.accept, beside)}
+        for name, told in (("scanner", self.scanner), ("temperature", self.temperature)):
+            if told is not None:
+                head[name] = to_plain(told.model_dump(), beside)
         whole_job = EncloseAll in self.stages
         used = [c for c in DEFAULTS if c in self.stages and not (whole_job and c in SURFACE_ONLY)]
         body = {c.stage: to_plain(self.stages[c].model_dump(), beside) for c in used}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from typing import Any
 
 from pydantic.json_schema import models_json_schema
@@ -42,6 +43,7 @@ def job_schema(registry: Registry) -> dict[str, Any]:
         properties[stage] = {"description": _summary(items), "anyOf": choices + mappings}
     return {
         "$schema": DIALECT,
+        "$comment": f"written by damageest {version('damageest')}",
         "title": "damageest job",
         "type": "object",
         "additionalProperties": False,

@@ -14,9 +14,10 @@ from damageest.output.fit_json import FitReport, report_fit
 from damageest.output.free_json import DatumReport, FreeMotionReport, LeftMotionReport
 from damageest.output.provenance import ProvenanceReport
 from damageest.output.reason_json import ReasonReport
+from damageest.output.section_json import SectionReport, report_section
 from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
 from damageest.output.skin_json import CoverageReport, SurplusReport, report_surplus
-from damageest.output.uncertainty_json import ReportedInterval
+from damageest.output.uncertainty_json import BudgetReport, ReportedInterval
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
@@ -135,11 +136,17 @@ class Report(JsonModel):
     fit: FitReport | None = Field(description="null where too few points lie near the skin")
     sites: list[SiteReport]
     surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
+    sections: list[SectionReport] = Field(description="those that the job asks for")
     export: ExportReport
     damage_volume: float
     volume_95: ReportedInterval | None = Field(
         description="95 % interval of `damage_volume`, its high end null where nothing limits it; null: there is none"
     )
+    budget: BudgetReport | None = Field(
+        description="budget of uncertainty of `damage_volume` (JCGM 100); null where there is no interval or no site"
+    )
+    not_in_budget: list[str] = Field(description="sources that the job does not tell: they are in no interval")
+    certificate: str = Field(description="scanner and standard of its certificate; empty where the job has none")
     undamaged_volume: float
     material: MaterialReport = Field(description="what the whole repair takes")
     truth: TruthReport | None
@@ -153,7 +160,15 @@ class Report(JsonModel):
 
 def result_schema() -> dict[str, Any]:
     """The JSON Schema of result.json."""
-    return {"$schema": DIALECT, **Report.model_json_schema(mode="serialization"), "title": "damageest result"}
+    from importlib.metadata import version
+
+    comment = f"written by damageest {version('damageest')}"
+    return {
+        "$schema": DIALECT,
+        "$comment": comment,
+        **Report.model_json_schema(mode="serialization"),
+        "title": "damageest result",
+    }
 
 
 def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: Any = str) -> dict[str, Any]:
@@ -187,6 +202,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
         fit=report_fit(result.fit),
         sites=sites,
         surplus=[report_surplus(item, result, written) for item in result.surplus],
+        sections=[report_section(section, written) for section in result.sections],
         export=ExportReport.read(written),
         material=sum_material([site.deposit for site in sites if site.deposit]),
         truth=_report_truth(result),

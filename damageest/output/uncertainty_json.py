@@ -2,11 +2,45 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from damageest.output.base import Bound, JsonModel
 
 ReportedInterval = tuple[float, Bound]
+
+
+class BudgetRowReport(JsonModel):
+    """A source of uncertainty, in the terms of JCGM 100 (GUM)."""
+
+    source: str = Field(description="its name, which stays the same from version to version")
+    text: str
+    type: Literal["A", "B"] = Field(description="A: from this scan by statistics; B: from other knowledge")
+    distribution: Literal["normal", "rectangular"]
+    uncertainty: float = Field(description="standard uncertainty of the source, in `unit`")
+    unit: str = Field(description="empty for a share, as of a scale")
+    sensitivity: float = Field(description="change of the result for each unit of the source")
+    contribution: float = Field(description="standard uncertainty of the result by this source")
+    share: float = Field(description="of the variance of the result, 0 to 1")
+
+
+class BudgetBoundReport(JsonModel):
+    source: str
+    text: str
+    low: Bound = Field(description="change of the low end of the interval, null: unlimited")
+    high: Bound = Field(description="change of the high end of the interval")
+
+
+class BudgetReport(JsonModel):
+    """A budget of uncertainty. `bounds` are no part of it: they move the ends of the 95 % interval."""
+
+    rows: list[BudgetRowReport]
+    combined: float = Field(description="combined standard uncertainty")
+    k: float = Field(description="coverage factor, of 95 %")
+    expanded: float = Field(description="expanded uncertainty: `k` times `combined`")
+    correction: float = Field(description="of the mean error: the middle of the interval is the value and this")
+    bounds: list[BudgetBoundReport]
 
 
 class FadingReport(JsonModel):
@@ -20,7 +54,8 @@ class FadingReport(JsonModel):
 
 class UncertaintyReport(JsonModel):
     """The causes. The first nine are standard deviations of the volume; `free`: its change at the ends of motions that
-    the scan does not exclude; the next two, how much larger it may be."""
+    the scan does not exclude; the next two, how much larger it may be;
+    `probing_form` and `scanner` are standard deviations again."""
 
     noise: float = Field(description="noise of the points on the inner surface")
     spacing: float = Field(description="the surface between the points, above all beside the rim")
@@ -35,4 +70,8 @@ class UncertaintyReport(JsonModel):
     free: tuple[float, float] = Field(description="least and largest change")
     inside: float = Field(description="where no points show the inner surface")
     beside: float = Field(description="where no points show the skin beside it")
+    probing_form: float = Field(description="probing form error of the scanner's certificate, beyond the noise")
+    scanner: float = Field(description="its other figures, and the temperature of the part")
+    budget: BudgetReport | None = Field(description="of the volume, source by source; null where nothing was measured")
+    depth_budget: BudgetReport | None = Field(description="of the largest depth")
     fading: FadingReport | None = Field(description="of a loss that is shallow; null for one with a sharp rim")

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Deviation, Floats, Part, Pose, Scan, Solid
+from damageest.checks.budget import UNKNOWN
+from damageest.geometry.remaining import subtract_from_part
 from damageest.geometry.skin import extract_ids
-from damageest.geometry.solids import iou, subtract_lost, to_manifold, to_solid, unite
+from damageest.geometry.solids import iou, to_solid, unite
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState
@@ -22,7 +24,8 @@ from damageest.rules.notes import make_notes, rank_notes
     gives="result",
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
-        "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "conversions",
+        "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "budget",
+        "scanner_errors", "conversions", "sections",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -58,7 +61,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         site_label=label,
         sites=sites,
         damage=damage,
-        undamaged=to_solid(subtract_lost(to_manifold(part, origin), lost), origin) if sites else part,
+        undamaged=subtract_from_part(part, [site.damage for site in sites if site.accepted]),
         warnings=rank_notes(state.warnings),
         failures=tuple(str(error) for error in state.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance, state.adapted is not None),
@@ -69,7 +72,11 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         adapted=state.adapted,
         fit=None if state.fitted is None else state.fitted.fit,
         sensor=state.sensor,
+        budget=state.budget,
+        not_in_budget=tuple(UNKNOWN[name] for name in state.scanner_errors.unknown),
+        certificate=state.scanner_errors.certificate,
         conversions=state.conversions,
+        sections=state.sections,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
 

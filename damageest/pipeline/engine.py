@@ -226,6 +226,10 @@ def start(engine: Engine) -> JobState:
     state = state.with_value(JobState.asked_tolerance, job.tolerance)
     state = state.with_value(JobState.choice, job.sites, digest(job.sites.model_dump()))
     state = state.with_value(JobState.accept, job.accept)
+    for name, told in (("scanner", job.scanner), ("temperature", job.temperature)):
+        state = state.with_named(name, told, digest(str(told and told.model_dump())))
+    asked = digest([one.model_dump() for one in job.sections])
+    state = state.with_value(JobState.asked_sections, job.sections, asked)
     for name, contract in OPTIONS.items():  # the content of files that they name is in the key of what they give
         stage = job.stages.get(contract)
         state = state.with_named(name, stage, digest(str(stage and stage.model_dump())))

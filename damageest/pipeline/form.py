@@ -74,13 +74,14 @@ def correct_scale(
     T[:3, 3] = (T[:3, 3] - form.frame.centre) / scale + form.frame.centre
     pose = replace(pose, T_part_scan=_make_rigid(T))
     moved = form.undo(aligned.points)
-    corrected = _divide(replace(aligned, points=moved * scale), scale)
+    corrected = divide_scan(replace(aligned, points=moved * scale), scale)
     if aligned.viewpoints is not None:
         corrected = replace(corrected, viewpoints=form.undo(aligned.viewpoints))
-    return _divide(scan, scale), pose, corrected, scale
+    return divide_scan(scan, scale), pose, corrected, scale
 
 
-def _divide(scan: Scan, scale: float) -> Scan:
+def divide_scan(scan: Scan, scale: float) -> Scan:
+    """The scan with all of its lengths divided by a scale, about the origin of its frame."""
     viewpoints = None if scan.viewpoints is None else scan.viewpoints / scale
     return replace(
         scan, points=scan.points / scale, viewpoints=viewpoints, noise=scan.noise / scale, spacing=scan.spacing / scale

@@ -21,6 +21,7 @@ from damageest.geometry.transforms import move_points
 from damageest.io.large_scans import JoinedViews
 from damageest.io.scans import join_attributes, make_scan
 from damageest.pipeline.engine import AnyStep, Branch, Engine, follow
+from damageest.pipeline.form import divide_scan
 from damageest.pipeline.state import JobState
 from damageest.pipeline.steps import step
 from damageest.registry.contracts import Contract
@@ -54,13 +55,19 @@ def where_thinned(*route: Contract | AnyStep) -> Branch:
 
 @step(gives="scan", kept=True)
 def add_points_near_damage(
-    engine: Engine, reader: ReadScan | None, scan: Scan, pose: Pose, part: Part, tolerance: float, unit: str
-) -> Scan:
+    engine: Engine, reader: ReadScan | None, scan: Scan, pose: Pose, part: Part, tolerance: float, unit: str,
+    thermal_scale: float,
+) -> Scan:  # fmt: skip
     """Adds all points near damage to the scan. The spacing is then that near damage."""
     assert reader is not None  # as `where_thinned` asks
     place = _Place(part, pose.T_part_scan, tolerance)
     most = max(len(scan.points), 1_000_000)
-    return _gather(lambda: _crop(_read(engine, reader, unit), reader.crop), place, most, scan)
+
+    def read() -> Iterator[Scan]:
+        pieces = _crop(_read(engine, reader, unit), reader.crop)
+        return pieces if thermal_scale == 1 else (divide_scan(piece, thermal_scale) for piece in pieces)
+
+    return _gather(read, place, most, scan)
 
 
 class _Place:

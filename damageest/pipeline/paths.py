@@ -7,7 +7,8 @@ from functools import partial
 
 from damageest.artefacts import Deposit, Part, Solid
 from damageest.errors import StageError
-from damageest.geometry.solids import subtract_lost, to_manifold, to_solid, unite
+from damageest.geometry.remaining import subtract_from_part
+from damageest.geometry.solids import to_solid, unite
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import Failures, FoundSite, JobState
@@ -45,9 +46,7 @@ def _find_left(sites: list[FoundSite], part: Part) -> Solid | None:
     """The part without the cavities of the sites; None where nothing is left."""
     if not sites:
         return part
-    origin = part.bounds.mean(axis=0)
-    cavities = [_find_cavity(site) for site in sites]
-    return to_solid(subtract_lost(to_manifold(part, origin), unite(cavities, origin)), origin)
+    return subtract_from_part(part, [_find_cavity(site) for site in sites])
 
 
 def _find_cavity(site: FoundSite) -> Solid:

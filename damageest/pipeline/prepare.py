@@ -7,7 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Pose, Reason, Scan, Sites
-from damageest.checks.scan_quality import check_walls, choose_tolerance, describe_few, raise_tolerance, require_intact
+from damageest.checks.scan_quality import (
+    check_walls,
+    choose_tolerance,
+    describe_few,
+    raise_tolerance,
+    require_intact,
+    require_real_clusters,
+)
 from damageest.errors import DamageestError, InputError, StageError
 from damageest.geometry.crops import crop_points
 from damageest.geometry.depth_steps import measure_depth_step
@@ -124,6 +131,12 @@ def check_intact(deviation: Deviation, tolerance: float, part: Part, segmenter: 
     except StageError as error:
         error.stage, error.use = "segment", segmenter.use if segmenter else ""
         raise
+
+
+@step()
+def check_clusters(sites: Sites, deviation: Deviation, tolerance: float, part: Part) -> None:
+    """Stops with an InputError where noise alone makes very many clusters, before each of them costs an enclosure."""
+    require_real_clusters(sites, deviation, tolerance, part)
 
 
 @step(gives=("intact", "warnings"))

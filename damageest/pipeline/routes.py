@@ -21,6 +21,7 @@ from damageest.pipeline.large_scans import add_points_near_damage, where_thinned
 from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.paths import plan_paths
 from damageest.pipeline.prepare import (
+    check_clusters,
     check_intact,
     crop_scan,
     gather_intact,
@@ -32,6 +33,8 @@ from damageest.pipeline.prepare import (
     settle_tolerance,
     take_tolerance,
 )
+from damageest.pipeline.scanner import correct_temperature, weigh_scanner
+from damageest.pipeline.sections import cut_sections
 from damageest.pipeline.selections import check_selections
 from damageest.pipeline.sensor import fold_hidden, look_for_sheets, measure_sensor, set_explained_aside
 from damageest.pipeline.sites import (
@@ -43,9 +46,15 @@ from damageest.pipeline.sites import (
     where_damaged,
 )
 from damageest.pipeline.surplus import find_surplus, relate_surplus
-from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
+from damageest.pipeline.uncertainty import measure_uncertainty, sum_budget, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
-from damageest.pipeline.writing import describe_output, keep_form, show_result, write_output
+from damageest.pipeline.writing import (
+    describe_output,
+    keep_form,
+    show_result,
+    write_output,
+    write_sections,
+)
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
 from damageest.stages.cluster import Cluster
@@ -65,6 +74,7 @@ ACQUIRE: Route = (
     note_scan,  # scan -> +warnings
     crop_scan,  # scan, reader -> scan
     set_far_aside,  # scan, part -> scan, +warnings
+    correct_temperature,  # scan, temperature -> scan, thermal_scale
     measure_scan,  # scan, part -> noise, spacing, depth_step
     take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
     Sample,  # part, tolerance -> samples
@@ -72,7 +82,7 @@ ACQUIRE: Route = (
     place_scan,  # scan, pose -> aligned, noise, spacing
     note_pose,  # pose -> +warnings
     where_thinned(  # scan, reader
-        add_points_near_damage,  # reader, scan, pose, part, tolerance, unit -> scan
+        add_points_near_damage,  # reader, scan, pose, part, tolerance, unit, thermal_scale -> scan
         place_scan,  # scan, pose -> aligned, noise, spacing
     ),
     correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner, warnings
@@ -85,6 +95,7 @@ ACQUIRE: Route = (
     check_intact,  # deviation, tolerance, part, segmenter ->
     inspect_skin,  # part, aligned, deviation, tolerance -> skin, deviation
     Cluster,  # aligned, deviation, tolerance -> sites
+    check_clusters,  # sites, deviation, tolerance, part ->
     look_for_sheets,  # part, aligned, deviation, tolerance -> sheets
     find_surplus,  # calls Cluster, EncloseAll: unit, sheets, aligned, deviation, tolerance, part, sites, samples
     #     -> surplus, deviation, +warnings
@@ -119,10 +130,12 @@ CLOSE: Route = (
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
     gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner, sheets, adapted
     #     -> facts
-    measure_sensor,  # part, aligned, deviation, sites, facts, explained, depth_step, tolerance, pose -> pose_error,
-    #     sensor
+    measure_sensor,  # part, aligned, deviation, sites, facts, explained, depth_step, tolerance, pose, aligner
+    #     -> pose_error, sensor
+    weigh_scanner,  # scanner, temperature, corrected_scale, fitted, aligned, pose_error, facts, part, unit
+    #     -> scanner_errors, +warnings
     measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
-    #     tolerance, unit -> found
+    #     scanner_errors, tolerance, unit -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit,
     #     views -> found
     fold_hidden,  # found, sensor, explained, sheets, aligner, accept, aligned, deviation, tolerance, asked_tolerance,
@@ -134,12 +147,15 @@ CLOSE: Route = (
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
     sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted, folded,
     #     views -> volume_95
+    sum_budget,  # found, volume_95, scanner_errors, aligned, part, unit, adapted, folded, views -> budget
+    cut_sections,  # asked_sections, part, aligned, adapted, pose_error, sensor, tolerance, unit -> sections, +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
-    #     coverage, surplus, adapted, fitted, sensor, volume_95, conversions
+    #     coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions, sections
     #     -> result
 )
 WRITE: Route = (
     Export,  # result, folder, writers, path_writers -> written
+    write_sections,  # written, result, folder -> written
     keep_form,  # written, adapted, aligned, tolerance, folder -> written
     describe_output,  # result, written, target -> result, content, job_text
     show_result,  # calls Report: written, result, folder, content, job_text -> result, written

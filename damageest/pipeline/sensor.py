@@ -38,10 +38,10 @@ UNSUPPORTED = {"intact_over", "intact_inside", "beyond_points", "off_boundary", 
 @step(gives=("pose_error", "sensor"))
 def measure_sensor(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, facts: ScanFacts, explained: Explained,
-    depth_step: float, tolerance: float, pose: Pose,
+    depth_step: float, tolerance: float, pose: Pose, aligner: Align | None,
 ) -> tuple[PoseError, Sensor]:  # fmt: skip
     """Measures noise and systematic errors of the intact skin, and what they hide."""
-    error = measure_pose_error(part, aligned, deviation, tolerance, spread=pose.spread)
+    error = measure_pose_error(part, aligned, deviation, tolerance, spread=pose.spread, held=is_given(aligner))
     levels = measure_levels(part, aligned, deviation)
     stray = (deviation.label == OUTLIER) | ((deviation.label == DAMAGE) & (sites.label == 0))
     share = (int(stray.sum()) - explained.points) / max(len(stray), 1)
@@ -135,10 +135,15 @@ def _limit_explained(state: JobState, site: FoundSite, cause: str) -> float:
     return min(most, limit_shown(state.aligned, state.deviation, site.members)) if cause == "stray" else most
 
 
+def is_given(aligner: Align | None) -> bool:
+    """Whether the job gives the pose, so that no error of the scan moves it."""
+    return getattr(aligner, "use", "none") == "none"
+
+
 def _is_folding(aligner: Align | None, accept: Accept) -> bool:
     """Whether sites that errors of the scan explain are set aside: not where the pose is given, whose error is not the
     sensor's, and not where the job accepts them."""
-    return getattr(aligner, "use", "none") != "none" and isinstance(accept, str) and accept != "all"
+    return not is_given(aligner) and isinstance(accept, str) and accept != "all"
 
 
 def _choose_limit(state: JobState) -> float:

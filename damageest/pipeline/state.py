@@ -29,6 +29,7 @@ from damageest.artefacts import (
     Rims,
     Samples,
     Scan,
+    Section,
     Sites,
     Solid,
     Surface,
@@ -38,12 +39,15 @@ from damageest.checks.coverage import SkinView
 from damageest.checks.free_pose import Dependence
 from damageest.checks.model_fit import AskedFit, FittedModel
 from damageest.checks.pose_error import PoseError
+from damageest.checks.scanner import ScannerErrors
 from damageest.checks.two_sheets import Sheets
 from damageest.checks.uncertainty import SiteError
 from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
-from damageest.findings import Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict
+from damageest.findings import Budget, Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict
 from damageest.job.model import Accept, SiteChoice
+from damageest.job.scanner import ScannerInfo, Temperature
+from damageest.job.sections import SectionChoice
 from damageest.pipeline.cache import digest
 from damageest.result import Conversion, Result
 from damageest.rules import Rule, ScanFacts
@@ -192,17 +196,19 @@ class JobState(State):
     """The whole job, as it goes along the route.
 
     From the job and the registry: ``name``, ``unit``, ``asked_tolerance`` (None: `auto`), ``choice`` of sites,
-    ``accept``, the stages whose options steps read (None where the job's route has none), and ``rules``, ``writers``,
-    ``path_writers`` and ``conversions``.
-    ``tolerance``: None until it is measured where the job says `auto`. ``depth_step``: of the scan's depth, 0 where it
-    is continuous. ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a larger.
-    ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan, which is ``part`` from
-    then on; None: it is as designed. ``asked_fit``: how it fits, where that was asked before.
-    ``intact`` (K,3): its points on the nominal surface.
-    ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the sites.
-    ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written into,
-    ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
-    ``sheets``: two surfaces over the same skin; ``explained``: places that views which lie apart explain, no sites.
+    ``accept``, ``asked_sections``, ``scanner`` and ``temperature`` (None: the job does not tell), the stages whose
+    options steps read (None where the job's route has none), and ``rules``, ``writers``, ``path_writers`` and
+    ``conversions``. ``tolerance``:
+    None until it is measured where the job says `auto`. ``depth_step``: of the scan's depth, 0 where it is continuous.
+    ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a larger. ``aligned``: the scan in
+    the part's frame. ``adapted``: the part deformed to follow the scan, which is ``part`` from then on; None: it is as
+    designed. ``asked_fit``: how it fits, where that was asked before. ``intact`` (K,3): its points on the nominal
+    surface. ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the
+    sites. ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written
+    into, ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
+    ``thermal_scale``: what the scan was divided by for the part's temperature; ``scanner_errors``: of the whole scan by
+    certificate and temperature; ``budget``: of the total volume. ``sheets``: two surfaces over the same skin;
+    ``explained``: places that views which lie apart explain, no sites.
     """
 
     name = Value[str]()
@@ -210,7 +216,10 @@ class JobState(State):
     asked_tolerance = Value[float | None]()
     choice = Value[SiteChoice]()
     accept = Value[Accept]()
+    asked_sections = Value[tuple[SectionChoice, ...]]()
     reader = Value[ReadScan | None]()
+    scanner = Value[ScannerInfo | None]()
+    temperature = Value[Temperature | None]()
     aligner = Value[Align | None]()
     adapter = Value[Adapt | None]()
     segmenter = Value[Segment | None]()
@@ -239,16 +248,20 @@ class JobState(State):
     skin = Value[SkinView]()
     views = Value[ViewFits | None]()
     corrected_scale = Value[float]()
+    thermal_scale = Value[float]()
     fitted = Value[FittedModel | None]()
     coverage = Value[Coverage]()
     facts = Value[ScanFacts]()
     pose_error = Value[PoseError]()
+    scanner_errors = Value[ScannerErrors]()
     sensor = Value[Sensor]()
     folded = Value[float]()
     sheets = Value[Sheets]()
     explained = Value[Explained]()
     surplus = Value[tuple[Surplus, ...]]()
     volume_95 = Value[Interval | None]()
+    budget = Value[Budget | None]()
+    sections = Value[tuple[Section, ...]]()
     enclosures = Value[Enclosures]()
 
     wanted = Value[tuple[int, ...] | None]()

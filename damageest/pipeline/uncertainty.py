@@ -10,11 +10,13 @@ import numpy as np
 
 from damageest.artefacts import INTACT, AdaptedPart, Deviation, Flags, Ints, Part, Pose, Scan, Solid
 from damageest.checks.beyond_points import ask_beyond_points
+from damageest.checks.budget import make_depth_budget, make_volume_budget
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.fading import measure_fading
 from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scan_quality import describe_few
+from damageest.checks.scanner import ScannerErrors
 from damageest.checks.uncertainty import (
     WIDTH,
     SiteError,
@@ -23,10 +25,11 @@ from damageest.checks.uncertainty import (
     limit_beside,
     measure_shifts,
     measure_site_error,
+    sum_free,
 )
 from damageest.checks.view_fit import ViewFits
 from damageest.checks.view_overlap import compare_at_site
-from damageest.findings import Fading, Interval, Uncertainty
+from damageest.findings import Budget, Fading, Interval, Uncertainty
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.form import measure_at_site
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
@@ -54,6 +57,7 @@ BESIDE = 2.0
         "fitted",
         "pose",
         "pose_error",
+        "scanner_errors",
         "tolerance",
         "unit",
     ),
@@ -88,10 +92,31 @@ def sum_uncertainty(
     if len(errors) != len(taken) or lost:
         return None
     # collect_result moves it to the volume of the union, which is the same but for overlaps
-    left = hidden + sum(limit_doubtful(site) for site in found if not site.accepted)
+    left = hidden + _sum_doubtful(found)
     total = combine_total(sum(site.damage.volume for site in taken), errors, left)
     is_open = any(site.uncertainty and site.uncertainty.is_open for site in taken)
     return (total[0], math.inf) if is_open else total
+
+
+@step(gives="budget")
+def sum_budget(
+    found: tuple[FoundSite, ...], volume_95: Interval | None, scanner_errors: ScannerErrors, aligned: Scan, part: Part,
+    unit: str, adapted: AdaptedPart | None, folded: float, views: ViewFits | None,
+) -> Budget | None:  # fmt: skip
+    """Makes the budget of the total volume; None where that has no interval, or there is no site."""
+    errors = [site.error for site in found if site.accepted and site.error is not None]
+    if volume_95 is None or not errors:
+        return None
+    hidden = (adapted.hidden if adapted else 0.0) + folded + (views.hidden if views else 0.0)
+    return make_volume_budget(
+        errors, scanner_errors, aligned.noise, part.tessellation_error, unit,
+        doubtful=hidden + _sum_doubtful(found), free=sum_free(errors),
+    )  # fmt: skip
+
+
+def _sum_doubtful(found: tuple[FoundSite, ...]) -> float:
+    """The volume of sites that are not accepted, and may be damage."""
+    return sum(limit_doubtful(site) for site in found if not site.accepted)
 
 
 def limit_doubtful(site: FoundSite) -> float:
@@ -118,7 +143,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     # what the model fit gives is the 95 % bound of a deviation
     found = measure_site_error(
         site.damage, inner, state.part, state.aligned, points, site.evidence, pose, facts, beyond,
-        free=state.pose.free, adapted=state.adapted,
+        free=state.pose.free, adapted=state.adapted, scanner=state.scanner_errors,
         form=measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH,
     )  # fmt: skip
     if found is None:
@@ -153,7 +178,14 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         inside=error.inside,
         beside=error.beside,
         fading=fading,
-    )
+        probing_form=error.probing_form,
+        scanner=float(np.linalg.norm(error.scanner)),
+        budget=make_volume_budget(
+            [error], state.scanner_errors, state.aligned.noise, state.part.tessellation_error, state.unit,
+            free=error.free,
+        ),
+        depth_budget=make_depth_budget(error, state.scanner_errors, state.unit),
+    )  # fmt: skip
     return replace(site, uncertainty=uncertainty, error=error, dependences=dependences)
 
 

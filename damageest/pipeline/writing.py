@@ -12,6 +12,7 @@ import numpy as np
 from damageest.artefacts import AdaptedPart, Reason, Scan
 from damageest.errors import StageError
 from damageest.io.forms import FORM, MeasuredForm, hash_scan, mark_scan, write_form
+from damageest.io.section_files import write_section_files
 from damageest.output.files import describe_job, describe_result, write_report
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState
@@ -44,6 +45,13 @@ def keep_form(
     return replace(written, files=(*written.files, FORM))
 
 
+@step(gives="written")
+def write_sections(written: ExportedFiles, result: Result, folder: Path) -> ExportedFiles:
+    """Writes the tables and drawings of sections."""
+    files = write_section_files(folder, result.sections, result.tolerance, result.units)
+    return replace(written, files=(*written.files, *files)) if files else written
+
+
 @step(gives=("result", "content", "job_text"))
 def describe_output(
     engine: Engine, result: Result, written: ExportedFiles, target: Path
@@ -62,7 +70,10 @@ def show_result(engine: Engine, state: JobState) -> tuple[Result, ExportedFiles]
     try:
         done = engine.call(Report, state).reported
     except StageError as error:
-        warning = Reason("report", f"{error.args[0]} (the run went on without a report)")
+        text = f"{error.args[0]} (the run went on without a report)"
+        if error.extra:
+            text = f"report.html was not written: {error.message}"
+        warning = Reason("report", text, remedy=error.remedy)
         return replace(result, warnings=(*result.warnings, warning)), written
     result = replace(result, stages=tuple(engine.records), steps=tuple(engine.steps))
     return result, replace(written, files=(*written.files, *done.files), notes=(*written.notes, *done.notes))

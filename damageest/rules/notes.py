@@ -33,6 +33,7 @@ RUN_CODES: dict[str, RunCode] = {
     "few_points": RunCode("the scan has too few points to show the skin between them", 0),
     "fell_back": RunCode("method auto took the route surface, since implicit failed", 1),
     "below_noise": RunCode("shallow places that errors of the scan explain are no sites", 0),
+    "certificate": RunCode("the scan contradicts the scanner's certificate or the part's temperature", 1),
     "depth_steps": RunCode("the scan's depth has steps, as of a depth camera", 1),
     "sparse_scan": RunCode("the points lie far apart for the tolerance", 1),
     "coarse_part": RunCode("the part's triangles deviate from its CAD surface by more than half the tolerance", 1),
@@ -47,6 +48,7 @@ RUN_CODES: dict[str, RunCode] = {
     "site_dropped": RunCode("a site was dropped, as the job says", 2),
     "sites_merged": RunCode("sites were merged, as the job says", 2),
     "cluster": RunCode("what the stage cluster says about how it grouped points", 2),
+    "section": RunCode("what a section could not show or measure", 1),
     "export": RunCode("a file was not written as the job asks for, or not at all", 1),
     "report": RunCode("the report failed, and the run went on without it", 1),
 }

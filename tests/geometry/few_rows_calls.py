@@ -36,6 +36,7 @@ from damageest.geometry import (
     pseudonormals,
     rays,
     refinement,
+    remaining,
     sampling,
     shapes,
     slivers,
@@ -243,6 +244,9 @@ CALLS: dict[str, Callable[[Rows], None]] = {
         solids.concatenate_meshes([CUBE] * r.count), (8 * r.count, 3), (12 * r.count, 3), (12 * r.count,)
     ),
     "solids.unite": lambda r: expect(np.asarray(solids.unite([CUBE] * r.count).volume()), ()),
+    "remaining.lift_faces": lambda r: expect(
+        remaining.lift_faces(r.mesh, np.zeros(len(r.mesh.faces), bool), 0.1).faces, (len(r.mesh.faces), 3)
+    ),
     "solids.iou": lambda r: expect(np.asarray(solids.iou(r.mesh, CUBE)), ()),
     "threads.cut_evenly": call_threads,
     "threads.map_in_threads": call_threads,
@@ -278,7 +282,7 @@ WITHOUT_ROWS: dict[str, str] = {
     **dict.fromkeys(
         (
             "bodies.split_bodies", "bodies.split_shells", "rounding.round_to_single", "simplification.simplify_within",
-            "skin.extract_ids", "skin.find_inner_faces", "touching.separate_touching",
+            "skin.extract_ids", "skin.find_inner_faces", "touching.separate_touching", "remaining.subtract_from_part",
         ),
         "takes solids, which have at least four triangles",
     ),

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 import trimesh
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.rays import RayCaster
+
+
+@pytest.fixture(autouse=True, params=["embree", "libigl"])
+def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Embree, and what is asked where it has no wheel."""
+    if request.param == "libigl":
+        monkeypatch.setitem(sys.modules, "embreex.mesh_construction", None)
 
 
 def ball(radius: float = 10.0, centre: tuple[float, float, float] = (0, 0, 0)) -> Mesh:

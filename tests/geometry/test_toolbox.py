@@ -71,8 +71,9 @@ def test_nothing_from_above_is_imported(path: Path) -> None:
     assert not [name for name in names if name[0].startswith("damageest_")]
 
 
-def test_libigl_is_imported_by_the_distances_alone() -> None:
+def test_libigl_is_imported_by_few_modules() -> None:
     sources = [*(ROOT / "damageest").rglob("*.py"), *(ROOT / "plugins").glob("*/damageest_*/**/*.py")]
     users = {path for path in sources if any(name.split(".")[0] == "igl" for name in list_imports(path))}
     thinning = ROOT / "plugins/cadquery/damageest_cadquery/_polyhedron.py"  # asks libigl for fewer triangles
-    assert users == {FOLDER / "distance.py", FOLDER / "pseudonormals.py", thinning}
+    own = {FOLDER / f"{name}.py" for name in ("distance", "isosurface", "pseudonormals", "rays")}
+    assert users == {*own, thinning}

@@ -27,3 +27,12 @@ def test_points_too_far_apart_to_show_the_noise_are_not_refused() -> None:
     assert measure_noise_and_spacing(scan.points)[0] > 0.2
     result = damageest.run({"version": 1}, part=part, scan=scan, settings=["tolerance=0.1", "allowance=none"])
     assert not result.sites
+
+
+@pytest.mark.parametrize("pose", ["known", "unknown"])
+def test_noise_below_the_tolerance_that_alone_makes_very_many_places_is_refused(pose: str) -> None:
+    part = PARTS["lever"]()
+    scan = Simulate(points=60_000, noise=0.2, pose="identity" if pose == "known" else "random", seed=3).run("mm", part)
+    settings = ["tolerance=0.25"] + ["align=none"] * (pose == "known")
+    with pytest.raises(InputError, match=r"scatter by 0\.(19|2|21) mm .* places below the skin .* at least 0\.(7|8)"):
+        damageest.run({"version": 1}, part=part, scan=scan, settings=settings)

@@ -38,6 +38,8 @@ class Axis:
 
 def find_common_axis(poses: Floats) -> Axis | None:
     """The axis of the rotations by which most of the poses (K,4,4) differ from the first; None for fewer than two."""
+    if len(poses) < 3:
+        return None
     motions = poses[1:] @ np.linalg.inv(poses[0])
     direction, angle, point, slide = _find_screw(motions)
     turn = (angle > 0.1) & (np.abs(slide) < NEAR)

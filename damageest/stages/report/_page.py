@@ -11,8 +11,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from damageest.artefacts import Floats
 from damageest.errors import StageError
 from damageest.io import colours
@@ -22,6 +20,7 @@ from damageest.rules.notes import fold_notes, qualify_nothing
 from damageest.stages.report import _style as style
 from damageest.stages.report._scene import EXAGGERATED, LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
+from damageest.stages.report._sections import draw_sections, group_sections
 from damageest.stages.report._sites import MOST_DRAWN, Shown
 from damageest.stages.report._values import list_fit, list_freedom, list_sensor, show_total_interval
 
@@ -97,6 +96,8 @@ def fill_page(
         map_colours=_sample_map(),
         histogram=draw_histogram(result),
         labels=LABELS,
+        sections=group_sections(result),
+        drawings=draw_sections(result),
         fit=list_fit(result),
         freedom=list_freedom(result),
         sensor=list_sensor(result),
@@ -174,10 +175,7 @@ def _read_library() -> str:
 
 def _sample_map() -> str:
     """The colour bar as stops of a CSS gradient."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return ", ".join(to_hex(colormaps[colours.DEVIATION](x)) for x in np.linspace(0, 1, 9))
+    return ", ".join(colours.COOLWARM)
 
 
 def _hash_scans(result: Result, content: Mapping[str, Any]) -> dict[str, str]:

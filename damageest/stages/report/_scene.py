@@ -216,8 +216,6 @@ def _add_site(stage: _Stage, result: Result, site: Site, share: int, most_points
 def _add_path(stage: _Stage, site: Site) -> None:
     """Adds the passes of a site, each layer of the deposit an object, and the nozzle where it is tightest."""
     import k3d
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
 
     path = site.path
     if path is None or not path.on.any():
@@ -229,7 +227,7 @@ def _add_path(stage: _Stage, site: Site) -> None:
         own = ends[number.ravel() == k]
         points = np.concatenate([path.points[own - 1], path.points[own]])
         pairs = np.stack([np.arange(len(own)), np.arange(len(own)) + len(own)], axis=1).astype(np.uint32)
-        colour = to_hex(colormaps["viridis"](k / max(count - 1, 1)))
+        colour = colours.pick_colour(colours.VIRIDIS, k / max(count - 1, 1))
         lines = k3d.lines(
             stage.place(points), pairs, indices_type="segment", shader="simple", color=style.to_number(colour),
             width=0.02, name="path",

@@ -11,13 +11,14 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.rays import RayCaster
-from damageest.geometry.solids import concatenate_meshes, to_manifold, to_solid
+from damageest.geometry.remaining import subtract_from_part
+from damageest.geometry.solids import concatenate_meshes, to_manifold
 from damageest.geometry.views import OVERVIEWS, View, choose_view
 from damageest.io import colours
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._drawing import draw
-from damageest.stages.report._section import choose_plane, draw_section, take_paper
+from damageest.stages.report._section import choose_plane, draw_section
 from damageest.stages.report._thin import thin_mesh
 from damageest.stages.report._values import list_path, show_interval, show_site_interval
 
@@ -50,6 +51,8 @@ class Shown:
     faces: str
     deposit: list[tuple[str, str]]
     path: list[tuple[str, str]]
+    budget: Mapping[str, Any] | None
+    depth_budget: Mapping[str, Any] | None
     files: list[tuple[str, str, bytes]] = field(default_factory=list)
     picture: bytes = b""
     section: str = ""
@@ -63,7 +66,6 @@ def describe_sites(result: Result, content: Mapping[str, Any], remains: Remains)
         return []
     part = to_manifold(result.part, result.part.bounds.mean(axis=0))
     drawn = {s.id for s in sorted(result.sites, key=lambda s: -s.damage.volume)[:MOST_DRAWN]}
-    paper = take_paper()
     shown = []
     for site, told in zip(result.sites, content["sites"], strict=True):
         one = _describe(result, site, told)
@@ -71,7 +73,7 @@ def describe_sites(result: Result, content: Mapping[str, Any], remains: Remains)
         view = choose_view(rays, site.surface, site.damage.bounds, result.part.diagonal)
         one.view = _to_plain(view)
         if site.id in drawn:
-            _draw_site(result, site, told, one, view, (rays, mesh), part, paper)
+            _draw_site(result, site, told, one, view, (rays, mesh), part)
         shown.append(one)
     return shown
 
@@ -92,8 +94,7 @@ class Remains:
         part = self._result.part
         if site.accepted and self._result.undamaged is not None:
             return self.without_accepted(self._result.undamaged)
-        origin = part.bounds.mean(axis=0)
-        left = to_solid(to_manifold(part, origin) - to_manifold(site.damage, origin), origin) or part
+        left = subtract_from_part(part, [site.damage]) or part
         return left, RayCaster(left)
 
 
@@ -133,6 +134,8 @@ def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
         faces=name_faces(result.part, site.damage, result.tolerance),
         deposit=rows,
         path=list_path(site, unit),
+        budget=told["uncertainty"] and told["uncertainty"]["budget"],
+        depth_budget=told["uncertainty"] and told["uncertainty"]["depth_budget"],
     )
 
 
@@ -162,7 +165,6 @@ def _draw_site(
     view: View,
     left: tuple[RayCaster, Mesh],
     part: Any,
-    paper: Any,
 ) -> None:
     rays, mesh = left
     smooth, near = len(result.sites) <= FEW, view._replace(radius=1.05 * view.radius)
@@ -173,7 +175,7 @@ def _draw_site(
     layers += [(*both, one.colour) for both in prepared.values()]
     one.picture = draw(view._replace(radius=1.7 * view.radius), layers, PICTURE if smooth else SMALLER, smooth)
     plane = choose_plane(result, site)
-    one.section, slab = draw_section(result, site, plane, part, paper)
+    one.section, slab = draw_section(result, site, plane, part)
     at = ", ".join(style.format_number(x) for x in plane.origin)
     normal = ", ".join(style.format_number(x, 3) for x in np.round(plane.across, 4) + 0.0)
     one.plane = f"through ({at}), normal ({normal}); scan points within {style.format_number(slab, 2)} {result.units}"

@@ -1,13 +1,15 @@
-"""The report as one HTML page."""
+"""The report as one HTML page, and as a PDF."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, field_validator, model_validator
 
+from damageest.stages import JobPath
 from damageest.stages.report import Report, ReportFiles
 
 if TYPE_CHECKING:
@@ -15,7 +17,8 @@ if TYPE_CHECKING:
 
 
 class Html(Report):
-    """One page, `report.html`, that a browser opens from disk without a network: sites, 3D view, sections, checks."""
+    """One page, `report.html`, that a browser opens from disk without a network: sites, 3D view, sections, checks; and
+    `report.pdf`, to be signed."""
 
     use: Literal["html"] = "html"
     points: int = Field(
@@ -27,16 +30,45 @@ class Html(Report):
     triangles: int = Field(
         120_000, ge=1000, le=1_000_000, description="about how many triangles the 3D view shows; meshes are simplified"
     )
+    pdf: bool = Field(
+        False, description="whether `report.pdf`, A4, is written too; needs `pip install 'damageest[pdf]'`"
+    )
+    company: str = Field("", max_length=80, description="name at the head of each page of the PDF")
+    logo: JobPath | None = Field(None, description="PNG or JPEG file at the head of each page of the PDF")
+    language: str = Field("en", description="language of the PDF: en, de; reasons and notes are English")
+
+    @field_validator("language")
+    @classmethod
+    def _check_language(cls, value: str) -> str:
+        from damageest.stages.report._words import list_languages
+
+        if value not in list_languages():
+            raise ValueError(f"no catalogue of the language '{value}'; there are: {', '.join(list_languages())}")
+        return value
+
+    @model_validator(mode="after")
+    def _check_pdf(self) -> Self:
+        if self.pdf and find_spec("reportlab") is None:
+            raise ValueError("pdf: needs the package reportlab; install it:  pip install 'damageest[pdf]'")
+        return self
 
     def run(self, result: Result, folder: Path, content: Mapping[str, Any], job_text: str) -> ReportFiles:
-        """Writes ``report.html`` into ``folder``."""
+        """Writes ``report.html``, and ``report.pdf`` where it is asked for, into ``folder``."""
         from damageest.stages.report._page import fill_page
         from damageest.stages.report._scene import build_scene
         from damageest.stages.report._sites import Remains, choose_overview, describe_sites
 
         scene, remains = build_scene(result, self.points, self.triangles), Remains(result)
         sites = describe_sites(result, content, remains)
-        page = fill_page(result, content, job_text, scene, sites, choose_overview(result, remains))
+        start = choose_overview(result, remains)
+        page = fill_page(result, content, job_text, scene, sites, start)
         (folder / "report.html").write_text(page, encoding="utf-8")
+        files = ["report.html"]
+        if self.pdf:
+            from damageest.stages.report._pdf import Letterhead, write_pdf
+
+            head = Letterhead(self.company, self.logo)
+            write_pdf(folder / "report.pdf", result, content, job_text, sites, remains, start, head, self.language)
+            files.append("report.pdf")
         picture = next((site.picture for site in sites if site.picture), b"")
-        return ReportFiles(("report.html",), picture=picture)
+        return ReportFiles(tuple(files), picture=picture)

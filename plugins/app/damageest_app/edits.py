@@ -16,12 +16,12 @@ def to_round(value: Any) -> Any:
     """Numbers with as many digits as a click deserves, as plain values of Python, lists of numbers on one line."""
     if isinstance(value, Mapping):
         return _flow({key: to_round(item) for key, item in value.items()})
-    if isinstance(value, (list, tuple)) or hasattr(value, "tolist"):
+    if isinstance(value, (list, tuple)) or getattr(value, "ndim", False):
         return _flow([to_round(item) for item in value])
-    if isinstance(value, float) or hasattr(value, "dtype"):
+    if isinstance(value, float) or (hasattr(value, "dtype") and value.dtype.kind == "f"):
         rounded = float(f"{float(value):.{DIGITS}g}")
         return rounded + 0.0  # no negative zero
-    return value
+    return value.item() if hasattr(value, "dtype") else value
 
 
 def _flow(value: Any) -> Any:
@@ -54,6 +54,8 @@ def open_stage(tree: Any, stage: str, use: str) -> Any:
             value.insert(0, "use", use)  # type: ignore[attr-defined]
         return value
     made = CommentedMap()
+    if getattr(tree, "ca", None) is not None and stage in tree.ca.items:
+        made.fa.set_flow_style()  # the comment stands at the end of its line, and what follows it stays below
     if stage in ("part", "scan"):
         if value is not None:
             made["path"] = value
@@ -75,9 +77,12 @@ def set_option(tree: Any, stage: str, use: str, option: str, value: Any) -> None
 
 
 def set_unit(tree: Any, of: str, unit: str) -> None:
-    """The unit of the file of ``part`` or ``scan``."""
+    """The unit of the file of ``part`` or ``scan``. A tolerance in figures becomes `auto`: it was measured with the
+    other unit."""
     stage = open_stage(tree, of, "file")
     stage["unit"] = unit
+    if isinstance(tree.get("tolerance"), (int, float)):
+        tree["tolerance"] = "auto"
 
 
 def add_crop(tree: Any, crop: Mapping[str, Any]) -> None:
@@ -127,20 +132,63 @@ def set_register(tree: Any) -> None:
         open_stage(tree, "align", "register")["datum"] = datum
 
 
-def toggle_datum(tree: Any, face: Selector) -> None:
-    """Adds a face to the datum, or takes it away where it is in it."""
+def list_datums(datum: Any) -> dict[str, list[Any]]:
+    """The faces of each datum by its letter, in the order of precedence; faces without letters under ``""``."""
+    if isinstance(datum, Mapping):
+        return {
+            str(letter): list(one.get("skin", []) if isinstance(one, Mapping) else one) for letter, one in datum.items()
+        }
+    return {"": list(datum)} if datum else {}
+
+
+def toggle_datum(tree: Any, face: Selector, letter: str = "") -> None:
+    """Adds a face to the datum, or takes it away where it is in it.
+
+    With a ``letter``, to that datum of a system, after those that there are; a face belongs to one of them. Faces that
+    had no letters become the first datum, A; without a letter, those of a system are fitted together.
+    """
+    from ruamel.yaml.comments import CommentedMap
+
     value = tree.get("align")
     use = value.get("use", "register") if isinstance(value, Mapping) else str(value or "register")
     stage = open_stage(tree, "align", "register" if use == "none" else use)
-    toggle(stage, "datum", face)
+    datums = list_datums(stage.get("datum"))
+    if not letter:
+        if isinstance(stage.get("datum"), Mapping):
+            stage["datum"] = to_round([one for faces in datums.values() for one in faces])
+        toggle(stage, "datum", face)
+        return
+    if "" in datums:
+        stage["datum"] = CommentedMap({"A": stage["datum"]})
+    system = stage.setdefault("datum", CommentedMap())
+    for other in list(system):
+        if other != letter and _has(list_datums(system)[other], face):
+            _toggle_in(system, other, face)
+    _toggle_in(system, letter, face)
+    if not system:
+        del stage["datum"]
+
+
+def _toggle_in(system: Any, letter: str, face: Selector) -> None:
+    """Adds a face to a datum of a system or removes it; a datum without faces goes."""
+    if isinstance(system.get(letter), Mapping):
+        toggle(system[letter], "skin", face)
+        if "skin" not in system[letter]:
+            del system[letter]
+    else:
+        toggle(system, letter, face)
+
+
+def _has(faces: Sequence[Any], face: Selector) -> bool:
+    return any(plain(one) in (plain(face), plain(to_round(face))) for one in faces)
 
 
 def toggle(mapping: Any, option: str, value: Any) -> None:
     """Adds an entry to a list, or removes it where it is there; the last one takes the list with it."""
-    there = [plain(item) for item in mapping.get(option) or []]
+    there = list(mapping.get(option) or [])
     wanted = to_round(value)
-    if plain(wanted) in there:
-        del mapping[option][there.index(plain(wanted))]
+    if _has(there, value):
+        del mapping[option][next(k for k, one in enumerate(there) if _has([one], value))]
         if not mapping[option]:
             del mapping[option]
     else:
@@ -150,18 +198,18 @@ def toggle(mapping: Any, option: str, value: Any) -> None:
 
 
 def plain(value: Any) -> Any:
-    """A value without what ruamel.yaml adds, to be compared."""
+    """A value without what ruamel.yaml and numpy add, to be compared."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
-    return (
-        float(value)
-        if isinstance(value, float)
-        else int(value)
-        if type(value) is not bool and isinstance(value, int)
-        else value
-    )
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, (int, float)):
+        return float(value) if isinstance(value, float) else int(value)
+    return value
 
 
 def choose_site(tree: Any, number: int, choice: str, is_doubtful: bool) -> None:

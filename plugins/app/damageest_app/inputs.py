@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 
 from damageest import read_inputs
-from damageest.artefacts import Part, Scan
+from damageest.artefacts import Floats, Ints, Part, Scan
 from damageest.geometry.crops import crop_points
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.units import diagnose_scale, diagnose_size, unit_factor
 from damageest.job import Job, load
 from damageest.registry import Registry
 from damageest.stages.scan import ReadScan
+from damageest_app.scene import thin
+from damageest_app.shade import shade_points
 
 UNITS = ("mm", "in", "cm", "m", "um", "ft")
 """Units that are offered, the likeliest mistake first."""
@@ -26,12 +28,15 @@ UNITS = ("mm", "in", "cm", "m", "um", "ft")
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """``whole``: the scan as it was read; ``scan``: what crops leave of it. ``doubt``: why the unit is doubtful, empty
-    where it is not; ``offers``: for `part` and `scan`, the units that would remove the doubt."""
+    """``whole``: the scan as it was read; ``scan``: what crops leave of it; ``shown`` (M,): those of its points that
+    the browser draws, and ``shade`` (M,), how bright they are. ``doubt``: why the unit is doubtful, empty where it is
+    not; ``offers``: for `part` and `scan`, the units that would remove the doubt."""
 
     part: Part
     whole: Scan
     scan: Scan
+    shown: Ints
+    shade: Floats
     doubt: str
     offers: tuple[tuple[str, str], ...]
 
@@ -77,7 +82,9 @@ class Reader:
         assert isinstance(crops, ReadScan)
         scan = self._measure(crop_points(whole, crops.crop) if crops.crop else whole)
         doubt = diagnose_scale(whole.points, part.vertices, part.unit) or diagnose_size(part.vertices, part.unit) or ""
-        return Inputs(part, whole, scan, doubt, offer_units(part, whole) if doubt else ())
+        shown = thin(len(scan.points))
+        shade = shade_points(scan.points[shown], None if scan.normals is None else scan.normals[shown])
+        return Inputs(part, whole, scan, shown, shade, doubt, offer_units(part, whole) if doubt else ())
 
     def _measure(self, scan: Scan) -> Scan:
         if scan.noise or len(scan.points) < 10:

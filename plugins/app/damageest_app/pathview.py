@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,14 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Mesh
 
+COLUMNS = ("x", "y", "z", "i", "j", "k", "feed", "on", "layer")
+"""Those of the table that are played."""
+
 
 @dataclass(frozen=True, eq=False)
 class PathPlay:
-    """Points (N,3) of the tip with the tool axis (N,3); ``on``: whether metal flows on the way to each; ``layer`` and
-    ``minutes`` (N,), when each is reached."""
+    """Points (N,3) on the top of the bead with the tool axis (N,3); ``on``: whether metal flows on the way to each;
+    ``layer`` and ``minutes`` (N,), when each is reached."""
 
     points: Floats
     axes: Floats
@@ -26,15 +30,20 @@ class PathPlay:
 
     @classmethod
     def read(cls, path: Path) -> PathPlay:
-        """Reads the table that `export: {paths: csv}` writes."""
+        """Reads the table that `export: {paths: csv}` writes, in the part's frame: where the build direction is not z,
+        the table is in that of the set-up, and a file beside it has the transform."""
         with path.open(newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
-        table = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+        table = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
         points = np.column_stack([table[name] for name in "xyz"])
         way = np.linalg.norm(np.diff(points, axis=0), axis=1)
         feed = np.maximum(table["feed"][1:], 1e-9)
         minutes = np.concatenate([[0.0], np.cumsum(way / feed)])
         axes = np.column_stack([table[name] for name in "ijk"])
+        setup = path.with_name(f"{path.stem}.setup.json")
+        if setup.is_file():
+            back = np.linalg.inv(np.array(json.loads(setup.read_text())["transform"], float))
+            points, axes = points @ back[:3, :3].T + back[:3, 3], axes @ back[:3, :3].T
         return cls(points, axes, table["on"] > 0, table["layer"].astype(np.int64), minutes)
 
     def at(self, share: float) -> int:

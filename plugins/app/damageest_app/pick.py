@@ -11,7 +11,7 @@ from damageest.artefacts import Floats, Mesh
 from damageest.geometry.rays import RayCaster
 
 NEAR = 0.01
-"""Largest angle, in radians, between the ray and a scan point that it picks: a few pixels."""
+"""Largest angle, in radians, between a ray and what it picks: a few pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,17 +41,30 @@ class Ray:
 
 
 class MeshPicker:
-    """Finds where rays meet a mesh."""
+    """Finds where clicks meet a mesh."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._caster = RayCaster(mesh)
 
     def find(self, ray: Ray) -> tuple[Floats, int] | None:
-        """Place (3,) and triangle; None where the ray meets nothing."""
-        distance, face = self._caster.find_first(ray.origin[None], ray.direction[None])
-        if face[0] < 0:
+        """Place (3,) and triangle that a ray meets, or one a few pixels beside it, so that edges and corners can be
+        clicked; None where it meets nothing."""
+        ways = _surround(ray.direction)
+        distance, face = self._caster.find_first(np.tile(ray.origin, (len(ways), 1)), ways)
+        met = np.flatnonzero(face >= 0)
+        if not len(met):
             return None
-        return ray.origin + distance[0] * ray.direction, int(face[0])
+        return ray.origin + distance[met[0]] * ways[met[0]], int(face[met[0]])
+
+
+def _surround(direction: Floats) -> Floats:
+    """(25,3) unit directions: the one given, then rings about it of growing angle up to `NEAR`."""
+    side = np.cross(direction, np.eye(3)[int(np.abs(direction).argmin())])
+    side /= np.linalg.norm(side)
+    turn = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    ring = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(direction, side)
+    ways = np.concatenate([direction[None], *(direction + NEAR * share * ring for share in (1 / 3, 2 / 3, 1))])
+    return np.asarray(ways / np.linalg.norm(ways, axis=1, keepdims=True))
 
 
 def find_point(points: Floats, ray: Ray) -> int | None:

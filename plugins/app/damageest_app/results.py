@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from damageest.artefacts import Floats, Mesh
 from damageest.io.colours import colour_site
 from damageest.output.folder import OutputFolder, open_output
 
@@ -38,8 +40,17 @@ class Results:
             self._solids[key] = self.output.read_solid(kind, site)
         return self._solids[key]
 
-    def find_site(self, number: int) -> Json | None:
-        return next((site for site in self.content["sites"] if site["id"] == number), None)
+    @cached_property
+    def skin(self) -> tuple[Mesh, Floats] | None:
+        """The skin in cells, and the mean signed distance (F,) of the scan to each, NaN where there is none."""
+        path = self.output.place / "skin.ply"
+        if not path.is_file():
+            return None
+        import trimesh
+
+        mesh = self.output.read_mesh("skin.ply")
+        columns = trimesh.load(path, process=False).metadata["_ply_raw"]["face"]["data"]
+        return None if mesh is None else (mesh, np.asarray(columns["distance"], float).ravel())
 
     def list_sites(self, values: Json) -> list[dict[str, Any]]:
         """A row for each site; ``values``: the job, which says what a person has decided since."""
@@ -64,11 +75,10 @@ class Results:
                     "interval": format_interval(site["volume_95"]),
                     "depth": f"{site['max_depth']:.3g}",
                     "area": f"{site['surface_area']:.4g}",
-                    "accepted": bool(site["accepted"]),
                     "choice": choice,
                     "merged": ", ".join(map(str, merged[0])) if merged else "",
                     "reasons": [
-                        {"text": reason["text"], "remedy": reason.get("remedy") or "", "effect": reason["effect"]}
+                        {"text": reason["text"], "remedy": reason.get("remedy") or ""}
                         for reason in site["verdict"]["reasons"]
                     ],
                 }
@@ -89,10 +99,9 @@ class Results:
 
     def list_notes(self) -> list[dict[str, str]]:
         """What the run noted, and what failed."""
-        failed = [{"text": str(one), "remedy": "", "tone": "error"} for one in self.content["failures"]]
+        failed = [{"text": str(one), "remedy": ""} for one in self.content["failures"]]
         doubts = [
-            {"text": str(one["text"]), "remedy": str(one.get("remedy") or ""), "tone": "info"}
-            for one in self.content["warnings"]
+            {"text": str(one["text"]), "remedy": str(one.get("remedy") or "")} for one in self.content["warnings"]
         ]
         return failed + doubts
 

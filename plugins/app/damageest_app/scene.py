@@ -11,7 +11,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkPolyDataNormals, vtkQuadricDecimation
-from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow
+from vtkmodules.vtkRenderingCore import vtkActor, vtkLight, vtkPolyDataMapper, vtkRenderer, vtkRenderWindow
 
 from damageest.artefacts import Floats, Mesh
 
@@ -32,8 +32,12 @@ class Scene:
         self.window = vtkRenderWindow()
         self.window.SetOffScreenRendering(1)
         self.window.AddRenderer(self.renderer)
+        light = vtkLight()  # a view without layers and lights is not sent, and the browser would keep the last one
+        light.SetLightTypeToHeadlight()
+        self.renderer.AddLight(light)
         self.layers: dict[str, Any] = {}
         self.bounds: dict[str, Floats] = {}
+        self._retired: list[Any] = []
         self.set_dark(False)
 
     def set_dark(self, dark: bool) -> None:
@@ -44,18 +48,16 @@ class Scene:
         self.remove(name)
         if data is None or not data.GetNumberOfPoints():
             return
-        mapper = vtkPolyDataMapper()
+        mapper, actor = vtkPolyDataMapper(), vtkActor()
         mapper.SetInputData(data)
         mapper.SetScalarVisibility(data.GetPointData().GetScalars() is not None)
-        actor = vtkActor()
         actor.SetMapper(mapper)
         look = actor.GetProperty()
         look.SetColor(*to_rgb(colour))
         look.SetOpacity(opacity)
         look.SetPointSize(size)
         look.SetLineWidth(size)
-        if data.GetNumberOfPolys() == 0:
-            look.SetLighting(False)
+        look.SetLighting(data.GetNumberOfPolys() > 0)
         look.SetAmbient(0.2)
         look.SetDiffuse(0.8)
         look.SetSpecular(0.1)
@@ -64,15 +66,19 @@ class Scene:
         self.bounds[name] = np.array(data.GetBounds()).reshape(3, 2).T
 
     def remove(self, *names: str) -> None:
+        """Hides layers. Their actors stay, without data: the browser knows objects by their addresses, and would draw
+        a mixture where another one is made at the address of one that was freed."""
         for name in names:
             if actor := self.layers.pop(name, None):
                 self.renderer.RemoveActor(actor)
+                actor.GetMapper().SetInputData(vtkPolyData())
+                self._retired.append(actor)
                 self.bounds.pop(name)
 
     def clear(self) -> None:
         self.remove(*self.layers)
 
-    def frame(self, names: tuple[str, ...] = (), direction: Floats | None = None, near: float = 1.0) -> dict[str, Any]:
+    def frame(self, names: tuple[str, ...] = (), direction: Floats | None = None, near: float = 1.12) -> dict[str, Any]:
         """Puts the camera where it sees these layers, by default all; gives it as vtk.js takes it."""
         chosen = [self.bounds[name] for name in names if name in self.bounds] or list(self.bounds.values())
         if not chosen:
@@ -139,6 +145,13 @@ def make_mesh(mesh: Mesh | None, colours: Colours | None = None) -> Any:
     normals.ConsistencyOff()
     normals.Update()
     return normals.GetOutput()
+
+
+def lift(mesh: Mesh | None, amount: float) -> Mesh | None:
+    """The mesh a little larger, so that it is drawn over a surface that it shares with another one."""
+    if mesh is None or not len(mesh.faces):
+        return None
+    return Mesh(mesh.vertices + amount * mesh.vertex_normals, mesh.faces)
 
 
 def thin(count: int, most: int = MOST_POINTS) -> NDArray[np.int64]:

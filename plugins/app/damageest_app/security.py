@@ -26,11 +26,12 @@ def make_token() -> str:
 
 
 class Guard:
-    """Checks requests. ``port`` is set when the server knows its own."""
+    """Checks requests. ``port`` is set when the server knows its own; ``tabs``: how many pages are connected."""
 
     def __init__(self, token: str) -> None:
         self.token = token
         self.port = 0
+        self.tabs = 0
 
     @property
     def cookie(self) -> str:
@@ -62,11 +63,15 @@ class Guard:
             given = request.query.get("token") or request.cookies.get(self.cookie)
             if fault := self.find_fault(request.headers.get("Host", ""), request.headers.get("Origin"), given):
                 return web.Response(status=403, text=f"refused: {fault}\n")
+            is_tab = request.path == "/ws"
+            self.tabs += is_tab
             try:
                 response = await handler(request)
             except web.HTTPException as error:
                 self._protect(error.headers)
                 raise
+            finally:
+                self.tabs -= is_tab
             if not response.prepared:
                 self._protect(response.headers)
                 if "token" in request.query:

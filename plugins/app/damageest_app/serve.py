@@ -44,6 +44,8 @@ def serve(path: Path, port: int, browser: bool, idle: int) -> None:
         def protect(web: Any) -> None:
             web.app.middlewares.append(guard.middleware())
             web.app.add_routes(make_routes(folder, session.find_output, session.note_upload))
+            session.runs.hold = web.shutdown_cancel
+            session.runs.release = lambda: None if guard.tabs else web.shutdown_schedule()
 
         def announce(**_: Any) -> None:
             guard.port = server.port
@@ -62,7 +64,7 @@ def serve(path: Path, port: int, browser: bool, idle: int) -> None:
                 timeout=idle, exec_mode="main",
             )  # fmt: skip
         finally:
-            session.close()
+            session.runs.stop()
     finally:
         sys.argv = arguments
 

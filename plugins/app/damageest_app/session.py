@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,7 +18,7 @@ from damageest_app.inputs import Inputs, Reader
 from damageest_app.jobfile import ConflictError, Edit, JobFile
 from damageest_app.pick import MeshPicker, Ray
 from damageest_app.results import Results
-from damageest_app.runner import Outcome, Progress, Runner, describe_end
+from damageest_app.runs import Runs
 from damageest_app.scene import Scene
 
 T = TypeVar("T")
@@ -36,6 +38,12 @@ class Panel:
     def read(self, values: dict[str, Any]) -> None:
         """The job was opened or changed."""
 
+    def build(self) -> None:
+        """Makes its part of the page."""
+
+    def forget(self) -> None:
+        """Another job is opened: what was clicked for the last one, and is not in it, goes."""
+
     def draw(self, scene: Scene) -> None:
         """The step is shown, or what it shows has changed."""
 
@@ -45,6 +53,9 @@ class Panel:
     def result(self) -> None:
         """There are other results."""
 
+    def warm(self) -> None:
+        """Prepares what a click will need, in a thread of its own."""
+
 
 class Session:
     """One folder, in one or more tabs, which all show the same."""
@@ -53,22 +64,21 @@ class Session:
         self.server, self.state, self.ctrl = server, server.state, server.controller
         self.folder, self.registry = folder, registry
         self.reader = Reader(registry)
-        self.runner = Runner(self._tell_progress)
+        self.runs = Runs(self)
         self.scene = Scene()
         self.panels: dict[str, Panel] = {}
         self.job: JobFile | None = None
         self.inputs: Inputs | None = None
         self.results: Results | None = None
-        self.was_stopped = False
+        self._tasks: set[asyncio.Future[None]] = set()
         self._tools: tuple[Any, MeshPicker, Faces] | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
         self.state.update(
             {
                 "step": "open", "dark": False, "message": "", "tone": "info", "busy": "", "running": False,
                 "share": 0.0, "doing": "", "stages": [], "seconds": 0, "job_name": "", "job_text": "",
                 "can_undo": False, "can_redo": False, "show_job": False, "has_inputs": False, "has_result": False,
                 "stale": False, "legend": [], "folder": str(folder.path), "writable": folder.is_writable,
-                "summary": [], "notes": [], "press": [0, 0], "conflict": False, "unit": "mm", "hint": "",
+                "summary": [], "notes": [], "conflict": False, "unit": "mm", "hint": "",
             }
         )  # fmt: skip
 
@@ -92,6 +102,22 @@ class Session:
             with self.state:
                 self.state.busy = ""
         return None
+
+    def spawn(self, work: Coroutine[Any, Any, object]) -> None:
+        """Goes on with this beside what the page asks for next: what a tab sends is answered in turn, so that nothing
+        could be stopped or looked at while a handler waits for a run."""
+
+        async def guard() -> None:
+            try:
+                await work
+            except Exception as error:
+                self.say(f"unexpected {type(error).__name__}: {error}", "error")
+                traceback.print_exception(error)
+            self.state.flush()
+
+        task = asyncio.ensure_future(guard())
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     def redraw(self, frame: bool = False) -> None:
         """Fills the 3D view for the step that is shown; ``frame``: moves the camera to all of it."""
@@ -133,10 +159,13 @@ class Session:
             self.say(str(error), "error")
             return
         self.results, self.state.has_result = None, False
+        for panel in self.panels.values():
+            panel.forget()
         self.state.message, self.state.conflict = "", False
         self.load_results()
         self.refresh()
         await self.read_inputs(frame=True)
+        self.warm()
 
     async def read_inputs(self, frame: bool = False) -> None:
         """Reads part and scan as the job says now."""
@@ -208,8 +237,6 @@ class Session:
         for panel in self.panels.values():
             panel.read(values)
 
-    # the run
-
     def find_output(self) -> Path | None:
         """The output folder of the open job; None where it lies outside of the folder of the app."""
         if self.job is None:
@@ -223,17 +250,33 @@ class Session:
     def load_results(self) -> None:
         """Reads what the last run of the job has written, where it has."""
         output = self.find_output()
-        self.results = None
+        self.results, self.state.summary, self.state.notes = None, [], []
         if output is not None and (output / "result.json").is_file():
             try:
-                self.results = Results(output)
+                found = Results(output)
+                found.list_sites({})
+                self.state.summary, self.state.notes, self.results = found.summarise(), found.list_notes(), found
             except DamageestError as error:
                 self.say(str(error), "warning")
+            except (KeyError, TypeError, ValueError, IndexError) as error:
+                why = f"{type(error).__name__}: {error}"
+                self.say(f"the result in {output} is of another version ({why}); run the job again", "warning")
         self.state.has_result = self.results is not None
-        self.state.summary = self.results.summarise() if self.results else []
-        self.state.notes = self.results.list_notes() if self.results else []
-        for panel in self.panels.values():
-            panel.result()
+        for name, panel in self.panels.items():
+            try:
+                panel.result()
+            except (DamageestError, OSError, ValueError, KeyError, TypeError, IndexError) as error:
+                self.say(f"{name}: the result cannot be shown: {type(error).__name__}: {error}", "error")
+
+    def warm(self) -> None:
+        """Prepares what clicks will need, beside everything else."""
+        if self.results is not None:
+            asyncio.get_running_loop().run_in_executor(None, self._warm)
+
+    def _warm(self) -> None:
+        with suppress(DamageestError, OSError, ValueError):  # a click says what is wrong
+            for panel in self.panels.values():
+                panel.warm()
 
     def _is_stale(self) -> bool:
         """Whether the results are those of another job than the one that is open now."""
@@ -246,72 +289,7 @@ class Session:
             return True
         return bool(json.loads(json.dumps(values)) != (self.results.content.get("provenance") or {}).get("job"))
 
-    async def run(self, then: str = "judge") -> None:
-        """Runs the job as `damageest run` does, and shows step ``then`` when it is done."""
-        if self.job is None or self.runner.is_busy:
-            return
-        output = self.find_output()
-        if output is None:
-            self.say(f"the output of the job lies outside of {self.folder.path}; the app writes below it only", "error")
-            return
-        self._loop = asyncio.get_running_loop()
-        state, path = self.state, self.job.path
-        with state:
-            state.update({"running": True, "share": 0.0, "doing": "start of the program", "stages": [], "message": ""})
-        before = _read_stamp(output)
-        clock = asyncio.ensure_future(self._tick())
-        try:
-            outcome = await asyncio.to_thread(self.runner.call, ["run", str(path), "--quiet"], self.folder.path)
-        finally:
-            clock.cancel()
-        with state:
-            state.update({"running": False, "seconds": round(outcome.seconds, 1), "doing": self.runner.progress.doing})
-            self._show_end(outcome, _read_stamp(output) != before, then)
-
-    def _show_end(self, outcome: Outcome, is_new: bool, then: str) -> None:
-        text = describe_end(outcome, self.runner.progress.doing)
-        self.was_stopped = outcome.stopped
-        if is_new:
-            self.load_results()
-            self.refresh()
-            self.go(then)
-        if text:
-            self.say(text, "warning" if outcome.stopped or is_new else "error")
-
-    def stop(self) -> None:
-        self.runner.stop()
-
-    def close(self) -> None:
-        """The server ends: nothing goes on."""
-        self.runner.stop()
-
-    async def _tick(self) -> None:
-        while True:
-            await asyncio.sleep(0.5)
-            with self.state:
-                self.state.seconds = round(self.state.seconds + 0.5, 1) if self.state.share else 0.5
-                self.state.share = max(self.state.share, 0.01)
-
-    def _tell_progress(self, progress: Progress) -> None:
-        """Called from the thread that follows the run."""
-        if self._loop is not None:
-            self._loop.call_soon_threadsafe(self._show_progress, progress)
-
-    def _show_progress(self, progress: Progress) -> None:
-        with self.state:
-            self.state.doing = progress.doing
-            self.state.share = progress.share
-            self.state.stages = [dict(one) for one in progress.stages]
-
     def note_upload(self, name: str) -> None:
         with self.state:
             self.state.files = self.folder.list_files()
             self.say(f"{name} is in the folder now", "success")
-
-
-def _read_stamp(output: Path) -> int:
-    """When the result was written; 0 where there is none."""
-    try:
-        return (output / "result.json").stat().st_mtime_ns
-    except OSError:
-        return 0

@@ -107,3 +107,26 @@ def test_a_site_has_one_choice_at_most(choices: list[tuple[int, str, bool]]) -> 
     accepted = {number for number, (choice, doubtful) in last.items() if choice == "accept" and doubtful}
     assert set(tree.get("sites", {}).get("drop", [])) == dropped
     assert set(tree.get("accept", [])) == accepted
+
+
+def test_datums_keep_their_precedence_and_a_second_click_takes_a_face_away(job: JobFile) -> None:
+    def click(face: int, letter: str = "") -> Any:
+        assert job.edit(lambda tree: edits.toggle_datum(tree, face, letter), allow)
+        return job.values["align"].get("datum")
+
+    assert click(3) == [3]
+    assert click(5, "B") == {"A": [3], "B": [5]}
+    assert list(click(7, "C").items()) == [("A", [3]), ("B", [5]), ("C", [7])]
+    assert click(3, "B") == {"B": [5, 3], "C": [7]}  # a face belongs to one datum
+    assert click(7, "C") == {"B": [5, 3]}
+    assert click(9) == [5, 3, 9]
+    for face in (5, 3):
+        click(face)
+    assert click(9) is None
+
+
+def test_how_a_datum_is_fitted_stays(job: JobFile) -> None:
+    job.path.write_text(TEXT.replace("align: register", "align: {use: icp, datum: {A: {skin: [1], fit: one_sided}}}"))
+    job.reload()
+    assert job.edit(lambda tree: edits.toggle_datum(tree, 2, "A"), allow)
+    assert job.values["align"] == {"use": "icp", "datum": {"A": {"skin": [1, 2], "fit": "one_sided"}}}

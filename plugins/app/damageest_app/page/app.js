@@ -39,6 +39,7 @@ window.damageest_page = {
     };
     window.addEventListener("keydown", (event) => {
       if (/^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName) && event.target.type !== "range") return;
+      if (document.querySelector(".v-overlay--active")) return; // a list or a dialog has its own keys
       const command = event.ctrlKey || event.metaKey;
       let name = command ? { z: event.shiftKey ? "redo" : "undo", Z: "redo", y: "redo" }[event.key] : keys[event.key];
       if (!name || event.altKey) return;
@@ -46,6 +47,12 @@ window.damageest_page = {
       event.stopPropagation();
       window.trame.trigger("key", [name]);
     }, true);
+    // a fault of the server while it answered a click: without this, nothing would be seen of it
+    window.addEventListener("unhandledrejection", (event) => {
+      const why = event.reason || {};
+      const words = (why.data && why.data.exception) || why.message || String(why);
+      window.trame.trigger("refused", [`unexpected fault: ${words}. The job file is as the last change left it`]);
+    });
     window.addEventListener("dragover", (event) => event.preventDefault());
     window.addEventListener("drop", (event) => {
       event.preventDefault();

@@ -10,10 +10,16 @@ from trame.widgets import vuetify3 as v3
 
 from damageest.io.colours import PART, SURPLUS, UNSEEN, colour_site
 from damageest_app import edits
+from damageest_app.panels.marks import mark
 from damageest_app.pick import MeshPicker, Ray
-from damageest_app.scene import Scene, make_lines, make_mesh, make_points
+from damageest_app.scene import Scene, lift, make_lines, make_mesh, make_points
 from damageest_app.section import HEIGHT, WIDTH, Cutter, Drawing, Plane, choose_plane, draw, measure_depth, to_space
 from damageest_app.session import Panel, Session
+
+MOST_WARM = 20
+"""Sites whose section is prepared before a click asks for it."""
+STOPPED = [("click_stop", "click.stop")]
+"""A click on a button of a card is no click on the card."""
 
 
 class JudgePanel(Panel):
@@ -27,7 +33,7 @@ class JudgePanel(Panel):
         self._cutters: dict[tuple[str, int], Cutter] = {}
         self.state.update(
             {"sites": [], "site": 0, "section": "", "section_axis": "auto", "section_offset": 0.0, "section_depth": 1.0,
-             "layers": ["damage"], "merge_with": [], "hint_measure": "two clicks measure a distance"}
+             "layers": ["damage"], "hint_measure": "two clicks measure a distance"}
         )  # fmt: skip
         self.state.change("section_offset")(lambda **_: self._update_section())
         self.state.change("section_axis")(lambda **_: self._move_plane())
@@ -48,7 +54,7 @@ class JudgePanel(Panel):
                     ("unseen", "unseen"),
                     ("surplus", "surplus"),
                 ):
-                    v3.VBtn(text, value=value, size="x-small", raw_attrs=[f'data-test="layer-{value}"'])
+                    v3.VBtn(text, value=value, size="x-small", raw_attrs=mark(f"layer-{value}"))
             with html.Div(v_if=("notes.length",)):
                 html.Div("Notes of the run", classes="head")
                 with html.Div(v_for=("(one, k) in notes",), key=("k",), classes="fine mb-1"):
@@ -58,7 +64,7 @@ class JudgePanel(Panel):
     def _build_site(self) -> None:
         with v3.VCard(
             v_for=("one in sites",), key=("one.id",), variant=("site === one.id ? 'tonal' : 'outlined'",), classes="mb-2 pa-2",
-            click=(self.choose, "[one.id]"), tabindex=0, raw_attrs=['data-test="site"', '@keydown.enter="$event.currentTarget.click()"'],
+            click=(self.choose, "[one.id]"), raw_attrs=mark("site", 'tabindex="0"', '@keydown.enter="$event.currentTarget.click()"'),
         ):  # fmt: skip
             with html.Div(classes="d-flex align-center"):
                 html.Span(classes="site-dot", style=("{background: one.colour}",))
@@ -82,48 +88,48 @@ class JudgePanel(Panel):
                 with html.Div(classes="d-flex mt-2", style="gap: 6px"):
                     v3.VBtn(
                         "accept",
-                        size="x-small",
+                        size="small",
                         variant="tonal",
                         color="success",
-                        raw_attrs=['data-test="accept"'],
-                        click=(self.decide, "[one.id, 'accept']"),
+                        raw_attrs=mark("accept"),
+                        __events=STOPPED,
+                        click_stop=(self.decide, "[one.id, 'accept']"),
                     )
                     v3.VBtn(
                         "drop",
-                        size="x-small",
+                        size="small",
                         variant="tonal",
                         color="error",
-                        raw_attrs=['data-test="drop"'],
-                        click=(self.decide, "[one.id, 'drop']"),
+                        raw_attrs=mark("drop"),
+                        __events=STOPPED,
+                        click_stop=(self.decide, "[one.id, 'drop']"),
                     )
                     v3.VBtn(
                         "as the criterion says",
-                        size="x-small",
+                        size="small",
                         variant="text",
                         v_if=("one.choice",),
-                        click=(self.decide, "[one.id, '']"),
+                        __events=STOPPED,
+                        click_stop=(self.decide, "[one.id, '']"),
                     )
                     v3.VSelect(
                         items=("sites.filter(x => x.id !== one.id).map(x => x.id)",), label="merge with", v_if=("sites.length > 1",),
                         update_modelValue=(self.merge, "[one.id, $event]"), style="max-width: 130px",
+                        raw_attrs=mark("merge", '@click.stop=""'),
                     )  # fmt: skip
 
     def build_drawing(self) -> None:
         """The section, over the 3D view."""
         with v3.VSheet(classes="drawing", v_if=("step === 'judge' && section",), elevation=4):
-            html.Div(
-                v_html=("section",),
-                raw_attrs=['data-test="section"', '@click="(at => at && trigger(\'measure\', at))(utils.damageest.place($event))"'],
-            )  # fmt: skip
+            measure = "(at => at && trigger('measure', at))(utils.damageest.place($event))"
+            html.Div(v_html=("section",), raw_attrs=mark("section", f'@click="{measure}"'))
             with html.Div(classes="d-flex align-center"):
-                with v3.VBtnToggle(
-                    v_model=("section_axis",), mandatory=True, density="compact", divided=True, classes="mr-3"
-                ):
+                with v3.VBtnToggle(v_model=("section_axis",), mandatory=True, divided=True, classes="mr-3"):
                     for value in ("auto", "x", "y", "z"):
-                        v3.VBtn(value, value=value, size="x-small")
+                        v3.VBtn(value, value=value, size="x-small", style="min-width: 34px")
                 v3.VSlider(
                     v_model=("section_offset",), min=("-section_depth",), max=("section_depth",), step=("section_depth / 100",),
-                    hide_details=True, label="move", raw_attrs=['data-test="section-offset"'],
+                    hide_details=True, raw_attrs=mark("section-offset"),
                 )  # fmt: skip
             html.Div("{{ hint_measure }}", classes="fine")
         self.session.ctrl.trigger("measure")(self.measure)
@@ -236,23 +242,37 @@ class JudgePanel(Panel):
         self._cutters, self.plane, self.measured = {}, None, []
         self.state.site, self.state.section = 0, ""
 
+    def warm(self) -> None:
+        results = self.session.results
+        for number in results.output.site_numbers[:MOST_WARM] if results else ():
+            damage = results.read_solid("damage", number) if results else None
+            if results is None or damage is None:
+                continue
+            plane = choose_plane(damage, results.output.read_surface(number))
+            for name in ("part", "damage", "deposit"):
+                if cutter := self._find_cutter(name, number):
+                    cutter.cut(plane)
+            if results.output.scan is not None:
+                draw(plane, {}, results.output.scan.points, results.tolerance, results.unit, "#000000")
+
     def draw(self, scene: Scene) -> None:
         inputs, results = self.session.inputs, self.session.results
         if inputs is None or results is None:
             self.state.hint = "run the job first" if self.state.job_name else "open a job first"
             return
         layers = self.state.layers
-        scene.put("part", make_mesh(inputs.part), colour=PART, opacity=0.35)
+        body = results.read_solid("undamaged")
+        scene.put("part", make_mesh(body if body is not None else inputs.part), colour=PART, opacity=0.4)
+        over = 1e-3 * inputs.part.diagonal
         scan = results.output.scan
         if "points" in layers and scan is not None:
             scene.put("points", make_points(scan.points), colour="#5d6b78", size=1.5)
         if "damage" in layers:
             for number in results.output.site_numbers:
-                scene.put(
-                    f"damage {number}", make_mesh(results.read_solid("damage", number)), colour=colour_site(number)
-                )
+                solid = lift(results.read_solid("damage", number), over)
+                scene.put(f"damage {number}", make_mesh(solid), colour=colour_site(number))
         if "unseen" in layers:
-            scene.put("unseen", make_mesh(results.output.read_mesh("unseen.ply")), colour=UNSEEN)
+            scene.put("unseen", make_mesh(lift(results.output.read_mesh("unseen.ply"), over)), colour=UNSEEN)
         if "surplus" in layers:
             for one in results.content["surplus"]:
                 scene.put(f"surplus {one['id']}", make_mesh(results.read_solid("surplus", one["id"])), colour=SURPLUS)

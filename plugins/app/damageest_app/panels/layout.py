@@ -11,6 +11,7 @@ from trame.widgets import vuetify3 as v3
 
 from damageest_app.panels.align import AlignPanel
 from damageest_app.panels.judge import JudgePanel
+from damageest_app.panels.marks import mark
 from damageest_app.panels.open import OpenPanel
 from damageest_app.panels.prepare import PreparePanel
 from damageest_app.panels.repair import RepairPanel
@@ -44,7 +45,7 @@ def build(session: Session) -> None:
         _build_bar(session)
         with v3.VMain(style="height: 100vh"), html.Div(classes="shell"):
             _build_rail(session)
-            with html.Div(classes="side", v_show="true"):
+            with html.Div(classes="side"):
                 _build_messages(session)
                 for name in STEPS:
                     with html.Div(v_if=(f"step === '{name}'",)):
@@ -54,14 +55,16 @@ def build(session: Session) -> None:
 
 
 def _look() -> dict[str, Any]:
-    return {"defaults": {"global": {"density": "compact"}, "VTextField": {"variant": "outlined", "hideDetails": True},
-                         "VSelect": {"variant": "outlined", "hideDetails": True}}}  # fmt: skip
+    small = {"density": "compact", "hideDetails": True}
+    field = {**small, "variant": "outlined"}
+    kinds = {"VTextField": field, "VSelect": field, "VSlider": small, "VRangeSlider": small, "VSwitch": small}
+    return {"defaults": {**kinds, "VBtnToggle": {"density": "compact"}, "VRadioGroup": small}}
 
 
 def _build_bar(session: Session) -> None:
     with v3.VAppBar(density="compact", flat=True, border="b"):
         html.Div("damageest", classes="text-h6 ml-4 mr-4")
-        html.Div("{{ job_name || 'no job is open' }}", classes="text-body-2 mr-2", raw_attrs=['data-test="job-name"'])
+        html.Div("{{ job_name || 'no job is open' }}", classes="text-body-2 mr-2", raw_attrs=mark("job-name"))
         v3.VBtn(
             icon="mdi-file-code-outline",
             title="the job file (j)",
@@ -73,14 +76,14 @@ def _build_bar(session: Session) -> None:
             title="undo (Ctrl+Z)",
             click=session.step_back,
             disabled=("!can_undo || running",),
-            raw_attrs=['data-test="undo"'],
+            raw_attrs=mark("undo"),
         )
         v3.VBtn(
             icon="mdi-redo",
             title="redo (Ctrl+Y)",
             click=(session.step_back, "[true]"),
             disabled=("!can_redo || running",),
-            raw_attrs=['data-test="redo"'],
+            raw_attrs=mark("redo"),
         )
         v3.VChip(
             "the job was changed since this result",
@@ -105,29 +108,29 @@ def _build_bar(session: Session) -> None:
             color="error",
             variant="tonal",
             prepend_icon="mdi-stop",
-            click=session.stop,
-            raw_attrs=['data-test="stop"'],
+            click=session.runs.stop,
+            raw_attrs=mark("stop"),
         )
         v3.VBtn(
             "Run", v_if=("!running",), color="primary", variant="flat", prepend_icon="mdi-play", title="run the job (r)",
-            click=session.run, disabled=("!job_name || !!busy",), raw_attrs=['data-test="run"'],
+            click=session.runs.start, disabled=("!job_name || !!busy",), raw_attrs=mark("run"),
         )  # fmt: skip
         v3.VBtn(
             icon=("dark ? 'mdi-weather-sunny' : 'mdi-weather-night'",),
             title="dark or light",
             click="dark = !dark",
-            raw_attrs=['data-test="dark"'],
+            raw_attrs=mark("dark"),
         )
         v3.VBtn(icon="mdi-keyboard-outline", title="keys (?)", click="show_keys = true")
         v3.VProgressLinear(active=("!!busy",), indeterminate=True, absolute=True, location="bottom", color="primary")
 
 
 def _build_rail(session: Session) -> None:
-    with v3.VNavigationDrawer(permanent=True, width=150), v3.VList(density="compact", nav=True):
+    with v3.VNavigationDrawer(permanent=True, width=148), v3.VList(density="compact", nav=True):
         for name, icon in zip(STEPS, ICONS, strict=True):
             v3.VListItem(
                 title=name.capitalize(), prepend_icon=icon, active=(f"step === '{name}'",), color="primary",
-                click=(session.go, f"['{name}']"), raw_attrs=[f'data-test="step-{name}"'],
+                click=(session.go, f"['{name}']"), raw_attrs=mark(f"step-{name}"),
             )  # fmt: skip
 
 
@@ -135,16 +138,11 @@ def _build_messages(session: Session) -> None:
     html.Div("{{ busy }} …", v_if=("busy",), classes="fine mb-2")
     with v3.VAlert(
         v_if=("message",), type=("tone",), variant="tonal", density="compact", closable=True, classes="mb-3",
-        __events=[("close", "click:close")], close="message = ''", raw_attrs=['data-test="message"'],
+        __events=[("close", "click:close")], close="message = ''", raw_attrs=mark("message"),
     ):  # fmt: skip
         html.Div("{{ message }}", classes="words")
         v3.VBtn(
-            "Reload",
-            v_if=("conflict",),
-            size="small",
-            classes="mt-2",
-            click=session.reload,
-            raw_attrs=['data-test="reload"'],
+            "Reload", v_if=("conflict",), size="small", classes="mt-2", click=session.reload, raw_attrs=mark("reload")
         )
     html.Div(
         "This folder cannot be written to, so no job can be made or changed here. Change its rights, or start the app "
@@ -174,7 +172,7 @@ def _build_stage(session: Session, judge: JudgePanel) -> None:
 
 def _build_dialogs() -> None:
     with v3.VNavigationDrawer(v_model=("show_job",), location="right", temporary=True, width=520):
-        html.Div("{{ job_text }}", classes="yaml pa-4", raw_attrs=['data-test="job-text"'])
+        html.Div("{{ job_text }}", classes="yaml pa-4", raw_attrs=mark("job-text"))
     with (
         v3.VNavigationDrawer(v_model=("show_stages",), location="right", temporary=True, width=380),
         v3.VTable(density="compact"),
@@ -196,7 +194,7 @@ def _build_dialogs() -> None:
 
 
 def _bind(session: Session) -> None:
-    state, server, ctrl = session.state, session.server, session.ctrl
+    state, ctrl = session.state, session.ctrl
 
     def set_dark(dark: bool, **_: Any) -> None:
         session.scene.set_dark(dark)
@@ -215,9 +213,9 @@ def _bind(session: Session) -> None:
             session.go(name)
         elif name == "run":
             if not state.running:
-                await session.run()
+                session.runs.start()
         elif name == "stop":
-            session.stop()
+            session.runs.stop()
         elif name == "frame":
             session.push(session.scene.frame())
         elif name in ("undo", "redo"):
@@ -234,4 +232,3 @@ def _bind(session: Session) -> None:
     ctrl.trigger("refused")(lambda text: session.say(text, "error"))
     ctrl.on_server_ready.add(lambda **_: session.panels["open"].begin())  # type: ignore[attr-defined]
     ctrl.on_client_connected.add(lambda **_: session.panels["open"].look())  # type: ignore[attr-defined]
-    del server

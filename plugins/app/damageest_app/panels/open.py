@@ -9,14 +9,13 @@ import numpy as np
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
-from damageest.artefacts import Floats
 from damageest.io.colours import PART
 from damageest_app import edits
 from damageest_app.inputs import UNITS
-from damageest_app.scene import Scene, make_mesh, make_points
+from damageest_app.panels.marks import mark
+from damageest_app.panels.shown import place_beside, put_scan
+from damageest_app.scene import Scene, make_mesh
 from damageest_app.session import Panel, Session
-
-SCAN = "#d97a34"
 
 
 class OpenPanel(Panel):
@@ -50,7 +49,7 @@ class OpenPanel(Panel):
         html.Div("A job of this folder", classes="head", v_if=("files.jobs.length",))
         v3.VSelect(
             items=("files.jobs",), model_value=("job_name",), update_modelValue=(session.open_job, "[$event]"),
-            label="job", v_if=("files.jobs.length",), raw_attrs=['data-test="job"'],
+            label="job", v_if=("files.jobs.length",), raw_attrs=mark("job"),
         )  # fmt: skip
         html.Div("A new job", classes="head")
         v3.VSelect(
@@ -58,14 +57,14 @@ class OpenPanel(Panel):
             items=("files.parts",),
             label="part as designed (CAD)",
             classes="mb-3",
-            raw_attrs=['data-test="part"'],
+            raw_attrs=mark("part"),
         )
         v3.VSelect(
             v_model=("new_scan",),
             items=("files.scans",),
             label="scan of the damaged part",
             classes="mb-3",
-            raw_attrs=['data-test="scan"'],
+            raw_attrs=mark("scan"),
         )
         with html.Div(classes="d-flex align-center"):
             v3.VSelect(
@@ -80,26 +79,26 @@ class OpenPanel(Panel):
                 variant="tonal",
                 click=self.make_job,
                 disabled=("!new_part || !new_scan || !!busy || !writable",),
-                raw_attrs=['data-test="make"'],
+                raw_attrs=mark("make"),
             )
         html.Div("Or drop files on this page: they are copied to {{ folder }}.", classes="fine mt-3")
         with html.Div(v_if=("has_inputs",)):
             html.Div("Part", classes="head")
-            html.Div("{{ part_facts }}", classes="text-body-2", raw_attrs=['data-test="part-facts"'])
+            html.Div("{{ part_facts }}", classes="text-body-2", raw_attrs=mark("part-facts"))
             html.Div("Scan", classes="head")
-            html.Div("{{ scan_facts }}", classes="text-body-2", raw_attrs=['data-test="scan-facts"'])
+            html.Div("{{ scan_facts }}", classes="text-body-2", raw_attrs=mark("scan-facts"))
             with v3.VAlert(
                 v_if=("unit_doubt",),
                 type="warning",
                 variant="tonal",
                 density="compact",
                 classes="mt-3",
-                raw_attrs=['data-test="unit-doubt"'],
+                raw_attrs=mark("unit-doubt"),
             ):
                 html.Div("{{ unit_doubt }}", classes="words fine")
                 v3.VBtn(
                     "the {{ one.of }} is in {{ one.unit }}", v_for=("one in unit_offers",), key=("one.of + one.unit",),
-                    size="small", classes="mt-2 mr-2", click=(self.set_unit, "[one.of, one.unit]"), raw_attrs=['data-test="unit-offer"'],
+                    size="small", classes="mt-2 mr-2", click=(self.set_unit, "[one.of, one.unit]"), raw_attrs=mark("unit-offer"),
                 )  # fmt: skip
             v3.VSwitch(v_model=("apart",), label="side by side", color="primary", hide_details=True, classes="mt-2")
 
@@ -115,7 +114,7 @@ class OpenPanel(Panel):
             return
         name = folder.new_job(state.new_part)
         words = ["init", state.new_part, state.new_scan, "--job", name, "--units", state.new_unit]
-        outcome = await session.work("measuring part and scan", session.runner.call, words, folder.path)
+        outcome = await session.work("measuring part and scan", session.runs.runner.call, words, folder.path)
         if outcome is None:
             return
         if outcome.status or not (folder.path / name).is_file():
@@ -127,7 +126,8 @@ class OpenPanel(Panel):
             session.say(outcome.messages, "warning")
 
     async def set_unit(self, of: str, unit: str) -> None:
-        await self.session.apply(lambda tree: edits.set_unit(tree, of, unit), reads=True)
+        if await self.session.apply(lambda tree: edits.set_unit(tree, of, unit), reads=True):
+            self.session.say(f"the {of} is read in {unit}; the tolerance is auto again", "success")
         self.session.push(self.session.scene.frame())
 
     def read(self, values: dict[str, Any]) -> None:
@@ -143,17 +143,5 @@ class OpenPanel(Panel):
             self.state.hint = "pick a part and its scan" if not self.state.job_name else ""
             return
         scene.put("part", make_mesh(inputs.part), colour=PART, opacity=1.0 if self.state.apart else 0.45)
-        points = inputs.scan.points
-        if self.state.apart:
-            points = points + place_beside(inputs.part.bounds, points)
-        scene.put("scan", make_points(points), colour=SCAN, size=2.0)
-
-
-def place_beside(bounds: Floats, points: Floats) -> Floats:
-    """By how much (3,) the scan is moved, so that it is seen beside the part."""
-    if not len(points):
-        return np.zeros(3)
-    low, high = points.min(axis=0), points.max(axis=0)
-    gap = 0.15 * float(np.linalg.norm(bounds[1] - bounds[0]))
-    middle = bounds.mean(axis=0) - (low + high) / 2
-    return np.array([bounds[1][0] + gap - low[0], middle[1], middle[2]])
+        offset = place_beside(inputs.part.bounds, inputs.scan.points) if self.state.apart else np.zeros(3)
+        put_scan(scene, inputs, offset)

@@ -11,8 +11,11 @@ from trame.widgets import vuetify3 as v3
 from damageest.artefacts import Floats
 from damageest_app import edits
 from damageest_app.histogram import Histogram
-from damageest_app.panels.open import SCAN
-from damageest_app.scene import Scene, make_lines, make_points, thin
+from damageest_app.panels.cut import CutTool
+from damageest_app.panels.marks import mark
+from damageest_app.panels.shown import put_scan
+from damageest_app.pick import Ray
+from damageest_app.scene import Scene, make_lines, thin
 from damageest_app.session import Panel, Session
 
 AXES = "xyz"
@@ -24,6 +27,7 @@ class PreparePanel(Panel):
     def __init__(self, session: Session) -> None:
         super().__init__(session)
         self.histogram: Histogram | None = None
+        self.cut = CutTool(session)
         self.state.update(
             {"crops": [], "box": [[0.0, 1.0]] * 3, "extent": [[0.0, 1.0]] * 3, "box_step": 0.01, "tolerance": 0.0,
              "tolerance_auto": True, "tolerance_limits": [0.0, 1.0], "histogram": "", "intact_share": "",
@@ -34,7 +38,7 @@ class PreparePanel(Panel):
 
     def build(self) -> None:
         html.Div("The scan", classes="head")
-        html.Div("{{ scan_facts }}", classes="text-body-2")
+        html.Div("{{ scan_facts }}", classes="text-body-2", raw_attrs=mark("scan-facts"))
         html.Div("Crop", classes="head")
         with html.Div(classes="d-flex flex-wrap", style="gap: 8px"):
             v3.VBtn(
@@ -43,7 +47,7 @@ class PreparePanel(Panel):
                 variant="tonal",
                 click=(self.crop, "['piece']"),
                 disabled=("!has_inputs",),
-                raw_attrs=['data-test="crop-piece"'],
+                raw_attrs=mark("crop-piece"),
             )
             v3.VBtn(
                 "box …",
@@ -51,8 +55,17 @@ class PreparePanel(Panel):
                 variant="tonal",
                 click="show_box = !show_box",
                 disabled=("!has_inputs",),
-                raw_attrs=['data-test="box"'],
+                raw_attrs=mark("box"),
             )
+            v3.VBtn(
+                "plane …",
+                size="small",
+                variant="tonal",
+                click=self.cut.begin,
+                disabled=("!has_inputs",),
+                raw_attrs=mark("cut"),
+            )
+        self.cut.build()
         with html.Div(v_if=("show_box",), classes="mt-2"):
             for k, axis in enumerate(AXES):
                 v3.VRangeSlider(
@@ -66,7 +79,7 @@ class PreparePanel(Panel):
                     color="primary",
                     variant="tonal",
                     click=(self.crop, "['keep']"),
-                    raw_attrs=['data-test="crop-keep"'],
+                    raw_attrs=mark("crop-keep"),
                 )
                 v3.VBtn("drop the box", size="small", variant="tonal", click=(self.crop, "['drop']"))
                 v3.VBtn("below z of the box away", size="small", variant="tonal", click=(self.crop, "['above']"))
@@ -83,11 +96,11 @@ class PreparePanel(Panel):
             v3.VSlider(
                 v_model=("tolerance",), min=("tolerance_limits[0]",), max=("tolerance_limits[1]",),
                 step=("(tolerance_limits[1] - tolerance_limits[0]) / 400",), hide_details=True, end=self.set_tolerance,
-                raw_attrs=['data-test="tolerance"'],
+                raw_attrs=mark("tolerance"),
             )  # fmt: skip
             html.Div(
                 "λ = {{ Number(tolerance).toPrecision(3) }} {{ unit }}; {{ intact_share }} of the points are nearer",
-                raw_attrs=['data-test="share"'],
+                raw_attrs=mark("share"),
             )
             v3.VBtn("auto", size="small", variant="text", click=self.set_auto)
         html.Div("The histogram needs a pose: run the job once.", v_if=("!histogram",), classes="fine")
@@ -155,8 +168,15 @@ class PreparePanel(Panel):
         if self.session.inputs is None:
             self.state.hint = "open a job first"
             return
-        scene.put("scan", make_points(self.session.inputs.scan.points), colour=SCAN)
+        inputs = self.session.inputs
+        put_scan(scene, inputs, np.zeros(3), self.cut.find_removed(inputs.scan.points[inputs.shown]))
         self._put_box(scene)
+
+    def pick(self, ray: Ray) -> None:
+        self.cut.pick(ray)
+
+    def forget(self) -> None:
+        self.cut.forget()
 
     def _draw_box(self) -> None:
         if self.state.step == "prepare":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
+from damageest_app.panels.marks import mark
 from damageest_app.scene import Scene
 from damageest_app.session import Panel, Session
 
@@ -23,13 +24,13 @@ class SeveralPanel(Panel):
                 label="doubtful ones",
                 color="primary",
                 hide_details=True,
-                raw_attrs=['data-test="only-doubtful"'],
+                raw_attrs=mark("only-doubtful"),
             )
-            v3.VBtn("next", size="small", variant="tonal", click=self.open_next, raw_attrs=['data-test="next-job"'])
-            v3.VBtn("look again", size="small", variant="text", click=self.look)
+            v3.VBtn("next", size="small", variant="tonal", click=self.open_next, raw_attrs=mark("next-job"))
+            v3.VBtn("look again", size="small", variant="text", click=self.look, raw_attrs=mark("look"))
         with v3.VCard(
             v_for=("one in rows.filter(x => !only_doubtful || x.state === 'doubtful')",), key=("one.job",), classes="mb-2 pa-2",
-            variant=("one.job === job_name ? 'tonal' : 'outlined'",), click=(self.open_job, "[one.job]"), raw_attrs=['data-test="job-row"'],
+            variant=("one.job === job_name ? 'tonal' : 'outlined'",), click=(self.open_job, "[one.job]"), raw_attrs=mark("job-row"),
         ):  # fmt: skip
             with html.Div(classes="d-flex align-center"):
                 html.Span("{{ one.job }}", classes="font-weight-medium mr-2")
@@ -40,8 +41,8 @@ class SeveralPanel(Panel):
                 classes="fine",
             )
         v3.VBtn(
-            "run those that were not", size="small", color="primary", variant="tonal", click=self.run_all,
-            disabled=("running || !rows.some(x => x.state === 'not run')",), raw_attrs=['data-test="run-all"'],
+            "run those that were not", size="small", color="primary", variant="tonal", click=self.start_all,
+            disabled=("running || !rows.some(x => x.state === 'not run')",), raw_attrs=mark("run-all"),
         )  # fmt: skip
 
     def look(self) -> None:
@@ -62,6 +63,9 @@ class SeveralPanel(Panel):
         await self.session.open_job(names[(here + 1) % len(names)])
         self.session.redraw(frame=True)
 
+    def start_all(self) -> None:
+        self.session.spawn(self.run_all())
+
     async def run_all(self) -> None:
         """Runs the jobs without a result, one after the other; Stop ends the row of them."""
         session = self.session
@@ -69,8 +73,8 @@ class SeveralPanel(Panel):
         for row in list(self.state.rows):
             if row["state"] == "not run":
                 await session.open_job(row["job"])
-                await session.run(then="several")
-                if session.was_stopped:
+                await session.runs.run(then="several")
+                if session.runs.was_stopped:
                     break
         self.look()
 
@@ -79,5 +83,5 @@ class SeveralPanel(Panel):
             self.look()
 
     def draw(self, scene: Scene) -> None:
-        del scene
         self.look()
+        self.session.panels["judge"].draw(scene)  # the sites of the open job

@@ -1,0 +1,110 @@
+"""Sections through a part: contours as designed and as scanned, and what was measured on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from damageest.artefacts.arrays import Floats, Vector
+from damageest.artefacts.fields import MOST, Checked, Range, require_finite, require_shape
+
+SECTION_KINDS = ("blade", "round", "contour", "line", "none")
+"""What a section shows: an aerofoil; circles; any other outline; skin along a line; nothing of the part."""
+
+
+@dataclass(frozen=True)
+class SectionValue(Checked):
+    """One measured quantity. ``nominal`` and ``measured``: as designed and as scanned; None where there is none.
+    ``error``: standard uncertainty of ``measured``. ``unit``: "length" or "degrees". ``note``: why it was not measured,
+    or what is to be known of it."""
+
+    name: str
+    nominal: float | None
+    measured: float | None
+    error: float = 0.0
+    unit: str = "length"
+    note: str = ""
+    _ranges: ClassVar[dict[str, Range]] = {"error": (0.0, MOST)}
+
+    @property
+    def difference(self) -> float | None:
+        """Measured less nominal; None where one of them is not known."""
+        return None if self.nominal is None or self.measured is None else self.measured - self.nominal
+
+
+@dataclass(frozen=True, eq=False)
+class SectionContour(Checked):
+    """One outline in the plane of a section, closed unless it is a ``line``, in the plane's coordinates.
+
+    ``nominal`` (K,2): stations on the part as designed, counter-clockwise round metal. ``normals`` (K,2): outward unit
+    vectors there. ``distance`` (K,): how far the scan lies outside it, NaN where it has no points. ``error`` (K,):
+    standard uncertainty of that by the noise. ``counts`` (K,): points that it was measured from.
+    """
+
+    nominal: Floats
+    normals: Floats
+    distance: Floats
+    error: Floats
+    counts: Floats
+    _dtypes: ClassVar[dict[str, Any]] = dict.fromkeys(("nominal", "normals", "distance", "error", "counts"), np.float64)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_shape("nominal", self.nominal, "K", 2)
+        require_finite("nominal", self.nominal)
+        require_shape("normals", self.normals, len(self.nominal), 2)
+        for name in ("distance", "error", "counts"):
+            require_shape(name, getattr(self, name), len(self.nominal))
+
+    @property
+    def measured(self) -> Floats:
+        """(K,2) the places of the scan at the stations, NaN where it has no points."""
+        return np.asarray(self.nominal + self.distance[:, None] * self.normals)
+
+    @property
+    def lengths(self) -> Floats:
+        """(K,) how far along the outline each station is."""
+        steps = np.linalg.norm(np.diff(self.nominal, axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+@dataclass(frozen=True, eq=False)
+class Section(Checked):
+    """A section of part and scan.
+
+    ``origin`` (3,), in the part's frame, is the plane's zero; ``along``, ``out`` and ``across`` are unit vectors, the
+    first two its coordinates, the third its normal. ``kind``: one of `SECTION_KINDS`. ``group``: the number, from 1, of
+    the item of the job that asks for it. ``seen``: share of the outlines that the scan shows. ``slab``: scan points
+    within this distance of the plane were used, ``points`` of them. ``marks``: places in the plane to draw, by name.
+    ``notes``: what is to be known.
+    """
+
+    number: int
+    name: str
+    kind: str
+    origin: Vector
+    along: Vector
+    out: Vector
+    across: Vector
+    contours: tuple[SectionContour, ...] = ()
+    values: tuple[SectionValue, ...] = ()
+    group: int = 1
+    seen: float = 0.0
+    slab: float = 0.0
+    points: int = 0
+    marks: tuple[tuple[str, float, float], ...] = ()
+    notes: tuple[str, ...] = ()
+    _ranges: ClassVar[dict[str, Range]] = {"seen": (0.0, 1.0), "slab": (0.0, MOST), "points": (0, MOST)}
+
+    def value(self, name: str) -> SectionValue:
+        """The quantity of this name. Raises KeyError where it was not asked for."""
+        found = next((each for each in self.values if each.name == name), None)
+        if found is None:
+            raise KeyError(f"section {self.number} has no '{name}'; it has: {', '.join(v.name for v in self.values)}")
+        return found
+
+    def to_part(self, flat: Floats) -> Floats:
+        """Places (N,2) of the plane in the part's frame (N,3)."""
+        return np.asarray(np.array(self.origin) + flat @ np.array([self.along, self.out]))

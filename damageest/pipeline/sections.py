@@ -1,0 +1,35 @@
+"""The step that cuts the sections that a job asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import AdaptedPart, Mesh, Part, Reason, Scan, Section
+from damageest.checks.pose_error import PoseError
+from damageest.findings import Sensor
+from damageest.geometry.transforms import move_points
+from damageest.job.sections import SectionChoice
+from damageest.pipeline.state import Reasons
+from damageest.pipeline.steps import step
+from damageest.sections.measure import Scanned, measure_sections
+
+
+@step(gives=("sections", "warnings"))
+def cut_sections(
+    asked_sections: tuple[SectionChoice, ...], part: Part, aligned: Scan, adapted: AdaptedPart | None,
+    pose_error: PoseError, sensor: Sensor, tolerance: float, unit: str,
+) -> tuple[tuple[Section, ...], Reasons]:  # fmt: skip
+    """Measures sections against the part as designed, also where it was adapted: bow and twist are what the field of
+    an adapted part follows."""
+    if not asked_sections:
+        return (), ()
+    points, designed = aligned.points, Mesh(part.vertices, part.faces)
+    if adapted is not None:
+        points = move_points(points, np.asarray(np.linalg.inv(adapted.motion), np.float64))
+        designed = Mesh(part.vertices - adapted.displacement, part.faces)
+    scanned = Scanned(
+        points, aligned.spacing, sensor.noise or aligned.noise, sensor.correlated, sensor.alike, pose_error, unit
+    )
+    sections = measure_sections(asked_sections, designed, scanned, tolerance, part.tessellation_error)
+    notes = [Reason("section", f"section {one.number}, {one.name}: {note}") for one in sections for note in one.notes]
+    return sections, tuple(notes)

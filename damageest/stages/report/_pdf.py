@@ -1,0 +1,395 @@
+"""The report as a PDF to be signed: one page of summary, the sections, a page for each site."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from reportlab.lib.pagesizes import A4
+from reportlab.lib.units import mm
+from reportlab.lib.utils import ImageReader
+from reportlab.platypus import BaseDocTemplate, Frame, KeepTogether, PageBreak, PageTemplate, Spacer, Table
+
+from damageest.artefacts import Mesh, Section
+from damageest.findings import Interval
+from damageest.geometry.rays import RayCaster
+from damageest.geometry.views import View
+from damageest.io import colours
+from damageest.io.section_files import lay_out
+from damageest.result import Result, Site
+from damageest.rules.notes import fold_notes
+from damageest.stages.report._drawing import draw
+from damageest.stages.report._pdf_parts import (
+    FOOT,
+    HEAD,
+    LEVELS,
+    LINE,
+    MARGIN,
+    SOFT,
+    WIDTH,
+    Pages,
+    Plot,
+    clean,
+    grid_table,
+    head,
+    pair_table,
+    picture,
+    register_fonts,
+    style,
+    write,
+)
+from damageest.stages.report._section import lay_out_site
+from damageest.stages.report._sections import choose_decimals
+from damageest.stages.report._sites import Remains, Shown
+from damageest.stages.report._thin import thin_mesh
+from damageest.stages.report._words import Words
+
+MOST_ROWS = 12
+"""Sites in the summary; all have a page."""
+MOST_NOTES = 6
+"""Notes of a run in the summary."""
+TRIANGLES = 60_000
+"""Triangles of the picture of the whole part."""
+N_ = str
+"""Marks texts that are translated where they are shown."""
+QUANTITIES = (
+    N_("chord"), N_("leading edge"), N_("trailing edge"), N_("thickness"), N_("twist"), N_("bow"),
+    N_("bow from straight"), N_("lean"), N_("form"), N_("deepest"), N_("highest"), N_("line profile"), N_("diameter"),
+    N_("off centre"), N_("run-out"), N_("roundness"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Letterhead:
+    """Who makes the report: the name of the company, and a file with its logo."""
+
+    company: str = ""
+    logo: Path | None = None
+
+
+@dataclass(frozen=True)
+class _Book:
+    """What every part of the document needs."""
+
+    result: Result
+    content: Mapping[str, Any]
+    job_text: str
+    words: Words
+    letterhead: Letterhead
+
+    @property
+    def unit(self) -> str:
+        return self.result.units
+
+    def interval(self, interval: Interval | None, unit: str) -> str:
+        if interval is None:
+            return self.words.tell("none: the scan does not support one")
+        low, high = interval
+        if not math.isfinite(high):
+            return self.words.tell("at least {low} {unit}", low=self.words.number(low), unit=unit)
+        return f"{self.words.number(low)} … {self.words.number(high)} {unit}"
+
+
+def write_pdf(
+    path: Path, result: Result, content: Mapping[str, Any], job_text: str, sites: Sequence[Shown], remains: Remains,
+    direction: Any, letterhead: Letterhead, language: str,
+) -> None:  # fmt: skip
+    """Writes the PDF. The same result gives the same bytes: there is no date but those that are signed.
+
+    ``content``: that of result.json; ``job_text``: that of job.yaml; ``sites``: as the page shows them; ``direction``
+    (3,): from which the part is looked at. Raises OSError where the logo cannot be read.
+    """
+    register_fonts()
+    book = _Book(result, content, job_text, Words(language), letterhead)
+    story: list[Any] = [*_summarise(book, _draw_part(result, remains, direction))]
+    if result.sections:
+        story += [PageBreak(), *_show_sections(book)]
+    for site, shown in zip(result.sites, sites, strict=True):
+        story += [PageBreak(), *_show_site(book, site, shown)]
+    numbered = book.words.tell("page {page} of {pages}")
+    canvas = type("NumberedPages", (Pages,), {"number_text": numbered})
+    document = BaseDocTemplate(
+        str(path), pagesize=A4, leftMargin=MARGIN, rightMargin=MARGIN, topMargin=HEAD, bottomMargin=FOOT,
+        title=f"{book.words.tell('Damage report')}: {result.name}", author=letterhead.company or "damageest",
+        creator=f"damageest {content['versions']['damageest']}", invariant=1,
+    )  # fmt: skip
+    frame = Frame(MARGIN, FOOT, WIDTH, A4[1] - HEAD - FOOT, 0, 0, 0, 0)
+    document.addPageTemplates(PageTemplate("page", [frame], onPage=lambda pen, _: _draw_head(pen, book)))
+    document.build(story, canvasmaker=canvas)
+
+
+def _draw_head(pen: Any, book: _Book) -> None:
+    """Company, logo and title at the head of a page, the job at its foot."""
+    top = A4[1] - 10 * mm
+    pen.saveState()
+    left = MARGIN
+    if book.letterhead.logo is not None:
+        image = ImageReader(BytesIO(book.letterhead.logo.read_bytes()))
+        width, height = image.getSize()
+        scale = min(12 * mm / height, 50 * mm / width)
+        pen.drawImage(image, MARGIN, top - scale * height + 2 * mm, scale * width, scale * height, mask="auto")
+        left += scale * width + 4 * mm
+    pen.setFont("VeraBd", 10)
+    pen.drawString(left, top - 6 * mm, clean_line(book.letterhead.company))
+    pen.setFont("Vera", 9)
+    pen.setFillColor(SOFT)
+    pen.drawRightString(A4[0] - MARGIN, top - 6 * mm, clean_line(book.words.tell("Damage report")))
+    pen.setStrokeColor(LINE)
+    pen.line(MARGIN, top - 11 * mm, A4[0] - MARGIN, top - 11 * mm)
+    pen.setFont("Vera", 7)
+    pen.drawString(
+        MARGIN, 10 * mm, clean_line(f"{book.result.name}  ·  damageest {book.content['versions']['damageest']}")
+    )
+    pen.restoreState()
+
+
+def clean_line(text: str) -> str:
+    """A text on one line for a canvas, which takes no markup."""
+    from xml.sax.saxutils import unescape
+
+    return unescape(clean(" ".join(text.split())))[:90]
+
+
+def _summarise(book: _Book, image: bytes) -> list[Any]:
+    result, content, tell, number = book.result, book.content, book.words.tell, book.words.number
+    cubic = f"{book.unit}³"
+    levels = [site.verdict.level for site in result.sites]
+    tone = "doubtful" if result.failures or "doubtful" in levels else "likely" if "likely" in levels else "proven"
+    facts = [
+        (tell("part"), Path(content["part"]["path"]).name or tell("given as arrays")),
+        (tell("scan"), _name_scans(book)),
+        (tell("damage volume"), f"{number(result.damage_volume)} {cubic}"),
+        (tell("95 % interval"), book.interval(result.volume_95, cubic)),
+        (tell("tolerance"), f"{number(result.tolerance, 3)} {book.unit}"),
+    ]
+    if result.coverage is not None:
+        facts.append((tell("skin seen"), book.words.share(result.coverage.seen)))
+    facts += _describe_pose(book)
+    left = pair_table(facts, 0.56 * WIDTH, 0.36)
+    both = Table([[left, picture(image, 0.42 * WIDTH)]], [0.57 * WIDTH, 0.43 * WIDTH])
+    both.setStyle([("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)])
+    story = [
+        write(result.name, 15, True, spaceAfter=3),
+        write(_say_verdict(book), 10, True, LEVELS[tone], spaceAfter=5),
+        both,
+    ]
+    if result.sites:
+        story += [head(tell("Sites")), _list_sites(book)]
+    notes = [*result.failures, *map(str, fold_notes(result.warnings))]
+    if notes:
+        story.append(head(tell("Notes")))
+        story += [write(f"– {note}", 7.5) for note in notes[:MOST_NOTES]]
+        if len(notes) > MOST_NOTES:
+            story.append(write(tell("{number} more are in result.json", number=len(notes) - MOST_NOTES), 7.5))
+    story += [head(tell("Inputs and program")), _trace(book), KeepTogether([Spacer(1, 8), _make_signatures(book)])]
+    return story
+
+
+def _say_verdict(book: _Book) -> str:
+    result, words = book.result, book.words
+    if not result.sites:
+        if result.failures:
+            return words.tell("Incomplete: no damage volume was found")
+        depth = f"{words.number(result.tolerance, 3)} {book.unit}"
+        return words.tell("No damage deeper than the tolerance of {depth} was found", depth=depth)
+    levels = [site.verdict.level for site in result.sites]
+    names = {"proven": words.tell("proven"), "likely": words.tell("likely"), "doubtful": words.tell("doubtful")}
+    parts = [f"{levels.count(level)} {name}" for level, name in names.items() if level in levels]
+    text = f"{words.count('{number} site', '{number} sites', len(levels))}: {', '.join(parts)}"
+    out = sum(not site.accepted for site in result.sites)
+    if out:
+        text += "; " + words.tell("{out} not part of the damage volume", out=out)
+    if result.failures:
+        text += "; " + words.tell("incomplete: {failed} failed", failed=len(result.failures))
+    return text
+
+
+def _name_scans(book: _Book) -> str:
+    names = [Path(path).name for path in book.content["scan"]["paths"]]
+    text = ", ".join(names[:3]) + (f" + {len(names) - 3}" if len(names) > 3 else "")
+    return f"{text or book.words.tell('given as array')}, {book.content['scan']['points']} {book.words.tell('points')}"
+
+
+def _describe_pose(book: _Book) -> list[tuple[str, str]]:
+    pose, tell, number = book.result.pose, book.words.tell, book.words.number
+    if pose.datums:
+        rows = [
+            (tell("datum {name}", name=datum.name),
+             f"{datum.kind}" + (f", {tell('faces')} {', '.join(map(str, datum.faces))}" if datum.faces else "")
+             + f"; rms {number(datum.rms, 2)} {book.unit}")
+            for datum in pose.datums
+        ]  # fmt: skip
+    elif count := _count_datums(book.job_text):
+        text = book.words.count("{number} selection of the skin", "{number} selections of the skin", count)
+        rows = [(tell("datums"), f"{text}; rms {number(pose.rms, 2)} {book.unit}")]
+    else:
+        rows = [(tell("datums"), tell("none: fitted to the skin, rms {rms} {unit}",
+                                      rms=number(pose.rms, 2), unit=book.unit))]  # fmt: skip
+    return rows + [(tell("not fixed"), motion.text) for motion in (*pose.free, *pose.left)]
+
+
+def _count_datums(job_text: str) -> int:
+    """How many selections of skin the job fits the pose to."""
+    from ruamel.yaml import YAML
+
+    align = YAML(typ="safe").load(job_text).get("align") or {}
+    return len(align.get("datum") or ()) if isinstance(align, Mapping) else 0
+
+
+def _list_sites(book: _Book) -> Table:
+    tell, number, unit = book.words.tell, book.words.number, book.unit
+    rows = [[tell("site"), f"{tell('volume')}, {unit}³", tell("95 % interval"), f"{tell('depth')}, {unit}",
+             tell("verdict")]]  # fmt: skip
+    for site in book.result.sites[:MOST_ROWS]:
+        verdict = tell(site.verdict.level) + ("" if site.accepted else f" ({tell('not in the sum')})")
+        rows.append([str(site.id), number(site.damage.volume), book.interval(site.volume_95, f"{unit}³"),
+                     number(site.max_depth, 3), verdict])  # fmt: skip
+    if len(book.result.sites) > MOST_ROWS:
+        rows.append([f"+ {len(book.result.sites) - MOST_ROWS}", "", "", "", ""])
+    return grid_table(rows, [0.1 * WIDTH, 0.2 * WIDTH, 0.34 * WIDTH, 0.14 * WIDTH, 0.22 * WIDTH], 8)
+
+
+def _trace(book: _Book) -> Table:
+    """Digests of the inputs, versions, and the implementation of each stage."""
+    from damageest.io.files import file_sha256
+
+    content, tell = book.content, book.words.tell
+    rows = [(tell("part"), f"SHA-256 {content['part']['sha256'] or '–'}")]
+    for path in book.result.scan.paths[:3]:
+        known = file_sha256(Path(path)) if Path(path).is_file() else "–"
+        rows.append((f"{tell('scan')} {Path(path).name}", f"SHA-256 {known}"))
+    versions = ", ".join(f"{name} {version}" for name, version in content["versions"].items())
+    stages = dict.fromkeys((record.stage, record.use) for record in book.result.stages)
+    rows.append((tell("job"), f"SHA-256 {sha256(book.job_text.encode()).hexdigest()}"))
+    rows += [(tell("versions"), versions), (tell("stages"), ", ".join(f"{stage}: {use}" for stage, use in stages))]
+    return pair_table(rows, WIDTH, 0.22, 6.5)
+
+
+def _make_signatures(book: _Book) -> Table:
+    tell = book.words.tell
+    names = [tell("measured by"), tell("checked by"), tell("released by")]
+    label = style(7, colour=SOFT)
+    cells = [[write(name, 8, True) for name in names], ["", "", ""],
+             [write(tell("name, date, signature"), 7, colour=SOFT)] * 3]  # fmt: skip
+    table = Table(cells, [WIDTH / 3] * 3, [5 * mm, 13 * mm, 1.5 * label.leading])
+    table.setStyle(
+        [("LINEBELOW", (k, 1), (k, 1), 0.6, SOFT) for k in range(3)] + [("BOX", (0, 0), (-1, -1), 0.4, LINE)]
+    )
+    return table
+
+
+def _show_sections(book: _Book) -> list[Any]:
+    result, words = book.result, book.words
+    story: list[Any] = [head(words.tell("Sections"))]
+    story.append(write(words.tell(
+        "Lengths in {unit}. Measured value; below it, its difference from nominal, ± twice its standard uncertainty.",
+        unit=book.unit), 7.5, colour=SOFT, spaceAfter=3))  # fmt: skip
+    decimals = choose_decimals(result.tolerance)
+    groups: dict[tuple[int, tuple[str, ...]], list[Section]] = {}
+    for section in result.sections:
+        groups.setdefault((section.group, tuple(value.name for value in section.values)), []).append(section)
+    for (_, names), sections in groups.items():
+        for start in range(0, len(sections), 5):
+            story += [_tabulate(book, names, sections[start : start + 5], decimals), Spacer(1, 4)]
+        notes = [f"{one.name}: {note}" for one in sections for note in one.notes]
+        told = dict.fromkeys(v.note for one in sections for v in one.values if v.note and v.measured is None)
+        story += [write(f"– {note}", 7) for note in (*notes, *told)]
+    plots = []
+    for section in result.sections:
+        if section.contours:
+            drawing = lay_out(section, result.tolerance, book.unit)
+            text = words.tell("deviations x {times}", times=f"{drawing.times:g}")
+            plots.append(
+                [write(f"{section.number}: {section.name}", 7.5, True), Plot(drawing, 0.49 * WIDTH, clean_line(text))]
+            )
+    legend = (
+        "blue: below, green: within, red: above the tolerance (dashed); dotted: no scan points; deviations enlarged"
+    )
+    if plots:
+        story.append(write(words.tell(legend), 7, colour=SOFT, spaceBefore=2, spaceAfter=2))
+    for start in range(0, len(plots), 2):
+        row = [*plots[start : start + 2], ""][:2]
+        table = Table([row], [0.5 * WIDTH] * 2)
+        table.setStyle([("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)])
+        story.append(table)
+    return story
+
+
+def _tabulate(book: _Book, names: tuple[str, ...], sections: list[Section], decimals: int) -> Table:
+    """Quantities in rows, sections in columns."""
+    words = book.words
+    rows = [["", *(f"{one.number}: {one.name}" for one in sections)]]
+    rows.append([words.tell("seen"), *(words.share(one.seen) if one.contours else "–" for one in sections)])
+    for k, name in enumerate(names):
+        bore, _, rest = name.partition(" ") if name.startswith("bore ") else ("", "", name)
+        if bore:
+            count, _, rest = rest.partition(" ")
+            bore = f"{words.tell('bore')} {count} "
+        line = [bore + words.tell(rest)]
+        for one in sections:
+            value = one.values[k]
+            if value.measured is None:
+                line.append("–")
+                continue
+            text = words.fixed(value.measured, decimals) + ("°" if value.unit == "degrees" else "")
+            more = words.fixed(value.measured - value.nominal, decimals, plus=True) if value.nominal else ""
+            more += f" ± {words.fixed(2 * value.error, decimals)}" if value.error else ""
+            line.append(f"{text}\n{more}" if more else text)
+        rows.append(line)
+    each = min(0.8 / max(len(sections), 1), 0.25) * WIDTH
+    return grid_table(rows, [0.2 * WIDTH, *([each] * len(sections))], 7)
+
+
+def _show_site(book: _Book, site: Site, shown: Shown) -> list[Any]:
+    tell, number, unit = book.words.tell, book.words.number, book.unit
+    rows = [
+        (tell("verdict"), tell(site.verdict.level) + ("" if site.accepted else f" ({tell('not in the sum')})")),
+        (tell("volume"), f"{number(site.damage.volume)} {unit}³"),
+        (tell("95 % interval"), book.interval(site.volume_95, f"{unit}³")),
+        (tell("depth"), f"{number(site.max_depth, 3)} {unit}"),
+        (tell("depth, 95 % interval"), book.interval(site.depth_95, unit)),
+        (tell("centre"), "(" + "; ".join(number(x) for x in site.centroid) + f") {unit}"),
+        (tell("inner area"), f"{number(float(np.linalg.norm(site.surface.cross, axis=1).sum() / 2))} {unit}²"),
+        (tell("scan points"), str(len(site.points))),
+        (tell("method"), site.method),
+    ]
+    if shown.faces:
+        rows.append((tell("CAD faces"), shown.faces))
+    if site.deposit is not None:
+        rows.append((tell("deposit"), f"{number(site.deposit.volume)} {unit}³"))
+    left = pair_table(rows, 0.55 * WIDTH, 0.38)
+    right = picture(shown.picture, 0.42 * WIDTH) if shown.picture else ""
+    both = Table([[left, right]], [0.57 * WIDTH, 0.43 * WIDTH])
+    both.setStyle([("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)])
+    story = [write(tell("Site {number}", number=site.id), 14, True, LEVELS[site.verdict.level], spaceAfter=4), both]
+    drawing = lay_out_site(result=book.result, site=site)
+    if drawing is not None:
+        legend = tell("section through the deepest point; grey: part as designed, red: damage, green: scan points")
+        story += [head(tell("Section")), Plot(drawing, 0.8 * WIDTH, clean_line(legend))]
+    story.append(head(tell("Reasons")))
+    reasons = shown.reasons or [tell("Nothing in the scan speaks against it.")]
+    story += [write(f"– {text}", 8) for text in reasons]
+    return story
+
+
+def _draw_part(result: Result, remains: Remains, direction: Any) -> bytes:
+    """What is left of the part, with the inner surfaces of the sites in colour."""
+    body = result.undamaged if result.undamaged is not None else result.part
+    up = np.eye(3)[2] if abs(direction[2]) < 0.9 else np.eye(3)[1]
+    way = np.asarray(direction, float) / np.linalg.norm(direction)
+    up = up - (up @ way) * way
+    view = View(result.part.bounds.mean(axis=0), 0.5 * result.part.diagonal, way, up / np.linalg.norm(up))
+    rays = remains.without_accepted(body)[1]
+    layers: list[tuple[RayCaster, Mesh, str]] = [(rays, body, "#c3ccd2")]
+    for site in result.sites:
+        if len(site.surface.faces):
+            small = thin_mesh(site.surface, TRIANGLES)  # a little nearer, so that the part does not hide it
+            small = Mesh(small.vertices + 2e-3 * result.part.diagonal * way, small.faces)
+            layers.append((RayCaster(small), small, colours.colour_site(site.id)))
+    return draw(view, layers, (420, 340), True)

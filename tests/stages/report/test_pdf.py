@@ -1,0 +1,77 @@
+"""The PDF of the report: what is on its pages, in which language, and that the same job gives the same bytes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from babel.messages import pofile
+
+import damageest
+from damageest.errors import JobError
+from damageest.job import load
+from damageest.registry import Registry
+from damageest.stages.report._words import FOLDER, Words, list_languages
+from tests import damaged_box
+
+pypdfium2 = pytest.importorskip("pypdfium2")
+pytest.importorskip("reportlab")
+
+REPORT = "report: {{use: html, pdf: yes, company: Müller & Söhne, language: {}}}\nsections: [{{y: 0}}]\n"
+SOURCES = (Path(damageest.__file__).parent / "stages/report").glob("_pdf*.py")
+
+
+def run(folder: Path, language: str) -> list[str]:
+    """The text of each page. Only the first run computes the result."""
+    job = damaged_box.write(folder, damaged_box.JOB.replace("report: none\n", REPORT.format(language)), 4000)
+    damageest.run(job, output=folder / "out")
+    document = pypdfium2.PdfDocument(folder / "out/report.pdf")
+    return [page.get_textpage().get_text_range() for page in document]
+
+
+def test_the_pdf_has_a_summary_sections_and_a_page_for_each_site(tmp_path: Path) -> None:
+    summary, sections, site = run(tmp_path, "en")
+    for text in (
+        "Müller & Söhne",
+        "1 site: 1",
+        "damage volume",
+        "95 % interval",
+        "SHA-256",
+        "released by",
+        "page 1 of 3",
+    ):
+        assert text in summary, text
+    assert "line profile" in sections
+    assert "Site 1" in site
+    first = (tmp_path / "out/report.pdf").read_bytes()
+    german = run(tmp_path, "de")
+    assert "Schadensbericht" in german[0]
+    assert "Seite 1 von 3" in german[0]
+    assert re.search(r"Toleranz\s+0,20+ mm", german[0])
+    run(tmp_path, "en")
+    assert (tmp_path / "out/report.pdf").read_bytes() == first
+
+
+def test_every_text_of_the_pdf_is_in_each_catalogue() -> None:
+    texts = set()
+    for path in SOURCES:
+        source = path.read_text()
+        texts |= set(re.findall(r'(?:tell|N_)\(\s*"((?:[^"\\]|\\.)*)"', source))
+        texts |= set(re.findall(r'count\(\s*"([^"]*)"', source))
+    assert len(texts) > 50
+    for language in list_languages()[1:]:
+        with (FOLDER / language / "LC_MESSAGES/damageest.po").open("rb") as file:
+            catalogue = pofile.read_po(file)
+        known = {m.id if isinstance(m.id, str) else m.id[0]: m.string for m in catalogue if m.id}
+        assert not texts - set(known)
+        words = Words(language)
+        for text, told in known.items():  # the compiled catalogue is that of the text file
+            if isinstance(told, str):
+                assert words.tell(text) == told
+
+
+def test_a_language_without_a_catalogue_is_a_fault_of_the_job(tmp_path: Path) -> None:
+    job = damaged_box.write_small(tmp_path)
+    with pytest.raises(JobError, match="no catalogue of the language 'fr'; there are: en, de"):
+        load(job, Registry.discover(), ["report.use=html", "report.language=fr"])
