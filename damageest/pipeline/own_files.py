@@ -15,7 +15,7 @@ from damageest.io.files import read_json
 
 _OURS = re.compile(
     r"result\.json|report\.(html|pdf)|job\.yaml|adapt\.npz|sections/(sections\.csv|section-\d+\.(csv|svg))|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|((scan|nominal)_frame/)?"
-    r"(path/site-\d+\.(csv|apt|ngc)|(scan|skin|unseen)\.ply|(doubtful/)?result\.3mf|(damage|undamaged|((doubtful/)?(damage|surface)|doubtful|deposit|"
+    r"(path/site-\d+\.(csv|apt|ngc)|(scan|skin|unseen)\.ply|(doubtful/)?result\.3mf|(damage|undamaged|((doubtful/)?(damage|surface)|doubtful|deposit|milled|"
     r"surplus)/site-\d+)\.(stl|ply|step))"
 )
 """What a run writes, by its path in the output folder. Other files are the user's and stay, unless the
