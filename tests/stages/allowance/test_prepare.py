@@ -39,11 +39,11 @@ def measure_area(body: Any, height: float) -> float:
 def test_an_undercut_is_removed_and_nothing_else() -> None:
     ball = Manifold.sphere(6, 128).translate((0, 0, -4))
     lost, cavity, made = prepare(ball, wall_angle=0)
-    assert (lost - cavity).volume() < 1e-6
+    assert (lost - cavity).volume() < 1e-5 * lost.volume()
     # straight up from the widest place, 4 below the top
     for height in (-3.0, -1.0, -0.2):
-        assert measure_area(cavity, height) == pytest.approx(np.pi * 36, rel=0.05)
-    assert measure_area(cavity, -8.0) == pytest.approx(measure_area(lost, -8.0), rel=0.05)
+        assert measure_area(cavity, height) == pytest.approx(np.pi * 36, rel=0.08)  # a cell of the grid
+    assert measure_area(cavity, -8.0) == pytest.approx(measure_area(lost, -8.0), rel=0.08)
     assert made.milled is not None
     assert made.milled.volume == pytest.approx(cavity.volume() - lost.volume(), rel=1e-6)
     assert made.cut_back_volume == pytest.approx(made.milled.volume)
@@ -63,7 +63,7 @@ def test_a_crack_becomes_as_wide_as_the_cutter() -> None:
     lost, cavity, _ = prepare(crack, min_radius=2.0, wall_angle=0)
     wide = cavity.slice(-3.0).bounds()
     assert wide[3] - wide[1] == pytest.approx(4.4, abs=0.6)
-    assert (lost - cavity).volume() < 1e-6
+    assert (lost - cavity).volume() < 1e-5 * lost.volume()
 
 
 def test_depth_is_added_below() -> None:
