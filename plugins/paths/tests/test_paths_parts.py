@@ -79,7 +79,7 @@ def test_travel_keeps_clear_of_layers_that_stand() -> None:
     later, _ = measure_way(Obstacles([mesh], low, high, 2.0, [3]), passes)
     assert later[:, 2].max() == 1.0
     down, _ = measure_way(None, passes, stays=True)
-    assert not len(down)
+    assert down[:, 2].max() == 0.0
     over, gap = measure_way(Obstacles([mesh], low, high, 2.0, [1]), passes, stays=True)
     assert over[:, 2].max() > 8 - 2 + 0.25
     assert gap >= 0.25

@@ -45,9 +45,9 @@ def test_an_undercut_is_removed_and_nothing_else() -> None:
         assert measure_area(cavity, height) == pytest.approx(np.pi * 36, rel=0.08)  # a cell of the grid
     assert measure_area(cavity, -8.0) == pytest.approx(measure_area(lost, -8.0), rel=0.08)
     assert made.milled is not None
-    assert made.milled.volume == pytest.approx(cavity.volume() - lost.volume(), rel=1e-6)
-    assert made.cut_back_volume == pytest.approx(made.milled.volume)
-    assert made.volume == pytest.approx(cavity.volume(), rel=1e-6)
+    assert made.milled.volume == pytest.approx(cavity.volume() - lost.volume(), rel=1e-3)
+    assert made.cut_back_volume == pytest.approx(made.milled.volume, rel=1e-3)
+    assert made.volume == pytest.approx(cavity.volume(), rel=1e-4)
 
 
 @pytest.mark.parametrize("angle", [15.0, 40.0])
