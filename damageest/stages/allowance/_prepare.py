@@ -78,7 +78,8 @@ def open_cavity(damage: Solid, part: Part, others: Solid | None, prepare: Prepar
     top = float(high[2]) + tolerance / 4
     floor = np.minimum(floor, top)
     if np.isfinite(slope):
-        floor = ndimage.grey_erosion(floor, structure=-_draw_cone(deep / slope, cell, slope), mode="nearest")
+        cone: Any = -_draw_cone(deep / slope, cell, slope)
+        floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
     if prepare.min_radius > 0:
         floor = _widen(floor, prepare.min_radius, cell, SHALLOW * cell)
     room = _raise_column(floor, corner, cell, top).simplify(tolerance / 8)
@@ -108,7 +109,7 @@ def _find_direction(damage: Solid, part: Part, prepare: Prepare) -> Floats:
             "the skin of the damage faces no direction from which it could be opened, as where it goes through",
             "give prepare.direction",
         )
-    return normalise(total[None])[0]
+    return np.asarray(normalise(total[None])[0])
 
 
 def _lower_floor(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float) -> Floats:

@@ -70,7 +70,7 @@ def measure_shaded(path: DepositPath, metal: Solid, step: float) -> float:
     radius = path.width / 2
     heights = np.linspace(0.1 * radius, path.standoff, HEIGHTS)
     middle = points[:, None] + heights[:, None] * axes[:, None]
-    shaded = is_inside(middle.reshape(-1, 3), metal).reshape(-1, HEIGHTS).any(axis=1)
+    shaded = np.asarray(is_inside(middle.reshape(-1, 3), metal).reshape(-1, HEIGHTS).any(axis=1))
     open_ = np.flatnonzero(~shaded)
     turns = np.array([make_frame(axis, np.zeros(3)).turn[:2] for axis in axes]).reshape(-1, 2, 3)
     angles = 2 * np.pi * np.arange(AROUND) / AROUND
