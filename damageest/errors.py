@@ -19,6 +19,7 @@ EXTRAS = {
     "pye57": "e57",
     "k3d": "report",
     "PIL": "report",
+    "reportlab": "pdf",
     "distributed": "batch",
     "dask": "batch",
 }

@@ -35,10 +35,10 @@ from damageest.io.conversions import as_manifold, as_trimesh
 class Site:
     """One damage: ``damage`` (DV) and ``surface`` (IDS) in the part's frame; ``deposit`` None where it is the DV.
 
-    After a cut-back, DV and IDS are those of the enlarged cavity. ``refused``: the stage `allowance` failed, and what
-    to deposit is not known. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into
-    the scan; ``max_depth``: the farthest of them below the nominal surface. ``accepted``: whether the site is part of
-    `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
+    After a cut-back alone, DV and IDS are those of the enlarged cavity. ``refused``: the stage `allowance` failed, and
+    what to deposit is not known. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices
+    into the scan; ``max_depth``: the farthest of them below the nominal surface. ``accepted``: whether the site is part
+    of `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
     unit of each motion of `Pose.free`. ``enclosures``: the closed surfaces that cut the DV out of the part; none where
     the DV is an enlarged cavity or a whole body of the part. ``path``: the passes that build up the deposit; None where
     the job asks for none, or none could be planned.

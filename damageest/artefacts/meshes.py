@@ -123,14 +123,17 @@ class Deposit(Solid):
     """What is to be deposited for one damage, including stock to be milled off.
 
     ``cavity`` is the damage volume (DV) enlarged by the cut-back into intact metal, None without a cut-back;
-    ``cut_back_volume`` the volume that this removes in addition. ``stock_volume``: what is above the nominal surface;
-    ``thickness``: its least, mean and largest height over the skin where stock was asked for, None where none was;
-    ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`, empty where the part has
-    none. ``heights``: of the damage's CAD faces by number, how high the job wants the stock on it, -1 where that is not
-    the same all over it; ``overlap``: how far the stock covers the intact skin. ``notes`` are warnings.
+    ``cut_back_volume`` the volume that this removes in addition. ``milled``: where the cavity was opened (`prepare`),
+    the intact metal to be milled off before deposition, cut-back included: the DV then stays as it is.
+    ``stock_volume``: what is above the nominal surface; ``thickness``: its least, mean and largest height over the skin
+    where stock was asked for, None where none was; ``touched``: the numbers of the CAD faces that stock stands on, as
+    in `Part.faces_brep`, empty where the part has none. ``heights``: of the damage's CAD faces by number, how high the
+    job wants the stock on it, -1 where that is not the same all over it; ``overlap``: how far the stock covers the
+    intact skin. ``notes`` are warnings.
     """
 
     cavity: Solid | None = None
+    milled: Solid | None = None
     stock_volume: float = 0.0
     cut_back_volume: float = 0.0
     thickness: tuple[float, float, float] | None = None

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Flags, Floats, Part, Scan
+from damageest.artefacts import INTACT, OUTLIER, Deviation, Flags, Floats, Part, Scan
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_faced_cubes
 
@@ -88,6 +88,7 @@ def measure_pose_error(
     form: float = 0.0,
     spread: Floats | None = None,
     held: bool = False,
+    fixing: Flags | None = None,
 ) -> PoseError:
     """The error that the intact points leave to the pose.
 
@@ -96,6 +97,7 @@ def measure_pose_error(
         form: standard deviation by which the skin is known to deviate; the measured one where it is larger.
         spread: (6,K) errors of a pose that was fitted to datums, as in `Pose`: not all of the skin fixes it.
         held: whether the pose was given: no error of the scan moves it.
+        fixing: (N,) which points lie on the datums that fix the pose; None: all of the skin does.
 
     No direction of the pose is taken to be worse than the tolerance: a larger error would show as damage. Turning a
     part of revolution about its axis changes no volume, though no point fixes it.
@@ -122,13 +124,14 @@ def measure_pose_error(
         weights = np.minimum(1, limit / np.maximum(np.abs(left), 1e-300))
     area = _measure_area_alike(left, places, systematic, edge)
     systematic = max(systematic, form)
-    answers: Floats = np.zeros((2, 6))
-    if not held:
-        trust = weights / (variance + systematic**2)
-        weighted = (rows * trust[:, None]).T
-        # the distance of a patch grows by 1 with the offset, and by its height over the centre with the scale
-        heights = np.stack([np.ones(len(rows)), height])
-        answers = np.asarray(np.linalg.solve(weighted @ rows + prior, weighted @ heights.T).T @ scale)
+    if held:
+        answers: Floats = np.zeros((2, 6))
+    elif fixing is None:
+        answers = _find_answers(rows, height, weights / (variance + systematic**2), prior) @ scale
+    else:
+        kept = Deviation(deviation.distance, deviation.face, np.where(fixing, deviation.label, OUTLIER))
+        _, _, own_rows, own_height, own_count = _average_patches(part, aligned, kept, centre, edge)
+        answers = _find_answers(own_rows @ scale, own_height, own_count / max(aligned.noise, 1e-9) ** 2, prior) @ scale
     information = (rows / (variance + systematic**2)[:, None]).T @ rows + prior
     covariance = np.linalg.inv(information)
     values, vectors = np.linalg.eigh(covariance)
@@ -138,6 +141,14 @@ def measure_pose_error(
     if spread is not None:
         errors = np.column_stack([errors, spread])
     return PoseError(centre, errors, systematic, area, *answers)
+
+
+def _find_answers(rows: Floats, height: Floats, trust: Floats, prior: Floats) -> Floats:
+    """The motions (2,6) that a fit with weights ``trust`` (P,) finds where each patch lies outside by 1, as by an
+    offset, and by its ``height`` (P,) over the centre, as by a scale."""
+    weighted = (rows * trust[:, None]).T
+    asked = np.stack([np.ones(len(rows)), height], axis=1)
+    return np.asarray(np.linalg.solve(weighted @ rows + prior, weighted @ asked).T)
 
 
 def _make_rows(places: Floats, normals: Floats) -> Floats:

@@ -65,10 +65,11 @@ class SiteError:
     ``inside`` (where points do not bound it), ``beside``, ``fading``: by how much the loss may be larger; ``less``: by
     how much it may be smaller, since the inner surface was closed across what was not seen. ``depth``: of the damage
     volume, corrected for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free
-    motions. ``measured``: the largest depth of a scan point, with what its noise, the pose and the skin may be off.
-    ``probing_form``, ``scanner`` (T,): by the certificate and the temperature, signed, by the terms of `ScannerErrors`;
-    ``depth_scanner`` (T,): the same of the depth, and ``depth_by``: the other causes of ``depth_error``, by name.
-    ``exposed``: the area that is moved against the skin by what deviates; ``curved``: that of skin made of chords.
+    motions. ``measured``: the largest depth of a scan point, with what its noise, its distance to the deepest place,
+    the pose and the skin may be off. ``probing_form``, ``scanner`` (T,): by the certificate and the temperature,
+    signed, by the terms of `ScannerErrors`; ``depth_scanner`` (T,): the same of the depth, and ``depth_by``: the other
+    causes of ``depth_error``, by name. ``exposed``: the area that is moved against the skin by what deviates;
+    ``curved``: that of skin made of chords.
     """
 
     volume: float
@@ -156,7 +157,8 @@ def measure_site_error(
     }
     told = float((shares.depth**2).sum())
     beside = sum(depth_by[name] ** 2 for name in depth_by if name not in ("spacing", "noise")) + told
-    by_point = float(np.sqrt(aligned.noise**2 + beside))
+    # the deepest place lies between the points: in a corner of the inner surface none may be as deep
+    by_point = float(np.sqrt(aligned.noise**2 + depth_by["spacing"] ** 2 + beside))
     return SiteError(
         volume=damage.volume,
         noise=surface.noise,

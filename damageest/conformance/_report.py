@@ -86,7 +86,13 @@ def describe(result: Any) -> dict[str, Any]:
             "verdict": {"level": site.verdict.level, "reasons": [vars(reason) for reason in site.verdict.reasons]},
             "accepted": site.accepted,
             "deposit": None,
-            "files": {"damage": f"damage/site-{site.id}.stl", "surface": None, "deposit": None, "every": []},
+            "files": {
+                "damage": f"damage/site-{site.id}.stl",
+                "surface": None,
+                "deposit": None,
+                "milled": None,
+                "every": [],
+            },
             "warnings": [vars(reason) for reason in site.warnings],
         }
         for site in result.sites

@@ -12,6 +12,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 from damageest.artefacts import Floats, Ints, Part
 from damageest.errors import StageError, suggest
 from damageest.geometry.cutting import cut_triangles
+from damageest.geometry.distance import closest_on_mesh
+from damageest.geometry.smooth_faces import label_smooth_faces
 from damageest.options import Options
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
@@ -21,6 +23,10 @@ Plane = tuple[Floats, float]
 
 ON_PLANE = 1e-7
 """Distance from a plane, in diagonals of the part, up to which a corner lies on it."""
+PICKED = 0.02
+"""Distance from the skin, in diagonals of the part, up to which a point is picked on it."""
+SMOOTH = 0.87
+"""Cosine of the angle between neighbouring triangles of one face, where the part is a mesh."""
 MAX_LISTED = 12
 """Largest number of valid names that an error lists."""
 
@@ -89,6 +95,11 @@ class Selector(StrictMapping):
     faces: tuple[int | str, ...] = Field(
         (), description="numbers or names of CAD faces, as listed by `damageest faces`"
     )
+    at: Vector | None = Field(
+        None,
+        description="a point picked on the skin, in part coordinates, in the job's unit: the CAD face nearest to it; "
+        "of a mesh, the smooth face around it",
+    )
     kind: Literal["plane", "cylinder", "other"] | None = Field(None, description="kind of the CAD face's surface")
 
     @model_validator(mode="after")
@@ -132,6 +143,8 @@ class Selector(StrictMapping):
             selected &= normals @ direction >= np.cos(np.radians(self.facing.angle)) - 1e-12
         if self.faces:
             selected &= np.isin(_require_brep(part, "faces")[parents], [find_face(part, face) for face in self.faces])
+        if self.at is not None:
+            selected &= _find_picked(part, self.at)[parents]
         if self.kind is not None:
             numbers = _require_brep(part, "kind")
             kinds = np.array([kind if kind in ("plane", "cylinder") else "other" for kind in part.face_kinds])
@@ -154,6 +167,18 @@ class Selector(StrictMapping):
             vertices, faces, kept, _ = cut_triangles(vertices, faces, np.where(near, 0.0, value))
             parents = parents[kept]
         return bool(self.matches(vertices[faces].mean(axis=1), part.face_normals[parents], parents, part).any())
+
+
+def _find_picked(part: Part, at: Vector) -> Mask:
+    """(F,) which triangles lie on the face that a point is picked on. Raises StageError for a point far from all."""
+    distance, face, _ = closest_on_mesh(np.array([at]), part)
+    if abs(distance[0]) > PICKED * part.diagonal:
+        raise StageError(
+            f"the point {', '.join(f'{x:g}' for x in at)} is {abs(distance[0]):.3g} {part.unit} from the part's skin",
+            "pick a point on the skin, in the part's frame",
+        )
+    number = label_smooth_faces(part.faces, part.face_normals, SMOOTH) if part.faces_brep is None else part.faces_brep
+    return np.asarray(number == number[face[0]])
 
 
 def _require_brep(part: Part, option: str) -> Ints:

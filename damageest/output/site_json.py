@@ -39,6 +39,7 @@ class FilesReport(JsonModel):
     damage: str | None
     surface: str | None
     deposit: str | None
+    milled: str | None = Field(description="intact metal to be milled off before deposition; null without `prepare`")
     every: list[str] = Field(description="all files of this site alone")
 
 
@@ -92,7 +93,9 @@ class ThicknessReport(JsonModel):
 class DepositReport(JsonModel):
     volume: float = Field(description="of what is to be deposited")
     stock_volume: float = Field(description="of its share beyond the nominal surface, to be milled off")
-    cut_back_volume: float = Field(description="of intact metal to be removed before, for a clean surface")
+    cut_back_volume: float = Field(
+        description="of intact metal to be removed before, for a clean surface or an open cavity"
+    )
     thickness: ThicknessReport | None = Field(description="of the stock; null where none was asked for or measured")
     faces: list[int] = Field(description="numbers of the CAD faces that stock stands on; empty without B-rep")
 
@@ -143,8 +146,10 @@ def index_files(files: Iterable[str]) -> dict[str, list[str]]:
 
 def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str]]) -> SiteReport:
     """``files``: as `index_files` gives them."""
-    kinds = ("damage", "surface", "deposit")
-    folders = dict(zip(kinds, kinds if site.accepted else ("doubtful", "doubtful/surface", "deposit"), strict=True))
+    kinds = ("damage", "surface", "deposit", "milled")
+    folders = {kind: kind for kind in kinds}
+    if not site.accepted:
+        folders |= {"damage": "doubtful", "surface": "doubtful/surface"}
     own = {kind: files.get(f"{folder}/site-{site.id}", []) for kind, folder in folders.items()}
     return SiteReport.read(
         site,

@@ -86,7 +86,7 @@ def _describe_site(found: FoundSite, part: Part, deviation: Deviation) -> Site:
     warnings = make_notes("enclose", found.notes)
     deposit, damage = found.deposit, found.damage
     if isinstance(deposit, Deposit):
-        damage = deposit.cavity or damage
+        damage = damage if deposit.milled is not None else deposit.cavity or damage
         warnings += make_notes("allowance", deposit.notes)
     path = found.path
     if path is not None:

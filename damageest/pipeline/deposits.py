@@ -77,6 +77,7 @@ def _subtract_earlier(deposit: Deposit, earlier: FoundSite, damage: Solid, toler
     if cavity is not None:
         cavity = _shorten(cavity, taken, origin)
         cut_back = max(cavity.volume - damage.volume, 0.0)
+    milled = deposit.milled if deposit.milled is None else to_solid(to_manifold(deposit.milled, origin) - taken, origin)
     if left is None:
         return deposit
     notes = deposit.notes
@@ -90,6 +91,7 @@ def _subtract_earlier(deposit: Deposit, earlier: FoundSite, damage: Solid, toler
         vertices=left.vertices,
         faces=left.faces,
         cavity=cavity,
+        milled=milled,
         stock_volume=max(left.volume - (cavity or damage).volume, 0.0),
         cut_back_volume=cut_back,
         notes=notes,

@@ -15,12 +15,12 @@ from damageest.io.files import read_json
 
 _OURS = re.compile(
     r"result\.json|report\.(html|pdf)|job\.yaml|adapt\.npz|sections/(sections\.csv|section-\d+\.(csv|svg))|truth/(damage\.(stl|ply)|pose\.json)|stages/.*|((scan|nominal)_frame/)?"
-    r"(path/site-\d+\.(csv|apt|ngc)|(scan|skin|unseen)\.ply|(doubtful/)?result\.3mf|(damage|undamaged|((doubtful/)?(damage|surface)|doubtful|deposit|"
+    r"(path/site-\d+\.(csv|apt|ngc)|(scan|skin|unseen)\.ply|(doubtful/)?result\.3mf|(damage|undamaged|((doubtful/)?(damage|surface)|doubtful|deposit|milled|"
     r"surplus)/site-\d+)\.(stl|ply|step))"
 )
 """What a run writes, by its path in the output folder. Other files are the user's and stay, unless the
 old result.json lists them, as those that a plugin wrote in another format."""
-FOLDERS = ("stages", "damage", "surface", "deposit", "path", "surplus", "doubtful", "truth",
+FOLDERS = ("stages", "damage", "surface", "deposit", "milled", "path", "surplus", "doubtful", "truth",
            "sections",
            "scan_frame", "nominal_frame")  # fmt: skip
 FILES = ("result.json", "report.html", "report.pdf", "job.yaml", "adapt.npz", "scan.ply", "skin.ply", "unseen.ply",

@@ -12,6 +12,7 @@ from damageest.pipeline.adapt import adapt_part
 from damageest.pipeline.alignment import align_scan
 from damageest.pipeline.collect import collect_result
 from damageest.pipeline.coverage import describe_coverage, inspect_skin
+from damageest.pipeline.datums import hold_datums, note_datums
 from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
@@ -87,9 +88,12 @@ ACQUIRE: Route = (
     ),
     correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner, warnings
     #     -> views, pose, aligned, noise, spacing, tolerance, warnings
+    hold_datums,  # calls Align: views, pose, aligned, scan, part, tolerance, aligner, warnings, unit, samples
+    #     -> pose, aligned, warnings
     correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader -> scan, pose, aligned, corrected_scale
     adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, refusal, samples, tolerance, unit, views, warnings,
     #     adapter, scan -> adapted, part, aligned, pose, samples, asked_fit, warnings
+    note_datums,  # adapted, aligner, part, tolerance, unit -> +warnings
     settle_tolerance,  # tolerance, asked_tolerance, part, aligned, noise -> tolerance, +warnings
     Segment,  # aligned, part, samples, tolerance -> deviation
     check_intact,  # deviation, tolerance, part, segmenter ->

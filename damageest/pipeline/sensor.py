@@ -13,6 +13,7 @@ from damageest.checks.sensor import NEEDED, describe_sensor, measure_levels, mea
 from damageest.checks.two_sheets import Sheets, measure_sheets, measure_two_sheets
 from damageest.findings import Explained, Sensor
 from damageest.job.model import Accept
+from damageest.pipeline.datums import choose_on_datums
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.pipeline.uncertainty import limit_doubtful
@@ -41,7 +42,11 @@ def measure_sensor(
     depth_step: float, tolerance: float, pose: Pose, aligner: Align | None,
 ) -> tuple[PoseError, Sensor]:  # fmt: skip
     """Measures noise and systematic errors of the intact skin, and what they hide."""
-    error = measure_pose_error(part, aligned, deviation, tolerance, spread=pose.spread, held=is_given(aligner))
+    feet = aligned.points - deviation.distance[:, None] * part.face_normals[deviation.face]
+    error = measure_pose_error(
+        part, aligned, deviation, tolerance, spread=pose.spread, held=is_given(aligner),
+        fixing=choose_on_datums(aligner, part, feet, deviation.face),
+    )  # fmt: skip
     levels = measure_levels(part, aligned, deviation)
     stray = (deviation.label == OUTLIER) | ((deviation.label == DAMAGE) & (sites.label == 0))
     share = (int(stray.sum()) - explained.points) / max(len(stray), 1)

@@ -20,6 +20,7 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.adapt.auto import AutoAdapt
     from damageest.stages.adapt.none import NoAdapt as NoAdapt
     from damageest.stages.adapt.smooth import Smooth
+    from damageest.stages.align.constrained import Constrained
     from damageest.stages.align.icp import Icp
     from damageest.stages.align.none import KnownPose
     from damageest.stages.align.points import Points
@@ -56,7 +57,7 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.segment.mesh_distance import MeshDistance
 
     return [
-        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, KnownPose, Points, NoAdapt, Smooth,
+        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Constrained, KnownPose, Points, NoAdapt, Smooth,
         AutoAdapt, MeshDistance, Dbscan, PyVista, LargestLoop, AllLoops, Offset, BoundingBox, Capsule,
         CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
         NoRepair, Manifold, NoAllowance, Milling, NoPath, Files, Uniform, CloudDistance, SignedDistance,

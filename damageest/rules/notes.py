@@ -26,6 +26,7 @@ RUN_CODES: dict[str, RunCode] = {
     "displaced_piece": RunCode("what lies outside may be a displaced piece of the part", 0, "displaced pieces"),
     "model_fit": RunCode("the part as designed does not explain the intact skin: bent, scaled, wavy, views apart", 0),
     "align": RunCode("what the stage align says about the pose: symmetry, free motions, doubts", 0),
+    "datum_moved": RunCode("the pose that datums gave was moved: by an adapted part, or by corrected views", 0),
     "unit": RunCode("the unit of part or scan is doubtful, by the size or by what a file says", 0),
     "thin_walls": RunCode("the tolerance is more than half the thickness of walls: no damage can be found there", 0),
     "tolerance_small": RunCode("the tolerance is so small that intact skin may be mistaken for damage", 0),

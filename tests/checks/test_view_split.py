@@ -95,6 +95,7 @@ def test_a_scan_that_names_its_views_is_not_separated() -> None:
     assert separate_views(get_part("lever"), replace(scan, cloud=view.astype(np.int32)), TOLERANCE) is None
 
 
+@pytest.mark.slow
 def test_a_misplaced_view_in_one_file_gives_no_accepted_site() -> None:
     """Left where they are, as a given pose asks for, views that do not fit make every false site doubtful; registered,
     they are moved, and no site is left."""

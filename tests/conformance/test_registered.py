@@ -38,6 +38,7 @@ WITH: dict[str, dict[str, Any]] = {
     "scan file": {"options": {"path": FOLDER / "prism.ply"}},
     "scan simulate": {"options": {"points": 20_000}},
     "align icp": {"pose": NEAR},
+    "align constrained": {"pose": NEAR, "options": {"shift": ["x", "y", "z"], "turn": ["x", "y", "z"]}},
     "align none": {"pose": np.eye(4)},
     "align points": {
         "options": {"pairs": PAIRS},

@@ -54,6 +54,15 @@ def test_cad_faces_are_taken_by_number_and_by_name() -> None:
     assert (choose(NAMED, faces=["b", "d"])[3] == by_number).all()
 
 
+@pytest.mark.parametrize("part", [BOX, NAMED], ids=["mesh", "cad"])
+def test_a_picked_point_takes_the_face_under_it(part: Part) -> None:
+    points, normals, _, taken = choose(part, at=[20.3, 4, -3])
+    assert (taken == (normals[:, 0] > 0.9)).all()
+    assert points[taken][:, 0] == pytest.approx(20)
+    with pytest.raises(StageError, match="from the part's skin"):
+        choose(part, at=[25, 4, -3])
+
+
 def test_an_unknown_face_names_the_valid_ones() -> None:
     with pytest.raises(StageError, match="b"):
         choose(NAMED, faces=["bb"])

@@ -46,6 +46,7 @@ def run_job(program: str, path: Path, threads: str) -> dict[str, bytes]:
     return found
 
 
+@pytest.mark.slow
 def test_python_and_command_give_the_same_bytes_with_one_thread_and_two(tmp_path: Path) -> None:
     path = damaged_box.write(tmp_path, JOB, 6000)
     first = run_job(AS_COMMAND, path, "")

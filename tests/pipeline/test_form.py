@@ -55,6 +55,7 @@ def make_scaled(folder: Path, scale: float) -> Path:
     return job
 
 
+@pytest.mark.slow
 def test_a_scale_is_corrected_on_request(tmp_path: Path) -> None:
     job = make_scaled(tmp_path, 1.005)
     named = damageest.run(job)

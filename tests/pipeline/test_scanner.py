@@ -56,7 +56,8 @@ def run(align: str, offset: float = 0.0, scale: float = 1.0, more: str = "{}", n
     points, normals = sample_damaged()
     points = scale * (points + offset * normals)
     points = points + np.random.default_rng(0).normal(scale=noise, size=points.shape)
-    job = {"version": 1, "tolerance": 0.1, "report": "none", "align": align, "adapt": "none", **json.loads(more)}
+    aligned = {"use": "icp", "datum": DATUMS} if align == "datums" else align
+    job = {"version": 1, "tolerance": 0.1, "report": "none", "align": aligned, "adapt": "none", **json.loads(more)}
     return damageest.run(job, part=make_box(), scan=Scan(points))
 
 
@@ -65,8 +66,20 @@ def find_row(budget: Budget | None, source: str) -> BudgetRow:
     return next(row for row in budget.rows if row.source == source)
 
 
-@pytest.mark.parametrize("align", ["none", "icp"])
-@pytest.mark.parametrize(("source", "offset", "scale"), [("probing_size", 0.03, 1.0), ("length", 0.0, 1.005)])
+DATUMS = [
+    {"box": [[-11, -8, -5.01], [11, 8, -4.99]]},
+    {"box": [[-11, -7.51, -6], [11, -7.49, 6]]},
+    {"box": [[9.99, -8, -6], [10.01, 8, 6]]},
+]
+
+
+@pytest.mark.parametrize(
+    ("align", "source", "offset", "scale"),
+    [
+        ("none", "probing_size", 0.03, 1.0), ("icp", "probing_size", 0.03, 1.0), ("icp", "length", 0.0, 1.005),
+        ("datums", "probing_size", 0.02, 1.0),
+    ],
+)  # fmt: skip
 def test_a_sensitivity_is_what_a_scan_with_that_error_shows(
     align: str, source: str, offset: float, scale: float
 ) -> None:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import trimesh
 
-from damageest.artefacts import Floats, Part
+from damageest.artefacts import Floats, Mesh, Part
 
 HEIGHT = 90.0
 """mm from the root of the blade to its tip, along z."""
@@ -70,7 +70,7 @@ class Blade:
         return Part(mesh.vertices, mesh.faces)
 
 
-def scan_mesh(part: Part, spacing: float, noise: float, seed: int = 0) -> Floats:
+def scan_mesh(part: Mesh, spacing: float, noise: float, seed: int = 0) -> Floats:
     """Points (N,3) evenly over a mesh, about ``spacing`` apart, moved along its normals by ``noise``."""
     mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
     points, face = trimesh.sample.sample_surface(mesh, int(mesh.area / spacing**2), seed=seed)

@@ -11,6 +11,7 @@ from damageest.artefacts import Deposit, Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance._limits import StockConflict
+from damageest.stages.allowance._prepare import Prepare, open_cavity
 from damageest.stages.allowance._selectors import KeepOut, StockPlan, StockTarget
 
 MAX_DUST = 1e-6
@@ -53,6 +54,13 @@ class Milling(Allowance):
         description="cut-back: intact metal within this distance of the inner damage surface is added to the cavity, "
         "in the job's unit; 0: none",
     )  # fmt: skip
+    prepare: Prepare | None = Field(
+        None,
+        description="{min_radius, wall_angle, undercut: remove, depth}: the cavity is opened before deposition, so "
+        "that cutter and beam reach all of it: walls lean outward by wall_angle (degrees) at least, undercuts are "
+        "removed, what is narrower than the radius is widened, depth is added below; default: as it is. The damage "
+        "volume stays",
+    )
     crowded: Literal["refuse", "clip"] = Field(
         "refuse",
         description="where stock would run into an opposite wall, close a bore or fill a gap: refuse the site, or "
@@ -78,6 +86,8 @@ class Milling(Allowance):
         origin: Floats = part.bounds.mean(axis=0)
         plan = StockPlan(self.outer, self.targets, self.keep_out)
         cavity = cut_back(damage, part, others, self.inner, tolerance) if self.inner else damage
+        if self.prepare is not None:
+            cavity = open_cavity(cavity, part, others, self.prepare, tolerance)
         hole, whole = to_manifold(cavity, origin), to_manifold(part, origin)
         left = subtract_lost(whole, hole)
         skin = take_skin(cavity, part, plan, origin)
@@ -113,6 +123,7 @@ class Milling(Allowance):
             body.vertices,
             body.faces,
             cavity=None if cavity is damage else cavity,
+            milled=None if self.prepare is None or cavity is damage else _subtract(cavity, damage, origin),
             stock_volume=max(body.volume - cavity.volume, 0.0),
             cut_back_volume=max(cavity.volume - damage.volume, 0.0),
             thickness=thickness,
@@ -121,6 +132,12 @@ class Milling(Allowance):
             overlap=0.0 if band is None else self.overlap,
             notes=tuple(notes),
         )
+
+
+def _subtract(cavity: Solid, damage: Solid, origin: Floats) -> Solid | None:
+    from damageest.geometry.solids import to_manifold, to_solid
+
+    return to_solid(to_manifold(cavity, origin) - to_manifold(damage, origin), origin)
 
 
 def _describe_touching(conflicts: list[StockConflict], part: Part) -> list[str]:

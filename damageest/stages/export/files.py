@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from damageest.artefacts import Floats, Solid
+from damageest.artefacts import Deposit, Floats, Solid
 from damageest.geometry.simplification import simplify_within
 from damageest.geometry.touching import ROUNDS, separate_touching
 from damageest.geometry.transforms import invert_pose, move_mesh, move_points
 from damageest.io.meshes import write_ply
 from damageest.stages import JobPath
 from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathWriter, Writer
-from damageest.stages.export._colours import DAMAGE, DEPOSIT, DOUBTFUL, SURPLUS, UNDAMAGED
+from damageest.stages.export._colours import DAMAGE, DEPOSIT, DOUBTFUL, MILLED, SURPLUS, UNDAMAGED
 from damageest.stages.export._coverage import write_coverage
 from damageest.stages.export._nominal import map_to_nominal
 from damageest.stages.export._options import Formats, MachineFile, PathFormats, PathOption, check_spline_writer
@@ -255,6 +255,8 @@ def _collect_bodies(result: Result) -> dict[str, Body]:
             continue
         found.append((f"damage/site-{site.id}", f"damage site-{site.id}", site.damage, DAMAGE))
         found.append((f"deposit/site-{site.id}", f"deposit site-{site.id}", site.deposit, DEPOSIT))
+        if isinstance(site.deposit, Deposit):
+            found.append((f"milled/site-{site.id}", f"to be milled site-{site.id}", site.deposit.milled, MILLED))
     for item in result.surplus:
         found.append((f"surplus/site-{item.id}", f"surplus site-{item.id}", item.solid, SURPLUS))
     return {stem: Body(name, solid, colour) for stem, name, solid, colour in found if solid is not None}

@@ -138,10 +138,10 @@ def lay_out_site(result: Result, site: Site) -> Layout | None:
     points = points[:: max(1, -(-len(points) // MOST_POINTS))]
     dots = [("within", point + np.array([[-0.7, 0.0], [0.7, 0.0]])) for point in points]
     length = style.round_nice(0.25 * (high[0] - low[0]))
-    ruler = np.array([[10.0, height - 10.0], [10.0 + scale * length, height - 10.0]])
+    ruler = np.array([[10.0, height + 9.0], [10.0 + scale * length, height + 9.0]])
     lines = [*(("above", loop) for loop in damage), *dots]
     text = f"{length:g} {result.units}"
-    return Layout((width, height), 1.0, tuple(areas), tuple(areas), (), tuple(lines), (), (ruler, text))
+    return Layout((width, height + 18.0), 1.0, tuple(areas), tuple(areas), (), tuple(lines), (), (ruler, text))
 
 
 def draw_histogram(result: Result) -> str:

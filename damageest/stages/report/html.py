@@ -31,7 +31,7 @@ class Html(Report):
         120_000, ge=1000, le=1_000_000, description="about how many triangles the 3D view shows; meshes are simplified"
     )
     pdf: bool = Field(
-        False, description="whether `report.pdf`, A4, is written too; needs `pip install 'damageest[pdf]'`"
+        False, description='whether `report.pdf`, A4, is written too; needs `pip install "damageest[pdf]"`'
     )
     company: str = Field("", max_length=80, description="name at the head of each page of the PDF")
     logo: JobPath | None = Field(None, description="PNG or JPEG file at the head of each page of the PDF")
@@ -49,7 +49,7 @@ class Html(Report):
     @model_validator(mode="after")
     def _check_pdf(self) -> Self:
         if self.pdf and find_spec("reportlab") is None:
-            raise ValueError("pdf: needs the package reportlab; install it:  pip install 'damageest[pdf]'")
+            raise ValueError('pdf: needs the package reportlab; install it:  pip install "damageest[pdf]"')
         return self
 
     def run(self, result: Result, folder: Path, content: Mapping[str, Any], job_text: str) -> ReportFiles:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
-from damageest.io.colours import DEVIATION
+from damageest.io.colours import COOLWARM, pick_colour
 
 REACH = 5.0
 """Tolerances at which the colours end."""
@@ -16,10 +17,13 @@ REACH = 5.0
 
 @cache
 def _table() -> NDArray[np.uint8]:
-    from matplotlib import colormaps
+    return spread(COOLWARM, 256)
 
-    shades = colormaps[DEVIATION](np.linspace(0, 1, 256))[:, :3]
-    return np.asarray(np.round(shades * 255), np.uint8)
+
+def spread(stops: Sequence[str], count: int) -> NDArray[np.uint8]:
+    """(count,3) colours at equal steps through a map."""
+    chosen = [pick_colour(stops, share) for share in np.linspace(0, 1, count)]
+    return np.asarray([[int(one[k : k + 2], 16) for k in (1, 3, 5)] for one in chosen], np.uint8)
 
 
 def colour_deviation(distance: Floats, tolerance: float) -> NDArray[np.uint8]:

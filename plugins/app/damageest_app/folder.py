@@ -17,6 +17,8 @@ MOST_FILES = 2000
 DEEPEST = 4
 JOBS = (".yaml", ".yml")
 LEFT_OUT = ("out", "stages", "node_modules", "__pycache__")
+MESHES = (".stl", ".obj", ".off", ".3mf")
+"""Formats of parts without CAD faces; scans are rarely written in them."""
 
 
 @dataclass(frozen=True)
@@ -104,3 +106,19 @@ class Folder:
         except (OSError, ValueError, KeyError, TypeError):
             row["state"] = "result cannot be read"
         return row
+
+
+def guess_inputs(files: dict[str, list[str]]) -> tuple[str | None, str | None]:
+    """The part and the scan of a folder, where there is no choice: CAD formats are parts, then meshes, then the rest;
+    a scan is rather what no part is. None where several files are as likely."""
+
+    def rank(name: str) -> int:
+        return 1 if Path(name).suffix.lower() in MESHES else 2 if name in files["scans"] else 0
+
+    def first(names: list[str], least: bool) -> str | None:
+        ranks = [rank(name) for name in names]
+        best = [name for name, one in zip(names, ranks, strict=True) if one == (min(ranks) if least else max(ranks))]
+        return best[0] if len(best) == 1 else None
+
+    part = first(files["parts"], least=True)
+    return part, first([name for name in files["scans"] if name != part], least=False) if part else None

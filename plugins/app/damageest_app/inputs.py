@@ -22,8 +22,8 @@ from damageest.stages.scan import ReadScan
 from damageest_app.scene import thin
 from damageest_app.shade import shade_points
 
-UNITS = ("mm", "in", "cm", "m", "um", "ft")
-"""Units that are offered, the likeliest mistake first."""
+UNITS = {"mm": "mm", "in": "inches", "cm": "cm", "m": "metres", "um": "micrometres", "ft": "feet"}
+"""Units that are offered, the likeliest mistake first, with their names."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,12 +58,12 @@ class MeshPicker:
 
 
 def _surround(direction: Floats) -> Floats:
-    """(25,3) unit directions: the one given, then rings about it of growing angle up to `NEAR`."""
+    """(41,3) unit directions: the one given, then rings about it of growing angle up to `NEAR`."""
     side = np.cross(direction, np.eye(3)[int(np.abs(direction).argmin())])
     side /= np.linalg.norm(side)
     turn = np.linspace(0, 2 * np.pi, 8, endpoint=False)
     ring = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(direction, side)
-    ways = np.concatenate([direction[None], *(direction + NEAR * share * ring for share in (1 / 3, 2 / 3, 1))])
+    ways = np.concatenate([direction[None], *(direction + NEAR * share * ring for share in (0.1, 0.2, 0.35, 0.6, 1))])
     return np.asarray(ways / np.linalg.norm(ways, axis=1, keepdims=True))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import sys
@@ -13,6 +14,8 @@ from damageest.errors import InputError
 from damageest_app.security import HOST, Guard, make_token
 
 PAGE = Path(__file__).parent / "page"
+FIRST = 60.0
+"""Seconds in which the first tab may come; a browser that starts on a busy machine takes its time."""
 
 
 def serve(path: Path, port: int, browser: bool, idle: int) -> None:
@@ -52,6 +55,9 @@ def serve(path: Path, port: int, browser: bool, idle: int) -> None:
             address = f"http://{HOST}:{server.port}/index.html?token={guard.token}"
             sys.stdout.write(f"damageest app: {folder.path}\n  {address}\n  Ctrl-C stops it\n")
             sys.stdout.flush()
+            loop = asyncio.get_running_loop()
+            loop.call_later(1, lambda: None if guard.tabs else session.runs.hold())
+            loop.call_later(FIRST, session.runs.release)
             if browser and not webbrowser.open(address):
                 sys.stdout.write("no browser was found here; open the address\n")
 

@@ -50,6 +50,9 @@ class Panel:
     def pick(self, ray: Ray) -> Any:
         """A click into the 3D view; may be a coroutine."""
 
+    def look(self) -> None:
+        """The folder may have other files."""
+
     def result(self) -> None:
         """There are other results."""
 
@@ -291,5 +294,5 @@ class Session:
 
     def note_upload(self, name: str) -> None:
         with self.state:
-            self.state.files = self.folder.list_files()
+            self.panels["open"].look()
             self.say(f"{name} is in the folder now", "success")

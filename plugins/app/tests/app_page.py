@@ -67,7 +67,7 @@ class Page:
         self.page.on("request", lambda r: self._check(r.url))
         self.page.on("response", lambda r: self.note(f"{r.status} {r.url}") if r.status >= 400 else None)
         self.page.goto(address)
-        self.page.wait_for_selector(mark("step-open"), timeout=30_000)
+        self.page.wait_for_selector(mark("step-open"), timeout=60_000)
 
     def note(self, fault: str) -> None:
         if not any(word in fault for word in NORMAL):
@@ -100,8 +100,9 @@ class Page:
         field.press("Tab")
 
     def at_rest(self, seconds: float = 1.2) -> None:
-        """Waits until what was asked for is drawn."""
+        """Waits until what was asked for is read and drawn."""
         self.page.wait_for_timeout(seconds * 1000)
+        self.page.locator(mark("busy")).wait_for(state="detached")
 
     def click_view(self, x: float, y: float) -> None:
         """A click into the 3D view, from 0 to 1."""

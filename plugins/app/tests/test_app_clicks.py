@@ -158,7 +158,6 @@ def test_two_sites_become_one(shop: Path) -> None:
         page.wait("section")
         page.choose("merge", "2")
         page.wait("site", "one with 1, 2")
-        page.shoot("merge")
         assert read_job(shop)["sites"]["merge"] == [[1, 2]]
         page.run()
         page.wait("site", "site 1")
@@ -181,7 +180,6 @@ def test_stock_and_keep_out_are_set_by_clicks(shop: Path) -> None:
         page.at_rest(0.5)
         page.click_at(front)
         page.wait("keep-out-row", "facing (0, -1, 0)")
-        page.shoot("keep-out")
         page.run()
         page.wait("site")
         assert page.faults == []
@@ -293,7 +291,6 @@ def test_doubtful_jobs_are_filtered_and_opened_one_after_the_other(shop: Path) -
         page.wait("job-row", "doubtful 1")
         page.page.locator(f"{mark('only-doubtful')} input").click()
         page.page.locator(mark("job-row")).nth(1).wait_for(state="detached")
-        page.shoot("several")
         page.click("next-job")
         page.wait("job-name", "b.yaml")
         page.page.locator(f"{mark('only-doubtful')} input").click()

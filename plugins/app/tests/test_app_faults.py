@@ -141,7 +141,11 @@ def test_stop_and_a_browser_that_closes_leave_the_app_and_the_run(shop: Path) ->
         shoot(page, "stopped")
         page.click("run")
         page.wait("stop")
-        page.page.close()  # in the middle: the run goes on, then the server ends
+        page.page.close()  # in the middle: the run goes on
+        page = Page(browser, address)
+        page.wait("stop")
+        shoot(page, "closed")
+        page.page.close()  # for good: the run goes on to its end, then the server ends
         end = time.monotonic() + 90
         while process.poll() is None and time.monotonic() < end:
             time.sleep(0.2)

@@ -9,6 +9,7 @@ import pytest
 import trimesh
 from damageest_app import edits
 from damageest_app.faces import Faces
+from damageest_app.folder import Folder, guess_inputs
 from damageest_app.histogram import Histogram
 from damageest_app.inputs import Reader
 from damageest_app.pathview import PathPlay, make_nozzle
@@ -149,3 +150,24 @@ def test_progress_grows_and_names_what_is_done() -> None:
         progress.take({"kind": "end", "stage": stage, "seconds": 0.1, "site": 0})
     assert shares == sorted(shares)
     assert [one["name"] for one in progress.stages] == ["part", "scan", "align", "enclose", "report"]
+
+
+@pytest.mark.parametrize(
+    ("names", "found"),
+    [
+        (["part.step", "scan.ply"], ("part.step", "scan.ply")),
+        (["part.stl", "scan.ply"], ("part.stl", "scan.ply")),
+        (["part.step", "part.stl", "scan.xyz"], ("part.step", "scan.xyz")),
+        (["part.step", "scan.stl"], ("part.step", "scan.stl")),
+        (["a.stl", "b.stl", "scan.ply"], (None, None)),
+        (["part.stl", "a.ply", "b.ply"], ("part.stl", None)),
+        (["scan.xyz"], (None, None)),
+        ([], (None, None)),
+    ],
+)
+def test_part_and_scan_are_chosen_where_there_is_no_choice(
+    tmp_path: Path, registry: Registry, names: list[str], found: tuple[str | None, str | None]
+) -> None:
+    for name in names:
+        (tmp_path / name).write_text("")
+    assert guess_inputs(Folder.open(tmp_path, registry).list_files()) == found

@@ -114,7 +114,7 @@ def _prepare(page: Page, pictures: Path) -> None:
     page.wait("scan-facts", "cropped away")
     page.click("run")
     page.wait("stop")
-    page.at_rest(2.5)
+    page.wait("doing", "align", 60)
     page.shot(pictures / "run.png")
     page.wait("site", seconds=200)
     page.at_rest()
@@ -126,6 +126,7 @@ def _prepare(page: Page, pictures: Path) -> None:
 
 def _align(page: Page, pictures: Path) -> None:
     page.click("step-align")
+    page.wait("legend")
     page.at_rest(2)
     page.shot(pictures / "align.png")
     page.click("tool-pairs")
@@ -135,13 +136,11 @@ def _align(page: Page, pictures: Path) -> None:
     page.click_view(0.25, 0.5)
     page.wait("pair-next", "a place on the scan")
     page.at_rest()
-    page.shot(pictures / "pairs.png")
     page.click("tool-datum")
     page.at_rest()
     page.click_view(0.45, 0.62)
     page.wait("datum-row", "skin facing")
     page.at_rest()
-    page.shot(pictures / "datum.png")
 
 
 def _judge(page: Page, pictures: Path) -> None:

@@ -139,6 +139,7 @@ def test_without_a_field_sites_have_facets_and_the_part_is_refused(done: Run, tm
             blind.as_cadquery(what, site)
 
 
+@pytest.mark.slow
 def test_a_field_that_is_not_that_of_the_mesh_is_refused(done: Run, tmp_path: Path) -> None:
     adapted = done.result.adapted
     assert adapted is not None
@@ -151,6 +152,7 @@ def test_a_field_that_is_not_that_of_the_mesh_is_refused(done: Run, tmp_path: Pa
     assert "damage/site-1.step" in written.files
 
 
+@pytest.mark.slow
 def test_faces_that_take_too_long_to_move_cost_the_exact_form(
     done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -165,6 +165,7 @@ def export_again(result: Result, folder: Path, **options: Any) -> ExportedFiles:
     return stage.run(result, folder, Registry.discover().writers)
 
 
+@pytest.mark.slow
 def test_a_site_that_takes_too_long_gets_facets_and_says_so(
     done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -183,7 +184,11 @@ def test_a_site_that_takes_too_long_gets_facets_and_says_so(
     ("fault", "text"),
     [
         (cadquery_faults.abort_at_second, "OpenCASCADE stopped (its process ended by an abort (SIGABRT))"),
-        (cadquery_faults.raise_at_second, "OpenCASCADE stopped (RuntimeError: Standard_NoSuchObject)"),
+        pytest.param(
+            cadquery_faults.raise_at_second,
+            "OpenCASCADE stopped (RuntimeError: Standard_NoSuchObject)",
+            marks=pytest.mark.slow,
+        ),
     ],
     ids=["abort", "raise"],
 )
@@ -198,6 +203,7 @@ def test_a_fault_of_opencascade_costs_only_the_exact_form(
     assert (tmp_path / "out/undamaged.step").is_file()
 
 
+@pytest.mark.slow
 def test_opencascade_that_never_starts_costs_all_exact_forms(
     done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

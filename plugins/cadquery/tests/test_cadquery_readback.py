@@ -87,6 +87,7 @@ def test_stock_on_a_spline_is_a_solid_in_the_file(multiplicity: int, height: flo
     assert set(list_names(path)) == {f"{title} {k}" for title in ("block", "stock") for k in range(6)}
 
 
+@pytest.mark.slow
 def test_stock_that_no_way_can_write_is_left_out_and_said(tmp_path: Path) -> None:
     """Over a deep crease the offset has a gap, as a spline too, and its triangles do not close."""
     from damageest_cadquery._stock import _thicken

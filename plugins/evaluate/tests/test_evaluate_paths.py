@@ -17,16 +17,16 @@ from tests.path_shapes import dent, plan
 @pytest.mark.slow
 def test_a_tooth_is_built_up_with_five_axes_and_nothing_is_touched() -> None:
     (scene, *_) = MAKERS["tooth"](np.random.default_rng(3), "tooth")
-    row = evaluate_scene(scene)
+    row, plain = evaluate_scene(scene, 5), evaluate_scene(scene, 3)
     assert row.filled > 0.99
-    assert row.unreached_5 <= row.unreached_3
+    assert row.unreached <= plain.unreached
     assert row.gap >= 0.75 * row.claimed > 0
     assert row.crossings == 0
     assert row.spill <= 1.1
     assert row.shaded == 0
     assert row.sunk <= 0.05
     assert row.flips == 0
-    assert "| tooth | 1 |" in make_table([row])
+    assert "| tooth | 5 | 1 |" in make_table([row, plain])
 
 
 def test_the_check_sees_a_nozzle_in_metal() -> None:

@@ -15,7 +15,7 @@ from damageest.geometry.transforms import turn_to_axis
 from damageest_paths.beads import SHARE, Beads, simulate_beads
 from damageest_paths.clearance import Clearance
 from damageest_paths.directions import Planner, gather_missing, list_directions, plan_parts
-from damageest_paths.moves import Moves, Travel, join_passes, rank_layers
+from damageest_paths.moves import Moves, Travel, find_corners, join_passes, rank_layers
 from damageest_paths.nozzle import Nozzle
 from damageest_paths.obstacles import Obstacles, draw_passes
 from damageest_paths.planar import Surroundings
@@ -39,11 +39,12 @@ class Task:
 
 @dataclass(frozen=True)
 class Speeds:
-    """``feed``, ``fast``: lengths a minute. ``hop``: lift between passes. ``is_simulated``: whether the beads are."""
+    """``feed``, ``fast``: lengths a minute. ``hop``: lift between passes; None: none where the way is free, else two
+    bead widths. ``is_simulated``: whether the beads are."""
 
     feed: float
     fast: float
-    hop: float
+    hop: float | None
     is_simulated: bool
 
 
@@ -143,9 +144,16 @@ def _find_tightest(one: Pass | None, origin: Floats) -> Floats | None:
 
 def _choose_travel(task: Task, clearance: Clearance, speeds: Speeds, process: Process, origin: Floats) -> Travel:
     """The safe distance is that of the farthest corner of part, deposit and other meshes, and some beads more."""
+    width = process.bead.width
     meshes = [task.body, *([task.left] if task.left else []), *task.others]
-    far = max(float(np.linalg.norm(mesh.vertices - origin, axis=1).max()) for mesh in meshes)
-    return Travel(speeds.hop, far + 10 * process.bead.width, np.zeros(3), process.gap, speeds.feed, speeds.fast)
+    vertices = np.concatenate([mesh.vertices for mesh in meshes]) - origin
+    far = float(np.linalg.norm(vertices, axis=1).max())
+    # beads stand out of the deposit by one width at most
+    above = max(process.gap + width - clearance.standoff, 0.0)
+    return Travel(
+        2 * width if speeds.hop is None else speeds.hop, far + 10 * width, np.zeros(3), process.gap, speeds.feed,
+        speeds.fast, find_corners(vertices), above, speeds.hop is None,
+    )  # fmt: skip
 
 
 def _simulate(

@@ -140,7 +140,9 @@ class Layers(Path):
     )
     travel_feed: Length | None = Field(None, description="speed between passes; default: five times feed")
     travel_clearance: Length | None = Field(
-        None, description="lift between passes, along the tool; default: two widths of a bead"
+        None,
+        description="lift between passes, along the tool; default: none where the way is free without, else two widths "
+        "of a bead",
     )
     start_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="how far a pass begins before its start")
     stop_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="how far a pass goes on beyond its end")
@@ -212,9 +214,7 @@ class Layers(Path):
             self._make_nozzle(),
             self.standoff or self.width,
             process,
-            Speeds(
-                self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance or 2 * self.width, self.simulate
-            ),
+            Speeds(self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance, self.simulate),
             direction,
             plan_conformal if self.layers == "conformal" else plan_planar,
         )

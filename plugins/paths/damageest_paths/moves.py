@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,8 +13,14 @@ from damageest.geometry.vectors import normalise
 from damageest_paths.clearance import Clearance
 from damageest_paths.process import Pass
 
-LIFTS = (1, 3, 9)
+LIFTS = (1, 2, 4, 8)
 """Multiples of the hop that are tried."""
+RADII = (0.25, 0.5, 1.0)
+"""Shares of the safe distance at which the tool goes round the part."""
+SAME = 1e-6
+"""Difference of two unit axes up to which they are the same."""
+FLAT = 0.01
+"""Share of the gap up to which two heights are the same."""
 MOST_EXITS = 12
 """Passes whose axes, and places, are tried where the tool cannot leave along its own axis, as in a bore."""
 MOST_POSES = 2000
@@ -23,9 +29,11 @@ MOST_POSES = 2000
 
 @dataclass(frozen=True)
 class Travel:
-    """``hop``: how far the tool is lifted along its axis between passes. ``safe``: a distance from ``centre`` (3,) at
-    which the nozzle is clear of everything. ``gap``: distance to keep. ``feed``, ``fast``: speeds of deposition and of
-    travel, in lengths a minute."""
+    """``hop``: how far the tool is lifted along its axis between passes; ``stays``: whether it is not where the way is
+    free without. ``safe``: a distance from ``centre`` (3,) at which the nozzle is clear of everything. ``corners``
+    (N,3): of the hull of everything, and ``above``: how far beyond it along the tool axis the nozzle is clear, measured
+    to the point that it works on. ``gap``: distance to keep. ``feed``, ``fast``: speeds of deposition and of travel, in
+    lengths a minute."""
 
     hop: float
     safe: float
@@ -33,6 +41,9 @@ class Travel:
     gap: float
     feed: float
     fast: float
+    corners: Floats
+    above: float
+    stays: bool = True
 
 
 class Exit(NamedTuple):
@@ -64,10 +75,10 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
     """One sequence of moves through passes in the part's frame.
 
     ``groups``: the passes of each part of the deposit. ``clearance``: to what is there; the layers, numbered from 1
-    over all groups, have that rank. Between two passes the tool is lifted by the hop, or by as much more as a clear
-    straight way needs, up to the safe distance. It comes and leaves along its axis; where that is not clear, along that
-    of another pass, or from above that pass. On the way to a pass the layers before it stand, and its own layer unless
-    the pass is the first of it.
+    over all groups, have that rank. Between two passes the tool stays down where the straight way is clear, else it is
+    lifted by the hop, or by as much more as a clear way needs, up to the safe distance. It comes and leaves along its
+    axis; where that is not clear, along that of another pass, or from above that pass. On the way to a pass the layers
+    before it stand, and its own layer unless the pass is the first of it.
     """
     rows: list[tuple[Floats, Floats, Floats, float, bool, int, int, int]] = []
     gap, number, blocked = np.inf, 0, 0
@@ -105,6 +116,16 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
     return Moves(points, axes, normals, feed, on, layer, numbers, parts, max(gap, 0.0), blocked, kinds)
 
 
+def find_corners(points: Floats) -> Floats:
+    """The corners (K,3) of the convex hull of ``points`` (N,3); all points where they have none, as on a plane."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        return points
+
+
 def rank_layers(groups: Sequence[Sequence[Pass]]) -> dict[tuple[int, int], int]:
     """The number, from 1, of each layer that has passes, by the number of its group and its own in the group."""
     layers = dict.fromkeys((number, one.layer) for number, passes in enumerate(groups) for one in passes)
@@ -112,10 +133,17 @@ def rank_layers(groups: Sequence[Sequence[Pass]]) -> dict[tuple[int, int], int]:
 
 
 def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
-    """The point (3,) at the safe distance from the centre, straight up the axis."""
+    """The point (3,) straight up the axis from which on all the nozzle is above everything, or at the safe distance."""
+    top = float((travel.corners @ axis).max()) + travel.above
+    sphere = float(_lift_to_sphere(point, axis, travel, travel.safe) @ axis)
+    return np.asarray(point + max(min(top, sphere) - float(point @ axis), travel.hop) * axis)
+
+
+def _lift_to_sphere(point: Floats, axis: Floats, travel: Travel, radius: float) -> Floats:
+    """The point (3,) at a distance from the centre, straight up the axis."""
     away = point - travel.centre
     along = float(away @ axis)
-    root = np.sqrt(max(along**2 - float(away @ away) + travel.safe**2, 0.0))
+    root = np.sqrt(max(along**2 - float(away @ away) + radius**2, 0.0))
     return np.asarray(point + max(root - along, travel.hop) * axis)
 
 
@@ -130,24 +158,28 @@ def _list_exits(groups: Sequence[Sequence[Pass]]) -> list[Exit]:
 
 
 def _list_ways_out(
-    point: Floats, axis: Floats, exits: Sequence[Exit], travel: Travel
+    point: Floats, axis: Floats, exits: Sequence[Exit], travel: Travel, lift: Callable[[Floats, Floats], Floats]
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Ways from a place (3,) to the safe distance: points (K,3) and axes (K,3). Straight up the tool's ``axis`` (3,);
-    after a hop along that of an exit; from above the exit."""
-    yield _lift(point, axis, travel)[None], axis[None]
+    """Ways from a place (3,) to where ``lift`` takes it: points (K,3) and axes (K,3). Straight up the tool's ``axis``
+    (3,); after a hop along that of an exit; from above the exit."""
+    yield lift(point, axis)[None], axis[None]
     turned = [(point, gate.axis) for gate in exits if not np.allclose(gate.axis, axis)]
     for place, along in [*turned, *exits]:
-        way = [point + travel.hop * axis, place + travel.hop * along, _lift(place, along, travel)]
+        way = [point + travel.hop * axis, place + travel.hop * along, lift(place, along)]
         yield np.array(way), np.array([axis, along, along])
 
 
 def _find_exit(
-    point: Floats, axis: Floats, exits: Sequence[Exit], clearance: Clearance, travel: Travel
+    point: Floats, axis: Floats, exits: Sequence[Exit], clearance: Clearance, travel: Travel, radius: float = 0.0
 ) -> tuple[Floats, Floats, float]:
-    """Points (K,3) and axes (K,3) from a place (3,) on a pass to the safe distance, and the least distance: the first
-    way that is clear, else the clearest."""
+    """Points (K,3) and axes (K,3) from a place (3,) on a pass to where the nozzle is above everything, or at a distance
+    ``radius`` from the centre, and the least distance: the first way that is clear, else the clearest."""
+
+    def lift(place: Floats, along: Floats) -> Floats:
+        return _lift_to_sphere(place, along, travel, radius) if radius else _lift(place, along, travel)
+
     best = np.empty((0, 3)), np.empty((0, 3)), -np.inf
-    for way, axes in _list_ways_out(point, axis, exits, travel):
+    for way, axes in _list_ways_out(point, axis, exits, travel, lift):
         gap = _measure_way(np.concatenate([point[None], way]), np.concatenate([axis[None], axes]), clearance, travel)
         if gap > best[2]:
             best = way, axes, gap
@@ -167,23 +199,44 @@ def _find_way(
     start, old = before.points[-1], before.axes[-1]
     if np.linalg.norm(stop - start) < 1e-9 and np.allclose(axis, old):
         return np.empty((0, 3)), np.empty((0, 3)), np.inf
-    for factor in LIFTS:
+    rise = float((stop - start) @ one.normals[0])
+    for factor in [0, *LIFTS] if travel.stays else LIFTS:
         lift = factor * travel.hop
         if np.linalg.norm(stop - travel.centre) + lift > travel.safe:
             break
         # both ends at the height of the higher one
-        rise = float((stop - start) @ one.normals[0])
         way = np.array([start + (max(rise, 0.0) + lift) * old, stop + (max(-rise, 0.0) + lift) * axis])
+        kept = np.array([factor > 0 or rise > travel.gap * FLAT, factor > 0 or -rise > travel.gap * FLAT])
         axes = np.array([old, axis])
-        points, turned = np.concatenate([start[None], way, stop[None]]), np.array([old, old, axis, axis])
-        gap = _measure_way(points, turned, clearance, travel)
+        points = np.concatenate([start[None], way[kept], stop[None]])
+        gap = _measure_way(points, np.concatenate([old[None], axes[kept], axis[None]]), clearance, travel)
         if gap >= travel.gap / 2:
-            return way, axes, gap
-    out, out_axes, first = _find_exit(start, old, exits, clearance, travel)
-    back, back_axes, last = _find_exit(stop, axis, exits, clearance, travel)
-    way, axes = _round_the_sphere(np.array([out[-1], back[-1]]), np.array([out_axes[-1], back_axes[-1]]), travel)
-    gap = min(first, last, _measure_way(way, axes, clearance, travel))
-    return np.concatenate([out[:-1], way, back[-2::-1]]), np.concatenate([out_axes[:-1], axes, back_axes[-2::-1]]), gap
+            return way[kept], axes[kept], gap
+    return _go_round(start, old, one, exits, clearance, travel)
+
+
+def _go_round(
+    start: Floats, old: Floats, one: Pass, exits: Sequence[Exit], clearance: Clearance, travel: Travel
+) -> tuple[Floats, Floats, float]:
+    """As `_find_way` from a place (3,) with an axis (3,), over the part or round it: the nearest way that is clear."""
+    stop, axis = one.points[0], one.axes[0]
+    best = np.empty((0, 3)), np.empty((0, 3)), -np.inf
+    far = max(float(np.linalg.norm(point - travel.centre)) for point in (start, stop))
+    radii = [share * travel.safe for share in RADII if share == 1 or share * travel.safe > far + 2 * travel.hop]
+    for radius in [0.0, *radii] if np.abs(axis - old).max() < SAME else radii:
+        out, out_axes, first = _find_exit(start, old, exits, clearance, travel, radius)
+        back, back_axes, last = _find_exit(stop, axis, exits, clearance, travel, radius)
+        ends, turned = np.array([out[-1], back[-1]]), np.array([out_axes[-1], back_axes[-1]])
+        if not radius and np.abs(turned[0] - turned[1]).max() > SAME:
+            continue
+        way, axes = _round_the_sphere(ends, turned, travel) if radius else (ends, turned)
+        gap = min(first, last, _measure_way(way, axes, clearance, travel))
+        if gap > best[2]:
+            points = np.concatenate([out[:-1], way, back[-2::-1]])
+            best = points, np.concatenate([out_axes[:-1], axes, back_axes[-2::-1]]), gap
+        if gap >= travel.gap / 2:
+            break
+    return best
 
 
 def _round_the_sphere(way: Floats, axes: Floats, travel: Travel) -> tuple[Floats, Floats]:

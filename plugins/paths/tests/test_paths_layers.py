@@ -178,7 +178,7 @@ def plan_along(name: str) -> tuple[Loss, DepositPath]:
     return loss, plan(loss, layers="conformal", axes=5, direction=UP)
 
 
-@pytest.mark.parametrize("name", ["groove", "bowl", "tip"])
+@pytest.mark.parametrize("name", ["bowl", pytest.param("groove", marks=pytest.mark.slow), "tip"])
 def test_layers_along_the_floor_fill_the_deposit(name: str) -> None:
     loss, path = plan_along(name)
     assert path.unreached_volume < 0.04 * loss.lost.volume
@@ -189,7 +189,7 @@ def test_layers_along_the_floor_fill_the_deposit(name: str) -> None:
     assert path.bead_volume > 0.7 * path.deposit_volume
 
 
-@pytest.mark.parametrize("name", ["groove", pytest.param("bowl", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["tip", *(pytest.param(name, marks=pytest.mark.slow) for name in ("groove", "bowl"))])
 def test_the_turning_nozzle_keeps_its_clearance(name: str) -> None:
     loss, path = plan_along(name)
     assert np.abs(np.diff(path.axes[path.on], axis=0)).max() > 1e-3

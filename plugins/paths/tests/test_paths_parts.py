@@ -52,10 +52,14 @@ def make_pass(x: float, top: float, layer: int) -> Pass:
     return Pass(points, np.tile(UP, (2, 1)), np.tile(UP, (2, 1)), layer)
 
 
-def measure_way(obstacles: Obstacles | None, passes: list[Pass]) -> tuple[Floats, float]:
+FAR_AWAY = np.array([[1000.0, 1000.0, 1000.0]])
+"""Corners so far that the tool leaves by the sphere."""
+
+
+def measure_way(obstacles: Obstacles | None, passes: list[Pass], stays: bool = False) -> tuple[Floats, float]:
     """The points of the travel from the second pass to the third, and the least distance on the way."""
     nozzle = make_nozzle(Cone(1.0, 4.0, 40.0, np.radians(20)))
-    travel = Travel(1.0, 100.0, np.zeros(3), 0.5, 600.0, 3000.0)
+    travel = Travel(1.0, 100.0, np.zeros(3), 0.5, 600.0, 3000.0, FAR_AWAY, 1.0, stays)
     moves = join_passes([passes], Clearance(nozzle, 2.0, obstacles), travel)
     return moves.points[(moves.number == 3) & ~moves.on][:-1], moves.gap
 
@@ -74,6 +78,19 @@ def test_travel_keeps_clear_of_layers_that_stand() -> None:
     assert 0.25 <= gap < np.inf
     later, _ = measure_way(Obstacles([mesh], low, high, 2.0, [3]), passes)
     assert later[:, 2].max() == 1.0
+    down, _ = measure_way(None, passes, stays=True)
+    assert down[:, 2].max() == 0.0
+    over, gap = measure_way(Obstacles([mesh], low, high, 2.0, [1]), passes, stays=True)
+    assert over[:, 2].max() > 8 - 2 + 0.25
+    assert gap >= 0.25
+
+
+def test_the_tool_comes_and_leaves_above_everything_along_its_axis() -> None:
+    nozzle = make_nozzle(Cone(1.0, 4.0, 40.0, np.radians(20)))
+    corners = np.array([[-30.0, 0.0, 7.0], [30.0, 0.0, -60.0]])
+    travel = Travel(1.0, 100.0, np.zeros(3), 0.5, 600.0, 3000.0, corners, 2.0)
+    moves = join_passes([[make_pass(0.0, 0.0, 0)]], Clearance(nozzle, 2.0), travel)
+    assert moves.points[[0, -1], 2].tolist() == [9.0, 9.0]
 
 
 def test_beads_are_drawn_as_they_lie() -> None:
@@ -99,7 +116,8 @@ def leave(obstacle: Manifold, x: float = 2.0) -> Moves:
     mesh = Mesh(*to_arrays(obstacle))
     near = Obstacles([mesh], np.array([-35.0, -12, -5]), np.array([5.0, 12, 5]), 2.0)
     nozzle = Nozzle(make_nozzle_mesh(Cone(1.0, 4.0, 40.0, np.radians(20))))  # as long as its mesh
-    return join_passes([passes], Clearance(nozzle, 2.0, near), Travel(1.0, 100.0, np.zeros(3), 0.5, 600.0, 3000.0))
+    travel = Travel(1.0, 100.0, np.zeros(3), 0.5, 600.0, 3000.0, FAR_AWAY, 1.0)
+    return join_passes([passes], Clearance(nozzle, 2.0, near), travel)
 
 
 def test_the_tool_leaves_where_it_is_clear() -> None:

@@ -57,6 +57,7 @@ def test_what_is_not_borne_out_leaves_the_rigid_result(tmp_path: Path, monkeypat
     assert rigid == auto
 
 
+@pytest.mark.slow
 def test_a_field_that_would_fold_the_part_leaves_the_rigid_result(tmp_path: Path, monkeypatch: Any) -> None:
     def fold(self: Any, part: Part, aligned: Any, tolerance: float) -> AdaptedPart | None:
         raise StageError("the field would fold the part")

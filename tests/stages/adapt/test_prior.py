@@ -205,6 +205,7 @@ def test_a_file_that_is_no_prior_is_refused(kind: str, said: str, tmp_path: Path
 JOB = {"version": 1, "units": "mm", "tolerance": TOLERANCE, "align": "icp", "report": "none", "export": "files"}
 
 
+@pytest.mark.slow
 def test_a_job_writes_its_form_and_takes_those_of_others(tmp_path: Path) -> None:
     flat = CENTRE + np.random.default_rng(8).uniform(-0.5, 0.5, (1500, 3)) * np.ptp(PART.bounds, axis=0)
     flat[:, 0] = CENTRE[0] + LOST * HALF  # where it broke

@@ -94,7 +94,7 @@ def _build_bar(session: Session) -> None:
         )
         v3.VSpacer()
         with html.Div(v_if=("running",), style="width: 340px", classes="mr-4"):
-            html.Div("{{ doing }} · {{ seconds }} s", classes="fine")
+            html.Div("{{ doing }} · {{ seconds }} s", classes="fine", raw_attrs=mark("doing"))
             v3.VProgressLinear(model_value=("100 * share",), color="primary", height=6, rounded=True)
         v3.VBtn(
             icon="mdi-format-list-checks",
@@ -135,7 +135,7 @@ def _build_rail(session: Session) -> None:
 
 
 def _build_messages(session: Session) -> None:
-    html.Div("{{ busy }} …", v_if=("busy",), classes="fine mb-2")
+    html.Div("{{ busy }} …", v_if=("busy",), classes="fine mb-2", raw_attrs=mark("busy"))
     with v3.VAlert(
         v_if=("message",), type=("tone",), variant="tonal", density="compact", closable=True, classes="mb-3",
         __events=[("close", "click:close")], close="message = ''", raw_attrs=mark("message"),
@@ -161,7 +161,7 @@ def _build_stage(session: Session, judge: JudgePanel) -> None:
         ):
             view = vtk_widgets.VtkLocalView(session.scene.window, ref="view")
             session.ctrl.view_update = view.update
-        with v3.VSheet(classes="legend", v_if=("legend.length",), elevation=2):
+        with v3.VSheet(classes="legend", v_if=("legend.length",), elevation=2, raw_attrs=mark("legend")):
             with html.Div(v_for=("one in legend",), classes="row", key=("one.label",)):
                 html.Div(classes="swatch", style=("{background: one.colour}",))
                 html.Span("{{ one.label }}")
@@ -231,4 +231,4 @@ def _bind(session: Session) -> None:
     ctrl.trigger("key")(key)
     ctrl.trigger("refused")(lambda text: session.say(text, "error"))
     ctrl.on_server_ready.add(lambda **_: session.panels["open"].begin())  # type: ignore[attr-defined]
-    ctrl.on_client_connected.add(lambda **_: session.panels["open"].look())  # type: ignore[attr-defined]
+    ctrl.on_client_connected.add(lambda **_: session.panels["open"].look())

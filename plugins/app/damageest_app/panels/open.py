@@ -11,6 +11,7 @@ from trame.widgets import vuetify3 as v3
 
 from damageest.io.colours import PART
 from damageest_app import edits
+from damageest_app.folder import guess_inputs
 from damageest_app.inputs import UNITS
 from damageest_app.panels.marks import mark
 from damageest_app.panels.shown import place_beside, put_scan
@@ -39,6 +40,8 @@ class OpenPanel(Panel):
         """A tab was opened or loaded again: the folder may have other files."""
         with self.state:
             self.state.files = self.session.folder.list_files()
+            part, scan = guess_inputs(self.state.files)
+            self.state.new_part, self.state.new_scan = self.state.new_part or part, self.state.new_scan or scan
 
     async def _open_first(self, name: str) -> None:
         await self.session.open_job(name)
@@ -46,6 +49,19 @@ class OpenPanel(Panel):
 
     def build(self) -> None:
         session = self.session
+        with v3.VAlert(
+            v_if=("has_inputs && unit_doubt",),
+            type="warning",
+            variant="tonal",
+            density="compact",
+            classes="mb-3",
+            raw_attrs=mark("unit-doubt"),
+        ):
+            html.Div("{{ unit_doubt }}", classes="words fine")
+            v3.VBtn(
+                "the {{ one.of }} is in {{ one.words }}", v_for=("one in unit_offers",), key=("one.of + one.unit",),
+                size="small", classes="mt-2 mr-2", click=(self.set_unit, "[one.of, one.unit]"), raw_attrs=mark("unit-offer"),
+            )  # fmt: skip
         html.Div("A job of this folder", classes="head", v_if=("files.jobs.length",))
         v3.VSelect(
             items=("files.jobs",), model_value=("job_name",), update_modelValue=(session.open_job, "[$event]"),
@@ -87,20 +103,12 @@ class OpenPanel(Panel):
             html.Div("{{ part_facts }}", classes="text-body-2", raw_attrs=mark("part-facts"))
             html.Div("Scan", classes="head")
             html.Div("{{ scan_facts }}", classes="text-body-2", raw_attrs=mark("scan-facts"))
-            with v3.VAlert(
-                v_if=("unit_doubt",),
-                type="warning",
-                variant="tonal",
-                density="compact",
-                classes="mt-3",
-                raw_attrs=mark("unit-doubt"),
-            ):
-                html.Div("{{ unit_doubt }}", classes="words fine")
-                v3.VBtn(
-                    "the {{ one.of }} is in {{ one.unit }}", v_for=("one in unit_offers",), key=("one.of + one.unit",),
-                    size="small", classes="mt-2 mr-2", click=(self.set_unit, "[one.of, one.unit]"), raw_attrs=mark("unit-offer"),
-                )  # fmt: skip
             v3.VSwitch(v_model=("apart",), label="side by side", color="primary", hide_details=True, classes="mt-2")
+            html.Div(
+                "Next: Run finds the pose and the damage. Prepare crops a scan that shows more than the part.",
+                v_if=("!has_result && !unit_doubt",),
+                classes="text-primary mt-2",
+            )
 
     async def make_job(self) -> None:
         """Writes the job file with `damageest init`, and opens it."""
@@ -122,12 +130,12 @@ class OpenPanel(Panel):
             return
         state.files = folder.list_files()
         await session.open_job(name)
-        if outcome.messages and not state.message:
+        if outcome.messages and not state.message and not state.unit_doubt:  # the page has the unit already
             session.say(outcome.messages, "warning")
 
     async def set_unit(self, of: str, unit: str) -> None:
         if await self.session.apply(lambda tree: edits.set_unit(tree, of, unit), reads=True):
-            self.session.say(f"the {of} is read in {unit}; the tolerance is auto again", "success")
+            self.session.say(f"the {of} is read in {UNITS[unit]}; the tolerance is auto again", "success")
         self.session.push(self.session.scene.frame())
 
     def read(self, values: dict[str, Any]) -> None:
@@ -135,7 +143,7 @@ class OpenPanel(Panel):
         if inputs is not None:
             self.state.part_facts, self.state.scan_facts = inputs.describe_part(), inputs.describe_scan()
             self.state.unit_doubt = inputs.doubt
-            self.state.unit_offers = [{"of": of, "unit": unit} for of, unit in inputs.offers]
+            self.state.unit_offers = [{"of": of, "unit": unit, "words": UNITS[unit]} for of, unit in inputs.offers]
 
     def draw(self, scene: Scene) -> None:
         inputs = self.session.inputs

@@ -8,7 +8,9 @@ import numpy as np
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
+from damageest.io.colours import VIRIDIS
 from damageest_app import edits
+from damageest_app.colours import spread
 from damageest_app.panels.marks import mark
 from damageest_app.pathview import PathPlay, make_nozzle
 from damageest_app.scene import Scene, make_lines, make_mesh
@@ -135,14 +137,10 @@ class PathTool(Panel):
         if play is None:
             self.state.path_words = ""
             return
-        from matplotlib import colormaps
-
         end = play.at(float(self.state.path_share))
         standoff = float(self.state.path.get("standoff") or self.state.path.get("width") or 0.0)  # as `path: layers`
         pieces, layers = play.list_passes(end)
-        shades = (np.array(colormaps["viridis"](np.linspace(0.1, 1, int(play.layer.max()) + 1)))[:, :3] * 255).astype(
-            np.uint8
-        )
+        shades = spread(VIRIDIS, int(play.layer.max()) + 1)
         colours = [np.repeat(shades[[layer]], len(piece), axis=0) for piece, layer in zip(pieces, layers, strict=True)]
         scene.put("passes", make_lines(pieces, colours), size=3.0)
         tip = play.points[end] + standoff * play.axes[end]

@@ -95,7 +95,7 @@ class PreparePanel(Panel):
             html.Div(v_html=("histogram",))
             v3.VSlider(
                 v_model=("tolerance",), min=("tolerance_limits[0]",), max=("tolerance_limits[1]",),
-                step=("(tolerance_limits[1] - tolerance_limits[0]) / 400",), hide_details=True, end=self.set_tolerance,
+                step=("(tolerance_limits[1] - tolerance_limits[0]) / 400",), hide_details=True, end=(self.set_tolerance, "[$event]"),
                 raw_attrs=mark("tolerance"),
             )  # fmt: skip
             html.Div(
@@ -120,8 +120,7 @@ class PreparePanel(Panel):
     async def uncrop(self) -> None:
         await self.session.apply(lambda tree: edits.drop_last(tree, "scan", "crop"), reads=True)
 
-    async def set_tolerance(self) -> None:
-        value = float(self.state.tolerance)
+    async def set_tolerance(self, value: float) -> None:
         await self.session.apply(lambda tree: edits.set_field(tree, "tolerance", float(f"{value:.3g}")))
 
     async def set_auto(self) -> None:

@@ -50,14 +50,14 @@ class RepairPanel(Panel):
     def _build_stock(self) -> None:
         html.Div("Stock that is milled off after deposition.", classes="fine mb-2")
         v3.VTextField(
-            v_model=("outer",),
+            model_value=("outer",),
             type="number",
             step=0.1,
             min=0,
             label="stock on all skin",
             suffix=("unit",),
             __events=["change"],
-            change=self.set_outer,
+            change=(self.set_outer, "[$event.target.value]"),
             classes="mb-3",
             raw_attrs=mark("outer"),
         )
@@ -101,7 +101,7 @@ class RepairPanel(Panel):
             multiple=True,
             chips=True,
             __events=SELECTED,
-            update_menu=(self.set_formats, "[$event]"),
+            update_menu=(self.set_formats, "[$event, formats, path_formats]"),
             label="formats",
             raw_attrs=mark("formats"),
         )
@@ -112,7 +112,7 @@ class RepairPanel(Panel):
             multiple=True,
             chips=True,
             __events=SELECTED,
-            update_menu=(self.set_formats, "[$event]"),
+            update_menu=(self.set_formats, "[$event, formats, path_formats]"),
             label="formats",
         )
         html.Div("Formats are written by the next run.", classes="fine mt-1 mb-3")
@@ -135,8 +135,8 @@ class RepairPanel(Panel):
             )
             html.Div("{{ one }}", v_for=("(one, k) in result_files",), key=("k",), classes="fine")
 
-    async def set_outer(self) -> None:
-        value = to_length(self.state.outer)
+    async def set_outer(self, text: Any) -> None:
+        value = to_length(text)
         if value is not None:
             await self.session.apply(lambda tree: edits.set_stock(tree, value))
 
@@ -144,11 +144,11 @@ class RepairPanel(Panel):
         if await self.session.apply(lambda tree: edits.set_field(tree, "allowance", None)):
             self.session.redraw()
 
-    async def set_formats(self, is_open: bool) -> None:
+    async def set_formats(self, is_open: bool, formats: list[str], paths: list[str]) -> None:
         """Writes the formats into the job when the list is closed, those that are not the default."""
         if is_open:
             return
-        formats, paths = list(self.state.formats) or ["stl"], list(self.state.path_formats)
+        formats = formats or ["stl"]
 
         def change(tree: Any) -> None:
             edits.set_option(tree, "export", "files", "format", formats if formats != ["stl"] else None)

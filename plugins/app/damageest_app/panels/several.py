@@ -26,7 +26,13 @@ class SeveralPanel(Panel):
                 hide_details=True,
                 raw_attrs=mark("only-doubtful"),
             )
-            v3.VBtn("next", size="small", variant="tonal", click=self.open_next, raw_attrs=mark("next-job"))
+            v3.VBtn(
+                "next",
+                size="small",
+                variant="tonal",
+                click=(self.open_next, "[only_doubtful]"),
+                raw_attrs=mark("next-job"),
+            )
             v3.VBtn("look again", size="small", variant="text", click=self.look, raw_attrs=mark("look"))
         with v3.VCard(
             v_for=("one in rows.filter(x => !only_doubtful || x.state === 'doubtful')",), key=("one.job",), classes="mb-2 pa-2",
@@ -52,10 +58,10 @@ class SeveralPanel(Panel):
         await self.session.open_job(name)
         self.session.go("judge" if self.session.results is not None else "open")
 
-    async def open_next(self) -> None:
-        """Opens the next job of the list, of the doubtful ones where only these are shown."""
+    async def open_next(self, only_doubtful: bool) -> None:
+        """Opens the next job of the list, or of the doubtful ones."""
         self.look()
-        names = [row["job"] for row in self.state.rows if not self.state.only_doubtful or row["state"] == "doubtful"]
+        names = [row["job"] for row in self.state.rows if not only_doubtful or row["state"] == "doubtful"]
         if not names:
             self.session.say("there is no such job", "info")
             return

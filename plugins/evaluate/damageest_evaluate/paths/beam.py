@@ -11,7 +11,7 @@ import numpy as np
 from damageest_paths.frames import make_frame
 
 from damageest.artefacts import DepositPath, Floats, Ints, Solid
-from damageest.geometry.distance import is_inside
+from damageest.geometry.distance import distance_to_mesh, is_inside
 from damageest.geometry.vectors import normalise
 
 HEIGHTS = 12
@@ -28,63 +28,83 @@ axis may turn freely, since it does not move the tool."""
 
 class _Places(NamedTuple):
     """Places on the tops of the beads: ``points``, the tool's ``axes`` there (N,3), the ``move`` (N,) of the path that
-    each lies on, and how much of it (N,) it stands for."""
+    each lies on, and the length (N,) of the pass that it stands for."""
 
     points: Floats
     axes: Floats
     move: Ints
-    share: Floats
+    length: Floats
 
 
 def _sample(path: DepositPath, step: float) -> _Places:
-    """Places not farther apart than ``step``."""
+    """Places along the passes, each standing for a stretch not longer than ``step``."""
     own = np.flatnonzero(path.on)
-    counts = np.maximum(np.ceil(path.moves[own] / step).astype(int), 1)
-    move = np.repeat(own, counts)
-    share = np.concatenate([(np.arange(count) + 0.5) / count for count in counts] or [np.empty(0)])[:, None]
+    runs = np.split(own, np.flatnonzero(np.diff(own) != 1) + 1) if len(own) else []
+    moves, shares, weights = [], [], []
+    for run in runs:
+        lengths = path.moves[run]
+        along = np.concatenate([[0.0], np.cumsum(lengths)])
+        count = max(int(np.ceil(along[-1] / step)), 1)
+        at = (np.arange(count) + 0.5) / count * along[-1]
+        number = np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(run) - 1)
+        moves.append(run[number])
+        shares.append((at - along[number]) / np.maximum(lengths[number], 1e-300))
+        weights.append(np.full(count, along[-1] / count))
+    if not runs:
+        return _Places(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64), np.empty(0))
+    move, share = np.concatenate(moves), np.concatenate(shares)[:, None]
     points = path.points[move - 1] + share * (path.points[move] - path.points[move - 1])
     axes = path.axes[move - 1] * (1 - share) + share * path.axes[move]
-    return _Places(points, normalise(axes), move, 1 / np.repeat(counts, counts))
+    return _Places(points, normalise(axes), move, np.concatenate(weights))
 
 
 def measure_shaded(path: DepositPath, metal: Solid, step: float) -> float:
     """The share of the points of the passes, ``step`` apart, from which metal stands in the beam.
 
-    Looked at are the beam's axis from the bead to the nozzle's tip, and its border from half a bead's width up.
+    Looked at are the beam's axis from the bead to the nozzle's tip, and its border from half a bead's width up. The
+    border is not looked at where the surface of the metal is farther from the axis than that.
     """
     points, axes, _, _ = _sample(path, step)
     if not len(points):
         return 0.0
     radius = path.width / 2
-    shaded = np.zeros(len(points), bool)
-    for height in np.linspace(0.1 * radius, path.standoff, HEIGHTS):
-        shaded |= is_inside(points + height * axes, metal)
-    turns = np.array([make_frame(axis, np.zeros(3)).turn[:2] for axis in axes])
+    heights = np.linspace(0.1 * radius, path.standoff, HEIGHTS)
+    middle = points[:, None] + heights[:, None] * axes[:, None]
+    shaded = np.asarray(is_inside(middle.reshape(-1, 3), metal).reshape(-1, HEIGHTS).any(axis=1))
+    open_ = np.flatnonzero(~shaded)
+    turns = np.array([make_frame(axis, np.zeros(3)).turn[:2] for axis in axes]).reshape(-1, 2, 3)
     angles = 2 * np.pi * np.arange(AROUND) / AROUND
-    for height in np.linspace(radius, max(path.standoff, radius), HEIGHTS):
-        for angle in angles:
-            beside = THIN * radius * (np.cos(angle) * turns[:, 0] + np.sin(angle) * turns[:, 1])
-            shaded |= is_inside(points + height * axes + beside, metal)
+    round_ = THIN * radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    heights = np.linspace(radius, max(path.standoff, radius), HEIGHTS)
+    middle = points[open_, None] + heights[:, None] * axes[open_, None]
+    near = distance_to_mesh(middle.reshape(-1, 3), metal).reshape(-1, HEIGHTS) <= radius
+    place, height = np.nonzero(near)
+    border = middle[place, height][:, None] + round_ @ turns[open_[place]]
+    hit = is_inside(border.reshape(-1, 3), metal).reshape(-1, AROUND).any(axis=1)
+    shaded[open_[place[hit]]] = True
     return float(shaded.mean())
 
 
 def measure_sunk(path: DepositPath, metal: Solid, step: float) -> float:
     """The volume of the beads that lies in metal, by the share of points in each bead; where beads overlap, each
     counts."""
-    points, _, move, share = _sample(path, step)
+    points, _, move, length = _sample(path, step)
     if not len(points):
         return 0.0
     normals = path.normals[move]
     beside = normalise(np.cross(path.points[move] - path.points[move - 1], normals))
     heights = path.heights[path.part[move] - 1][:, None]
-    weights = path.moves[move] * path.section[path.part[move] - 1] * share
-    total = 0.0
-    for aside in (np.arange(ACROSS) + 0.5) / ACROSS - 0.5:
-        for down in (np.arange(DEEP) + 0.5) / DEEP:
-            total += float(
-                weights[is_inside(points + aside * path.width * beside - down * heights * normals, metal)].sum()
-            )
-    return total / (ACROSS * DEEP)
+    weights = length * path.section[path.part[move] - 1]
+    aside = (np.arange(ACROSS) + 0.5) / ACROSS - 0.5
+    down = (np.arange(DEEP) + 0.5) / DEEP
+    across = points[:, None, None] + (aside[:, None] * path.width)[:, None] * beside[:, None, None]
+    places = across - (down[:, None] * heights[:, None])[:, None] * normals[:, None, None]
+    # where the surface is farther from the bead's middle than its corners are, all of the section is as the middle
+    middle = points - heights / 2 * normals
+    inside = np.repeat(is_inside(middle, metal)[:, None], ACROSS * DEEP, axis=1)
+    near = np.flatnonzero(distance_to_mesh(middle, metal) < np.hypot(path.width, heights[:, 0]) / 2)
+    inside[near] = is_inside(places[near].reshape(-1, 3), metal).reshape(len(near), ACROSS * DEEP)
+    return float((weights * inside.mean(axis=1)).sum())
 
 
 def count_flips(path: DepositPath) -> int:

@@ -3,43 +3,41 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from damageest_paths.layers import Layers
 
-from damageest.artefacts import DepositPath, Solid
 from damageest_evaluate.paths.beam import count_flips, measure_shaded, measure_sunk
 from damageest_evaluate.paths.check import count_crossings, measure_built, measure_nozzle
 from damageest_evaluate.paths.scenes import Scene
 
 BEADS = 100.0
 """The volume of a deposit in cubes of the bead's width; it is less wide where the deposit is thin."""
-SUFFICES = 0.01
-"""Share of a deposit that may be out of reach where a number of axes suffices."""
+MUCH = 0.5
+"""Share of a deposit that is out of reach from which a path counts only for that."""
 
 
 @dataclass(frozen=True)
 class PathRow:
-    """One deposit. Lengths in the part's unit; ``gap``: least distance of the nozzle from metal by the independent
-    check; ``built``: the same from beads that were laid before; ``claimed``: by the planner. All three in bead widths.
-    Shares of the deposit: ``unreached_3``, ``unreached_5``, ``surplus`` (what the beads add beyond it), and ``sunk``
-    (what of the beads lies in metal, by the independent check); of the reachable: ``filled``; of the way along passes:
-    ``shaded`` (metal in the beam). ``flips``: jumps of the rotary axis. ``seconds_3``, ``seconds_5``: of the
-    processor."""
+    """One path. Lengths in the part's unit; ``gap``: least distance of the nozzle from metal by the independent check;
+    ``built``: the same from beads that were laid before; ``claimed``: by the planner. All three in bead widths, as
+    ``spill``; ``void`` in heights. Shares of the deposit: ``unreached``, ``surplus`` (what the beads add beyond it),
+    and ``sunk`` (what of the beads lies in metal, by the independent check); of the reachable: ``filled``; of the way
+    along passes: ``shaded`` (metal in the beam) and ``travel``. ``flips``: jumps of the rotary axis. ``seconds``: of
+    the processor, to plan; ``checked``: to check."""
 
     kind: str
     name: str
+    axes: int
     volume: float
     width: float
     height: float
-    unreached_3: float
-    unreached_5: float
+    unreached: float
     filled: float
     spill: float
     void: float
-    largest_gap: float
     gap: float
     built: float
     claimed: float
@@ -51,46 +49,45 @@ class PathRow:
     passes: int
     layers: int
     travel: float
-    seconds_3: float
-    seconds_5: float
+    seconds: float
+    checked: float
 
 
 def choose_options(scene: Scene) -> dict[str, object]:
-    """Bead and nozzle that fit a deposit: about `BEADS` cubes of the bead's width, not wider than it is thick."""
-    thick = 2 * scene.body.volume / scene.body.area
-    width = float(f"{min((scene.body.volume / BEADS) ** (1 / 3), 1.5 * thick):.3g}")
+    """Bead and nozzle that fit a deposit: about `BEADS` cubes of the bead's width, not wider than it is thick. Where
+    the scene says the width, the standoff is five of it."""
+    if scene.width is not None:
+        width, standoff = scene.width, 5 * scene.width
+    else:
+        thick = 2 * scene.body.volume / scene.body.area
+        width = float(f"{min((scene.body.volume / BEADS) ** (1 / 3), 1.5 * thick):.3g}")
+        standoff = 3 * width
     nozzle = {"tip_radius": 0.8 * width, "cone_angle": 20.0, "length": 50 * width, "body_radius": 6 * width}
-    return {"width": width, "height": width / 2, "feed": 600.0, "standoff": 3 * width, "nozzle": nozzle}
+    return {"width": width, "height": width / 2, "feed": 600.0, "standoff": standoff, "nozzle": nozzle}
 
 
-def evaluate_scene(scene: Scene) -> PathRow:
-    """Plans and checks one deposit. The path with 5 axes is simulated and checked."""
-    options = choose_options(scene)
-    paths, seconds = [], []
-    for more in ({"axes": 3, "simulate": False}, {"axes": 5}):
-        before = time.process_time()
-        stage = Layers.model_validate({**options, **more})
-        path = stage.run(body=scene.body, left=scene.left, built=None, tolerance=0.02 * stage.width)
-        seconds.append(time.process_time() - before)
-        assert path is not None
-        paths.append(path)
-    plain, path = paths
-    gap = _check(path, scene.left)
+def evaluate_scene(scene: Scene, axes: int) -> PathRow:
+    """Plans, simulates and checks one path."""
+    before = time.process_time()
+    stage = Layers.model_validate({**choose_options(scene), "axes": axes})
+    path = stage.run(body=scene.body, left=scene.left, built=None, tolerance=0.02 * stage.width)
+    planned = time.process_time()
+    assert path is not None
     fill, width, height = path.fill, path.width, float(path.heights.min())
-    return PathRow(
+    is_some = bool(path.on.any())
+    row = PathRow(
         kind=scene.kind,
         name=scene.name,
+        axes=axes,
         volume=scene.body.volume,
         width=width,
         height=height,
-        unreached_3=plain.unreached_volume / scene.body.volume,
-        unreached_5=path.unreached_volume / scene.body.volume,
+        unreached=path.unreached_volume / scene.body.volume,
         filled=fill.filled if fill else np.nan,
         spill=fill.spill_distance / width if fill else np.nan,
         void=fill.void / min(width, height) if fill else np.nan,
-        largest_gap=fill.largest_gap / (width**2 * height) if fill else np.nan,
-        gap=gap / width,
-        built=(measure_built(path, path.width / 4 / 2) if path.on.any() else np.inf) / width,
+        gap=(measure_nozzle(path, scene.left, width / 4 / 10) if is_some else np.inf) / width,
+        built=(measure_built(path, width / 4) if is_some else np.inf) / width,
         claimed=min(path.clearance, path.travel_clearance) / width,
         shaded=measure_shaded(path, scene.left, width / 4),
         sunk=measure_sunk(path, scene.left, width / 4) / scene.body.volume,
@@ -99,62 +96,62 @@ def evaluate_scene(scene: Scene) -> PathRow:
         crossings=count_crossings(path),
         passes=path.passes,
         layers=path.layers,
-        travel=path.travel / max(path.length + path.travel, 1e-300),
-        seconds_3=seconds[0],
-        seconds_5=seconds[1],
+        travel=path.travel / path.length if is_some else np.nan,
+        seconds=planned - before,
+        checked=0.0,
+    )
+    return replace(row, checked=time.process_time() - planned)
+
+
+def run_scenes(scenes: Sequence[Scene]) -> Iterator[PathRow]:
+    """The rows of all scenes, first with 5 axes, then with 3."""
+    for axes in (5, 3):
+        for scene in scenes:
+            yield evaluate_scene(scene, axes)
+
+
+def describe_row(row: PathRow) -> str:
+    """A row on one line."""
+    return " ".join(
+        f"{key}={value:.4g}" if isinstance(value, float) else f"{key}={value}" for key, value in asdict(row).items()
     )
 
 
-def _check(path: DepositPath, left: Solid) -> float:
-    """Distance of the nozzle from what is left of the part, ten times finer than the planner looks."""
-    return measure_nozzle(path, left, path.width / 4 / 10) if path.on.any() else np.inf
-
-
-def run_scenes(scenes: Sequence[Scene], tell: Callable[[str], None]) -> list[PathRow]:
-    """The rows of all scenes, one after the other."""
-    rows = []
-    for scene in scenes:
-        row = evaluate_scene(scene)
-        rows.append(row)
-        tell(
-            " ".join(
-                f"{key}={value:.4g}" if isinstance(value, float) else f"{key}={value}"
-                for key, value in asdict(row).items()
-            )
-        )
-    return rows
-
-
 def make_table(rows: Sequence[PathRow]) -> str:
-    """A Markdown table: one line a kind, and all."""
+    """A Markdown table: a line for each kind and number of axes, and for all."""
     from damageest_evaluate.readme import format_markdown
 
     head = [
-        "deposits", "number", "out of reach, 3 axes", "5 axes", "5 needed", "filled, least", "spill, largest",
-        "void, largest", "nozzle gap, least", "from beads", "in the beam", "sunk, largest", "travel, median",
-        "time 3 axes", "5 axes",
+        "deposits", "axes", "number", "out of reach", "filled, least", "spill", "void", "gap", "from beads",
+        "in the beam", "sunk", "flips", "travel, median", "largest", "time, median", "largest",
     ]  # fmt: skip
     lines = [head]
     for kind in [*dict.fromkeys(row.kind for row in rows), "all"]:
-        own = [row for row in rows if kind in (row.kind, "all")]
-        needed = sum(row.unreached_3 > SUFFICES >= row.unreached_5 for row in own)
-        lines.append(
-            [
-                kind,
-                str(len(own)),
-                f"{np.median([row.unreached_3 for row in own]):.1%}",
-                f"{np.median([row.unreached_5 for row in own]):.1%}",
-                str(needed),
-                f"{np.nanmin([row.filled for row in own]):.2%}",
-                f"{np.nanmax([row.spill for row in own]):.2f}",
-                f"{np.nanmax([row.void for row in own]):.2f}",
-                f"{min(row.gap for row in own):.2f}",
-                f"{min(row.built for row in own):.2f}",
-                f"{max(row.shaded for row in own):.1%}",
-                f"{max(row.sunk for row in own):.1%}",
-                f"{np.median([row.travel for row in own]):.0%}",
-                f"{np.median([row.seconds_3 for row in own]):.1f} s",
-                f"{np.median([row.seconds_5 for row in own]):.1f} s",
-            ]
-        )
+        for axes in (3, 5):
+            own = [row for row in rows if kind in (row.kind, "all") and row.axes == axes]
+            if own:
+                lines.append(_make_line(kind, axes, own))
     return format_markdown(lines)
+
+
+def _make_line(kind: str, axes: int, own: Sequence[PathRow]) -> list[str]:
+    """What a path has that reaches less than `MUCH` counts for what is out of reach, not for the rest."""
+    some = [row for row in own if row.unreached < MUCH] or list(own)
+    return [
+        kind,
+        str(axes),
+        str(len(own)),
+        f"{np.median([row.unreached for row in own]):.1%}",
+        f"{np.nanmin([row.filled for row in some]):.1%}",
+        f"{np.nanmax([row.spill for row in some]):.2f}",
+        f"{np.nanmax([row.void for row in some]):.2f}",
+        f"{min(row.gap for row in own):.2f}",
+        f"{min(row.built for row in own):.2f}",
+        f"{max(row.shaded for row in own):.1%}",
+        f"{max(row.sunk for row in own):.1%}",
+        str(sum(row.flips for row in own)),
+        f"{np.nanmedian([row.travel for row in some]):.0%}",
+        f"{np.nanmax([row.travel for row in some]):.0%}",
+        f"{np.median([row.seconds for row in own]):.1f} s",
+        f"{max(row.seconds for row in own):.1f} s",
+    ]

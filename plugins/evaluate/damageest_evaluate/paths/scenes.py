@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +14,20 @@ from damageest.geometry.solids import to_manifold, to_solid
 from damageest.stages.scan.scanner import apply_tools
 from damageest_evaluate.damages import KINDS, make_random_damage
 from damageest_evaluate.parts import PARTS
+from damageest_evaluate.paths.others import make_on_part
 from damageest_evaluate.paths.tight import TIGHT
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A deposit: ``kind`` and ``name``; the solid to build up, and what is left of the part."""
+    """A deposit: ``kind`` and ``name``; the solid to build up, and what is left of the part. ``width``: of the bead;
+    None: one that fits the deposit."""
 
     kind: str
     name: str
     body: Solid
     left: Solid
+    width: float | None = None
 
 
 def _cut(kind: str, name: str, part: Any, tool: Any) -> list[Scene]:
@@ -142,8 +145,19 @@ def read_job(path: Path, registry: Any) -> list[Scene]:
     return _split("job", path.stem, part, damage) if damage is not None else []
 
 
-def make_scenes(jobs: Sequence[Path], each: int, random: int, registry: Any) -> list[Scene]:
-    """Deposits of the jobs, ``each`` of the kinds that are made to measure, and ``random`` of the suite."""
+def make_on_others(path: Path, each: int) -> list[Scene]:
+    """Losses of a part that others made."""
+    found = []
+    for number in range(each):
+        part, tool, width = make_on_part(path, number)
+        for scene in _cut("others", f"{path.stem} {number + 1}", part, tool)[:1]:
+            found.append(replace(scene, width=width))
+    return found
+
+
+def make_scenes(jobs: Sequence[Path], each: int, random: int, parts: Sequence[Path], registry: Any) -> list[Scene]:
+    """Deposits of the jobs, ``each`` of the kinds that are made to measure and on each of the ``parts``, and ``random``
+    of the suite."""
     scenes = [scene for path in jobs for scene in read_job(path, registry)]
     for kind, make in MAKERS.items():
         for number in range(each):
@@ -154,4 +168,6 @@ def make_scenes(jobs: Sequence[Path], each: int, random: int, registry: Any) -> 
             scenes += _cut(kind, f"{kind} {number + 1}", loss.part, loss.tool)[:1]
     for seed in range(random):
         scenes += make_random(seed)[:1]
+    for path in parts:
+        scenes += make_on_others(path, each)
     return scenes

@@ -1,0 +1,69 @@
+"""`damageest inspect`: compares a scan made after a step of a repair with what the step was to give."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from damageest.cli._process import end_with
+from damageest.cli._streams import say
+
+
+class StepName(StrEnum):
+    """A step of a repair."""
+
+    deposited = "deposited"
+    milled = "milled"
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of the run before the repair.")],
+    scan: Annotated[Path, typer.Argument(metavar="SCAN", help="Scan of the part after the step.")],
+    step: Annotated[StepName, typer.Option("--step", help="What was done before this scan.")],
+    tolerance: Annotated[
+        float | None, typer.Option("--tolerance", help="Allowed deviation, in the job's unit; default: the job's.")
+    ] = None,
+    same_setup: Annotated[
+        bool, typer.Option("--same-setup", help="The part was not moved since the scan before: take its pose.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
+) -> None:
+    """Say what is missing and what is over after a step of a repair, and add it to the record in OUT."""
+    end_with(lambda: _inspect(folder, scan, step.value, tolerance, same_setup))
+
+
+def _inspect(folder: Path, scan: Path, step: str, tolerance: float | None, same_setup: bool) -> int:
+    """Prints what was found, and gives the exit status: 1 where a tolerance is not met or not shown."""
+    from damageest.errors import Fault, InputError, JobError
+    from damageest.inspection.aim import read_aim
+    from damageest.inspection.compare import inspect_step
+    from damageest.inspection.page import write_page
+    from damageest.inspection.record import NAME, PAGE, append_inspection, read_record
+
+    if tolerance is not None and not 0 < tolerance < float("inf"):
+        raise JobError([Fault(f"a tolerance is a number above 0, not {tolerance}")], "--tolerance")
+    if not scan.is_file():
+        raise InputError(f"{scan}: there is no such file; give the scan made after the step")
+    aim = read_aim(folder, step)  # type: ignore[arg-type]
+    if (folder / NAME).is_file():
+        read_record(folder / NAME, aim)  # a record that cannot take the entry is said before the work
+    found = inspect_step(aim, scan, tolerance, same_setup)
+    unit = aim.folder.unit
+    for one in found.findings:
+        where = f"site {one.site}" if one.site else "elsewhere"
+        interval = "" if one.low is None else f", 95 %: {one.low:.4g} to {one.high or float('inf'):.4g}"
+        say(f"{where}: {one.kind} {one.volume:.4g} {unit}³{interval}, by up to {one.depth:.3g} {unit} ({one.level})")
+    for verdict in found.verdicts:
+        why = f": {verdict.why}" if verdict.why else ""
+        say(f"site {verdict.site}: tolerance {found.tolerance:.3g} {unit} {verdict.outcome}{why}")
+    for number in aim.refused:
+        say(f"note: site {number} was not to be repaired, and is not looked at")
+    for note in found.notes:
+        say(f"note: {note}")
+    record = append_inspection(aim, found, scan)
+    write_page(record, folder / PAGE)
+    say(f"added to {folder / NAME}, and its page {folder / PAGE}")
+    return 0 if all(verdict.outcome == "met" for verdict in found.verdicts) else 1

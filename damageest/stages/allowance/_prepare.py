@@ -1,0 +1,172 @@
+"""Opens the cavity before deposition: walls that lean outward, no undercuts, room for the cutter."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from damageest.artefacts import Floats, Mesh, Part, Solid, Vector
+from damageest.errors import StageError
+from damageest.geometry.refinement import halve_edges
+from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.solids import to_manifold, to_solid
+from damageest.geometry.transforms import turn_to_axis
+from damageest.geometry.vectors import normalise
+from damageest.options import Options
+
+NODES = 160
+"""Nodes of the grid along its longer side at most."""
+FINE = 6.0
+"""Nodes of the grid for each radius of the cutter, where there is memory for them."""
+OPEN = 0.2
+"""Length of the mean normal of a damage's skin below which it faces no direction."""
+SHALLOW = 0.5
+"""Cells of the grid by which a place has to be lower than the cutter comes for it to count as narrow."""
+SLACK = 1.5
+"""Cells of the grid by which the cutter is thinner where it is looked whether it comes down."""
+CRUMB = 1e-9
+"""Share of the damage volume below which metal to mill off is rounding."""
+
+
+class Prepare(Options):
+    """How the cavity is opened before deposition."""
+
+    min_radius: float = Field(
+        0.0, ge=0, allow_inf_nan=False,
+        description="radius of the cutter: what is narrower is widened to it, in the job's unit",
+    )  # fmt: skip
+    wall_angle: float = Field(
+        20.0, ge=0, lt=80, description="least angle between a wall and the direction of the opening, in degrees"
+    )
+    undercut: Literal["remove"] = Field(
+        "remove", description="metal above the cavity, seen along the direction, is removed up to the damage's rim"
+    )
+    depth: float = Field(
+        0.0, ge=0, allow_inf_nan=False, description="intact metal that is removed below the damage, in the job's unit"
+    )
+    direction: Vector | None = Field(
+        None, description="[x, y, z] from which the cavity is milled and filled; default: the mean normal of the skin"
+    )
+
+
+def open_cavity(damage: Solid, part: Part, others: Solid | None, prepare: Prepare, tolerance: float) -> Solid:
+    """The cavity that is opened; that of the damage where it is open already.
+
+    Seen along the direction, the floor of the cavity is a height over a grid of the plane across it. It is lowered to
+    the least cone round each of its places (an erosion by a cone, as of a grey image; Serra 1982), whose sides have the
+    wall angle, and by a ball of the cutter's radius where it is narrower than the cutter. What lies above it, in the
+    part and not above the damage's highest place, is the cavity. ``others``: damage of other sites, which is left out.
+
+    Raises StageError where the skin faces no direction, or nothing of the volume is left.
+    """
+    from scipy import ndimage
+
+    direction = _find_direction(damage, part, prepare)
+    origin, turn = damage.bounds.mean(axis=0), turn_to_axis(direction).T
+    vertices = (damage.vertices - origin) @ turn.T
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    slope = 1 / np.tan(np.radians(prepare.wall_angle)) if prepare.wall_angle > 0 else np.inf
+    deep = float(high[2] - low[2]) + prepare.depth
+    out = deep / slope + 2 * prepare.min_radius if np.isfinite(slope) else 2 * prepare.min_radius
+    size = float((high - low)[:2].max()) + 2 * out
+    cell = max(min(tolerance, prepare.min_radius / FINE if prepare.min_radius else np.inf), size / NODES)
+    nx, ny = (np.ceil(((high - low)[:2] + 2 * out) / cell).astype(int) + 5).tolist()
+    corner = low[:2] - out - 2 * cell
+    floor = _lower_floor(Mesh(vertices, damage.faces), corner, (nx, ny), cell) - prepare.depth
+    top = float(high[2]) + tolerance / 4
+    floor = np.minimum(floor, top)
+    if np.isfinite(slope):
+        cone: Any = -_draw_cone(deep / slope, cell, slope)
+        floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
+    if prepare.min_radius > 0:
+        floor = _widen(floor, prepare.min_radius, cell, SHALLOW * cell)
+    room = _raise_column(floor, corner, cell, top).simplify(tolerance / 8)
+    room = room.transform(np.column_stack([turn.T, np.zeros(3)]))
+    whole, lost = to_manifold(part, origin), to_manifold(damage, origin)
+    milled = (whole ^ room) - lost
+    if others is not None:
+        milled -= to_manifold(others, origin)
+    if milled.volume() <= CRUMB * damage.volume:
+        return damage
+    cavity = to_solid(lost + milled, origin)
+    if cavity is None:
+        raise StageError("the opened cavity is no solid", "use a slightly different prepare.wall_angle")
+    return cavity
+
+
+def _find_direction(damage: Solid, part: Part, prepare: Prepare) -> Floats:
+    if prepare.direction is not None:
+        length = float(np.linalg.norm(prepare.direction))
+        if length > 0:
+            return np.asarray(prepare.direction) / length
+        raise StageError("prepare.direction has no length", "give a direction [x, y, z]")
+    skin = damage.cross[~find_inner_faces(damage, part)]
+    total, area = skin.sum(axis=0), float(np.linalg.norm(skin, axis=1).sum())
+    if not area or np.linalg.norm(total) < OPEN * area:
+        raise StageError(
+            "the skin of the damage faces no direction from which it could be opened, as where it goes through",
+            "give prepare.direction",
+        )
+    return np.asarray(normalise(total[None])[0])
+
+
+def _lower_floor(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float) -> Floats:
+    """The lowest place of a mesh in the cell round each node of a grid; infinite where there is none."""
+    fine = halve_edges(mesh, cell / 2).vertices
+    node = np.round((fine[:, :2] - corner) / cell).astype(int)
+    floor = np.full(shape, np.inf)
+    np.minimum.at(floor, (node[:, 0], node[:, 1]), fine[:, 2])
+    return floor
+
+
+def _draw_cone(radius: float, cell: float, slope: float) -> Floats:
+    count = int(np.ceil(radius / cell))
+    x = np.arange(-count, count + 1) * cell
+    return np.asarray(slope * np.hypot(x[:, None], x[None]))
+
+
+def _widen(floor: Floats, radius: float, cell: float, least: float) -> Floats:
+    """The floor, lower where neither a flat cutter nor a ball cutter comes down to it without a cut elsewhere: there a
+    ball is pressed down to it."""
+    from scipy import ndimage
+
+    def shape(size: float, is_ball: bool) -> dict[str, Any]:
+        count = int(np.ceil(size / cell))
+        x = np.arange(-count, count + 1) * cell
+        away = np.hypot(x[:, None], x[None])
+        rise = size - np.sqrt(np.maximum(size**2 - away**2, 0.0)) if is_ball else np.zeros_like(away)
+        return {"footprint": away <= size, "structure": -rise, "mode": "nearest"}
+
+    # a wall is as exact as the grid
+    slim = max(radius - SLACK * cell, 0.5 * radius)
+    cutters = [shape(slim, is_ball) for is_ball in (False, True)]
+    reached = [ndimage.grey_erosion(ndimage.grey_dilation(floor, **one), **one) for one in cutters]
+    pressed = np.where(np.minimum(*reached) > floor + least, floor, floor.max())
+    return np.asarray(np.minimum(floor, ndimage.grey_erosion(pressed, **shape(radius, True))))
+
+
+def _raise_column(floor: Floats, corner: Floats, cell: float, top: float) -> Any:
+    """What lies above a floor given at the nodes of a grid, up to a height; a Manifold."""
+    from manifold3d import Manifold, Mesh64
+
+    nx, ny = floor.shape
+    x, y = np.meshgrid(corner[0] + cell * np.arange(nx), corner[1] + cell * np.arange(ny), indexing="ij")
+    # thin everywhere, so that the column is one closed body; its top lies above the damage
+    roof = np.full(nx * ny, top + cell)
+    below = np.column_stack([x.ravel(), y.ravel(), np.minimum(floor.ravel(), top)])
+    above = np.column_stack([x.ravel(), y.ravel(), roof])
+    number = np.arange(nx * ny).reshape(nx, ny)
+    a, b, c, d = (each.ravel() for each in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+    up = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    ring = np.concatenate([number[:, 0], number[-1, 1:], number[-2::-1, -1], number[0, -2:0:-1]])
+    on = np.roll(ring, -1)
+    count = nx * ny
+    sides = np.concatenate(
+        [np.stack([ring, on, on + count], axis=1), np.stack([ring, on + count, ring + count], axis=1)]
+    )
+    faces = np.concatenate([up[:, ::-1], up + count, sides])
+    body = Manifold(Mesh64(np.concatenate([below, above]), faces.astype(np.uint64)))
+    # what is only as high as the roof's plate is no opening
+    return body.trim_by_plane((0.0, 0.0, -1.0), -top)

@@ -1,0 +1,83 @@
+"""Datums and the steps after the alignment: what moves a pose by datums says so, or fits it to them again."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import damageest
+from damageest.artefacts import Floats, Part, Scan
+from damageest.result import Result
+
+SIZE, NOISE, TOLERANCE = np.array([60.0, 30.0, 20.0]), 0.04, 0.16
+CORNERS = np.array(list(product([-30, 0], [-15, 15], [-10, 10])), float)
+"""Of the end of the part that has the datums."""
+
+
+def box(*corners: list[float]) -> list[dict[str, Any]]:
+    return [{"box": list(corners)}]
+
+
+DATUMS = {
+    "A": box([-31, -16, -10.01], [0, 16, -9.99]),
+    "B": box([-31, -15.01, -11], [0, -14.99, 11]),
+    "C": box([-30.01, -16, -11], [-29.99, 16, 11]),
+}
+
+
+def make_part() -> Part:
+    """A block with an end that is cut away aslant, so that it fits in one way only."""
+    corners = np.array(list(product([-30.0, 30.0], [-15.0, 15.0], [-10.0, 10.0])))
+    corners[[5, 7]] = [[24.0, -15.0, 10.0], [18.0, 8.0, 10.0]]
+    mesh = trimesh.convex.convex_hull(corners)
+    return Part(mesh.vertices, mesh.faces)
+
+
+def draw(count: int) -> Floats:
+    part = make_part()
+    mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
+    points, _ = trimesh.sample.sample_surface(mesh, count, seed=0)
+    return np.asarray(points)
+
+
+def run(points: Floats, view: Any = None, **job: Any) -> Result:
+    noisy = points + np.random.default_rng(0).normal(scale=NOISE, size=points.shape)
+    scan = Scan(noisy, viewpoints=None if view is None else np.array([[-200.0, 0, 50], [200, 0, 50]]), view=view)
+    return damageest.run({"version": 1, "tolerance": TOLERANCE, "report": "none", **job}, part=make_part(), scan=scan)
+
+
+def measure_off(result: Result) -> float:
+    """How far the end with the datums lies from its place."""
+    T = result.pose.T_part_scan
+    return float(np.linalg.norm(CORNERS @ T[:3, :3].T + T[:3, 3] - CORNERS, axis=1).max())
+
+
+@pytest.mark.parametrize("datum", [DATUMS, [one for items in DATUMS.values() for one in items]], ids=["system", "list"])
+def test_an_adapted_part_that_moves_the_pose_off_its_datums_is_named(datum: Any) -> None:
+    points = draw(8000)
+    points[:, 2] += 0.0006 * np.maximum(points[:, 0], 0) ** 2
+    moved = run(points, align={"use": "icp", "datum": datum}, adapt="smooth")
+    (note,) = [note for note in moved.warnings if note.code == "datum_moved"]
+    assert note.amount is not None
+    assert note.amount >= measure_off(moved) > TOLERANCE / 4
+    held = run(points, align={"use": "icp", "datum": datum}, adapt="none")
+    assert measure_off(held) < NOISE / 2
+    assert "datum_moved" not in [note.code for note in held.warnings]
+
+
+@pytest.mark.slow
+def test_datums_are_fitted_again_after_views_were_put_right() -> None:
+    """Half of the datums is in a view that lies off by three tolerances."""
+    points = draw(16_000)
+    view = (points[:, 0] + np.random.default_rng(1).uniform(-14, 14, len(points)) > -12).astype(np.int32)
+    points[view == 1, 2] += 3 * TOLERANCE
+    result = run(points, view, align={"use": "register", "datum": DATUMS}, adapt="none")
+    assert result.fit is not None
+    assert any(one.is_corrected for one in result.fit.views)
+    bottom = points[:, 2] - 3 * TOLERANCE * view < -9.999
+    assert result.aligned.points[bottom, 2].mean() == pytest.approx(-10, abs=NOISE / 4)
+    assert "datum_moved" not in [note.code for note in result.warnings]

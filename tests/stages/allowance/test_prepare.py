@@ -1,0 +1,79 @@
+"""A cavity that is opened before deposition: what it holds, and that a cutter reaches all of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from damageest.artefacts import Deposit, Part, Solid
+from damageest.errors import StageError
+from damageest.geometry.solids import to_manifold, to_solid
+from damageest.stages.allowance.milling import Milling
+
+TOLERANCE = 0.1
+BLOCK = Manifold.cube((60, 40, 20)).translate((-30, -20, -20))
+
+
+def as_solid(body: Any) -> Solid:
+    found = to_solid(body)
+    assert found is not None
+    return found
+
+
+def prepare(tool: Any, **options: Any) -> tuple[Any, Any, Deposit]:
+    """The damage that a tool leaves in the block, the cavity that is made of it, and the deposit."""
+    block, damage = as_solid(BLOCK), as_solid(BLOCK ^ tool)
+    part = Part(block.vertices, block.faces)
+    made = Milling(prepare=options).run(damage=damage, part=part, tolerance=TOLERANCE, others=None)
+    assert isinstance(made, Deposit)
+    return to_manifold(damage), to_manifold(made.cavity or damage), made
+
+
+def measure_area(body: Any, height: float) -> float:
+    return float(body.slice(height).area())
+
+
+def test_an_undercut_is_removed_and_nothing_else() -> None:
+    ball = Manifold.sphere(6, 128).translate((0, 0, -4))
+    lost, cavity, made = prepare(ball, wall_angle=0)
+    assert (lost - cavity).volume() < 1e-5 * lost.volume()
+    # straight up from the widest place, 4 below the top
+    for height in (-3.0, -1.0, -0.2):
+        assert measure_area(cavity, height) == pytest.approx(np.pi * 36, rel=0.08)  # a cell of the grid
+    assert measure_area(cavity, -8.0) == pytest.approx(measure_area(lost, -8.0), rel=0.08)
+    assert made.milled is not None
+    assert made.milled.volume == pytest.approx(cavity.volume() - lost.volume(), rel=1e-3)
+    assert made.cut_back_volume == pytest.approx(made.milled.volume, rel=1e-3)
+    assert made.volume == pytest.approx(cavity.volume(), rel=1e-4)
+
+
+@pytest.mark.parametrize("angle", [15.0, 40.0])
+def test_walls_lean_outward_by_the_angle(angle: float) -> None:
+    _, cavity, _ = prepare(Manifold.cube((16, 12, 12), True), wall_angle=angle)
+    out = 3.0 * np.tan(np.radians(angle))
+    low, high = np.array(cavity.slice(-5.5).bounds()), np.array(cavity.slice(-2.5).bounds())
+    assert np.abs(high - low) == pytest.approx(out, abs=0.4)
+
+
+def test_a_crack_becomes_as_wide_as_the_cutter() -> None:
+    crack = Manifold.cube((20, 0.4, 12), True)
+    lost, cavity, _ = prepare(crack, min_radius=2.0, wall_angle=0)
+    wide = cavity.slice(-3.0).bounds()
+    assert wide[3] - wide[1] == pytest.approx(4.4, abs=0.6)
+    assert (lost - cavity).volume() < 1e-5 * lost.volume()
+
+
+def test_depth_is_added_below() -> None:
+    _, cavity, _ = prepare(Manifold.cube((16, 12, 12), True), wall_angle=0, depth=1.5)
+    assert cavity.bounding_box()[2] == pytest.approx(-7.5, abs=0.01)
+
+
+def test_a_hole_through_the_part_asks_for_a_direction() -> None:
+    hole = Manifold.cylinder(60, 5, 5, 48, True)
+    with pytest.raises(StageError, match="faces no direction"):
+        prepare(hole)
+    _, cavity, _ = prepare(hole, direction=(0.0, 0.0, 1.0), wall_angle=20)
+    assert measure_area(cavity, -0.5) > measure_area(cavity, -19.5) > np.pi * 24
