@@ -134,8 +134,8 @@ def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
         faces=name_faces(result.part, site.damage, result.tolerance),
         deposit=rows,
         path=list_path(site, unit),
-        budget=told["uncertainty"] and told["uncertainty"]["budget"],
-        depth_budget=told["uncertainty"] and told["uncertainty"]["depth_budget"],
+        budget=(told.get("uncertainty") or {}).get("budget"),
+        depth_budget=(told.get("uncertainty") or {}).get("depth_budget"),
     )
 
 
