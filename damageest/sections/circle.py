@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.vectors import normalise
 
 ON_CIRCLE = 0.6
 """Share of an outline that has to lie on one circle for it to be a round."""
@@ -55,7 +56,7 @@ def fit_circle(places: Floats, scale: float | None = None) -> Circle | None:
     fit = least_squares(off, start, loss=loss, f_scale=1.0 if scale is None else max(scale / size, 1e-12))
     weights = np.ones(len(at)) if scale is None else 1 / (1 + (off(fit.x) * size / max(scale, 1e-12)) ** 2)
     away = scaled - fit.x[:2]
-    slopes = np.column_stack([-away / np.linalg.norm(away, axis=1)[:, None], -np.ones(len(at))])
+    slopes = np.column_stack([-normalise(away), -np.ones(len(at))])
     try:
         covariance = np.linalg.inv((slopes * weights[:, None]).T @ slopes)
     except np.linalg.LinAlgError:

@@ -9,6 +9,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.rays import RayCaster
+from damageest.geometry.vectors import normalise
 
 NEAR = 0.01
 """Largest angle, in radians, between a ray and what it picks: a few pixels."""
@@ -64,7 +65,7 @@ def _surround(direction: Floats) -> Floats:
     turn = np.linspace(0, 2 * np.pi, 8, endpoint=False)
     ring = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(direction, side)
     ways = np.concatenate([direction[None], *(direction + NEAR * share * ring for share in (0.1, 0.2, 0.35, 0.6, 1))])
-    return np.asarray(ways / np.linalg.norm(ways, axis=1, keepdims=True))
+    return normalise(ways)
 
 
 def find_point(points: Floats, ray: Ray) -> int | None:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Flags, Floats, Ints
+from damageest.geometry.vectors import normalise
 from damageest_machines.definition import Rotary
 
 SINGULAR = np.radians(2e-4)
@@ -117,7 +118,7 @@ def slerp(first: Floats, last: Floats, share: Floats) -> Floats:
     a = np.where(is_small, 1 - share, np.sin((1 - share) * angle) / sine)
     b = np.where(is_small, share, np.sin(share * angle) / sine)
     found = a[:, None] * first + b[:, None] * last
-    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
+    return normalise(found)
 
 
 def _make_chain(axes: Sequence[Rotary]) -> _Chain:

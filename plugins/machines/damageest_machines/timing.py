@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Flags, Floats
+from damageest.geometry.vectors import normalise
 from damageest_machines.definition import Machine
 from damageest_machines.moves import Moves
 from damageest_machines.positions import Positions
@@ -47,7 +48,7 @@ def _limit_corners(steps: Floats, rate: Floats, blend: float, stops: Flags) -> F
     limit = np.zeros(len(steps) + 1)
     if len(steps) < 2:
         return limit
-    units = steps / np.maximum(np.linalg.norm(steps, axis=1), 1e-300)[:, None]
+    units = normalise(steps)
     half = np.sqrt(np.clip((1 - (units[:-1] * units[1:]).sum(axis=1)) / 2, 0, 1))  # sine of half the change
     inner = np.sqrt(np.clip(1 - half**2, 0, 1))
     speed = np.sqrt(np.minimum(rate[:-1], rate[1:]) * blend * inner / np.maximum(1 - inner, 1e-12))

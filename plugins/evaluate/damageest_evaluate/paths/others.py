@@ -9,6 +9,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.geometry.solids import to_manifold
+from damageest.geometry.vectors import normalise
 from damageest_evaluate.damages import PlacePicker
 
 WIDTH = 1.2
@@ -29,7 +30,7 @@ def make_lump(rng: np.random.Generator, radius: float) -> Any:
     phase = rng.uniform(0, 2 * np.pi, 6)
 
     def move(places: Floats) -> Floats:
-        out = places / np.maximum(np.linalg.norm(places, axis=1, keepdims=True), 1e-12)
+        out = normalise(places)
         rise = np.sin(out @ waves.T + phase).mean(axis=1, keepdims=True)
         return np.asarray(places * (1 + 2 * ROUGH * rise))
 
