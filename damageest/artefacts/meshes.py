@@ -133,7 +133,6 @@ class Deposit(Solid):
     """
 
     cavity: Solid | None = None
-    milled: Solid | None = None
     stock_volume: float = 0.0
     cut_back_volume: float = 0.0
     thickness: tuple[float, float, float] | None = None
@@ -141,6 +140,7 @@ class Deposit(Solid):
     heights: tuple[tuple[int, float], ...] = ()
     overlap: float = 0.0
     notes: tuple[str, ...] = ()
+    milled: Solid | None = None
     _ranges: ClassVar[dict[str, Range]] = dict.fromkeys(
         ("stock_volume", "cut_back_volume", "thickness", "overlap"), (0.0, MOST)
     )
