@@ -31,6 +31,9 @@ from damageest.artefacts import (
     Rims,
     Samples,
     Scan,
+    Section,
+    SectionContour,
+    SectionValue,
     Sites,
     Solid,
     Surface,
@@ -57,7 +60,28 @@ PATH = DepositPath(
     POINTS, UP, -UP, np.arange(7) + 1 / 3, np.arange(7) > 2, np.arange(1, 8), np.arange(1, 8), np.ones(7, np.int64),
     UP[:1], POINTS[0, :1], 2.0, POINTS[1, :1], 1 / 3, 10.0, SOLID, 0.1, np.inf,
 )  # fmt: skip
+VALUE = SectionValue("chord", 40.0, None, 0.01, "length", "an edge is not seen")
+CONTOUR = SectionContour(POINTS[:, :2], UP[:, 1:], np.r_[np.nan, POINTS[1:, 0]], np.ones(7) / 3, np.arange(7.0))
 ARTEFACTS: list[Any] = [
+    VALUE,
+    CONTOUR,
+    Section(
+        1,
+        "root",
+        "blade",
+        (1.0, 2.0, 1 / 3),
+        (1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, 1.0),
+        (CONTOUR, CONTOUR),
+        (VALUE,),
+        2,
+        0.9,
+        0.1,
+        700,
+        (("leading edge", 1 / 3, 2.0),),
+        ("short",),
+    ),
     UNREACHED,
     FILL,
     PATH,
@@ -76,6 +100,7 @@ ARTEFACTS: list[Any] = [
     SOLID,
     Surface(BOX.vertices, BOX.faces[:5]),
     Deposit(SOLID.vertices, SOLID.faces, SOLID, 0.5, 1 / 3, (0.1, 0.2, 0.3), (4, 7), ((4, 1 / 3),), 0.1, ("clipped",)),
+    Deposit(SOLID.vertices, SOLID.faces, milled=SOLID),
     Deposit(SOLID.vertices, SOLID.faces),
     Part(
         BOX.vertices,
