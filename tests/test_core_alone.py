@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,18 +15,22 @@ import damageest
 from damageest.artefacts import Solid
 from damageest.errors import EXTRAS, StageError
 from damageest.geometry import isosurface
+from damageest.isolation import end_workers
 from tests import damaged_box
 
 
 @pytest.fixture(autouse=True)
-def without_extras(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Modules of the extras do not load, in this process and in those that it starts."""
+def without_extras(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Modules of the extras do not load, in this process and in those that it starts; those of earlier tests end."""
+    end_workers()
     folder = tmp_path_factory.mktemp("hidden")
     for module in EXTRAS:
         (folder / f"{module}.py").write_text(f"raise ModuleNotFoundError('no {module} here', name='{module}')\n")
     for name in [name for name in sys.modules if name.partition(".")[0] in EXTRAS]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.syspath_prepend(str(folder))
+    yield
+    end_workers()
 
 
 def test_a_run_needs_no_extra_and_names_the_one_of_the_page(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from damageest.checks.scanner import ScannerErrors, find_shares
 from damageest.findings import Coverage, Interval
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
-from damageest.geometry.neighbourhoods import find_nearby
+from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
 from damageest.rules import ScanFacts
 from damageest.rules.inner_surface import GAP
 
@@ -40,16 +40,21 @@ OUTWARD = 0.3
 damage puts skin outside."""
 ASKED = 2000
 """Scan points among which the deepest ones of a site are looked for."""
+
+AROUND, NOISY = 7, 3.0
+"""Scan points about the deepest one, it among them, that tell whether it lies in a corner of the inner surface; and by
+how many standard deviations of their noise the deepest of many points is deeper than those where it does not."""
 MOST = 50_000
 """Scan points whose largest depth is taken."""
 
 
 class _Place(NamedTuple):
     """``depth`` below the skin of a place ``at`` (3,), and the outward ``normal`` (3,) of the skin nearest to it;
-    ``measured``: the largest depth of a scan point."""
+    ``measured``: the largest depth of a scan point; ``rise``: by how much those nearest to it are less deep."""
 
     depth: float
     measured: float
+    rise: float
     at: Floats
     normal: Floats
 
@@ -65,11 +70,11 @@ class SiteError:
     ``inside`` (where points do not bound it), ``beside``, ``fading``: by how much the loss may be larger; ``less``: by
     how much it may be smaller, since the inner surface was closed across what was not seen. ``depth``: of the damage
     volume, corrected for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free
-    motions. ``measured``: the largest depth of a scan point, with what its noise, its distance to the deepest place,
-    the pose and the skin may be off. ``probing_form``, ``scanner`` (T,): by the certificate and the temperature,
-    signed, by the terms of `ScannerErrors`; ``depth_scanner`` (T,): the same of the depth, and ``depth_by``: the other
-    causes of ``depth_error``, by name. ``exposed``: the area that is moved against the skin by what deviates;
-    ``curved``: that of skin made of chords.
+    motions. ``measured``: the largest depth of a scan point, with what its noise, the pose and the skin may be off, and
+    how far a corner of the inner surface goes beyond it. ``probing_form``, ``scanner`` (T,): by the certificate and the
+    temperature, signed, by the terms of `ScannerErrors`; ``depth_scanner`` (T,): the same of the depth, and
+    ``depth_by``: the other causes of ``depth_error``, by name. ``exposed``: the area that is moved against the skin by
+    what deviates; ``curved``: that of skin made of chords.
     """
 
     volume: float
@@ -157,8 +162,9 @@ def measure_site_error(
     }
     told = float((shares.depth**2).sum())
     beside = sum(depth_by[name] ** 2 for name in depth_by if name not in ("spacing", "noise")) + told
-    # the deepest place lies between the points: in a corner of the inner surface none may be as deep
-    by_point = float(np.sqrt(aligned.noise**2 + depth_by["spacing"] ** 2 + beside))
+    by_point = float(np.sqrt(aligned.noise**2 + beside))
+    # in a corner of the inner surface no point may be as deep as it is; where the floor is level, one is
+    corner = min(max(deepest.rise - NOISY * aligned.noise, 0.0), WIDTH * depth_by["spacing"])
     return SiteError(
         volume=damage.volume,
         noise=surface.noise,
@@ -178,7 +184,7 @@ def measure_site_error(
         less=damage.volume * evidence.ids_unseen if hole else 0.0,
         depth=deepest.depth - surface.depth_excess,
         depth_error=float(np.sqrt(surface.depth**2 + beside)),
-        measured=deepest.measured + WIDTH * by_point,
+        measured=deepest.measured + WIDTH * by_point + corner,
         depth_free=sum(
             max(-one.low, one.high) * abs(float(one.move(deepest.at[None])[0] @ deepest.normal)) for one in free
         ),
@@ -287,8 +293,13 @@ def _find_deepest(damage: Solid, inner: Flags, part: Part, members: Floats, reac
     distance, face, _ = closest_on_mesh(near if len(near) else vertices, part)
     at = int(distance.argmax())
     # the maximum of a part of many points would be less than what was measured
-    measured = float(distance_to_mesh(members[:: max(1, len(members) // MOST)], part).max())
-    return _Place(float(distance[at]), measured, (near if len(near) else vertices)[at], part.face_normals[face[at]])
+    asked = members[:: max(1, len(members) // MOST)]
+    depths = distance_to_mesh(asked, part)
+    first = int(depths.argmax())
+    _, beside = find_neighbours(asked[first : first + 1], AROUND, asked)
+    rise = float(depths[first] - np.median(depths[beside]))
+    place = (near if len(near) else vertices)[at]
+    return _Place(float(distance[at]), float(depths[first]), rise, place, part.face_normals[face[at]])
 
 
 def _measure_curved(damage: Solid, skin: Flags, area: Floats) -> float:

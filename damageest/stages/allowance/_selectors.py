@@ -49,7 +49,9 @@ class KeepOut(Selector):
         solids = [name for name in ("cylinder", "mesh") if getattr(self, name) is not None]
         one = len(solids) + bool(self.conditions()) == 1
         return (
-            "" if one else "give one of: cylinder; mesh; a box; or conditions on skin: half_space, facing, faces, at, kind"
+            ""
+            if one
+            else "give one of: cylinder; mesh; a box; or conditions on skin: half_space, facing, faces, at, kind"
         )
 
     def is_solid(self) -> bool:
