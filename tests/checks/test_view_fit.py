@@ -121,6 +121,7 @@ def test_mixed_points_at_edges_are_no_misplaced_view() -> None:
     assert not found.disagree
 
 
+@pytest.mark.slow
 def test_views_that_are_put_right_leave_no_doubt_that_the_scan_shows_this_part() -> None:
     """Only half of the scan lay on the part before."""
     part = PARTS["ribbed_plate"]()

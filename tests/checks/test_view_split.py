@@ -128,6 +128,7 @@ def test_views_that_two_surfaces_tell_apart_give_no_site_and_one_line() -> None:
     assert told.amount
 
 
+@pytest.mark.slow
 def test_a_loss_under_views_that_lie_apart_stays_a_site() -> None:
     """It is in one cluster with the skin of a view that lies too deep, and deeper than that explains."""
     part = PARTS["ribbed_plate"]()

@@ -56,7 +56,11 @@ def measure_off(result: Result) -> float:
     return float(np.linalg.norm(CORNERS @ T[:3, :3].T + T[:3, 3] - CORNERS, axis=1).max())
 
 
-@pytest.mark.parametrize("datum", [DATUMS, [one for items in DATUMS.values() for one in items]], ids=["system", "list"])
+@pytest.mark.parametrize(
+    "datum",
+    [DATUMS, pytest.param([one for items in DATUMS.values() for one in items], marks=pytest.mark.slow)],
+    ids=["system", "list"],
+)
 def test_an_adapted_part_that_moves_the_pose_off_its_datums_is_named(datum: Any) -> None:
     points = draw(8000)
     points[:, 2] += 0.0006 * np.maximum(points[:, 0], 0) ** 2

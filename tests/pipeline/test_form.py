@@ -26,6 +26,7 @@ def dent(points: np.ndarray, normals: np.ndarray, depth: float, width: float) ->
     return points - deep[:, None] * normals
 
 
+@pytest.mark.slow
 def test_only_what_is_much_deeper_than_the_bend_is_proven() -> None:
     points, normals = draw_skin(count=30_000)
     dented = dent(points, normals, 2.5, 8.0)

@@ -20,6 +20,7 @@ def test_noise_of_three_tolerances_is_refused_with_the_tolerance_to_give(pose: s
         damageest.run({"version": 1}, part=part, scan=scan, settings=settings)
 
 
+@pytest.mark.slow
 def test_points_too_far_apart_to_show_the_noise_are_not_refused() -> None:
     """On bars a few gaps wide, noise without a pose comes out 400 times too large."""
     part = PARTS["grille"]()

@@ -76,10 +76,12 @@ DATUMS = [
 @pytest.mark.parametrize(
     ("align", "source", "offset", "scale"),
     [
-        ("none", "probing_size", 0.03, 1.0), ("icp", "probing_size", 0.03, 1.0), ("icp", "length", 0.0, 1.005),
+        pytest.param("none", "probing_size", 0.03, 1.0, marks=pytest.mark.slow),
+        ("icp", "probing_size", 0.03, 1.0),
+        ("icp", "length", 0.0, 1.005),
         ("datums", "probing_size", 0.02, 1.0),
     ],
-)  # fmt: skip
+)
 def test_a_sensitivity_is_what_a_scan_with_that_error_shows(
     align: str, source: str, offset: float, scale: float
 ) -> None:

@@ -46,6 +46,7 @@ def test_truth_lies_in_the_intervals_of_both_sites_and_of_the_total() -> None:
     assert result.volume_95[0] <= sum(TRUE_VOLUMES) <= result.volume_95[1]
 
 
+@pytest.mark.slow
 def test_total_is_narrower_than_the_sites_together_and_wider_than_each() -> None:
     result = run(20_000, 0.04, 0, 1)
     widths = [site.volume_95[1] - site.volume_95[0] for site in result.sites if site.volume_95]

@@ -25,7 +25,7 @@ from damageest.stages.export import ExportedFiles
 from damageest.stages.export.files import Files
 from tests.needs import import_for, needs_plugin
 
-pytestmark = needs_plugin("cadquery")
+pytestmark = [needs_plugin("cadquery"), pytest.mark.xdist_group("adapted")]  # one scene for all
 cq = import_for("cadquery", "cadquery")
 
 TOLERANCE = 0.2
@@ -128,6 +128,7 @@ def test_files_in_the_scan_frame_lie_where_the_scan_is(done: Run) -> None:
     assert np.median(distance_to_mesh(there[intact], Mesh(left.vertices, left.faces))) < TOLERANCE / 4
 
 
+@pytest.mark.slow
 def test_without_a_field_sites_have_facets_and_the_part_is_refused(done: Run, tmp_path: Path) -> None:
     assert done.result.adapted is not None
     blind = replace(done.result, adapted=replace(done.result.adapted, field=None))

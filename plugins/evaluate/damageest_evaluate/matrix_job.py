@@ -95,7 +95,8 @@ def make_settings(item: Implementation, scene: MatrixJob) -> dict[str, Any] | st
         nozzle = {"tip_radius": width / 2, "length": 20 * width, "body_radius": 3 * width}
         options |= {"width": width, "height": width / 2, "feed": 600.0, "nozzle": nozzle}
     elif stage == "align" and use != "register":
-        moved = _make_small_motion(scene) @ scene.pose if use == "icp" else scene.pose
+        moved = _make_small_motion(scene) @ scene.pose if use in ("icp", "constrained") else scene.pose
+        options |= {"shift": ["x", "y", "z"], "turn": ["x", "y", "z"]} if use == "constrained" else {}
     missing = [name for name, field in item.cls.model_fields.items() if field.is_required() and name not in options]
     if missing:
         return f"has no default for: {', '.join(missing)}"

@@ -80,6 +80,7 @@ def test_a_bent_part_is_adapted(tmp_path: Path) -> None:
     assert np.isclose(found.adapted.amount, 1.0, rtol=0.2)
 
 
+@pytest.mark.slow
 def test_a_pose_that_is_refused_since_the_part_is_deformed_is_found(tmp_path: Path) -> None:
     given, settings = scan([SPHERE], scale=1.0), ["align=register"]
     with pytest.raises(StageError, match="lies on the part") as refused:

@@ -71,6 +71,7 @@ def test_depth_is_added_below() -> None:
     assert cavity.bounding_box()[2] == pytest.approx(-7.5, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_hole_through_the_part_asks_for_a_direction() -> None:
     hole = Manifold.cylinder(60, 5, 5, 48, True)
     with pytest.raises(StageError, match="faces no direction"):

@@ -95,6 +95,7 @@ def test_a_thinned_scan_has_all_points_of_the_damage(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "out/result.json").read_text())["scan"]["total"] == POINTS
 
 
+@pytest.mark.slow
 def test_crops_hold_for_the_points_added(tmp_path: Path) -> None:
     low = [-30, -30, -30]
     few = damageest.run(
