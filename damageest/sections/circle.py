@@ -58,7 +58,7 @@ def fit_circle(places: Floats, scale: float | None = None) -> Circle | None:
     away = scaled - fit.x[:2]
     slopes = np.column_stack([-normalise(away), -np.ones(len(at))])
     try:
-        covariance = np.linalg.inv((slopes * weights[:, None]).T @ slopes)
+        covariance = np.asarray(np.linalg.inv((slopes * weights[:, None]).T @ slopes), np.float64)
     except np.linalg.LinAlgError:
         return None
     return Circle(middle + size * fit.x[:2], float(size * fit.x[2]), covariance)
