@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +16,11 @@ LIFT = 1e-7
 """By how much the outer faces of what is taken off are lifted off the skin, as a share of the part's diagonal."""
 
 
-def subtract_from_part(part: Part, lost: Sequence[Solid]) -> Solid | None:
+def subtract_from_part(part: Part, lost: Sequence[Solid], union: Any = None) -> Solid | None:
     """The part without ``lost`` solids, which lie inside it; None where nothing is left, the part itself without any.
 
-    All are in one frame and unit. The outer faces of a damage volume lie on the part's skin but for rounding. The plain
+    All are in one frame and unit; ``union``: of ``lost``, as `unite` gives it about the middle of the part's bounds,
+    where it is there already. The outer faces of a damage volume lie on the part's skin but for rounding. The plain
     difference leaves membranes without thickness there, over up to two fifths of an opening: no volume, but rays and
     other software see them. So these faces are lifted off the skin first, outwards; the inner damage surface and the
     rim stay as they are.
@@ -29,7 +31,7 @@ def subtract_from_part(part: Part, lost: Sequence[Solid]) -> Solid | None:
         return part
     origin = part.bounds.mean(axis=0)
     whole = to_manifold(part, origin)
-    plain = unite(lost, origin)
+    plain = unite(lost, origin) if union is None else union
     lifted = [lift_faces(one, ~find_inner_faces(one, part), LIFT * part.diagonal) for one in lost]
     left = whole - unite(lifted, origin)
     if abs(whole.volume() - plain.volume() - left.volume()) > BALANCE * whole.volume():

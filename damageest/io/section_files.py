@@ -107,7 +107,7 @@ def lay_out(section: Section, tolerance: float, unit: str, width: float = WIDTH)
     size = float(np.ptp(flat, axis=0).max())
     deviations = np.concatenate([contour.distance for contour in section.contours])
     largest = max(float(np.abs(deviations[np.isfinite(deviations)]).max(initial=0.0)), tolerance)
-    times = max(_round_down(SHOWN * size / largest), 1.0) if largest > 0 else 1.0
+    times = max(round_nice(SHOWN * size / largest), 1.0) if largest > 0 else 1.0
     moved = np.concatenate([_exaggerate(contour, times) for contour in section.contours])
     everything = np.concatenate([flat, moved[np.isfinite(moved).all(axis=1)]])
     low, high = everything.min(axis=0), everything.max(axis=0)
@@ -128,7 +128,7 @@ def lay_out(section: Section, tolerance: float, unit: str, width: float = WIDTH)
         place(np.vstack([edge, edge[:1]]) if closed else edge)
         for c in section.contours for edge in (c.nominal + sign * times * tolerance * c.normals for sign in (-1, 1))
     ]  # fmt: skip
-    length = _round_down(0.25 * (width - 2 * MARGIN) / scale)
+    length = round_nice(0.25 * (width - 2 * MARGIN) / scale)
     start = np.array([MARGIN, height - 12.0])
     marks = [(name, *place(np.array([[x, y]]))[0].tolist()) for name, x, y in section.marks]
     return Drawing(
@@ -195,7 +195,7 @@ def _exaggerate(contour: SectionContour, times: float) -> Floats:
     return np.asarray(contour.nominal + times * contour.distance[:, None] * contour.normals)
 
 
-def _round_down(value: float) -> float:
+def round_nice(value: float) -> float:
     """The largest of 1, 2 and 5 times a power of ten that is at most a positive value."""
     power = 10.0 ** math.floor(math.log10(value))
     return power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-9))

@@ -42,7 +42,8 @@ def collect_result(engine: Engine, state: JobState) -> Result:
     for item in state.surplus:  # those of surroundings are outliers until here
         kept[item.points] = ADDED
     origin = part.bounds.mean(axis=0)
-    lost = unite((site.damage for site in sites if site.accepted), origin)
+    accepted = [site.damage for site in sites if site.accepted]
+    lost = unite(accepted, origin)
     damage = to_solid(lost, origin)
     # a cut-back is no damage: what was found is compared as it was found
     cut_back = any(site.damage is not found.damage for site, found in zip(sites, state.found, strict=True))
@@ -61,7 +62,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         site_label=label,
         sites=sites,
         damage=damage,
-        undamaged=subtract_from_part(part, [site.damage for site in sites if site.accepted]),
+        undamaged=subtract_from_part(part, accepted, lost),
         warnings=rank_notes(state.warnings),
         failures=tuple(str(error) for error in state.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance, state.adapted is not None),

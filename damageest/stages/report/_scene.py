@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import DAMAGE, INTACT, Floats, Mesh
 from damageest.geometry.transforms import turn_to_axis
 from damageest.io import colours
+from damageest.io.section_files import round_nice
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._least_depth import map_least_depth
@@ -144,7 +145,7 @@ def choose_limit(result: Result) -> float:
     deviation = result.deviation
     known = np.isin(deviation.label, (INTACT, DAMAGE))
     far = float(np.quantile(np.abs(deviation.distance[known]), 0.995)) if known.any() else 0.0
-    return style.round_nice(max(2 * result.tolerance, far) * 1.25)
+    return round_nice(max(2 * result.tolerance, far) * 1.25)
 
 
 def _share_triangles(result: Result, most: int) -> int:
@@ -252,7 +253,7 @@ def _add_form(stage: _Stage, result: Result, share: int) -> int:
     shown = thin_mesh(Mesh(designed, adapted.part.faces), share)
     moved = adapted.displacement[cKDTree(designed).query(shown.vertices)[1]]
     length = np.linalg.norm(moved, axis=1)
-    most = style.round_nice(float(length.max()))
+    most = round_nice(float(length.max()))
     ends = {"0": stage.place(shown.vertices), f"{EXAGGERATED}": stage.place(shown.vertices + EXAGGERATED * moved)}
     item = k3d.mesh(
         ends, shown.faces.astype(np.uint32), attribute=(np.round(length / most * 127) / 127 * most).astype(np.float32),

@@ -11,8 +11,8 @@ from damageest.artefacts import INTACT, Floats, Mesh
 from damageest.geometry.solids import to_manifold
 from damageest.io import colours
 from damageest.io.section_files import Drawing as Layout
+from damageest.io.section_files import round_nice
 from damageest.result import Result, Site
-from damageest.stages.report import _style as style
 from damageest.stages.report._svg import GROUND, INK, METAL, NO_FILL, SOFT, Drawing, choose_ticks
 
 MOST_POINTS = 700
@@ -137,7 +137,7 @@ def lay_out_site(result: Result, site: Site) -> Layout | None:
     points = place(flat[near])
     points = points[:: max(1, -(-len(points) // MOST_POINTS))]
     dots = [("within", point + np.array([[-0.7, 0.0], [0.7, 0.0]])) for point in points]
-    length = style.round_nice(0.25 * (high[0] - low[0]))
+    length = round_nice(0.25 * (high[0] - low[0]))
     ruler = np.array([[10.0, height + 9.0], [10.0 + scale * length, height + 9.0]])
     lines = [*(("above", loop) for loop in damage), *dots]
     text = f"{length:g} {result.units}"
@@ -236,7 +236,7 @@ def _choose_points(result: Result, plane: Plane, low: Floats, high: Floats) -> t
 def _draw_ruler(drawing: Drawing, low: Floats, high: Floats, unit: str) -> None:
     """A ruler of a round length at the bottom left, with a mark at each tenth of it."""
     width, height = high - low
-    length = style.round_nice(0.3 * width)
+    length = round_nice(0.3 * width)
     x, y, tick = low[0] + 0.03 * width, low[1] + 0.04 * height, 0.012 * height
     line = [(x, y + 2 * tick), (x, y), (x + length, y), (x + length, y + 2 * tick)]
     for k in range(1, 10):

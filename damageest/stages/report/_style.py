@@ -42,9 +42,3 @@ def format_share(value: float) -> str:
     if value >= 1:
         return f"100{THIN}%"
     return f"{min(100 * value, 99.9):.{1 if value > 0.95 or value < 0.1 else 0}f}{THIN}%"
-
-
-def round_nice(value: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that is at most a positive value."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-9))

@@ -8,6 +8,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.io.section_files import round_nice
 
 INK, SOFT, GROUND, METAL = "var(--ink)", "var(--soft)", "var(--ground)", "var(--metal)"
 """Colours that the page's style sheet gives, for a light and a dark ground."""
@@ -100,8 +101,6 @@ class Drawing:
 
 def choose_ticks(low: float, high: float, count: int) -> Floats:
     """Round values between two limits: about ``count`` of them, at multiples of 1, 2 or 5 times a power of ten."""
-    from damageest.stages.report._style import round_nice
-
     step = round_nice((high - low) / max(count, 1))
     first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
     return np.asarray(np.arange(first, last + 1) * step, np.float64)
