@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -16,15 +14,14 @@ from reportlab.lib.units import mm
 from reportlab.lib.utils import ImageReader
 from reportlab.platypus import BaseDocTemplate, Frame, KeepTogether, PageBreak, PageTemplate, Spacer, Table
 
-from damageest.artefacts import Mesh, Section
-from damageest.findings import Interval
+from damageest.artefacts import Mesh
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.views import View
 from damageest.io import colours
-from damageest.io.section_files import lay_out
 from damageest.result import Result, Site
 from damageest.rules.notes import fold_notes
 from damageest.stages.report._drawing import draw
+from damageest.stages.report._pdf_book import Book, Letterhead, clean_line
 from damageest.stages.report._pdf_parts import (
     FOOT,
     HEAD,
@@ -35,7 +32,6 @@ from damageest.stages.report._pdf_parts import (
     WIDTH,
     Pages,
     Plot,
-    clean,
     grid_table,
     head,
     pair_table,
@@ -44,8 +40,8 @@ from damageest.stages.report._pdf_parts import (
     style,
     write,
 )
+from damageest.stages.report._pdf_sections import show_sections
 from damageest.stages.report._section import lay_out_site
-from damageest.stages.report._sections import choose_decimals
 from damageest.stages.report._sites import Remains, Shown
 from damageest.stages.report._thin import thin_mesh
 from damageest.stages.report._words import Words
@@ -56,44 +52,6 @@ MOST_NOTES = 6
 """Notes of a run in the summary."""
 TRIANGLES = 60_000
 """Triangles of the picture of the whole part."""
-N_ = str
-"""Marks texts that are translated where they are shown."""
-QUANTITIES = (
-    N_("chord"), N_("leading edge"), N_("trailing edge"), N_("thickness"), N_("twist"), N_("bow"),
-    N_("bow from straight"), N_("lean"), N_("form"), N_("deepest"), N_("highest"), N_("line profile"), N_("diameter"),
-    N_("off centre"), N_("run-out"), N_("roundness"),
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Letterhead:
-    """Who makes the report: the name of the company, and a file with its logo."""
-
-    company: str = ""
-    logo: Path | None = None
-
-
-@dataclass(frozen=True)
-class _Book:
-    """What every part of the document needs."""
-
-    result: Result
-    content: Mapping[str, Any]
-    job_text: str
-    words: Words
-    letterhead: Letterhead
-
-    @property
-    def unit(self) -> str:
-        return self.result.units
-
-    def interval(self, interval: Interval | None, unit: str) -> str:
-        if interval is None:
-            return self.words.tell("none: the scan does not support one")
-        low, high = interval
-        if not math.isfinite(high):
-            return self.words.tell("at least {low} {unit}", low=self.words.number(low), unit=unit)
-        return f"{self.words.number(low)} … {self.words.number(high)} {unit}"
 
 
 def write_pdf(
@@ -106,10 +64,10 @@ def write_pdf(
     (3,): from which the part is looked at. Raises OSError where the logo cannot be read.
     """
     register_fonts()
-    book = _Book(result, content, job_text, Words(language), letterhead)
+    book = Book(result, content, job_text, Words(language), letterhead)
     story: list[Any] = [*_summarise(book, _draw_part(result, remains, direction))]
     if result.sections:
-        story += [PageBreak(), *_show_sections(book)]
+        story += [PageBreak(), *show_sections(book)]
     for site, shown in zip(result.sites, sites, strict=True):
         story += [PageBreak(), *_show_site(book, site, shown)]
     numbered = book.words.tell("page {page} of {pages}")
@@ -124,7 +82,7 @@ def write_pdf(
     document.build(story, canvasmaker=canvas)
 
 
-def _draw_head(pen: Any, book: _Book) -> None:
+def _draw_head(pen: Any, book: Book) -> None:
     """Company, logo and title at the head of a page, the job at its foot."""
     top = A4[1] - 10 * mm
     pen.saveState()
@@ -149,14 +107,7 @@ def _draw_head(pen: Any, book: _Book) -> None:
     pen.restoreState()
 
 
-def clean_line(text: str) -> str:
-    """A text on one line for a canvas, which takes no markup."""
-    from xml.sax.saxutils import unescape
-
-    return unescape(clean(" ".join(text.split())))[:90]
-
-
-def _summarise(book: _Book, image: bytes) -> list[Any]:
+def _summarise(book: Book, image: bytes) -> list[Any]:
     result, content, tell, number = book.result, book.content, book.words.tell, book.words.number
     cubic = f"{book.unit}³"
     levels = [site.verdict.level for site in result.sites]
@@ -191,7 +142,7 @@ def _summarise(book: _Book, image: bytes) -> list[Any]:
     return story
 
 
-def _say_verdict(book: _Book) -> str:
+def _say_verdict(book: Book) -> str:
     result, words = book.result, book.words
     if not result.sites:
         if result.failures:
@@ -210,13 +161,13 @@ def _say_verdict(book: _Book) -> str:
     return text
 
 
-def _name_scans(book: _Book) -> str:
+def _name_scans(book: Book) -> str:
     names = [Path(path).name for path in book.content["scan"]["paths"]]
     text = ", ".join(names[:3]) + (f" + {len(names) - 3}" if len(names) > 3 else "")
     return f"{text or book.words.tell('given as array')}, {book.content['scan']['points']} {book.words.tell('points')}"
 
 
-def _describe_pose(book: _Book) -> list[tuple[str, str]]:
+def _describe_pose(book: Book) -> list[tuple[str, str]]:
     pose, tell, number = book.result.pose, book.words.tell, book.words.number
     if pose.datums:
         rows = [
@@ -242,7 +193,7 @@ def _count_datums(job_text: str) -> int:
     return len(align.get("datum") or ()) if isinstance(align, Mapping) else 0
 
 
-def _list_sites(book: _Book) -> Table:
+def _list_sites(book: Book) -> Table:
     tell, number, unit = book.words.tell, book.words.number, book.unit
     rows = [[tell("site"), f"{tell('volume')}, {unit}³", tell("95 % interval"), f"{tell('depth')}, {unit}",
              tell("verdict")]]  # fmt: skip
@@ -255,7 +206,7 @@ def _list_sites(book: _Book) -> Table:
     return grid_table(rows, [0.1 * WIDTH, 0.2 * WIDTH, 0.34 * WIDTH, 0.14 * WIDTH, 0.22 * WIDTH], 8)
 
 
-def _trace(book: _Book) -> Table:
+def _trace(book: Book) -> Table:
     """Digests of the inputs, versions, and the implementation of each stage."""
     from damageest.io.files import file_sha256
 
@@ -271,7 +222,7 @@ def _trace(book: _Book) -> Table:
     return pair_table(rows, WIDTH, 0.22, 6.5)
 
 
-def _make_signatures(book: _Book) -> Table:
+def _make_signatures(book: Book) -> Table:
     tell = book.words.tell
     names = [tell("measured by"), tell("checked by"), tell("released by")]
     label = style(7, colour=SOFT)
@@ -284,69 +235,7 @@ def _make_signatures(book: _Book) -> Table:
     return table
 
 
-def _show_sections(book: _Book) -> list[Any]:
-    result, words = book.result, book.words
-    story: list[Any] = [head(words.tell("Sections"))]
-    story.append(write(words.tell(
-        "Lengths in {unit}. Measured value; below it, its difference from nominal, ± twice its standard uncertainty.",
-        unit=book.unit), 7.5, colour=SOFT, spaceAfter=3))  # fmt: skip
-    decimals = choose_decimals(result.tolerance)
-    groups: dict[tuple[int, tuple[str, ...]], list[Section]] = {}
-    for section in result.sections:
-        groups.setdefault((section.group, tuple(value.name for value in section.values)), []).append(section)
-    for (_, names), sections in groups.items():
-        for start in range(0, len(sections), 5):
-            story += [_tabulate(book, names, sections[start : start + 5], decimals), Spacer(1, 4)]
-        notes = [f"{one.name}: {note}" for one in sections for note in one.notes]
-        told = dict.fromkeys(v.note for one in sections for v in one.values if v.note and v.measured is None)
-        story += [write(f"– {note}", 7) for note in (*notes, *told)]
-    plots = []
-    for section in result.sections:
-        if section.contours:
-            drawing = lay_out(section, result.tolerance, book.unit)
-            text = words.tell("deviations x {times}", times=f"{drawing.times:g}")
-            plots.append(
-                [write(f"{section.number}: {section.name}", 7.5, True), Plot(drawing, 0.49 * WIDTH, clean_line(text))]
-            )
-    legend = (
-        "blue: below, green: within, red: above the tolerance (dashed); dotted: no scan points; deviations enlarged"
-    )
-    if plots:
-        story.append(write(words.tell(legend), 7, colour=SOFT, spaceBefore=2, spaceAfter=2))
-    for start in range(0, len(plots), 2):
-        row = [*plots[start : start + 2], ""][:2]
-        table = Table([row], [0.5 * WIDTH] * 2)
-        table.setStyle([("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)])
-        story.append(table)
-    return story
-
-
-def _tabulate(book: _Book, names: tuple[str, ...], sections: list[Section], decimals: int) -> Table:
-    """Quantities in rows, sections in columns."""
-    words = book.words
-    rows = [["", *(f"{one.number}: {one.name}" for one in sections)]]
-    rows.append([words.tell("seen"), *(words.share(one.seen) if one.contours else "–" for one in sections)])
-    for k, name in enumerate(names):
-        bore, _, rest = name.partition(" ") if name.startswith("bore ") else ("", "", name)
-        if bore:
-            count, _, rest = rest.partition(" ")
-            bore = f"{words.tell('bore')} {count} "
-        line = [bore + words.tell(rest)]
-        for one in sections:
-            value = one.values[k]
-            if value.measured is None:
-                line.append("–")
-                continue
-            text = words.fixed(value.measured, decimals) + ("°" if value.unit == "degrees" else "")
-            more = words.fixed(value.measured - value.nominal, decimals, plus=True) if value.nominal else ""
-            more += f" ± {words.fixed(2 * value.error, decimals)}" if value.error else ""
-            line.append(f"{text}\n{more}" if more else text)
-        rows.append(line)
-    each = min(0.8 / max(len(sections), 1), 0.25) * WIDTH
-    return grid_table(rows, [0.2 * WIDTH, *([each] * len(sections))], 7)
-
-
-def _show_site(book: _Book, site: Site, shown: Shown) -> list[Any]:
+def _show_site(book: Book, site: Site, shown: Shown) -> list[Any]:
     tell, number, unit = book.words.tell, book.words.number, book.unit
     rows = [
         (tell("verdict"), tell(site.verdict.level) + ("" if site.accepted else f" ({tell('not in the sum')})")),

@@ -31,14 +31,19 @@ class Group:
 
 def group_sections(result: Result) -> list[Group]:
     """The sections of a result by their item of the job and the quantities that they have."""
-    found: dict[tuple[int, tuple[str, ...]], list[Section]] = {}
-    for section in result.sections:
-        found.setdefault((section.group, tuple(value.name for value in section.values)), []).append(section)
     digits = choose_decimals(result.tolerance)
     return [
         Group(names, tuple((one, tuple(show_value(value, digits) for value in one.values)) for one in sections))
-        for (_, names), sections in found.items()
+        for (_, names), sections in collect_groups(result).items()
     ]
+
+
+def collect_groups(result: Result) -> dict[tuple[int, tuple[str, ...]], list[Section]]:
+    """The sections of a result by the number of their item of the job and the names of their quantities."""
+    found: dict[tuple[int, tuple[str, ...]], list[Section]] = {}
+    for section in result.sections:
+        found.setdefault((section.group, tuple(value.name for value in section.values)), []).append(section)
+    return found
 
 
 def choose_decimals(tolerance: float) -> int:

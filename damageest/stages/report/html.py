@@ -65,7 +65,8 @@ class Html(Report):
         (folder / "report.html").write_text(page, encoding="utf-8")
         files = ["report.html"]
         if self.pdf:
-            from damageest.stages.report._pdf import Letterhead, write_pdf
+            from damageest.stages.report._pdf import write_pdf
+            from damageest.stages.report._pdf_book import Letterhead
 
             head = Letterhead(self.company, self.logo)
             write_pdf(folder / "report.pdf", result, content, job_text, sites, remains, start, head, self.language)
