@@ -21,6 +21,7 @@ from damageest.io import colours
 from damageest.result import Result, Site
 from damageest.rules.notes import fold_notes
 from damageest.stages.report._drawing import draw
+from damageest.stages.report._page import choose_tone
 from damageest.stages.report._pdf_book import Book, Letterhead, clean_line
 from damageest.stages.report._pdf_parts import (
     FOOT,
@@ -110,8 +111,6 @@ def _draw_head(pen: Any, book: Book) -> None:
 def _summarise(book: Book, image: bytes) -> list[Any]:
     result, content, tell, number = book.result, book.content, book.words.tell, book.words.number
     cubic = f"{book.unit}³"
-    levels = [site.verdict.level for site in result.sites]
-    tone = "doubtful" if result.failures or "doubtful" in levels else "likely" if "likely" in levels else "proven"
     facts = [
         (tell("part"), Path(content["part"]["path"]).name or tell("given as arrays")),
         (tell("scan"), _name_scans(book)),
@@ -127,7 +126,7 @@ def _summarise(book: Book, image: bytes) -> list[Any]:
     both.setStyle([("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)])
     story = [
         write(result.name, 15, True, spaceAfter=3),
-        write(_say_verdict(book), 10, True, LEVELS[tone], spaceAfter=5),
+        write(_say_verdict(book), 10, True, LEVELS[choose_tone(result)], spaceAfter=5),
         both,
     ]
     if result.sites:
@@ -244,7 +243,7 @@ def _show_site(book: Book, site: Site, shown: Shown) -> list[Any]:
         (tell("depth"), f"{number(site.max_depth, 3)} {unit}"),
         (tell("depth, 95 % interval"), book.interval(site.depth_95, unit)),
         (tell("centre"), "(" + "; ".join(number(x) for x in site.centroid) + f") {unit}"),
-        (tell("inner area"), f"{number(float(np.linalg.norm(site.surface.cross, axis=1).sum() / 2))} {unit}²"),
+        (tell("inner area"), f"{number(site.surface.area)} {unit}²"),
         (tell("scan points"), str(len(site.points))),
         (tell("method"), site.method),
     ]
