@@ -46,10 +46,12 @@ def clean_message(text: object, most: int = MOST_TEXT) -> str:
 
 class DamageestError(Exception):
     """Base of all errors that damageest raises on purpose; its text is meant for the user. ``topic``: the word by which
-    `damageest explain` says more about it; empty where it does not."""
+    `damageest explain` says more about it; empty where it does not. ``code``: the sort of error, as in
+    `damageest.rules.error_codes`, which names the page of the documentation for it."""
 
     exit_status = 1
     topic = ""
+    code = "unexpected"
 
 
 @dataclass(frozen=True)
@@ -72,9 +74,11 @@ class JobError(DamageestError):
 
     exit_status = 2
 
-    def __init__(self, faults: list[Fault], source: str = "job") -> None:
+    def __init__(self, faults: list[Fault], source: str = "job", code: str = "") -> None:
         self.faults = faults
         self.source = source
+        is_option = source.startswith("--") or all(fault.source.startswith("--") for fault in faults)
+        self.code = code or ("option" if is_option else "job")
         super().__init__("\n".join(self.lines()))
 
     def lines(self) -> list[str]:
@@ -88,8 +92,8 @@ class InputError(DamageestError):
 
     exit_status = 2
 
-    def __init__(self, message: object = "", topic: str = "") -> None:
-        self.topic = topic
+    def __init__(self, message: object = "", topic: str = "", code: str = "input") -> None:
+        self.topic, self.code = topic, code
         super().__init__(message)
 
 
@@ -98,6 +102,7 @@ class PluginError(DamageestError):
     something that is not installed: ``remedy`` then says what to do."""
 
     exit_status = 2
+    code = "plugin"
 
     def __init__(self, message: str, remedy: str = "") -> None:
         self.remedy = remedy
@@ -115,11 +120,11 @@ class StageError(DamageestError):
 
     exit_status = 1
 
-    def __init__(self, message: str, remedy: str = "", method: str = "", topic: str = "") -> None:
+    def __init__(self, message: str, remedy: str = "", method: str = "", topic: str = "", code: str = "stage") -> None:
         self.message, self.own_remedy, self.method = message, remedy, method
         self.remedy = ", or ".join(part for part in (remedy, f"method: {method}" if method else "") if part)
         self.stage, self.use, self.site, self.place, self.topic = "", "", 0, "", topic
-        self.extra = ""
+        self.extra, self.code = "", code
         super().__init__(message)
 
     def __str__(self) -> str:
@@ -160,19 +165,25 @@ def describe_missing_library(error: BaseException) -> StageError | None:
         return StageError(
             f"the system library {library} is missing",
             f"install the package that has {library}; `damageest plugins` names those that the plugins need",
+            code="missing",
         )
     if isinstance(error, ModuleNotFoundError) and error.name:
         module = error.name.partition(".")[0]
         if module not in EXTRAS:
-            return StageError(f"the Python module {error.name} is not installed", f"pip install {module}")
+            return StageError(
+                f"the Python module {error.name} is not installed", f"pip install {module}", code="missing"
+            )
         extra = EXTRAS[module]
         missing = StageError(
             f"the Python module {error.name} is not installed; the extra '{extra}' brings it",
             f'pip install "damageest[{extra}]"',
+            code="missing",
         )
         missing.extra = extra
         return missing
     if isinstance(error, ImportError):
         text = " ".join(str(error).split())[:400]
-        return StageError(f"a Python module cannot be loaded: {text}", "--debug shows which; install it again")
+        return StageError(
+            f"a Python module cannot be loaded: {text}", "--debug shows which; install it again", code="missing"
+        )
     return None

@@ -104,7 +104,7 @@ def test_topics_are_listed_and_a_word_that_is_none_is_refused() -> None:
 def test_a_refusal_and_a_run_with_doubts_name_their_topics_in_one_line(tmp_path: Path) -> None:
     refused = run("unit", tmp_path)
     assert refused.returncode == 2
-    assert refused.stderr.splitlines()[-1] == "help: damageest explain unit"
+    assert refused.stderr.splitlines()[-1] == "help: damageest explain unit; see docs/bad-scan.md#the-unit-is-wrong"
     doubted = run("mesh", tmp_path)
     assert doubted.returncode == 0
     assert [line for line in doubted.stdout.splitlines() if line.startswith("help: ")] == [

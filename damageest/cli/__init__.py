@@ -12,8 +12,10 @@ import typer
 from damageest import __version__
 from damageest.cli import _interrupt, _process, _streams
 from damageest.cli._commands import Commands
+from damageest.cli._errors import describe_failure, say_error
+from damageest.cli._json import say_json
 from damageest.cli._streams import say
-from damageest.errors import DamageestError, clean_message, describe_missing_library, is_interrupt
+from damageest.errors import DamageestError, describe_missing_library, is_interrupt
 from damageest.io.files import working_folder
 from damageest.isolation.one_thread import ONE_THREAD
 from damageest.isolation.supervise import note_status
@@ -137,15 +139,12 @@ def _stop_interrupted() -> NoReturn:
 
 
 def fail(error: Exception) -> NoReturn:
-    """Prints the error and exits with its status. With --debug, prints the traceback."""
+    """Prints the error and exits with its status. With --debug, prints the traceback; with --json also the error as
+    JSON on standard output."""
+    if "--json" in sys.argv:
+        say_json(describe_failure(error))
     if "--debug" in sys.argv:
         traceback.print_exception(error)
-    elif isinstance(error, DamageestError):
-        say(f"error: {error}", err=True)
     else:
-        say(
-            f"error: unexpected {type(error).__name__}: {clean_message(error)}\n"
-            "  try: add --debug to see the traceback",
-            err=True,
-        )
+        say_error(error)
     sys.exit(getattr(error, "exit_status", 1))

@@ -67,4 +67,6 @@ def _refuse_missing(name: str) -> None:
         from damageest.errors import InputError
         from damageest.registry import Registry
 
-        raise InputError(f"'damageest {name}' needs {Registry.discover().describe_plugin(COMMANDS[name])}")
+        raise InputError(
+            f"'damageest {name}' needs {Registry.discover().describe_plugin(COMMANDS[name])}", code="missing"
+        )

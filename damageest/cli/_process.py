@@ -11,7 +11,8 @@ from typing import NoReturn
 
 import typer
 
-from damageest.cli._streams import say
+from damageest.cli._errors import describe_failure, say_error
+from damageest.cli._json import say_json
 from damageest.errors import StageError
 from damageest.isolation import supervise as watching
 from damageest.isolation.supervise import IS_POSSIBLE, end_like_fork, supervise
@@ -27,7 +28,9 @@ def end_with(work: Callable[[], int]) -> NoReturn:
     """As `end_with_each`, for work that is one item."""
 
     def report(error: StageError, _: str) -> int:
-        say(f"error: {error}", err=True)
+        if "--json" in sys.argv:
+            say_json(describe_failure(error))
+        say_error(error)
         return error.exit_status
 
     end_with_each(lambda _: work(), [""], report)

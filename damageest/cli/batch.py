@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from damageest.cli._streams import say
+from damageest.cli._json import AsJson, say_json
+from damageest.cli._streams import keep_for_results, say
 from damageest.errors import clean_message
 from damageest.isolation.limits import STAGE_SECONDS
 
@@ -49,6 +50,7 @@ def command(
         typer.Option("--set", help="Replace a value of each job: stage.option=value or field=value. May be repeated."),
     ] = None,
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Compute all jobs and stages again.")] = False,
+    as_json: AsJson = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table.")] = False,
 ) -> None:
     """Run many jobs at once, each in a process of its own; one that fails is a row of the table, not an end.
@@ -61,7 +63,7 @@ def command(
 
     options = Options(parse_memory(memory) if memory else None, timeout, stage_timeout, not no_cache)
     _interrupt.text = f"interrupted; the jobs that were done are in {out}, and the same command continues after them"
-    with _Display(quiet) as display:
+    with keep_for_results(as_json), _Display(quiet) as display:
         rows = batch(
             jobs,
             workers=workers or None,
@@ -71,7 +73,9 @@ def command(
             options=options,
             tell=display.show,
         )
-    if not quiet:
+    if as_json:
+        say_json({"jobs": [row.to_values() for row in rows], "written": out / "batch.html"})
+    elif not quiet:
         _print(rows, out)
     raise typer.Exit(0 if all(row.ran for row in rows) else 1)
 

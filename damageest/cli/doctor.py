@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import platform
@@ -12,7 +11,8 @@ from typing import Annotated
 
 import typer
 
-from damageest.cli._streams import keep_for_results, say, say_result
+from damageest.cli._json import AsJson, say_json
+from damageest.cli._streams import keep_for_results, say
 
 LIBRARIES = ("GL", "EGL", "X11", "OpenGL")
 """Shared libraries that pictures, windows and some plugins load."""
@@ -53,14 +53,14 @@ class Findings:
 
 
 def command(
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")] = False,
+    as_json: AsJson = False,
     quick: Annotated[bool, typer.Option("--quick", help="Leave out the self-test, which takes some seconds.")] = False,
 ) -> None:
     """Say what is installed, what is missing and whether a small run gives the right volume; exit status 1 if not."""
     with keep_for_results(as_json):
         found = examine(quick)
     if as_json:
-        say_result(json.dumps({"schema": 1, **asdict(found)}))
+        say_json(asdict(found))
     else:
         _print(found)
     if found.faults:

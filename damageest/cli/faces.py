@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from damageest.cli import _process
+from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
-from damageest.cli._streams import keep_for_results, say, say_result
+from damageest.cli._streams import keep_for_results, say
 
 if TYPE_CHECKING:
     from damageest.stages.part import CadFace
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def command(
     part: Annotated[Path, typer.Argument(help="CAD file of the part: STEP, IGES or BREP.")],
     units: Annotated[str, typer.Option(help="Unit of the printed lengths: um, mm, cm, m, in, ft.")] = "mm",
-    as_json: Annotated[bool, typer.Option("--json", help="Print the faces as JSON.")] = False,
+    as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """List a part's CAD faces: number, name, kind, area, centre, and normal, or axis and radius."""
@@ -51,7 +51,7 @@ def _list_faces(part: Path, units: str, as_json: bool) -> int:
     assert isinstance(reader, ReadPart)
     faces = call_implementation(reader.cad_faces, {"unit": unit}, reader, item, Limits())
     if as_json:
-        say_result(json.dumps({"part": str(part), "units": unit, "faces": [asdict(face) for face in faces]}, indent=1))
+        say_json({"part": part, "units": unit, "faces": [asdict(face) for face in faces]})
     else:
         _print_table(faces, unit)
     return 0

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from damageest.cli import _process
+from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
-from damageest.cli._streams import say
+from damageest.cli._streams import keep_for_results, say
 
 
 class StepName(StrEnum):
@@ -29,13 +32,21 @@ def command(
     same_setup: Annotated[
         bool, typer.Option("--same-setup", help="The part was not moved since the scan before: take its pose.")
     ] = False,
+    as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Say what is missing and what is over after a step of a repair, and add it to the record in OUT."""
-    end_with(lambda: _inspect(folder, scan, step.value, tolerance, same_setup))
+    end_with(lambda: _inspect_clean(folder, scan, step.value, tolerance, same_setup, as_json))
 
 
-def _inspect(folder: Path, scan: Path, step: str, tolerance: float | None, same_setup: bool) -> int:
+def _inspect_clean(
+    folder: Path, scan: Path, step: str, tolerance: float | None, same_setup: bool, as_json: bool
+) -> int:
+    with keep_for_results(as_json, for_good=_process.is_command):
+        return _inspect(folder, scan, step, tolerance, same_setup, as_json)
+
+
+def _inspect(folder: Path, scan: Path, step: str, tolerance: float | None, same_setup: bool, as_json: bool) -> int:
     """Prints what was found, and gives the exit status: 1 where a tolerance is not met or not shown."""
     from damageest.errors import Fault, InputError, JobError
     from damageest.inspection.aim import read_aim
@@ -66,4 +77,8 @@ def _inspect(folder: Path, scan: Path, step: str, tolerance: float | None, same_
     record = append_inspection(aim, found, scan)
     write_page(record, folder / PAGE)
     say(f"added to {folder / NAME}, and its page {folder / PAGE}")
+    if as_json:
+        found_there = {"findings": list(map(asdict, found.findings)), "sites": list(map(asdict, found.verdicts))}
+        told = {"folder": folder, "step": step, "units": unit, "tolerance": found.tolerance, **found_there}
+        say_json({**told, "refused": list(aim.refused), "notes": list(found.notes), "record": folder / NAME})
     return 0 if all(verdict.outcome == "met" for verdict in found.verdicts) else 1

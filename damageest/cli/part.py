@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from damageest.cli import _process
+from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
 from damageest.cli._streams import keep_for_results, say, say_result
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def command(
     part: Annotated[Path, typer.Argument(help="CAD file of the part: STEP AP242.")],
     units: Annotated[str, typer.Option(help="Unit of the printed lengths: um, mm, cm, m, in, ft.")] = "mm",
-    as_json: Annotated[bool, typer.Option("--json", help="Print them as JSON.")] = False,
+    as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """List a part's datums, datum systems and tolerances, with the CAD faces that they refer to."""
@@ -60,7 +60,7 @@ def _list_pmi(part: Path, units: str, as_json: bool) -> int:
     unit = canonical_unit(units)
     found = read_pmi(part, unit, Registry.discover())
     if as_json:
-        say_result(json.dumps({"part": str(part), "units": unit, **asdict(found)}, indent=1))
+        say_json({"part": part, "units": unit, **asdict(found)})
         return 0
     for datum in found.datums:
         say_result(f"datum {datum.name}: {_name_faces(datum.faces)}")

@@ -2,29 +2,61 @@
 
 from __future__ import annotations
 
-from damageest.cli._streams import say
+from typing import Any
+
+from damageest.cli._json import AsJson, say_json
+from damageest.cli._streams import keep_for_results, say
+
+MOST_SHOWN = 6
+"""Implementations of a plugin that are named; of more, their number is printed."""
 
 
-def command() -> None:
+def command(as_json: AsJson = False) -> None:
     """List installed plugins with licence, stages, export formats and commands, and broken plugins with the reason."""
+    with keep_for_results(as_json):
+        plugins, conflicts = _collect()
+    if as_json:
+        say_json({"plugins": plugins, "conflicts": conflicts})
+        return
+    for one in plugins:
+        stages = one["stages"] if len(one["stages"]) <= MOST_SHOWN else [f"{len(one['stages'])} stage implementations"]
+        shown = [*stages, *([f"export formats: {', '.join(one['formats'])}"] if one["formats"] else [])]
+        shown += [f"commands: {', '.join(one['commands'])}"] if one["commands"] else []
+        said = ", ".join(shown) or ("broken" if one["broken"] else "no stages")
+        say(f"{one['name']} {one['version']}  {one['licence']}  {said}")
+        for item in one["broken"]:
+            say(f"  broken: {item['reason']}\n  try: {item['remedy']}")
+    for conflict in conflicts:
+        names = " and ".join(conflict["providers"])
+        say(f"conflict: {conflict['stage']} is provided by {names}\n  try: uninstall all but one")
+
+
+def _collect() -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The plugins, and the implementations that several of them provide."""
     from damageest.cli._commands import load_commands
     from damageest.registry import Registry
 
     commands = load_commands()
     registry = Registry.discover()
-    for provider in registry.providers:
-        stages = [f"{i.contract.stage}: {i.name}" for i in registry.implementations if i.provider == provider]
-        broken = [b for b in registry.broken if b.provider == provider]
-        formats = [name for name, owner in registry.formats.items() if owner == provider]
-        shown = stages if len(stages) <= 6 else [f"{len(stages)} stage implementations"]
-        shown += [f"export formats: {', '.join(formats)}"] if formats else []
-        added = commands.get(provider.name)
-        shown += [f"commands: {', '.join(added)}"] if added else []
-        say(f"{provider}  {provider.licence}  {', '.join(shown) or ('broken' if broken else 'no stages')}")
-        for item in broken:
-            say(f"  broken: {item.reason}\n  try: {item.remedy}")
-    for group in registry.clashes:
-        names = " and ".join(str(item.provider) for item in group)
-        say(
-            f"conflict: {group[0].contract.stage}: {group[0].name} is provided by {names}\n  try: uninstall all but one"
-        )
+    plugins = [
+        {
+            "name": provider.name,
+            "version": provider.version,
+            "licence": provider.licence,
+            "stages": [f"{i.contract.stage}: {i.name}" for i in registry.implementations if i.provider == provider],
+            "formats": [name for name, owner in registry.formats.items() if owner == provider],
+            "commands": list(commands.get(provider.name, ())),
+            "broken": [
+                {"reason": one.reason, "remedy": one.remedy} for one in registry.broken if one.provider == provider
+            ],
+        }
+        for provider in registry.providers
+    ]
+    conflicts = [
+        {
+            "stage": f"{group[0].contract.stage}: {group[0].name}",
+            "providers": [str(item.provider) for item in group],
+        }
+        for group in registry.clashes
+    ]
+    return plugins, conflicts

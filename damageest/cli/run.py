@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from damageest.cli import _process
+from damageest.cli._errors import describe_failure, say_error
+from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with_each
 from damageest.cli._streams import keep_for_results, say, say_result
 from damageest.errors import clean_message
@@ -48,7 +50,7 @@ def command(
         typer.Option("--set", help="Replace a value of the job: stage.option=value or field=value. May be repeated."),
     ] = None,
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Compute all stages again.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print result.json on stdout, one line per job.")] = False,
+    as_json: AsJson = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, no progress and no table.")] = False,
     memory: Annotated[
         str, typer.Option(metavar="SIZE", help="Memory that the run may allocate, as 6GB. Default: what is free.")
@@ -106,6 +108,7 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
     from damageest.io.files import read_json
     from damageest.job import load
     from damageest.registry import Registry
+    from damageest.rules.error_codes import format_help
 
     limit_this_process(given.limits.memory)
     progress = Progress(given.quiet, _process.BEGAN if _process.is_command else None)
@@ -145,7 +148,7 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
             status = max(status, 1)
             say(
                 f"error: {job.source}: none of the sites is accepted as damage; see the reasons of each, and "
-                "name those that are damage in the job:  accept: [1],  or  accept: all",
+                "name those that are damage in the job:  accept: [1],  or  accept: all\n" + format_help("not_accepted"),
                 err=True,
             )
         if result.failures:
@@ -195,12 +198,10 @@ def _report_failure(error: Exception, source: str, as_json: bool, debug: bool) -
 
     status = int(getattr(error, "exit_status", 1))
     if as_json:
-        say_result(json.dumps({"schema": 1, "status": "failed", "job": source, "exit": status, "error": str(error)}))
+        say_json(describe_failure(error, source))
     if debug:
         traceback.print_exception(error)
-    say(f"error: {error}", err=True)
-    if topic := getattr(error, "topic", ""):
-        say(f"help: damageest explain {topic}", err=True)
+    say_error(error)
     return status
 
 

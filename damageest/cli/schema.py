@@ -16,27 +16,32 @@ class SchemaName(StrEnum):
     job = "job"
     result = "result"
     reasons = "reasons"
+    errors = "errors"
 
 
 def command(
     which: Annotated[
         SchemaName,
         typer.Argument(
-            help="job: schema of the job file; result: schema of result.json; reasons: the codes of reasons, as tables."
+            help="job: schema of the job file; result: schema of result.json; reasons, errors: their codes, as tables."
         ),
     ] = SchemaName.job,
 ) -> None:
     """Print the JSON Schema of the job file, with the options of all installed plugins, or of result.json, or the
-    table of all reasons."""
+    tables of all reasons or errors."""
     from damageest.job.schema import job_schema
     from damageest.output.result_json import result_schema
     from damageest.registry import Registry
+    from damageest.rules.error_codes import format_errors
     from damageest.rules.reference import format_reasons
 
     with keep_for_results(for_good=_process.is_command):
         registry = Registry.discover()
         if which is SchemaName.reasons:
             say_result(format_reasons(registry.rules).rstrip("\n"))
+            return
+        if which is SchemaName.errors:
+            say_result(format_errors().rstrip("\n"))
             return
         content = job_schema(registry) if which is SchemaName.job else result_schema()
         say_result(json.dumps(content, indent=2))

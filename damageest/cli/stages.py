@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from damageest.cli._json import AsJson, say_json
 from damageest.cli._streams import say
 from damageest.errors import suggest
 
@@ -19,6 +20,7 @@ def command(
         str | None, typer.Argument(help="Show the implementations of one stage, with their options.")
     ] = None,
     name: Annotated[str | None, typer.Argument(help="Show one implementation, with its full description.")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """List stages, their implementations and options."""
     from damageest.errors import Fault, JobError, PluginError
@@ -30,14 +32,44 @@ def command(
         raise JobError(
             [Fault(f"there is no stage '{stage}'{suggest(stage, STAGES)}; there are: {', '.join(STAGES)}")], "stages"
         )
+    items = {each: registry.of(each) for each in ([stage] if stage else STAGES)}
     if stage and name:
         try:
-            _print_implementation(registry.get(stage, name))
+            items = {stage: (registry.get(stage, name),)}
         except (KeyError, PluginError) as error:
             raise JobError([Fault(str(error.args[0]))], "stages") from None
+    if as_json:
+        say_json({"stages": [_collect(item) for each in items.values() for item in each]})
+        return
+    if stage and name:
+        _print_implementation(items[stage][0])
         return
     for each in [stage] if stage else STAGES:
         _print_stage(each, registry, with_options=bool(stage))
+
+
+def _collect(item: Implementation) -> dict[str, Any]:
+    """An implementation and its options, for programs."""
+    from damageest.registry.contracts import DEFAULTS
+
+    return {
+        "stage": item.contract.stage,
+        "name": item.name,
+        "is_default": DEFAULTS[item.contract] == item.name,
+        "description": inspect.getdoc(item.cls) or "",
+        "provider": item.provider.name,
+        "version": item.provider.version,
+        "options": [
+            {
+                "name": option,
+                "description": field.description or "",
+                "is_required": field.is_required(),
+                "default": None if field.is_required() else field.get_default(call_default_factory=True),
+            }
+            for option, field in item.cls.model_fields.items()
+            if option != "use"
+        ],
+    }
 
 
 def _print_stage(stage: str, registry: Registry, with_options: bool) -> None:

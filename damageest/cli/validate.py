@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from damageest.cli import _process
+from damageest.cli._errors import say_help
+from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
-from damageest.cli._streams import say
+from damageest.cli._streams import keep_for_results, say
 
 
 def command(
@@ -17,21 +21,29 @@ def command(
         list[str] | None,
         typer.Option("--set", help="Replace a value of the job: stage.option=value or field=value. May be repeated."),
     ] = None,
+    as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Check jobs without computing a result, and list all errors with line and column. Where a job selects faces or
     skin of the part, the part is read."""
-    end_with(lambda: _check(jobs, settings or []))
+    end_with(lambda: _check_clean(jobs, settings or [], as_json))
 
 
-def _check(jobs: list[Path], settings: list[str]) -> int:
+def _check_clean(jobs: list[Path], settings: list[str], as_json: bool) -> int:
+    with keep_for_results(as_json, for_good=_process.is_command):
+        return _check(jobs, settings, as_json)
+
+
+def _check(jobs: list[Path], settings: list[str], as_json: bool) -> int:
     """Prints what is wrong, and gives the exit status."""
-    from damageest.errors import InputError, JobError, StageError
+    from damageest.errors import DamageestError, Fault, InputError, JobError, StageError
     from damageest.job import load
     from damageest.registry import Registry
 
     registry = Registry.discover()
     status = 0
+    rows: list[dict[str, Any]] = []
+    last: DamageestError | None = None
     for path in jobs:
         try:
             job = load(path, registry, settings)
@@ -40,14 +52,22 @@ def _check(jobs: list[Path], settings: list[str]) -> int:
 
                 check_with_part(job, registry)
         except JobError as error:
-            status = 2
+            status, last = 2, error
+            rows.append({"job": path, "is_valid": False, "faults": [asdict(fault) for fault in error.faults]})
             for line in error.lines():
                 say(line, err=True)
             continue
         except (InputError, StageError) as error:
-            status = error.exit_status if status < 2 else status
+            status, last = error.exit_status if status < 2 else status, error
+            rows.append({"job": path, "is_valid": False, "faults": [asdict(Fault(str(error)))]})
             say(f"{path}: {error}", err=True)
             continue
-        stages = ", ".join(f"{contract.stage} {stage.use}" for contract, stage in job.stages.items())
-        say(f"{path}: valid; method {job.method}: {stages}")
+        chosen = [{"stage": contract.stage, "use": stage.use} for contract, stage in job.stages.items()]
+        rows.append({"job": path, "is_valid": True, "faults": [], "method": job.method, "stages": chosen})
+        named = ", ".join(f"{one['stage']} {one['use']}" for one in chosen)
+        say(f"{path}: valid; method {job.method}: {named}")
+    if as_json:
+        say_json({"jobs": rows})
+    if last is not None:
+        say_help(last)
     return status

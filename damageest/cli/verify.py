@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
+from damageest.cli import _process
+from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
-from damageest.cli._streams import say
+from damageest.cli._streams import keep_for_results, say
 
 
 def command(
@@ -16,13 +18,19 @@ def command(
     rerun: Annotated[
         bool, typer.Option("--rerun", help="Run the job of result.json again, elsewhere, and compare.")
     ] = False,
+    as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Check files and inputs of an output folder against the hashes in its result.json."""
-    end_with(lambda: _check(folder, rerun))
+    end_with(lambda: _check_clean(folder, rerun, as_json))
 
 
-def _check(folder: Path, rerun: bool) -> int:
+def _check_clean(folder: Path, rerun: bool, as_json: bool) -> int:
+    with keep_for_results(as_json, for_good=_process.is_command):
+        return _check(folder, rerun, as_json)
+
+
+def _check(folder: Path, rerun: bool, as_json: bool) -> int:
     """Prints what changed, and gives the exit status."""
     from damageest.output.folder import open_output
     from damageest.output.verification import find_changes, find_other_versions
@@ -31,13 +39,17 @@ def _check(folder: Path, rerun: bool) -> int:
     changes = find_changes(folder, content)
     for text in changes:
         say(f"error: {text}", err=True)
-    for text in find_other_versions(content):
+    others = find_other_versions(content)
+    for text in others:
         say(f"note: {text}")
     count, inputs = (len(content["provenance"][kind]) for kind in ("outputs", "inputs"))
     if not changes:
         say(f"{folder}: result.json, {count} files and {inputs} inputs are as the run left them")
-    if rerun:
-        changes += _run_again(folder, content)
+    differences = _run_again(folder, content) if rerun else []
+    if as_json:
+        told = {"folder": folder, "changes": changes, "other_versions": others, "files": count, "inputs": inputs}
+        say_json({**told, "differences": differences if rerun else None})
+    changes += differences
     return 1 if changes else 0
 
 

@@ -28,5 +28,6 @@ def require_memory_for(paths: Sequence[Path]) -> None:
     except StageError as error:
         raise InputError(
             f"{next(iter(sizes))}: {error.message}\n  try: a machine with more memory, a larger --memory, or a file "
-            "with fewer points or triangles"
+            "with fewer points or triangles",
+            code="memory",
         ) from None

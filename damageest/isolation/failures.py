@@ -17,13 +17,16 @@ _NAMES = {
 }
 _SIGNALS = {int(getattr(signal, name)): text for name, text in _NAMES.items() if hasattr(signal, name)}
 
+_CODES = {"time": "time_limit", "memory": "memory"}
+"""Why a call gave no value, and the code of its error."""
+
 
 class ProcessError(StageError):
     """A call in a worker that gave no value. ``why``: "time", "memory", "crash", or "exit" for sys.exit."""
 
     def __init__(self, why: str, message: str, remedy: str = "") -> None:
         self.why = why
-        super().__init__(message, remedy)
+        super().__init__(message, remedy, code=_CODES.get(why, "crash"))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return ProcessError, (self.why, self.message, self.remedy), vars(self)

@@ -23,5 +23,7 @@ def require_memory(needed: float, what: str, remedy: str) -> None:
     free = measure_free_memory()
     if needed > free:
         raise StageError(
-            f"would need about {format_bytes(needed)} of memory for {what}, but {format_bytes(free)} are free", remedy
+            f"would need about {format_bytes(needed)} of memory for {what}, but {format_bytes(free)} are free",
+            remedy,
+            code="memory",
         )

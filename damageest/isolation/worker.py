@@ -165,6 +165,7 @@ def _share_memory(limits: Limits, owner: str) -> int:
             f"the run holds {format_bytes(own_memory())} of the {format_bytes(limits.memory)} that it may allocate, "
             f"which leaves too little for the process of {owner or 'this stage'}",
             "a larger --memory, a larger tolerance, or fewer scan points",
+            code="memory",
         )
     return left
 

@@ -114,13 +114,16 @@ def open_output(folder: Path) -> OutputFolder:
     if not path.is_file():
         raise InputError(
             f"{folder}: there is no result.json, so this is not an output folder; name the folder that `damageest run` "
-            "wrote, as out/<name>"
+            "wrote, as out/<name>",
+            code="result_folder",
         )
     try:
         content = read_json(path)
         return OutputFolder(folder, {**content, "sites": list(content["sites"]), "units": content["units"]})
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: cannot be read as a result: {error}; run the job again") from None
+        raise InputError(
+            f"{path}: cannot be read as a result: {error}; run the job again", code="result_folder"
+        ) from None
 
 
 def _read(path: Path) -> Mesh:

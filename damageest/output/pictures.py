@@ -60,7 +60,7 @@ def draw_picture(picture: Picture, path: Path) -> None:
         # VTK's messages say the same in many lines; they are the cause of the error, for --debug
         call_isolated(draw_here, arguments, worker="picture", limits=Limits(seconds=0), show=False, stays=False)
     except Exception as error:  # VTK and PyVista share none: where there is no library, ImportError
-        raise StageError(*NO_GRAPHICS) from error
+        raise StageError(*NO_GRAPHICS, code="missing") from error
 
 
 def open_window(folder: OutputFolder, site: int) -> None:
@@ -72,6 +72,7 @@ def open_window(folder: OutputFolder, site: int) -> None:
         raise StageError(
             "there is no display for a window here",
             f"damageest picture {folder.folder} -o picture.png, or open {folder.folder / 'report.html'} in a browser",
+            code="missing",
         )
     import pyvista as pv
 

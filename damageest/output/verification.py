@@ -18,7 +18,10 @@ def read_provenance(folder: Path, content: Mapping[str, Any]) -> dict[str, Any]:
     """The provenance of a result. Raises InputError where it has none."""
     found = content.get("provenance")
     if not isinstance(found, dict):
-        raise InputError(f"{folder}/result.json has no provenance: an earlier version wrote it; run the job again")
+        raise InputError(
+            f"{folder}/result.json has no provenance: an earlier version wrote it; run the job again",
+            code="result_folder",
+        )
     return found
 
 

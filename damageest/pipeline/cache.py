@@ -66,7 +66,8 @@ def _seal(stem: str, arrays: Path, meta: Any) -> str:
 
 def describe_unwritable(error: OSError, place: Path) -> JobError:
     """The error for a place that cannot be written, such as a full disk."""
-    return JobError([Fault(f"{error.filename or place}: cannot be written: {error.strerror or error}", "output")])
+    fault = Fault(f"{error.filename or place}: cannot be written: {error.strerror or error}", "output")
+    return JobError([fault], code="output")
 
 
 @dataclass(frozen=True)

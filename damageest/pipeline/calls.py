@@ -68,10 +68,10 @@ def call_guarded(function: Callable[[], T], owner: str) -> T:
         raise
     except SystemExit as end:
         what = f"called sys.exit({'' if end.code is None else clean_message(end.code, 200)})"
-        raise StageError(f"{what}, which would end the run", _blame(owner)) from end
+        raise StageError(f"{what}, which would end the run", _blame(owner), code="crash") from end
     except BaseException as end:
         what = f"raised {type(end).__name__}{f' ({clean_message(end, 400)})' if end.args else ''}"
-        raise StageError(f"{what}, which would end the run", _blame(owner)) from end
+        raise StageError(f"{what}, which would end the run", _blame(owner), code="crash") from end
 
 
 def _blame(owner: str) -> str:

@@ -132,7 +132,7 @@ class Engine:
             with at_work(what, self.limits.seconds):
                 _, given = self.remember(step.name, key, lambda: self._run(step, state), step.kept)
         except MemoryError:
-            raise StageError(f"{what}: ran out of memory", MORE_MEMORY) from None
+            raise StageError(f"{what}: ran out of memory", MORE_MEMORY, code="memory") from None
         seconds = time.perf_counter() - start - sum(record.seconds for record in self.records[called:])
         self.steps.append(StepRecord(step.name, round(seconds, 3)))
         _tell(self.registry.hooks.hook.damageest_after_step, step=what, seconds=seconds)

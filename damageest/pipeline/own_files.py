@@ -42,7 +42,7 @@ def refuse_names_in_use(target: Path) -> None:
 
 def _refuse(path: Path, found: str, written: str) -> None:
     message = f"{path} is {found}, but a run writes {written} of that name; rename it, or choose another folder"
-    raise JobError([Fault(message, "output")])
+    raise JobError([Fault(message, "output")], code="output")
 
 
 def keep_own_files(old: Path, target: Path) -> None:

@@ -13,6 +13,8 @@ from damageest.pipeline.state import Candidate, FoundSite, JobState
 from damageest.registry.registry import Implementation
 
 MORE_MEMORY = "a larger tolerance, fewer scan points (scan.most_points), or a larger --memory"
+READERS = {"part": "part_file", "scan": "scan_file"}
+"""Stages that read files, and the code of an error for one that cannot be used."""
 
 
 def locate_error(error: Exception, item: Implementation, state: JobState | Candidate | FoundSite) -> DamageestError:
@@ -22,11 +24,13 @@ def locate_error(error: Exception, item: Implementation, state: JobState | Candi
         return error
     if isinstance(error, DamageestError) and not isinstance(error, StageError):
         error.args = (clean_message(error),)
+        if error.code == "input" and stage in READERS:
+            error.code = READERS[stage]
         return error
     if not isinstance(error, StageError) and (missing := describe_missing_library(error)):
         error = missing
     if isinstance(error, OSError) and stage in ("part", "scan"):
-        return InputError(f"{stage}: {item.name}: {clean_message(error)}")
+        return InputError(f"{stage}: {item.name}: {clean_message(error)}", code=READERS[stage])
     if isinstance(error, OSError) and stage in ("export", "report") and error.errno:
         return describe_unwritable(error, Path("the output"))
     placed = error if isinstance(error, StageError) else _explain(error, f"{item.provider}")
@@ -50,18 +54,21 @@ def _explain(error: Exception, provider: str) -> StageError:
     """An error that a stage did not raise on purpose, in words for the user and the author."""
     first = next(iter(clean_message(error, 400).splitlines()), "")
     if isinstance(error, MemoryError):
-        return StageError("ran out of memory", MORE_MEMORY)
+        return StageError("ran out of memory", MORE_MEMORY, code="memory")
     if isinstance(error, ArtefactError):
         return StageError(
             f"gave a result that is not valid: {first}",
             f"another implementation; report it to the authors of {provider}",
+            code="faulty",
         )
     if isinstance(error, ValueError) and "read-only" in first:
         return StageError(
             f"tried to edit what it was given, which later stages use as well ({first})",
             f"another implementation; the authors of {provider} should edit a copy",
+            code="faulty",
         )
     return StageError(
         f"failed unexpectedly: {type(error).__name__}: {first}",
         f"--debug for the traceback; report it to the authors of {provider}, with job and inputs",
+        code="faulty",
     )

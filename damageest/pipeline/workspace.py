@@ -186,12 +186,12 @@ def _old_path(target: Path) -> Path:
 def _refuse_other_folder(target: Path) -> None:
     """Raises JobError for a folder that damageest did not write: it is never replaced."""
     if target.is_file():
-        raise JobError([Fault(f"{target} is a file; name a folder", "output")])
+        raise JobError([Fault(f"{target} is a file; name a folder", "output")], code="output")
     held = {path.name for path in target.iterdir()} if target.is_dir() else set()
     held -= {"stages", INSIDE, "lost+found"}  # the last one is the system's, in a mounted volume
     if held and "result.json" not in held and not (target / INSIDE / "old/result.json").is_file():
         message = f"{target} holds files but no result.json, so it is not an earlier output; choose another folder"
-        raise JobError([Fault(message, "output")])
+        raise JobError([Fault(message, "output")], code="output")
 
 
 @contextmanager
@@ -201,10 +201,12 @@ def _lock(hidden: Path, target: Path) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout:
-        raise JobError([Fault(f"another run is writing to {target}; wait, or choose another folder")]) from None
+        raise JobError(
+            [Fault(f"another run is writing to {target}; wait, or choose another folder")], code="output"
+        ) from None
     except OSError as error:
         message = f"{hidden / 'lock'}: cannot be used as a lock: {error.strerror or error}; remove it"
-        raise JobError([Fault(message, "output")]) from None
+        raise JobError([Fault(message, "output")], code="output") from None
     try:
         yield
     finally:

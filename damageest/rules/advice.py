@@ -30,6 +30,12 @@ class Topic:
     text: str
     job: str = ""
 
+    @property
+    def page(self) -> str:
+        """The section of the documentation with the same words, and an example."""
+        words = "".join(mark for mark in self.title.lower() if mark.isalnum() or mark in " -")
+        return f"docs/bad-scan.md#{words.replace(' ', '-')}"
+
 
 TOPICS = (
     Topic(

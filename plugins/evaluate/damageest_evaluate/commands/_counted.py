@@ -6,11 +6,16 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
 from damageest_evaluate.processes import Row
 from damageest_evaluate.rows import EvaluationCase, run_all
+
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Print the rows as one line of JSON on standard output, in place of tables.")
+]
 
 
 def split_words(text: str) -> list[str]:
@@ -40,13 +45,22 @@ def run_counted(
     return run_all(cases, out / name if out else None, workers, timeout, print_row, scheduler)
 
 
-def show_report(make: Callable[[bool], str], name: str, out: Path | None, write: Path | None) -> None:
-    """Prints a report, writes it to ``out``/``name``.md, and between the marks ``name`` of the file ``write``, there
-    without its legend. ``make`` makes it, with a legend or without."""
+def show_table(text: str, rows: Sequence[Any], as_json: bool) -> None:
+    """Prints a table, or with --json the rows that it is made from."""
+    from damageest.io.for_programs import format_json
+
+    typer.echo(format_json({"command": format_command(), "rows": rows}) if as_json else f"\n{text}")
+
+
+def show_report(
+    make: Callable[[bool], str], name: str, out: Path | None, write: Path | None, rows: Sequence[Row], as_json: bool
+) -> None:
+    """Prints a report, or with --json its rows. Writes it to ``out``/``name``.md, and between the marks ``name`` of the
+    file ``write``, there without its legend. ``make`` makes it, with a legend or without."""
     from damageest_evaluate.readme import replace_between_marks
 
     text = make(True)
-    typer.echo("\n" + text)
+    show_table(text, rows, as_json)
     if out:
         (out / f"{name}.md").write_text(text + "\n", encoding="utf-8")
     if write:

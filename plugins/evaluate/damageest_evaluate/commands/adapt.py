@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from damageest_evaluate.commands._counted import AsJson, show_table
+
 
 def command(
     groups: Annotated[
@@ -19,6 +21,7 @@ def command(
     workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 1,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,
     out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for adapt.jsonl, to resume from.")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Measure the stage adapt on deformed parts with known loss, against rigid and plain fits and parts as designed."""
     from damageest.errors import InputError
@@ -37,4 +40,4 @@ def command(
     uses = split_words(use) or USES
     cases = [case for case in cases if (case.group, case.name) in names and case.use in uses]
     rows = run_counted(cases, out, "adapt.jsonl", workers, timeout, format_adapting_row)
-    typer.echo("\n" + make_adapting_table(rows))
+    show_table(make_adapting_table(rows), rows, as_json)

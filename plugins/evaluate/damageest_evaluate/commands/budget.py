@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
+from damageest_evaluate.commands._counted import AsJson
+
 
 def command(
     draws: Annotated[int, typer.Option(min=1, help="Scans that are drawn of each part.")] = 200,
@@ -17,6 +19,7 @@ def command(
     timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a process is stopped.")] = 3600,
     out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for budget.jsonl, to resume from.")] = None,
     write: Annotated[Path | None, typer.Option(help="File whose table between the marks `budget` is replaced.")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Draw scans with the errors that a certificate allows, and count how often the truth lies in the intervals.
 
@@ -42,4 +45,4 @@ def command(
 
     rows = run_counted(cases, out, "budget.jsonl", workers, timeout, describe)
     text = make_budget_table(rows, format_command())
-    show_report(lambda _: text, "budget", out, write)
+    show_report(lambda _: text, "budget", out, write, rows, as_json)

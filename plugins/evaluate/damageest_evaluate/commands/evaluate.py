@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from damageest_evaluate.commands import adapt, budget, honesty, path, realistic, speed, steady
-from damageest_evaluate.commands._counted import format_command
+from damageest_evaluate.commands._counted import AsJson, format_command, show_table
 from damageest_evaluate.commands.intervals import run_intervals
 
 if TYPE_CHECKING:
@@ -84,6 +85,7 @@ def job_command(
     scheduler: Scheduler = "",
     out: Out = None,
     plots: Plots = True,
+    as_json: AsJson = False,
 ) -> None:
     """Measure which depth of damage is found on your part with your scanner, and how accurately.
 
@@ -106,10 +108,10 @@ def job_command(
     with tempfile.TemporaryDirectory(prefix="damageest-evaluate-", dir=place) as folder:
         study = plan_study(job, request, seeds, Registry.discover(), Path(folder))
         for note in study.notes:
-            typer.echo(note)
+            typer.echo(note, err=as_json)
         rows = _run_cases(study.cases, jobs, timeout, out, scheduler)
-    _write_report(rows, [], study.unit, out, plots)
-    typer.echo(f"\n{summarise(rows, study.unit)}")
+    _write_report(rows, [], study.unit, out, plots, as_json)
+    typer.echo(f"\n{summarise(rows, study.unit)}", err=as_json)
 
 
 @app.command("suite")
@@ -146,6 +148,7 @@ def suite_command(
     scheduler: Scheduler = "",
     out: Out = None,
     plots: Plots = True,
+    as_json: AsJson = False,
     write: Annotated[
         Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the tables.")
     ] = None,
@@ -169,7 +172,8 @@ def suite_command(
             raise InputError(
                 "--intervals: varies noise and density itself; leave out --vary, --against, --set, --noise and --points"
             )
-        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, format_command(), scheduler)
+        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, format_command(), scheduler,
+            as_json)  # fmt: skip
         return
     if out:
         out.mkdir(parents=True, exist_ok=True)
@@ -183,8 +187,8 @@ def suite_command(
     planned = suite.make_cases(cases, seed, chosen, pose, request, Registry.discover())
     rows = _run_cases(planned, jobs, timeout, out, scheduler)
     first = ["part"] if len(chosen) > 1 or not collect_axes(rows) else []
-    _write_report(rows, first, "mm", out, plots)
-    typer.echo(f"\n{summarise(rows, 'mm')}")
+    _write_report(rows, first, "mm", out, plots, as_json)
+    typer.echo(f"\n{summarise(rows, 'mm')}", err=as_json)
     if write:
         write.write_text(
             replace_between_marks(
@@ -210,17 +214,19 @@ def _run_cases(
     return run_all(cases, out / "cases.jsonl" if out else None, jobs, timeout, print_row, scheduler)
 
 
-def _write_report(rows: list[dict[str, Any]], first: list[str], unit: str, out: Path | None, plots: bool) -> None:
+def _write_report(
+    rows: list[dict[str, Any]], first: list[str], unit: str, out: Path | None, plots: bool, as_json: bool
+) -> None:
     from damageest_evaluate.figures import collect_axes
     from damageest_evaluate.plots import draw_plots
     from damageest_evaluate.report import format_tables, write_files
 
-    typer.echo("\n" + format_tables(rows, [*first, *collect_axes(rows)], unit))
+    show_table(format_tables(rows, [*first, *collect_axes(rows)], unit), rows, as_json)
     if out:
         write_files(rows, unit, out, format_command())
         paths = draw_plots(rows, unit, out) if plots else []
         names = ", ".join(sorted({path.stem for path in paths}))
-        typer.echo(f"written to {out}" + (f", with plots: {names}" if paths else ""))
+        typer.echo(f"written to {out}" + (f", with plots: {names}" if paths else ""), err=as_json)
 
 
 @app.command("matrix")
@@ -232,6 +238,7 @@ def matrix_command(
     write: Annotated[
         Path | None, typer.Option(help="Text file. Its lines between the matrix marks are replaced by the table.")
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Measure IoU, time and memory of every implementation of every stage, with the other stages at default."""
     from damageest.registry import Registry
@@ -241,7 +248,7 @@ def matrix_command(
     if write:
         replace_between_marks(write, None, "matrix")  # fails before the runs start if the marks are missing
     cells = run_matrix(jobs, Registry.discover(), stage or (), workers, timeout, _print_cell)
-    typer.echo(make_matrix_table(cells))
+    show_table(make_matrix_table(cells), list(map(asdict, cells)), as_json)
     if write:
         write.write_text(
             replace_between_marks(write, make_matrix_table(cells, legend=False), "matrix"), encoding="utf-8"

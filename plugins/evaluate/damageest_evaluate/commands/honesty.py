@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
+from damageest_evaluate.commands._counted import AsJson
+
 
 def command(
     kinds: Annotated[
@@ -30,6 +32,7 @@ def command(
         Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
     ] = None,
     show: Annotated[bool, typer.Option("--list", help="Only list the cases.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Count right, said and silent results on scans with known trouble.
 
@@ -70,4 +73,11 @@ def command(
         return f"{row['number']} {format_trouble_row(row)}"
 
     rows = run_counted(cases, out, "honesty.jsonl", workers, timeout, describe, scheduler)
-    show_report(lambda legend: make_trouble_tables(rows, format_command(), legend), "honesty", out, write)
+    show_report(
+        lambda legend: make_trouble_tables(rows, format_command(), legend),
+        "honesty",
+        out,
+        write,
+        rows,
+        as_json,
+    )

@@ -8,10 +8,12 @@ from typing import Any
 
 import typer
 
+from damageest_evaluate.commands._counted import show_table
+
 
 def run_intervals(
     cases: int, seed: int, parts: Sequence[str], jobs: int, timeout: float, out: Path | None,
-    write: Path | None, marks: str, command: str, scheduler: str,
+    write: Path | None, marks: str, command: str, scheduler: str, as_json: bool = False,
 ) -> None:  # fmt: skip
     """Runs the cases, prints the table, and puts it between the marks of ``write``."""
     from damageest.registry import Registry
@@ -33,6 +35,6 @@ def run_intervals(
 
     rows = run_all(planned, out / "intervals.jsonl" if out else None, jobs, timeout, print_row, scheduler)
     text = make_interval_tables(rows, command)
-    typer.echo("\n" + text)
+    show_table(text, rows, as_json)
     if write:
         write.write_text(replace_between_marks(write, text, marks), encoding="utf-8")

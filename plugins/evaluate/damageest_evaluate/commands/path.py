@@ -11,6 +11,8 @@ from typing import Annotated
 
 import typer
 
+from damageest_evaluate.commands._counted import AsJson, show_table
+
 
 def command(
     jobs: Annotated[
@@ -29,6 +31,7 @@ def command(
     write: Annotated[
         Path | None, typer.Option(help="Text file. Its lines between the path marks are replaced by the table.")
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Plan deposition paths for deposits of known shape, and check what they fill and whether the nozzle touches.
 
@@ -50,7 +53,7 @@ def command(
         if out:
             out.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
     table = make_table(rows)
-    typer.echo(table)
+    show_table(table, list(map(asdict, rows)), as_json)
     if write:
         words = [word for word in sys.argv[1:] if not word.startswith("--write")]
         measured = describe_measurement(f"`{shlex.join(['damageest', *words])}`")

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from damageest_evaluate.commands._counted import AsJson
+
 
 def command(
     sensors: Annotated[
@@ -25,6 +27,7 @@ def command(
         Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
     ] = None,
     show: Annotated[bool, typer.Option("--list", help="Only list the cases.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Measure pose, damage, doubt, notes and time on scans as six real sensors make them.
 
@@ -54,4 +57,11 @@ def command(
             typer.echo(f"{item.number} {describe_case(item.make_blank_row())}")
         return
     rows = run_counted(cases, out, "realistic.jsonl", workers, timeout, format_realistic_row)
-    show_report(lambda legend: make_realistic_report(rows, format_command(), legend), "realistic", out, write)
+    show_report(
+        lambda legend: make_realistic_report(rows, format_command(), legend),
+        "realistic",
+        out,
+        write,
+        rows,
+        as_json,
+    )

@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+from damageest_evaluate.commands._counted import AsJson, show_table
+
 
 def command(
     kinds: Annotated[str, typer.Option(metavar="A;B", help="Names of cases. Default: all but the dense scan.")] = "",
@@ -21,6 +23,7 @@ def command(
     write: Annotated[
         Path | None, typer.Option(help="Text file. Its lines between the speed marks are replaced by the table.")
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Measure processor and wall time of runs of several kinds, one after the other.
 
@@ -46,7 +49,7 @@ def command(
         typer.echo(f"{case.varied['kind']}: {runs[-1]['error']} {runs[-1]['seconds']:.1f} s", err=True)
         rows.append(runs)
     table = make_speed_table(rows)
-    typer.echo(table)
+    show_table(table, rows, as_json)
     if write:
         measured = describe_measurement(f"`{shlex.join(['damageest', *_leave_out_write(sys.argv[1:])])}`")
         write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "speed"), encoding="utf-8")

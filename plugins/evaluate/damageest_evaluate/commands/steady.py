@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
+from damageest_evaluate.commands._counted import AsJson, show_table
+
 
 def command(
     case: Annotated[str, typer.Option(metavar="A,B", help="Numbers of cases of the honesty suite. Default: 26.")] = "",
@@ -14,6 +16,7 @@ def command(
     workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 2,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a case is stopped.")] = 900,
     out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for steady.jsonl, to resume from.")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Draw scans again and compare the verdicts.
 
@@ -40,4 +43,4 @@ def command(
         typer.echo(f"{row['number']} {row['kind']}: {row['part']}: {told}, {row['seconds']:.0f} s", err=True)
 
     rows = run_all(cases, out / "steady.jsonl" if out else None, workers, timeout, print_row)
-    typer.echo("\n" + format_markdown(make_steady_table(rows)))
+    show_table(format_markdown(make_steady_table(rows)), rows, as_json)

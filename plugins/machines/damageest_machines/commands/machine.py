@@ -10,14 +10,21 @@ import typer
 
 app = typer.Typer(no_args_is_help=True, help="List, show and check machine files, for programs from deposition paths.")
 
+AsJson = Annotated[bool, typer.Option("--json", help="Print one line of JSON on standard output, for programs.")]
+
 
 @app.command("list")
-def list_machines() -> None:
+def list_machines(as_json: AsJson = False) -> None:
     """List the machine files that the package brings."""
+    from damageest.io.for_programs import format_json
     from damageest_machines.files import list_shipped, read_machine
 
-    for name, file in list_shipped().items():
-        typer.echo(f"{name:24} {read_machine(file).name}")
+    machines = {name: read_machine(file).name for name, file in list_shipped().items()}
+    if as_json:
+        typer.echo(format_json({"machines": [{"name": name, "title": title} for name, title in machines.items()]}))
+        return
+    for name, title in machines.items():
+        typer.echo(f"{name:24} {title}")
 
 
 @app.command("show")

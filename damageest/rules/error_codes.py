@@ -1,0 +1,183 @@
+"""The sorts of errors, and what a command's exit status means: for `damageest explain`, for the line below an error,
+and for the tables of docs/command-line.md."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from damageest.errors import DamageestError, StageError
+from damageest.rules.advice import TOPICS
+
+
+@dataclass(frozen=True)
+class ErrorCode:
+    """A sort of error: its ``meaning``, the exit status, the ``remedy``, and the ``page`` of the documentation."""
+
+    meaning: str
+    status: int
+    remedy: str
+    page: str
+
+
+ERROR_CODES: dict[str, ErrorCode] = {
+    "job": ErrorCode(
+        "the job file is not valid: each fault is named with its line, and what would be valid",
+        2,
+        "Correct the lines that are named; `damageest validate` checks a job and computes nothing.",
+        "docs/job-reference.md",
+    ),
+    "option": ErrorCode(
+        "an option of the command line is not valid",
+        2,
+        "Correct it; `--help` after the command lists its options.",
+        "docs/command-line.md",
+    ),
+    "part_file": ErrorCode(
+        "the file of the part cannot be read, or is no solid",
+        2,
+        "Export the part again as a closed solid, as STEP, STL or 3MF.",
+        "docs/your-own-scan.md#what-the-part-should-be",
+    ),
+    "scan_file": ErrorCode(
+        "the file of the scan cannot be read, or holds no points that can be used",
+        2,
+        "Export the scan again, as PLY or E57, and compare its size with that in the scanner's software.",
+        "docs/your-own-scan.md#how-to-export-from-the-scanners-software",
+    ),
+    "input": ErrorCode(
+        "a file, a folder, an array or a value that was given cannot be used",
+        2,
+        "Do what the message says.",
+        "docs/your-own-scan.md",
+    ),
+    "output": ErrorCode(
+        "the output folder cannot be written, is used by another run, or holds files of others",
+        2,
+        "Make room, wait for the other run, or name another folder by `--output`. An earlier result is whole.",
+        "docs/faults.md#the-output-folder",
+    ),
+    "result_folder": ErrorCode(
+        "a folder that was given is not one that a run wrote, or cannot be read as one",
+        2,
+        "Name the folder that `damageest run` prints last, or run the job again.",
+        "docs/evidence-and-limits.md",
+    ),
+    "plugin": ErrorCode(
+        "a plugin does not keep its contract, is there twice, or needs what is not installed",
+        2,
+        "`damageest plugins` says which and why; take another implementation, or report it to its authors.",
+        "docs/plugin-guide.md#when-it-does-not-work",
+    ),
+    "missing": ErrorCode(
+        "a Python package, a library of the system, OpenGL or a display is not there",
+        1,
+        "Install what is named; `damageest doctor` lists what is here and what is not.",
+        "docs/install.md",
+    ),
+    "stage": ErrorCode(
+        "a stage failed, or refused what it was given: the message names stage, site and reason",
+        1,
+        "Do what stands after `try:`.",
+        "docs/stages.md",
+    ),
+    "memory": ErrorCode(
+        "a computation needs more memory than is free, or ran out of it",
+        1,
+        "Take a larger tolerance, fewer points (`scan.most_points`), or give it more by `--memory`. Where a file is "
+        "too large to be read, the exit status is 2.",
+        "docs/faults.md#memory",
+    ),
+    "time_limit": ErrorCode(
+        "a stage took longer than its limit of time and was ended",
+        1,
+        "Raise `--stage-timeout`, or take another implementation.",
+        "docs/batch.md#limits-of-memory-and-time",
+    ),
+    "crash": ErrorCode(
+        "the process of a stage ended by itself, as native libraries do that crash",
+        1,
+        "Take another implementation, and report it with job and inputs. An earlier result is whole.",
+        "docs/batch.md#limits-of-memory-and-time",
+    ),
+    "faulty": ErrorCode(
+        "the code of a stage failed in a way that it does not foresee, or gave what its contract does not allow",
+        1,
+        "Take another implementation, and report it to the authors of the package that is named.",
+        "docs/plugin-guide.md#when-it-does-not-work",
+    ),
+    "not_accepted": ErrorCode(
+        "sites were found, and none of them is accepted as damage",
+        1,
+        "Read their reasons; name those that are damage in the job, as `accept: [1]`.",
+        "docs/verdicts.md",
+    ),
+    "unexpected": ErrorCode(
+        "damageest itself failed",
+        1,
+        "`--debug` shows where. Report it, with the job and what `damageest doctor` prints.",
+        "docs/faults.md",
+    ),
+}
+EXIT_STATUSES: dict[int, str] = {
+    0: "done; for `run` also where no damage was found, and where an extra for the report is not installed",
+    1: "a stage failed or refused, no site is accepted, a site has no volume, a job of a batch is not `ok`, a "
+    "tolerance is not met (`inspect`), or `verify` or `doctor` found a fault",
+    2: "the command, the job or an input is not valid; nothing was written for that job",
+    130: "ended by Ctrl-C",
+    141: "who read the output closed it, as `head` does",
+}
+STAGE_PAGES = {
+    "part": "docs/your-own-scan.md#what-the-part-should-be",
+    "scan": "docs/your-own-scan.md",
+    "align": "docs/pose-and-wear.md",
+    "adapt": "docs/adaptive.md",
+    "allowance": "docs/cam.md#stock-to-mill-off",
+    "path": "docs/paths.md",
+    "export": "docs/cam.md#files",
+}
+"""Pages about what a stage does, where there is one; of others, docs/stages.md."""
+
+
+def name_code(error: BaseException) -> str:
+    """The word by which `damageest explain` says more about an error: its topic, else its sort."""
+    topic = str(getattr(error, "topic", ""))
+    return topic or (error.code if isinstance(error, DamageestError) else "unexpected")
+
+
+def find_page(error: BaseException) -> str:
+    """The page of the documentation on an error, with the section where there is one."""
+    for topic in TOPICS:
+        if topic.word == getattr(error, "topic", ""):
+            return topic.page
+    if isinstance(error, StageError) and error.code == "stage":
+        return STAGE_PAGES.get(error.stage, ERROR_CODES["stage"].page)
+    return ERROR_CODES[name_code(error)].page
+
+
+def describe_help(error: BaseException) -> str:
+    """The line below an error: the command that explains it, and the page."""
+    return format_help(name_code(error), find_page(error))
+
+
+def format_help(code: str, page: str = "") -> str:
+    """The line that says where to read more about a code; ``page``: that of the code by default."""
+    return f"help: damageest explain {code}; see {page or ERROR_CODES[code].page}"
+
+
+def format_errors() -> str:
+    """Markdown: the exit statuses, and the sorts of errors."""
+    lines = ["| status | meaning |", "| --- | --- |"]
+    lines += [f"| {status} | {meaning} |" for status, meaning in EXIT_STATUSES.items()]
+    lines += [
+        "",
+        "## Errors",
+        "",
+        "| error | status | meaning | what to do | page |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for code, one in ERROR_CODES.items():
+        link = one.page.removeprefix("docs/")
+        name = re.sub(r"\.md.*", "", link)
+        lines.append(f"| `{code}` | {one.status} | {one.meaning} | {one.remedy} | [{name}]({link}) |")
+    return "\n".join(lines) + "\n"
