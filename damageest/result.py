@@ -123,7 +123,7 @@ class StepRecord:
     seconds: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Everything a run computed. Lengths in ``units``; meshes in the part's frame.
 
@@ -168,6 +168,10 @@ class Result:
     certificate: str = ""
     sections: tuple[Section, ...] = ()
     conversions: Mapping[str, Conversion] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        levels = ", ".join(f"{site.id} {site.verdict.level}" for site in self.sites) or "none"
+        return f"<Result {self.name}: sites: {levels}; damage volume {self.damage_volume:.6g} {self.units}³>"
 
     @property
     def status(self) -> Literal["ok", "incomplete"]:
@@ -229,6 +233,21 @@ class Result:
             known = ", ".join(sorted(self.conversions)) or "none"
             raise InputError(f"no plugin here converts a result to '{kind}'; there are: {known}")
         return self.conversions[kind](self, what, site)
+
+    def _repr_html_(self) -> str | None:
+        """The result in a notebook: its table, sections and a picture. None, so that the notebook shows the text, for a
+        result that no run made."""
+        show = self.conversions.get("html")
+        return None if show is None else str(show(self, "result", None))
+
+    def plot(self, site: int | None = None, show: bool = True) -> Any:
+        """Shows what is left of the part, the damage volumes and the scan in 3D, by PyVista: in a notebook within it,
+        elsewhere in a window. ``site``: look at this one. ``show``: False gives the ``pyvista.Plotter`` instead.
+
+        Raises StageError where PyVista is not installed: the extra `vtk` brings it.
+        """
+        plotter = self.convert("plotter", "window" if show else "result", site)
+        return plotter.show() if show else plotter
 
     def _transform_to(self, frame: str) -> Floats | None:
         """T (4,4) that takes a point of the part to a frame; None for the part's own."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from damageest.registry.hookspecs import hookimpl
 
 if TYPE_CHECKING:
+    from damageest.result import Conversion
     from damageest.rules import Rule
     from damageest.stages import Stage
     from damageest.stages.export import PathWriter, Writer
@@ -123,3 +124,11 @@ def damageest_path_writers() -> Mapping[str, PathWriter]:
         "apt": PathWriter(write_apt, "apt"),
         "rs274": PathWriter(write_rs274, "ngc"),
     }
+
+
+@hookimpl
+def damageest_conversions() -> Mapping[str, Conversion]:
+    """How a result shows itself in a notebook, and in a window."""
+    from damageest.stages.report.html import open_plotter, show_in_notebook
+
+    return {"html": show_in_notebook, "plotter": open_plotter}

@@ -73,3 +73,17 @@ class Html(Report):
             files.append("report.pdf")
         picture = next((site.picture for site in sites if site.picture), b"")
         return ReportFiles(tuple(files), picture=picture)
+
+
+def show_in_notebook(result: Result, what: str, site: int | None) -> str:
+    """The result as a piece of HTML with table, sections and a picture: the conversion `html` of `Result.convert`."""
+    from damageest.stages.report._notebook import make_snippet
+
+    return make_snippet(result)
+
+
+def open_plotter(result: Result, what: str, site: int | None) -> Any:
+    """A ``pyvista.Plotter`` with the result: the conversion `plotter` of `Result.convert`."""
+    from damageest.stages.report._plot import make_plotter
+
+    return make_plotter(result, site, what == "window")
