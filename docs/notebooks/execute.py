@@ -35,6 +35,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     return files
 
 
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """Links of other pages to a notebook lead to its page; on GitHub they lead to the notebook itself."""
+    return re.sub(r"\(notebooks/(\w+)\.ipynb\)", r"(notebooks/\1.md)", markdown)
+
+
 def make_page(text: str) -> str:
     """The Markdown of a notebook, executed: its text, its code, and what each cell gave."""
     notebook: Any = nbformat.reads(text, as_version=4)
