@@ -111,7 +111,7 @@ def draw(case: Case, folder: OutputFolder) -> None:
             limit = 3 * float(folder.content["tolerance"])
             by_distance = panels.colour_distances(scan.distance, limit)
             colour = by_distance if look == "deviation" else panels.colour_sites(scan.site)
-            panels.add_scan(plotter, scan.points, colour, left)
+            panels.add_scan(plotter, scan.points, colour, left, way)
         else:
             plotter.enable_depth_peeling(8)
             panels.add_body(plotter, left, panels.LEFT, 0.5 if look == "damage" else 1.0)
@@ -120,7 +120,7 @@ def draw(case: Case, folder: OutputFolder) -> None:
                 if body is not None:
                     shown = colours.DEPOSIT if look == "deposit" else colours.colour_site(number)
                     panels.add_body(plotter, body, shown, edges=False)
-        panels.look_at(plotter, left, way, 1.2)
+        panels.look_at(plotter, left, way)
     panels.save(plotter, IMAGES / f"{case.name}.png", SIZE, PALETTE)
 
 

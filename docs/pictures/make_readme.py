@@ -54,14 +54,14 @@ def draw_picture() -> None:
             panels.add_body(plotter, result.part, panels.LEFT)
         elif column == 1:
             colour = panels.colour_distances(scan.distance, 3 * result.tolerance)
-            panels.add_scan(plotter, scan.points, colour, left)
+            panels.add_scan(plotter, scan.points, colour, left, np.array(WAY))
         else:
             plotter.enable_depth_peeling(8)
             panels.add_body(plotter, left, panels.LEFT, 0.4)
             for site in result.sites:
                 panels.add_body(plotter, site.damage, colours.colour_site(site.id), edges=False)
         plotter.add_text(title, position=(12, 6), font_size=9, color="black")
-        panels.look_at(plotter, result.part, np.array(WAY), 1.3)
+        panels.look_at(plotter, result.part, np.array(WAY), 0.9)
     panels.save(plotter, IMAGES / "in-and-out.png", SIZE, PALETTE)
 
 

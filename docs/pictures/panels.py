@@ -14,8 +14,8 @@ from damageest.geometry.views import OVERVIEWS, choose_view
 from damageest.io import colours
 
 LEFT, EDGE = "#c9d1d6", "#8a959c"
-LIGHT = np.array([-0.35, -0.55, 0.76])
-"""Where the light comes from."""
+LIGHT = np.array([-0.4, 0.5, 0.8])
+"""Where the light comes from: to the right of the picture, to its top, to the eye."""
 
 
 def open_panels(columns: int, size: tuple[int, int]) -> pv.Plotter:
@@ -49,13 +49,17 @@ def add_body(plotter: pv.Plotter, mesh: Mesh, colour: str, opacity: float = 1.0,
         plotter.add_mesh(lines, color=EDGE, line_width=1.5)
 
 
-def add_scan(plotter: pv.Plotter, points: Floats, colour: Floats, surface: Mesh, size: float = 5.0) -> None:
-    """Points (N,3) in a ``colour`` (N,3) of 0 to 1 each, lit as the ``surface`` next to them is."""
+def add_scan(
+    plotter: pv.Plotter, points: Floats, colour: Floats, surface: Mesh, way: Floats, size: float = 5.0
+) -> None:
+    """Points (N,3) in a ``colour`` (N,3) of 0 to 1 each, lit as the ``surface`` next to them is, and seen
+    from ``way`` (3,)."""
     normals = surface.face_normals[closest_on_mesh(points, surface).face]
-    shade = 0.6 + 0.4 * np.clip(normals @ LIGHT, 0, 1)
+    light = LIGHT / np.linalg.norm(LIGHT) @ np.stack(view_axes(way))
+    shade = 0.55 + 0.5 * np.clip(normals @ light, 0, 1)
     cloud = pv.PolyData(points)
     cloud["rgb"] = (255 * np.clip(colour * shade[:, None], 0, 1)).astype(np.uint8)
-    plotter.add_mesh(cloud, scalars="rgb", rgb=True, point_size=size, lighting=False)
+    plotter.add_mesh(cloud, scalars="rgb", rgb=True, point_size=5, lighting=False)
 
 
 def colour_sites(site: Any) -> Floats:
@@ -76,11 +80,28 @@ def colour_distances(distance: Floats, limit: float) -> Floats:
     return np.stack([np.interp(at, np.arange(len(steps)), steps[:, channel]) for channel in range(3)], axis=1)
 
 
-def look_at(plotter: pv.Plotter, body: Mesh, way: Floats, zoom: float) -> None:
-    """All of a body from a direction (3,), in the same place in each panel."""
-    plotter.view_vector(way, (0, 0, 1))
-    plotter.reset_camera(bounds=body.bounds.T.ravel().tolist())
-    plotter.camera.zoom(zoom)
+def look_at(plotter: pv.Plotter, body: Mesh, way: Floats, zoom: float = 0.92) -> None:
+    """All of a body from a direction (3,), in the same place in each panel; it fills a share ``zoom`` of it."""
+    across, up, to_eye = view_axes(way)
+    flat = np.asarray(body.vertices) @ np.stack([across, up, to_eye], axis=1)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    focus = ((low + high) / 2) @ np.stack([across, up, to_eye])
+    plotter.camera.focal_point = focus
+    plotter.camera.position = focus + 3 * np.linalg.norm(high - low) * to_eye
+    plotter.camera.up = up
+    plotter.enable_parallel_projection()
+    width, height = (int(side) for side in plotter.renderer.GetSize())
+    half = (high - low) / 2
+    plotter.camera.parallel_scale = max(half[1], half[0] * height / width) / zoom
+    plotter.renderer.ResetCameraClippingRange()
+
+
+def view_axes(way: Floats) -> tuple[Floats, Floats, Floats]:
+    """To the right of the picture, to its top, and to the eye, each (3,)."""
+    to_eye = np.asarray(way, float) / np.linalg.norm(way)
+    across = np.cross([0.0, 0.0, 1.0], to_eye)
+    across /= np.linalg.norm(across)
+    return across, np.cross(to_eye, across), to_eye
 
 
 def choose_way(left: Mesh, surfaces: list[Mesh]) -> Floats:

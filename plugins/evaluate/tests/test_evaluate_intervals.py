@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -104,5 +105,6 @@ def test_rows_are_kept_and_the_table_goes_to_the_page(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert cells(page.read_text(), "all")[0] == "2"
     rows = (tmp_path / "intervals.jsonl").read_text()
-    assert CliRunner().invoke(app, words).exit_code == 0
+    again = CliRunner().invoke(app, [*words, "--json"])
+    assert len(json.loads(again.stdout)["rows"]) == len(rows.splitlines())
     assert (tmp_path / "intervals.jsonl").read_text() == rows
