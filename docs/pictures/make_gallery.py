@@ -15,7 +15,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 import panels
+import pyvista as pv
 
 from damageest.findings import describe_interval
 from damageest.io import colours
@@ -31,11 +33,13 @@ BEGIN, END = "<!-- gallery: begin -->\n", "<!-- gallery: end -->"
 
 @dataclass(frozen=True)
 class Case:
-    """A job of the repository, its heading, and what its two pictures show."""
+    """A job of the repository, its heading, and what its two pictures show. ``is_wide``: the first one shows all that
+    was scanned, and not only the part."""
 
     job: str
     title: str
     looks: tuple[Literal["points", "deviation"], Literal["damage", "deposit"]] = ("points", "damage")
+    is_wide: bool = False
 
     @property
     def name(self) -> str:
@@ -51,7 +55,7 @@ CASES = (
     Case("jobs/cylinder_two_sides.yaml", "A cylinder that fits in any turn"),
     Case("jobs/worn_shaft.yaml", "A seat worn on one side", ("deviation", "damage")),
     Case("jobs/worn_bore.yaml", "A worn bore, with stock to bore it out", ("points", "deposit")),
-    Case("jobs/bad_scans/table.yaml", "The table and a clamp in the scan"),
+    Case("jobs/bad_scans/table.yaml", "The table and a clamp in the scan", is_wide=True),
     Case("jobs/bad_scans/holes.yaml", "A deep hole, scanned from one side"),
 )
 
@@ -111,6 +115,8 @@ def draw(case: Case, folder: OutputFolder) -> None:
             limit = 3 * float(folder.content["tolerance"])
             by_distance = panels.colour_distances(scan.distance, limit)
             colour = by_distance if look == "deviation" else panels.colour_sites(scan.site)
+            if look == "points":
+                colour[(np.abs(scan.distance) > limit) & (scan.site == 0)] = pv.Color(colours.SURPLUS).float_rgb
             panels.add_scan(plotter, scan.points, colour, left, way)
         else:
             plotter.enable_depth_peeling(8)
@@ -120,7 +126,8 @@ def draw(case: Case, folder: OutputFolder) -> None:
                 if body is not None:
                     shown = colours.DEPOSIT if look == "deposit" else colours.colour_site(number)
                     panels.add_body(plotter, body, shown, edges=False)
-        panels.look_at(plotter, left, way)
+        is_wide = case.is_wide and column == 0
+        panels.look_at(plotter, scan.points if is_wide else left.vertices, way)
     panels.save(plotter, IMAGES / f"{case.name}.png", SIZE, PALETTE)
 
 
@@ -157,7 +164,8 @@ def main(words: list[str]) -> None:
             folder, seconds, megabytes = run(case, output)
             entries[case.name] = asdict(describe(case, folder, seconds, megabytes))
         draw(case, open_output(output))
-        kept.write_text(json.dumps(entries, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        ordered = {one.name: entries[one.name] for one in CASES if one.name in entries}
+        kept.write_text(json.dumps(ordered, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     text = PAGE.read_text(encoding="utf-8")
     sections = "\n".join(write(case, Entry(**entries[case.name])) for case in CASES if case.name in entries)
     head, tail = text.partition(BEGIN)[0], text.partition(END)[2]

@@ -61,7 +61,7 @@ def draw_picture() -> None:
             for site in result.sites:
                 panels.add_body(plotter, site.damage, colours.colour_site(site.id), edges=False)
         plotter.add_text(title, position=(12, 6), font_size=9, color="black")
-        panels.look_at(plotter, result.part, np.array(WAY), 0.9)
+        panels.look_at(plotter, result.part.vertices, np.array(WAY), 0.9)
     panels.save(plotter, IMAGES / "in-and-out.png", SIZE, PALETTE)
 
 
@@ -69,7 +69,7 @@ def record_run() -> None:
     """The example job in a terminal of its own, as a drawing without fonts from elsewhere."""
     command = ["damageest", "run", "jobs/block_wedge.yaml"]
     code = "import sys; sys.argv[0] = 'damageest'; from damageest.cli import main; main()"
-    environment = {**os.environ, "COLUMNS": str(COLUMNS), "FORCE_COLOR": "1", "TERM": "xterm-256color"}
+    environment = {**os.environ, "COLUMNS": str(COLUMNS)}  # a pipe: a line for each stage, none is drawn again
     done = subprocess.run(
         [sys.executable, "-c", code, *command[1:], "--no-cache"],
         cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=True,
@@ -77,7 +77,11 @@ def record_run() -> None:
     console = Console(record=True, width=COLUMNS, file=open(os.devnull, "w"), force_terminal=True)  # noqa: SIM115
     console.print(Text("$ " + " ".join(command), style="bold"))
     said = done.stdout.replace(f"{ROOT}/", "~/damageest/")
-    console.print(Text.from_ansi(said), soft_wrap=False)
+    text = Text(said)
+    text.highlight_regex(r"(?m)^site  volume.*$", "bold")
+    text.highlight_regex(r"\bproven\b", "green")
+    text.highlight_regex(r"(?m)^note:", "yellow")
+    console.print(text)
     plain = re.sub(r"@font-face\s*\{\{.*?\}\}", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
     path = IMAGES / "run.svg"
     drawn = console.export_svg(title="damageest", code_format=plain, unique_id="run")

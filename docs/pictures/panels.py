@@ -80,10 +80,10 @@ def colour_distances(distance: Floats, limit: float) -> Floats:
     return np.stack([np.interp(at, np.arange(len(steps)), steps[:, channel]) for channel in range(3)], axis=1)
 
 
-def look_at(plotter: pv.Plotter, body: Mesh, way: Floats, zoom: float = 0.92) -> None:
-    """All of a body from a direction (3,), in the same place in each panel; it fills a share ``zoom`` of it."""
+def look_at(plotter: pv.Plotter, vertices: Floats, way: Floats, zoom: float = 0.92) -> None:
+    """All of some vertices (N,3) from a direction (3,); they fill a share ``zoom`` of the panel."""
     across, up, to_eye = view_axes(way)
-    flat = np.asarray(body.vertices) @ np.stack([across, up, to_eye], axis=1)
+    flat = np.asarray(vertices) @ np.stack([across, up, to_eye], axis=1)
     low, high = flat.min(axis=0), flat.max(axis=0)
     focus = ((low + high) / 2) @ np.stack([across, up, to_eye])
     plotter.camera.focal_point = focus
