@@ -83,7 +83,9 @@ def test_validate(tmp_path: Path) -> None:
     good.write_text(damaged_box.JOB + "clutser: x\nsegment: y\n")
     done = call("validate", good)
     assert done.returncode == 2
-    assert [line.split(":")[1] for line in done.stderr.splitlines()] == ["7", "8"]
+    *faults, last = done.stderr.splitlines()
+    assert [line.split(":")[1] for line in faults] == ["7", "8"]
+    assert last == "help: damageest explain job; see docs/job-reference.md"
     assert done.stdout == ""
 
 
