@@ -97,6 +97,10 @@ def describe(case: Case, folder: OutputFolder, seconds: float, megabytes: float)
     known = "" if interval is None else f" (95 %: {describe_interval((interval[0], interval[1] or float('inf')))})"
     truth = content.get("truth") or {}
     true = f"{truth['volume']:.5g} {unit}, IoU {truth['iou']:.3f}" if truth.get("iou") is not None else ""
+    cut_back = sum((site["deposit"] or {}).get("cut_back_volume") or 0 for site in content["sites"])
+    known += f", with {cut_back:.5g} {unit} of worn metal that is cut back" if cut_back else ""
+    true += ", before that" if cut_back and true else ""
+    known += "" if all(site["accepted"] for site in content["sites"]) else "; a doubtful site is no part of it"
     volume = content["damage_volume"]
     return Entry(about, seconds, megabytes, tuple(sites), f"{volume:.5g} {unit}{known}", true)
 
@@ -160,10 +164,13 @@ def main(words: list[str]) -> None:
         if chosen and case.name not in chosen:
             continue
         output = ROOT / "jobs" / "out" / "gallery" / case.name
-        if not only_draw:
+        if only_draw:
+            known = entries[case.name]
+            folder, seconds, megabytes = open_output(output), known["seconds"], known["megabytes"]
+        else:
             folder, seconds, megabytes = run(case, output)
-            entries[case.name] = asdict(describe(case, folder, seconds, megabytes))
-        draw(case, open_output(output))
+        entries[case.name] = asdict(describe(case, folder, seconds, megabytes))
+        draw(case, folder)
         ordered = {one.name: entries[one.name] for one in CASES if one.name in entries}
         kept.write_text(json.dumps(ordered, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     text = PAGE.read_text(encoding="utf-8")
