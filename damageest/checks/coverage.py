@@ -44,7 +44,8 @@ def measure_coverage(part: Part, skin: SkinView, losses: Sequence[Solid], tolera
     seen = skin.seen | _find_removed(cells, skin.seen, losses, max(tolerance, spacing))
     label = cells.label_connected(~seen)
     regions, region = _describe_regions(part, cells, label, rays, (LEAST_EDGE * max(tolerance, spacing)) ** 2)
-    share = float(cells.areas[seen].sum() / cells.areas.sum())
+    is_skin = np.ones(len(seen), bool) if part.unseen is None else ~part.unseen[cells.parent]
+    share = float(cells.areas[seen & is_skin].sum() / max(cells.areas[is_skin].sum(), 1e-300))
     lost = rays.lost if rays else np.zeros(len(seen), bool)
     distance = np.where(skin.seen, skin.distance, np.nan)
     return Coverage(share, regions, cells.mesh, seen, distance, lost, region)
