@@ -33,5 +33,6 @@ def keep_shared(scan: Scan, aligned: Scan, part: Part, tolerance: float, unit: s
         f"the part is an earlier scan, which shows {area:.4g} {unit}² of skin: what is said holds there alone; "
         f"{1 - kept.mean():.0%} of the later scan's points show other skin and were set aside"
     )
-    told = Reason("earlier_scan", text, amount=float(1 - kept.mean()))
+    remedy = "if it is the scan that shows the part as designed, part and scan are swapped"
+    told = Reason("earlier_scan", text, amount=float(1 - kept.mean()), remedy=remedy)
     return (replace(scan, notes=(*scan.notes, text)).take(kept), aligned.take(kept), [told])

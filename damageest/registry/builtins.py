@@ -58,11 +58,11 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.segment.mesh_distance import MeshDistance
 
     return [
-        PartFile, EarlierScan, ScanFile, Simulate, EdgeAware, Register, Icp, Constrained, KnownPose, Points, NoAdapt, Smooth,
+        PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Constrained, KnownPose, Points, NoAdapt, Smooth,
         AutoAdapt, MeshDistance, Dbscan, PyVista, LargestLoop, AllLoops, Offset, BoundingBox, Capsule,
         CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
         NoRepair, Manifold, NoAllowance, Milling, NoPath, Files, Uniform, CloudDistance, SignedDistance,
-        PartFromScan, Html, NoReport,
+        PartFromScan, EarlierScan, Html, NoReport,
     ]  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh, Scan
 from damageest.errors import InputError
-from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.isosurface import extract_region
 from damageest.geometry.local_fits import smooth_points
 from damageest.geometry.neighbourhoods import find_neighbours, measure_local_areas, thin_points
@@ -80,8 +80,8 @@ def close_surface(scan: Scan, cell: float | None, most_cells: int) -> ScannedSur
     if unseen.all():
         raise InputError("no surface could be reconstructed along the scan's points; set part.cell smaller")
     seen = Mesh(mesh.vertices, mesh.faces[~unseen])
-    off = distance_to_mesh(points[held_out], seen)
-    off = off[off < 3 * step]  # those beyond lie on what counts as unseen
+    far, face, _ = closest_on_mesh(points[held_out], mesh)
+    off = far[~unseen[face]]
     error = float(np.percentile(off, 95)) if len(off) else 0.0
     if not len(off) or error > 3 * noise + step:
         raise InputError(f"the surface deviates from its points by {error:.3g}; set part.cell smaller than {step:.3g}")

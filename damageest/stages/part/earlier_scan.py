@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -12,8 +12,6 @@ from damageest.artefacts import Part
 from damageest.errors import InputError
 from damageest.geometry.units import UnitOption
 from damageest.io.files import file_sha256
-from damageest.io.meshes import MESH_SUFFIXES
-from damageest.io.points import READERS
 from damageest.stages import JobPath
 from damageest.stages.part import ReadPart
 
@@ -28,7 +26,6 @@ class EarlierScan(ReadPart):
     """
 
     use: Literal["earlier_scan"] = "earlier_scan"
-    reads: ClassVar[tuple[str, ...]] = tuple(suffix for suffix in READERS if suffix not in MESH_SUFFIXES)
     path: JobPath | tuple[JobPath, ...] = Field(
         description="the earlier scan, a file or a list of files in one frame, relative to the job's folder"
     )
@@ -74,7 +71,8 @@ def read_earlier(
     digest = hashlib.sha256("".join(map(file_sha256, paths)).encode()).hexdigest()
     note = (
         f"stands for the part as an earlier scan of {len(scan.points)} points shows it, in that scan's frame: "
-        f"{made.seen_area:.4g} {unit}² of skin, with a noise of {made.noise:.3g}, edges rounded by about {made.cell:.3g}"
+        f"{made.seen_area:.4g} {unit}² of skin, with a noise of {made.noise:.3g}, edges rounded by about "
+        f"{made.cell:.3g}"
     )
     return Part(
         made.vertices, made.faces, unit, name, digest, tessellation_error=made.error,
