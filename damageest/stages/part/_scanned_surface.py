@@ -129,7 +129,7 @@ def _find_unseen(mesh: Mesh, cloud: Floats, normals: Floats, spacing: float) -> 
     size = np.bincount(piece[bare], area[bare], minlength=len(middle)) if bare.any() else np.zeros(len(middle))
     bare &= size[np.maximum(piece, 0)] > SPOT * spacing**2
     if not bare.any():
-        return bare
+        return np.zeros(len(middle), bool)
     return np.asarray(find_neighbours(middle, 1, middle[bare])[0][:, 0] < RIM * spacing)
 
 
