@@ -22,8 +22,8 @@ def keep_shared(scan: Scan, aligned: Scan, part: Part, tolerance: float, unit: s
     left. Nothing is changed where the part is as designed."""
     if part.unseen is None:
         return scan, aligned, ()
-    unseen, behind = find_unshared(aligned.points, aligned.spacing, part, tolerance)
-    kept = ~(unseen | behind)
+    unseen, other = find_unshared(aligned.points, aligned.spacing, part, tolerance)
+    kept = ~(unseen | other)
     if kept.sum() < FEWEST:
         raise StageError(
             "the two scans have no skin in common in the pose found", "scan sides that the earlier scan shows as well"
@@ -33,6 +33,8 @@ def keep_shared(scan: Scan, aligned: Scan, part: Part, tolerance: float, unit: s
         f"the part is an earlier scan, which shows {area:.4g} {unit}² of skin: what is said holds there alone; "
         f"{1 - kept.mean():.0%} of the later scan's points show other skin and were set aside"
     )
+    if other.any():
+        text += f", {int(other.sum())} of them below the skin, on surfaces that may have been there before"
     remedy = "if it is the scan that shows the part as designed, part and scan are swapped"
     told = Reason("earlier_scan", text, amount=float(1 - kept.mean()), remedy=remedy)
     return (replace(scan, notes=(*scan.notes, text)).take(kept), aligned.take(kept), [told])
