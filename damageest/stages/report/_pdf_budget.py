@@ -52,7 +52,7 @@ def show_budget(book: Book, budget: Budget, name: str, unit: str) -> list[Any]:
     rows.append([tell("combined standard uncertainty"), "", "", "", "", number(budget.combined, 3), ""])
     expanded = tell("expanded uncertainty, k = {k}", k=number(budget.k, 2))
     rows.append([expanded, "", "", "", "", number(budget.expanded, 3), ""])
-    widths = [share * WIDTH for share in (0.34, 0.06, 0.13, 0.14, 0.12, 0.13, 0.08)]
+    widths = [share * WIDTH for share in (0.27, 0.05, 0.12, 0.19, 0.15, 0.13, 0.09)]
     title = head(tell("Budget of uncertainty: {name}", name=name))
     story: list[Any] = [KeepTogether([title, grid_table(rows, widths, 7)])]
     if budget.correction:
