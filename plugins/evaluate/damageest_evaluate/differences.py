@@ -87,6 +87,8 @@ OTHER: Views = ((1, 0, 0), (0, 0, 1), (0, -1, 0), (0, 0, -1))
 FRONT: Views = ((0, -1, 0), (0.8, -0.6, 0), (-0.8, -0.6, 0))
 SIDE: Views = ((0.6, -0.8, 0), (0.9, 0.2, 0.3), (0.2, -0.9, -0.3))
 """Directions from which some of the sides are seen."""
+COMMON = {"cluster", "earlier_scan", "scraps", "speck"}
+"""Codes that say nothing of an outcome."""
 BALL, BOX = "ball", "box"
 COARSE = (15_000, 0.08)
 """Points of a scan before those that were not seen are left out, and their noise in mm."""
@@ -165,7 +167,8 @@ class DifferenceCase:
         low, high = result.volume_95 or (0.0, math.inf)
         accepted = [site for site in result.sites if site.accepted]
         named = [site for site in result.sites if site.verdict.level == "doubtful"]
-        codes = sorted({note.code for note in result.warnings} | {r.code for s in named for r in s.verdict.reasons})
+        told = {note.code for note in result.warnings} | {r.code for s in named for r in s.verdict.reasons}
+        codes = sorted(told - COMMON)
         inside = low <= lost <= high and (not accepted or lost > 0) and (lost == 0 or bool(accepted))
         wrong_is_said = bool(named) or result.volume_95 is None or result.status != "ok"
         if lost == 0:  # nothing is to be found, and nothing to be doubted
