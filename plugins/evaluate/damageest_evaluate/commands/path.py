@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -25,7 +23,9 @@ def command(
     part: Annotated[
         list[Path] | None, typer.Option(help="A part's file, in mm; it gets as many losses as --each says.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(dir_okay=False, help="File for the rows, as JSON.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="JSON Lines file for the rows. A run goes on from it.")
+    ] = None,
     write: Annotated[
         Path | None, typer.Option(help="Text file. Its lines between the path marks are replaced by the table.")
     ] = None,
@@ -44,11 +44,9 @@ def command(
         replace_between_marks(write, None, "path")
     scenes = make_scenes(jobs or [], each, random, part or [], Registry.discover())
     rows = []
-    for row in run_scenes(scenes):
+    for row in run_scenes(scenes, out):
         rows.append(row)
         typer.echo(describe_row(row), err=True)
-        if out:
-            out.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
     table = make_table(rows)
     typer.echo(table)
     if write:
