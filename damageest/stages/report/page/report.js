@@ -11,15 +11,20 @@
     return !box || box.checked;
   };
 
-  const isBelow = (height) => {
+  // the tool of a site that has fewer layers than the slider stands at its last one
+  const last = {};
+  for (const item of scene.objects) last[item.site] = Math.max(last[item.site] || 0, item.height);
+
+  const isBelow = (item) => {
     const slider = document.getElementById("height");
-    return !slider || !height || height <= Number(slider.value);
+    if (!slider || !item.height) return true;
+    return item.alone ? item.height === Math.min(Number(slider.value), last[item.site]) : item.height <= Number(slider.value);
   };
 
   function showObjects() {
     for (const item of scene.objects) {
       const object = view3d.getObjectById(item.id);
-      if (object) object.visible = isChecked("layer", item.layer) && (!item.site || isChecked("site", item.site)) && isBelow(item.height);
+      if (object) object.visible = isChecked("layer", item.layer) && (!item.site || isChecked("site", item.site)) && isBelow(item);
     }
     const form = document.getElementById("form");
     if (form) form.hidden = !isChecked("layer", "form");
