@@ -49,7 +49,7 @@ VISIBLE = 0.04
 class Scene:
     """``snapshot``: k3d's binary snapshot in base64. ``objects``: for each object of it its number, layer, site (0:
     none) and, for passes and the tool, the number of the deposit's layer that they belong to, counted over its parts
-    (else 0); ``alone``: it is shown with no other layer.
+    (else 0); ``alone``: it is shown with no other layer; ``minutes`` of passes: when the layer is done.
     ``views``: for each site, by number, centre, radius and viewing direction. ``origin`` (3,): what was subtracted from
     all coordinates. ``size`` (3,): half of the part's extents. ``limit``: the deviation at the ends of the colour bar.
     ``shown``, ``points``: how many scan points are shown, of how many. ``exaggerate``: by how much the form of an
@@ -234,6 +234,7 @@ def _add_path(stage: _Stage, site: Site) -> None:
     ends = np.flatnonzero(path.on)
     kinds, number = np.unique(np.stack([path.part[ends], path.layer[ends]]), axis=1, return_inverse=True)
     count = kinds.shape[1]
+    minutes = np.cumsum(path.moves / path.feed)
     for k in range(count):
         own = ends[number.ravel() == k]
         points = np.concatenate([path.points[own - 1], path.points[own]])
@@ -244,6 +245,7 @@ def _add_path(stage: _Stage, site: Site) -> None:
             width=0.02, name="path",
         )  # fmt: skip
         stage.add(lines, "path", site.id, k + 1)
+        stage.objects[-1]["minutes"] = float(f"{minutes[own[-1]]:.3g}")
         _add_tool(stage, site, path.points[own[-1]], path.axes[own[-1]], k + 1)
     if path.tightest is not None:
         _add_tool(stage, site, *path.tightest)

@@ -103,15 +103,26 @@
     return view3d.setTime(factor).then(showObjects);
   }
 
+  function sayLayers() {
+    const slider = document.getElementById("height"), done = {};
+    for (const item of scene.objects) {
+      if (item.minutes !== undefined && item.height <= Number(slider.value)) done[item.site] = item.minutes;
+    }
+    const sites = Object.keys(done), times = sites.map((site) => (sites.length > 1 ? `site ${site}: ` : "") + `${done[site]} min`);
+    const upTo = slider.value === slider.max ? `all ${slider.max}` : `1 to ${slider.value} of ${slider.max}`;
+    document.getElementById("height-text").textContent = `${upTo} · ${times.join(", ")}`;
+  }
+
   function listen() {
     for (const box of find("input.layer, input.site")) box.addEventListener("change", showObjects);
     for (const id of ["clip-axis", "clip-flip", "clip-at"]) document.getElementById(id).addEventListener("input", clip);
     const slider = document.getElementById("height");
     if (slider) {
       slider.addEventListener("input", () => {
-        document.getElementById("height-text").textContent = `1 to ${slider.value} of ${slider.max}`;
+        sayLayers();
         showObjects();
       });
+      sayLayers();
     }
     const form = document.getElementById("exaggerate");
     if (form) form.addEventListener("input", exaggerate);
