@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from damageest_evaluate.commands import adapt, budget, honesty, path, realistic, speed, steady
+from damageest_evaluate.commands import adapt, budget, honesty, path, prepare, realistic, speed, steady
 from damageest_evaluate.commands._counted import format_command
 from damageest_evaluate.commands.intervals import run_intervals
 
@@ -25,6 +25,7 @@ app.command("realistic")(realistic.command)
 app.command("steady")(steady.command)
 app.command("speed")(speed.command)
 app.command("path")(path.command)
+app.command("prepare")(prepare.command)
 
 Vary = Annotated[
     list[str] | None,

@@ -19,6 +19,10 @@ from damageest_evaluate.paths.others import make_on_part, read_file
 from damageest_evaluate.paths.tight import TIGHT
 
 
+LARGE = 30_000
+"""Triangles of a part from which a deposit on it comes late."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A deposit: ``kind`` and ``name``; the solid to build up, and what is left of the part. ``width``: of the bead;
@@ -162,7 +166,8 @@ def make_on_others(path: Path, each: int, registry: Any) -> list[Scene]:
 
 def make_scenes(jobs: Sequence[Path], each: int, random: int, parts: Sequence[Path], registry: Any) -> list[Scene]:
     """Deposits of the jobs, ``each`` of the kinds that are made to measure and on each of the ``parts``, and ``random``
-    of the suite; in turn one of each kind, part and job, so that what a run has done when it is stopped is of all."""
+    of the suite. They come in turn, one of each kind, part and job, those that take a minute each at the end: so what a
+    run has done when it is stopped is of all the others."""
     groups = [make_on_others(path, each, registry) for path in parts] + [read_job(path, registry) for path in jobs]
     numbers = range(each)
     for kind, make in MAKERS.items():
@@ -173,4 +178,5 @@ def make_scenes(jobs: Sequence[Path], each: int, random: int, parts: Sequence[Pa
         names = [f"{kind} {number + 1}" for number in numbers]
         groups.append([_cut(kind, name, *loss)[0] for name, loss in zip(names, losses, strict=True)])
     groups.append([scene for seed in range(random) for scene in make_random(seed)[:1]])
-    return [scene for turn in zip_longest(*groups) for scene in turn if scene is not None]
+    scenes = [scene for turn in zip_longest(*groups) for scene in turn if scene is not None]
+    return sorted(scenes, key=lambda scene: scene.kind == "bore" or len(scene.left.faces) > LARGE)
