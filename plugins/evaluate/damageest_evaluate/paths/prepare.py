@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from damageest_paths.directions import find_open_normal
 from damageest_paths.layers import Layers
 
 from damageest.artefacts import Part, Solid
@@ -35,8 +36,8 @@ ATTEMPTS = 20
 @dataclass(frozen=True)
 class PrepareRow:
     """One damage. ``lost``: its volume; ``before``, ``after``: shares of what is to be deposited that the path reaches,
-    without and with preparation; ``milled``: intact metal that is milled off, and ``convex``: what a convex opening
-    would take off, both as shares of ``lost``. ``why``: what is still not reached, and why."""
+    without and with preparation; ``milled``: intact metal that is milled off, and ``convex``: what a convex cavity that
+    is open straight up takes off, both as shares of ``lost``. ``why``: what is still not reached, and why."""
 
     name: str
     lost: float
@@ -77,19 +78,21 @@ def make_ragged(part: Part, seed: int) -> tuple[Any, Any]:
 
 
 def evaluate_damage(name: str, part: Part, seed: int, milling: type[Any]) -> PrepareRow:
-    """One row, with 3 axes along the normal of the open side."""
+    """One row, with 3 axes along the normal of the open side, for the path and for the opening."""
     body, lost = make_ragged(part, seed)
     origin = part.bounds.mean(axis=0)
     damage, left = to_solid(lost, origin), to_solid(body - lost, origin)
     assert damage is not None
     assert left is not None
     scene = Scene("ragged", name, damage, left)
-    options = {**choose_options(scene), "axes": 3, "direction": "normal", "simulate": False}
-    width = float(scene.width or options["width"])  # type: ignore[arg-type]
+    options = choose_options(scene)
+    width = float(str(options["width"]))
     tolerance = 0.05 * width
-    stage = milling.model_validate({"prepare": {"min_radius": width, "wall_angle": WALL}})
+    direction = tuple(find_open_normal(damage, left, tolerance).tolist())
+    options |= {"axes": 3, "direction": direction, "simulate": False}
+    stage = milling.model_validate({"prepare": {"min_radius": width, "wall_angle": WALL, "direction": direction}})
     deposit = stage.run(damage=damage, part=part, tolerance=tolerance, others=None)
-    convex = (lost.hull() ^ body).volume() - lost.volume()
+    convex = (_open_convex(lost, direction) ^ body).volume() - lost.volume()
     before = Layers.model_validate(options).run(body=damage, left=left, built=None, tolerance=tolerance)
     assert before is not None
     after, why = before, ""
@@ -107,6 +110,17 @@ def evaluate_damage(name: str, part: Part, seed: int, milling: type[Any]) -> Pre
     return PrepareRow(
         name, damage.volume, width, _reach(before), _reach(after), cut / damage.volume, convex / damage.volume, why
     )
+
+
+def _open_convex(lost: Any, direction: Any) -> Any:
+    """The hull of a body and of its shadow at its highest place along a direction (3,)."""
+    from manifold3d import Manifold
+
+    points = np.asarray(lost.to_mesh().vert_properties, dtype=np.float64)[:, :3]
+    up = np.asarray(direction)
+    height = points @ up
+    raised = points + (height.max() - height)[:, None] * up
+    return Manifold.hull_points(np.concatenate([points, raised]))
 
 
 def _reach(path: Any) -> float:

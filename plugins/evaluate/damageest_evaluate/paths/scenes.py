@@ -18,7 +18,6 @@ from damageest_evaluate.parts import PARTS
 from damageest_evaluate.paths.others import make_on_part, read_file
 from damageest_evaluate.paths.tight import TIGHT
 
-
 LARGE = 30_000
 """Triangles of a part from which a deposit on it comes late."""
 
