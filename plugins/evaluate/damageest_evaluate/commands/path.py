@@ -36,7 +36,7 @@ def command(
     files of --part the bead is 1.2 mm wide, or less on a small part. The checks share no code with the planner.
     """
     from damageest.registry import Registry
-    from damageest_evaluate.paths.run import describe_row, make_table, run_scenes
+    from damageest_evaluate.paths.run import describe_row, make_demands, make_table, run_scenes
     from damageest_evaluate.paths.scenes import make_scenes
     from damageest_evaluate.readme import describe_measurement, replace_between_marks
 
@@ -47,7 +47,7 @@ def command(
     for row in run_scenes(scenes, out):
         rows.append(row)
         typer.echo(describe_row(row), err=True)
-    table = make_table(rows)
+    table = "\n\n".join([make_demands(rows), make_table(rows)])
     typer.echo(table)
     if write:
         words = [word for word in sys.argv[1:] if not word.startswith("--write")]

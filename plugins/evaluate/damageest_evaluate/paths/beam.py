@@ -22,8 +22,8 @@ THIN = 0.9
 ACROSS, DEEP = 5, 5
 """Places across a bead and down into it that are looked at."""
 FLIP, UPRIGHT = 45.0, 5.0
-"""Degrees: a turn of the rotary axis about z from one point to the next that is a flip, and the tilt below which that
-axis may turn freely, since it does not move the tool."""
+"""Degrees: a turn of the rotary axis about z from one point to the next that is a flip, and the angle between tool
+and z, upward or downward, below which that axis may turn freely, since it does not move the tool."""
 
 
 class _Places(NamedTuple):
@@ -113,5 +113,6 @@ def count_flips(path: DepositPath) -> int:
     tilt = np.degrees(np.arctan2(np.hypot(axes[:, 0], axes[:, 1]), axes[:, 2]))
     turn = np.degrees(np.arctan2(axes[:, 1], axes[:, 0]))
     turned = np.abs((np.diff(turn) + 180) % 360 - 180)
+    tilt = np.minimum(tilt, 180 - tilt)  # a tool from below turns about the same axis
     steep = np.minimum(tilt[1:], tilt[:-1]) > UPRIGHT
     return int((steep & (turned > FLIP) & path.on[1:]).sum())

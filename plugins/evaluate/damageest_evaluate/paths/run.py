@@ -141,6 +141,58 @@ def describe_row(row: PathRow) -> str:
     )
 
 
+@dataclass(frozen=True)
+class Demand:
+    """What is asked of each path that is not mostly out of reach: ``least`` or ``most`` of a value of its row."""
+
+    words: str
+    name: str
+    form: str
+    least: float = -np.inf
+    most: float = np.inf
+
+    def find_worst(self, rows: Sequence[PathRow]) -> PathRow:
+        sign = 1 if np.isfinite(self.most) else -1
+        return max(rows, key=lambda row: sign * float(getattr(row, self.name)))
+
+    def holds(self, row: PathRow) -> bool:
+        return self.least <= float(getattr(row, self.name)) <= self.most
+
+
+DEMANDS = (
+    Demand("no point of the beam in metal", "shaded", ".1%", most=0.0),
+    Demand("sunk at most 5 % of the deposit", "sunk", ".1%", most=0.05),
+    Demand("spill at most 1.1 bead widths", "spill", ".2f", most=1.1),
+    Demand("filled at least 99.5 % of what is reachable", "filled", ".2%", least=0.995),
+    Demand("travel at most twice the deposition", "travel", ".2f", most=2.0),
+    Demand("nozzle clear of metal, bead widths", "gap", ".2f", least=1e-9),
+    Demand("nozzle clear of earlier beads, bead widths", "built", ".2f", least=1e-9),
+    Demand("no jump of the rotary axis", "flips", "d", most=0),
+)
+TRAVEL = 0.2
+"""Median of travel over deposition that is asked for."""
+
+
+def make_demands(rows: Sequence[PathRow], axes: int = 5) -> str:
+    """A Markdown table: a line for each demand, on how many paths it holds, and the worst of them."""
+    from damageest_evaluate.readme import format_markdown
+
+    own = [row for row in rows if row.axes == axes and row.unreached < MUCH and row.passes]
+    lines = [["demand", "holds on", "worst", "there"]]
+    for demand in DEMANDS if own else ():
+        worst = demand.find_worst(own)
+        value = format(getattr(worst, demand.name), demand.form)
+        lines.append([demand.words, f"{sum(map(demand.holds, own))} of {len(own)}", value, worst.name])
+    if own:
+        middle = float(np.median([row.travel for row in own]))
+        between = float(np.median([row.between for row in own]))
+        words = f"{between:.0%} without the way in and out"
+        lines.append(
+            [f"median travel at most {TRAVEL:.0%}", "yes" if middle <= TRAVEL else "no", f"{middle:.0%}", words]
+        )
+    return format_markdown(lines)
+
+
 def make_table(rows: Sequence[PathRow]) -> str:
     """A Markdown table: a line for each kind and number of axes, and for all."""
     from damageest_evaluate.readme import format_markdown
