@@ -12,6 +12,9 @@ import typer
 
 def command(
     count: Annotated[int, typer.Option(min=1, help="Number of damages.")] = 20,
+    out: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="JSON Lines file for the rows. A run goes on from it.")
+    ] = None,
     write: Annotated[
         Path | None, typer.Option(help="Text file. Its lines between the prepare marks are replaced by the table.")
     ] = None,
@@ -24,7 +27,7 @@ def command(
     if write:
         replace_between_marks(write, None, "prepare")
     rows = []
-    for row in run_prepare(count, Registry.discover()):
+    for row in run_prepare(count, Registry.discover(), out):
         rows.append(row)
         typer.echo(
             f"{row.name}: {row.before:.1%} {row.after:.1%} {row.milled:.2f} {row.convex:.2f} {row.why}", err=True

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from damageest_evaluate.parts import PARTS
 from damageest_evaluate.paths.others import make_lump
 from damageest_evaluate.paths.run import choose_options
 from damageest_evaluate.paths.scenes import Scene
+from damageest_evaluate.rows import read_rows
 
 OWN = ("block", "shaft", "lever", "cuboid", "coupling")
 """Parts that are damaged in turn."""
@@ -127,17 +130,24 @@ def _reach(path: Any) -> float:
     return 1 - float(path.unreached_volume) / float(path.deposit_volume)
 
 
-def run_prepare(count: int, registry: Any) -> Iterator[PrepareRow]:
-    """The rows of ``count`` damages; those that are refused have no figures after."""
+def run_prepare(count: int, registry: Any, out: Path | None = None) -> Iterator[PrepareRow]:
+    """The rows of ``count`` damages; those that are refused have no figures after. Rows that the file ``out`` has are
+    taken from it, others are appended to it."""
     milling = registry.get(Allowance.stage, "milling").cls
-    parts = {name: PARTS[name]() for name in OWN}
+    known = {row["name"]: PrepareRow(**row) for row in read_rows(out)}
     for seed in range(count):
-        name = OWN[seed % len(OWN)]
-        try:
-            yield evaluate_damage(f"{name} {seed // len(OWN) + 1}", parts[name], seed, milling)
-        except (StageError, LookupError) as error:
-            nan = float("nan")
-            yield PrepareRow(f"{name} {seed // len(OWN) + 1}", nan, nan, nan, nan, nan, nan, str(error))
+        part = OWN[seed % len(OWN)]
+        name = f"{part} {seed // len(OWN) + 1}"
+        row = known.get(name)
+        if row is None:
+            try:
+                row = evaluate_damage(name, PARTS[part](), seed, milling)
+            except (StageError, LookupError) as error:
+                row = PrepareRow(name, *[np.nan] * 6, str(error))
+            if out:
+                with out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(asdict(row)) + "\n")
+        yield row
 
 
 def make_prepare_table(rows: Sequence[PrepareRow]) -> str:

@@ -167,7 +167,7 @@ def make_scenes(jobs: Sequence[Path], each: int, random: int, parts: Sequence[Pa
     """Deposits of the jobs, ``each`` of the kinds that are made to measure and on each of the ``parts``, and ``random``
     of the suite. They come in turn, one of each kind, part and job, those that take a minute each at the end: so what a
     run has done when it is stopped is of all the others."""
-    groups = [make_on_others(path, each, registry) for path in parts] + [read_job(path, registry) for path in jobs]
+    groups = [make_on_others(path, each, registry) for path in parts]
     numbers = range(each)
     for kind, make in MAKERS.items():
         seeds = [np.random.default_rng([4711, number, len(kind)]) for number in numbers]
@@ -177,5 +177,6 @@ def make_scenes(jobs: Sequence[Path], each: int, random: int, parts: Sequence[Pa
         names = [f"{kind} {number + 1}" for number in numbers]
         groups.append([_cut(kind, name, *loss)[0] for name, loss in zip(names, losses, strict=True)])
     groups.append([scene for seed in range(random) for scene in make_random(seed)[:1]])
+    groups += [read_job(path, registry) for path in jobs]
     scenes = [scene for turn in zip_longest(*groups) for scene in turn if scene is not None]
     return sorted(scenes, key=lambda scene: scene.kind == "bore" or len(scene.left.faces) > LARGE)
