@@ -134,4 +134,4 @@ def is_closed(line: Floats) -> bool:
         return False
     # numpy.allclose takes most of the time where many lines are compared
     (a, b), (c, d) = line[0].tolist(), line[-1].tolist()
-    return max(abs(a - c), abs(b - d)) <= 1e-8 + 1e-5 * min(abs(c), abs(d))
+    return bool(max(abs(a - c), abs(b - d)) <= 1e-8 + 1e-5 * min(abs(c), abs(d)))

@@ -143,7 +143,8 @@ def run_prepare(count: int, registry: Any, out: Path | None = None) -> Iterator[
             try:
                 row = evaluate_damage(name, PARTS[part](), seed, milling)
             except (StageError, LookupError) as error:
-                row = PrepareRow(name, *[np.nan] * 6, str(error))
+                nan = float("nan")
+                row = PrepareRow(name, nan, nan, nan, nan, nan, nan, str(error))
             if out:
                 with out.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(asdict(row)) + "\n")
