@@ -23,7 +23,9 @@ def command(
     ] = None,
     show: Annotated[
         list[str] | None,
-        typer.Option("--show", help="damage, points, deviation, deposit or stock; a row for each. Default: damage."),
+        typer.Option(
+            "--show", help="damage, points, deviation, deposit, stock or path; a row for each. Default: damage."
+        ),
     ] = None,
     size: Annotated[str, typer.Option(help="Width and height in pixels, of each column and row.")] = "900x700",
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
@@ -52,6 +54,10 @@ def command(
     opened = tuple(open_output(folder) for folder in folders)
     for folder, number in zip(opened, sites, strict=True):
         folder.check_site(number)
+        shown = [number] if number else folder.site_numbers
+        if "path" in looks and all(folder.read_path(each) is None for each in shown):
+            text = f"{folder.folder} has no path/site-*.csv; plan paths (path: layers) with export.paths: csv"
+            raise JobError([Fault(text)], "--show")
     if debug:
         os.environ["DAMAGEEST_DEBUG"] = "1"
     width, height = (int(number) for number in numbers.groups())

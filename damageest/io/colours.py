@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 SITES = ("#d1495b", "#edae49", "#00798c", "#66a182", "#8d5b9f", "#d97a34", "#3f7fc1", "#a8577e")
 PART, SURPLUS, UNSEEN, DEPOSIT = "#9aa5ad", "#9d6fc4", "#c77f00", "#2f86d6"
+NOZZLE, BEAM, UNREACHED = "#c9a227", "#f05a28", "#e00000"
 DEVIATION = "coolwarm"
 """matplotlib's colour map of signed deviations: blue below the nominal surface, red above it, as inspection has it;
 grey between, so that it is seen on a light and on a dark ground."""

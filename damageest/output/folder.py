@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,6 +26,18 @@ class LabelledScan:
     points: Floats
     distance: Floats
     site: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenPath:
+    """A deposition path, in the frame of the other files: ``points`` (N,3) on the tops of the beads, whether the move
+    that ends there deposits (N,), its ``layer`` (N,), counted over the parts of the deposit, and the bead's ``width``.
+    """
+
+    points: Floats
+    on: NDArray[np.bool_]
+    layer: NDArray[np.int64]
+    width: float
 
 
 @dataclass(frozen=True)
@@ -87,6 +100,29 @@ class OutputFolder:
         """The inner damage surface of a site."""
         found = self.read_mesh(f"surface/site-{site}.ply")
         return found if found is not None else self.read_mesh(f"doubtful/surface/site-{site}.ply")
+
+    def read_path(self, site: int) -> WrittenPath | None:
+        """The deposition path of a site from the table that ``export: {paths: csv}`` writes; None without one.
+
+        Raises InputError where it cannot be read."""
+        path = self.place / f"path/site-{site}.csv"
+        if not path.is_file():
+            return None
+        try:
+            with path.open(newline="", encoding="utf-8") as stream:
+                rows = list(csv.DictReader(stream))
+            points = np.array([[float(row[name]) for name in "xyz"] for row in rows])
+            on = np.array([row["on"] == "1" for row in rows])
+            parts = np.array([(int(row["part"]), int(row["layer"])) for row in rows])
+            layer = np.unique(parts, axis=0, return_inverse=True)[1].ravel() + 1
+            width = float(rows[0]["width"])
+            setup = path.with_name(f"site-{site}.setup.json")
+            if setup.is_file():
+                back = np.linalg.inv(np.array(read_json(setup)["transform"], float))
+                points = points @ back[:3, :3].T + back[:3, 3]
+        except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+            raise InputError(f"{path}: cannot be read as a path: {error}; run the job again") from None
+        return WrittenPath(points, on, layer, width)
 
     @cached_property
     def scan(self) -> LabelledScan | None:

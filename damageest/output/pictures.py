@@ -18,14 +18,17 @@ from damageest.io import colours
 from damageest.isolation import Limits, call_isolated
 from damageest.output.folder import OutputFolder
 
-Look = Literal["damage", "points", "deviation", "deposit", "stock"]
-LOOKS: tuple[Look, ...] = ("damage", "points", "deviation", "deposit", "stock")
+Look = Literal["damage", "points", "deviation", "deposit", "stock", "path"]
+LOOKS: tuple[Look, ...] = ("damage", "points", "deviation", "deposit", "stock", "path")
 """damage: damage volumes in what is left; points: the scan, each site in its colour; deviation: the scan by signed
-distance; deposit: deposits on what is left; stock: those, coloured by their height over the nominal surface."""
+distance; deposit: deposits on what is left; stock: those, coloured by their height over the nominal surface; path:
+passes coloured by layer, what they do not reach in red, and the nozzle with its beam where it is tightest."""
 Side = Literal["iso", "x", "y", "z"]
 SIDES = {"iso": (-1.0, -1.0, 0.8), "x": (1.0, 0.0, 0.0), "y": (0.0, -1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LEFT, EDGE, GROUND = "#c9d1d6", "#8a959c", "white"
 MOST_POINTS = 300_000
+TUBE = 0.2
+"""Radius of a pass that is drawn, in bead widths."""
 NO_GRAPHICS = (
     "the picture could not be drawn: this machine has no OpenGL, or its graphics driver failed",
     "apt-get install libegl1 libgl1 libgl1-mesa-dri (OpenGL without a graphics card); or open report.html in a "
@@ -120,6 +123,9 @@ def _add_look(plotter: Any, folder: OutputFolder, site: int, look: Look, unique:
         edges = body.extract_feature_edges(30, boundary_edges=False, non_manifold_edges=False, manifold_edges=False)
         if edges.n_cells:
             plotter.add_mesh(edges, color=EDGE, line_width=1.5)
+    if look == "path":
+        _add_paths(plotter, folder, site)
+        return
     for number in folder.site_numbers:
         body = None if look == "damage" else folder.read_solid("deposit", number)
         body = body or folder.read_solid("damage", number)  # which is what to deposit where there is no allowance
@@ -129,6 +135,29 @@ def _add_look(plotter: Any, folder: OutputFolder, site: int, look: Look, unique:
             _add_stock(plotter, folder, body, unique)
         else:
             plotter.add_mesh(_wrap(body), color=colours.colour_site(number) if look == "damage" else colours.DEPOSIT)
+
+
+def _add_paths(plotter: Any, folder: OutputFolder, site: int) -> None:
+    """Adds the path of a site, 0 for those of all."""
+    import pyvista as pv
+
+    for number in [site] if site else folder.site_numbers:
+        path = folder.read_path(number)
+        if path is not None:
+            ends = np.flatnonzero(path.on)
+            places = np.stack([path.points[ends - 1], path.points[ends]], axis=1).reshape(-1, 3)
+            lines = np.column_stack([np.full(len(ends), 2), np.arange(2 * len(ends)).reshape(-1, 2)])
+            passes = pv.PolyData(places, lines=lines.ravel())
+            passes.cell_data["layer"] = path.layer[ends]
+            tubes = passes.tube(radius=TUBE * path.width, n_sides=12)
+            plotter.add_mesh(tubes, scalars="layer", cmap="viridis", show_scalar_bar=False)
+        for kind, look in (
+            ("unreached", {"color": colours.UNREACHED}),
+            ("tool", {"color": colours.NOZZLE, "opacity": 0.45}),
+        ):
+            mesh = folder.read_mesh(f"path/site-{number}.{kind}.ply")
+            if mesh is not None:
+                plotter.add_mesh(_wrap(mesh), **look)
 
 
 def _add_stock(plotter: Any, folder: OutputFolder, deposit: Mesh, unique: str) -> None:

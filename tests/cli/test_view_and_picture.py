@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 import damageest
+from damageest.artefacts import Mesh
 from damageest.errors import InputError, JobError, StageError
+from damageest.io.meshes import write_ply
 from damageest.output import pictures
 from damageest.output.folder import OutputFolder, open_output
 from tests import damaged_box
@@ -108,6 +110,33 @@ def test_a_picture_shows_the_damage(folder: Path, tmp_path: Path) -> None:
             assert (own[120 * row : 120 * (row + 1)].min(axis=2) < 240).mean() > 0.05, (row, column)
         assert red[120:, 160 * column : 160 * (column + 1)].sum() > 20
     assert red[120:, 160:].sum() > 3 * red[120:, :160].sum(), "the site is seen from near"
+
+
+def test_a_picture_shows_the_path_and_what_it_does_not_reach(folder: Path, tmp_path: Path) -> None:
+    from PIL import Image
+
+    from damageest.cli.picture import command
+
+    shutil.copytree(folder, tmp_path / "out")
+    options = {"site": [1], "side": "z", "show": ["path"], "size": "160x120", "debug": False}
+    with pytest.raises(JobError, match=r"no path/site-\*\.csv"):
+        command([tmp_path / "out"], output=tmp_path / "p.png", **options)  # type: ignore[arg-type]
+    path, body = tmp_path / "out/path", open_output(folder).read_solid("damage", 1)
+    assert body
+    path.mkdir()
+    low, high = body.bounds
+    rows = [f"{x},{low[1]},{high[2] + 1},0,0,1,9,{on},1,1,1,1,1,row" for x, on in ((low[0], 0), (high[0], 1))]
+    (path / "site-1.csv").write_text("\n".join(["x,y,z,i,j,k,feed,on,layer,pass,part,width,height,kind", *rows]) + "\n")
+    write_ply(path / "site-1.unreached.ply", Mesh(body.vertices + np.array([0, 0, 1]), body.faces))
+    try:
+        command([tmp_path / "out"], output=tmp_path / "p.png", **options)  # type: ignore[arg-type]
+    except StageError as error:
+        pytest.skip(str(error))
+    image = np.asarray(Image.open(tmp_path / "p.png").convert("RGB")).astype(int)
+    red = (image[..., 0] > image[..., 1] + 80) & (image[..., 0] > image[..., 2] + 80)
+    violet = (image[..., 2] > image[..., 1] + 25) & (image[..., 0] > image[..., 1] + 15)
+    assert red.sum() > 100
+    assert violet.sum() > 20
 
 
 def die(**_: object) -> None:

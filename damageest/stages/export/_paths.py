@@ -9,8 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from damageest.artefacts import DepositPath, Floats
-from damageest.geometry.transforms import move_points
+from damageest.artefacts import DepositPath, Floats, Mesh
+from damageest.geometry.solids import concatenate_meshes
+from damageest.geometry.tools import place_tool
+from damageest.geometry.transforms import move_mesh, move_points
+from damageest.io.meshes import write_ply
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles, PathSettings, PathWriter, describe_setup
 
@@ -30,8 +33,9 @@ def write_paths(
     """Writes each site's path in the formats ``names``, below ``place``.
 
     ``T`` (4,4) takes a point from the part's frame to that of the files; None for none. A path with a set-up frame is
-    written in that frame, and ``site-1.setup.json`` has the transform from the frame of the other files to it. What a
-    writer says of a file is a warning, which begins with the file's name.
+    written in that frame, and ``site-1.setup.json`` has the transform from the frame of the other files to it. Meshes
+    of what no pass reaches, and of nozzle and beam where the nozzle is tightest, are in the frame of the other files.
+    What a writer says of a file is a warning, which begins with the file's name.
     """
     files, said = [], []
     for site in result.sites:
@@ -51,7 +55,22 @@ def write_paths(
             values = {"units": result.units, "transform": np.add(moved.setup, 0.0).tolist()}
             (folder / name).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
             files.append(name)
+        for kind, mesh in (_list_meshes(site.path) if names else {}).items():
+            name = f"{place}path/site-{site.id}.{kind}.ply"
+            write_ply(folder / name, move_mesh(mesh, T))
+            files.append(name)
     return ExportedFiles(tuple(files), tuple(said), warnings=tuple(said))
+
+
+def _list_meshes(path: DepositPath) -> dict[str, Mesh]:
+    """What is to be seen of a path besides its moves, by the name of its file."""
+    found: dict[str, Mesh] = {}
+    if path.missing is not None:
+        found["unreached"] = path.missing
+    if path.tightest is not None:
+        tool = [mesh for mesh in place_tool(path, *path.tightest) if len(mesh.faces)]
+        found["tool"] = Mesh(*concatenate_meshes(tool)[:2])
+    return found
 
 
 def _move_path(path: DepositPath, T: Floats | None) -> DepositPath:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import DAMAGE, INTACT, Floats, Mesh
-from damageest.geometry.transforms import turn_to_axis
+from damageest.geometry.tools import place_tool
 from damageest.io import colours
 from damageest.io.section_files import round_nice
 from damageest.result import Result, Site
@@ -26,7 +26,9 @@ LAYERS = {
     "surface": ("Inner damage surfaces", False),
     "deposit": ("Deposits", False),
     "path": ("Deposition passes, by layer", True),
-    "nozzle": ("Nozzle where it is tightest", False),
+    "tool": ("Nozzle and beam at the end of the layer", False),
+    "nozzle": ("Nozzle and beam where it is tightest", False),
+    "unreached": ("Deposit that no pass reaches", True),
     "surplus": ("Surplus", True),
     "unseen": ("Skin that the scan does not show", True),
     "least": ("Least depth of a loss that can be seen", False),
@@ -46,7 +48,8 @@ VISIBLE = 0.04
 @dataclass
 class Scene:
     """``snapshot``: k3d's binary snapshot in base64. ``objects``: for each object of it its number, layer, site (0:
-    none) and, for passes, the number of the deposit's layer that they belong to, counted over its parts (else 0).
+    none) and, for passes and the tool, the number of the deposit's layer that they belong to, counted over its parts
+    (else 0); ``alone``: it is shown with no other layer; ``minutes`` of passes: when the layer is done.
     ``views``: for each site, by number, centre, radius and viewing direction. ``origin`` (3,): what was subtracted from
     all coordinates. ``size`` (3,): half of the part's extents. ``limit``: the deviation at the ends of the colour bar.
     ``shown``, ``points``: how many scan points are shown, of how many. ``exaggerate``: by how much the form of an
@@ -74,12 +77,14 @@ class _Stage:
     def place(self, points: Floats) -> Any:
         return (np.round((points - self.origin) / self.step) * self.step).astype(np.float32)
 
-    def add(self, item: Any, layer: str, site: int = 0, height: int = 0) -> None:
+    def add(self, item: Any, layer: str, site: int = 0, height: int = 0, alone: bool = False) -> None:
         item.id = len(self.made) + 1  # k3d's own numbers are addresses in memory, and differ from run to run
         self.made.append(item)
-        self.objects.append({"id": item.id, "layer": layer, "site": site, "height": height})
+        self.objects.append({"id": item.id, "layer": layer, "site": site, "height": height, "alone": alone})
 
-    def add_mesh(self, mesh: Mesh, layer: str, colour: str, site: int = 0, opacity: float = 1.0) -> None:
+    def add_mesh(
+        self, mesh: Mesh, layer: str, colour: str, site: int = 0, opacity: float = 1.0, height: int = 0
+    ) -> None:
         import k3d
 
         if not len(mesh.faces):
@@ -93,7 +98,7 @@ class _Stage:
             flat_shading=True,
             name=layer,
         )
-        self.add(item, layer, site)
+        self.add(item, layer, site, height, height > 0)
 
     def add_points(self, points: Floats, layer: str, site: int, size: float, **look: Any) -> None:
         import k3d
@@ -215,15 +220,21 @@ def _add_site(stage: _Stage, result: Result, site: Site, share: int, most_points
 
 
 def _add_path(stage: _Stage, site: Site) -> None:
-    """Adds the passes of a site, each layer of the deposit an object, and the nozzle where it is tightest."""
+    """Adds the passes of a site, each layer of the deposit an object, the nozzle and its beam at the end of each layer
+    and where it is tightest, and what no pass reaches."""
     import k3d
 
     path = site.path
-    if path is None or not path.on.any():
+    if path is None:
+        return
+    if path.missing is not None:
+        stage.add_mesh(path.missing, "unreached", colours.UNREACHED, site.id)
+    if not path.on.any():
         return
     ends = np.flatnonzero(path.on)
     kinds, number = np.unique(np.stack([path.part[ends], path.layer[ends]]), axis=1, return_inverse=True)
     count = kinds.shape[1]
+    minutes = np.cumsum(path.moves / path.feed)
     for k in range(count):
         own = ends[number.ravel() == k]
         points = np.concatenate([path.points[own - 1], path.points[own]])
@@ -234,10 +245,19 @@ def _add_path(stage: _Stage, site: Site) -> None:
             width=0.02, name="path",
         )  # fmt: skip
         stage.add(lines, "path", site.id, k + 1)
-    if path.tightest is not None and len(path.nozzle.faces):
-        point, axis = path.tightest
-        places = path.nozzle.vertices @ turn_to_axis(axis).T + point + path.standoff * axis
-        stage.add_mesh(Mesh(places, path.nozzle.faces), "nozzle", "#c9a227", site.id, opacity=0.5)
+        stage.objects[-1]["minutes"] = float(f"{minutes[own[-1]]:.3g}")
+        _add_tool(stage, site, path.points[own[-1]], path.axes[own[-1]], k + 1)
+    if path.tightest is not None:
+        _add_tool(stage, site, *path.tightest)
+
+
+def _add_tool(stage: _Stage, site: Site, point: Floats, axis: Floats, height: int = 0) -> None:
+    """Adds nozzle and beam at a point (3,) with a tool axis (3,); with a ``height``, for that layer alone."""
+    assert site.path is not None
+    nozzle, beam = place_tool(site.path, point, axis)
+    layer = "tool" if height else "nozzle"
+    stage.add_mesh(nozzle, layer, colours.NOZZLE, site.id, 0.5, height)
+    stage.add_mesh(beam, layer, colours.BEAM, site.id, 0.7, height)
 
 
 def _add_form(stage: _Stage, result: Result, share: int) -> int:

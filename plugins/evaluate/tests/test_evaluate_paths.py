@@ -57,6 +57,8 @@ def test_the_check_sees_a_rotary_axis_that_flips() -> None:
     axes[:] = [0.6, 0.0, 0.8]
     axes[np.flatnonzero(path.on)[5] :] = [-0.6, 0.0, 0.8]
     assert count_flips(replace(path, axes=axes)) == 1
+    upright = np.where(axes[:, :1] > 0, [0.05, 0.0, -0.99875], [-0.05, 0.0, -0.99875])  # from below, nearly along z
+    assert count_flips(replace(path, axes=upright / np.linalg.norm(upright, axis=1)[:, None])) == 0
 
 
 def test_the_check_sees_a_pass_that_crosses_itself() -> None:

@@ -58,10 +58,11 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
     column = metal ^ plane.extrude(top + standoff - floor).translate((0, 0, floor))
     sink = find_sink(top - floor, process)
     free = plane - shift_border(_shadow(column, floor + sink, top, process), (1 - FLUSH) * radius)
-    reach, inner = width / 2 * (1 + FLUSH), width / 2 * (1 - FLUSH / 2)
+    # a ring half a bead within what is drawn lies within the free region, by a little; what it covers is reached
+    reach = width / 2 * (1 - FLUSH / 2)
     flush = shift_border(free, reach)
     if process.axes == 5:
-        return Aims(free, flush, flush, shift_border(free, inner))
+        return Aims(free, flush, flush, flush)
     if beam.cone == 0:
         free -= shift_border(_shadow(column, top, top + standoff, process), (1 - FLUSH) * beam.radius)
     else:
@@ -69,7 +70,8 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
         for bottom, end in zip(heights[:-1].tolist(), heights[1:].tolist(), strict=True):
             wide = (1 - FLUSH) * beam.measure_radius(end)
             free -= shift_border(_shadow(column, top + bottom, top + end, process), wide)
-    return Aims(free, shift_border(free, reach), flush, shift_border(free, inner))
+    reached = shift_border(free, reach)
+    return Aims(free, reached, flush, reached)
 
 
 def _shadow(metal: Any, low: float, high: float, process: Process) -> Any:

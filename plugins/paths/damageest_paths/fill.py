@@ -25,6 +25,9 @@ WAY = 6.0
 """Bead widths of travel that a pass more costs, where a ring beside rows is compared with pieces of it."""
 NEARER = 0.85
 """Share of a step from a ring to the border of the rows within it: their ends are round."""
+BESIDE, WITHIN = 0.9, 0.02
+"""Share of half a bead's width within which a line that follows the border of the free region lies beside a gap, and
+bead widths that it lies within that border."""
 ROUNDS = 2
 """How often gaps between passes are looked for and filled."""
 
@@ -66,7 +69,27 @@ def list_lines(
         if not rows:
             break
         lines += _finish([Line(row, "gap") for row in rows], region, bead, free, shortest)
-    return lines
+    return lines if free is None else [*lines, *_fill_beside(region, lines, bead, free, shortest)]
+
+
+def _fill_beside(region: Any, lines: Sequence[Line], bead: Bead, free: Any, shortest: float) -> list[Line]:
+    """Pieces of the border of the free region that cover gaps in which no row may lie: tips of the region beside metal.
+    Of pieces that cover the same the one that covers most is taken."""
+    gaps = _list_gaps(region, lines, bead)
+    rings = _read_rings(shift_border(region ^ free, -WITHIN * bead.width), bead) if gaps else []
+    found: list[Line] = []
+    for gap in gaps:
+        near, rest = shift_border(gap, bead.width / 2 * BESIDE), gap
+        pieces = [Line(piece, "gap") for ring in rings for piece in cut_ring(ring, near, bead.width)]
+        left = _finish(pieces, region, bead, free, shortest)
+        while left:
+            gains = [float((rest ^ cover([line.points], bead.width)).area()) for line in left]
+            best = int(np.argmax(np.round(gains, 9)))
+            if gains[best] <= SLIVER * bead.width**2:
+                break
+            found.append(left.pop(best))
+            rest -= cover([found[-1].points], bead.width)
+    return found
 
 
 def _fill_piece(region: Any, bead: Bead, angle: float, free: Any, shortest: float) -> list[Line]:

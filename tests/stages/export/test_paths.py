@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from damageest.artefacts import DepositPath, Floats
+from damageest.artefacts import DepositPath, Floats, Solid
 from damageest.errors import StageError
 from damageest.geometry.transforms import invert_pose
+from damageest.output.folder import OutputFolder
 from damageest.registry import Registry
 from damageest.stages.export import PathSettings
 from damageest.stages.export.path_apt import write_apt
@@ -189,6 +190,32 @@ def test_three_axes_are_written_in_a_set_up_frame(tmp_path: Path, registry: Regi
     assert read_csv(tmp_path / "scan_frame/path/site-1.csv") == pytest.approx(table)
     other = np.array(json.loads((tmp_path / "scan_frame/path/site-1.setup.json").read_text())["transform"])
     assert np.allclose(other @ invert_pose(result.pose), T)
+
+
+def test_a_path_is_read_again_with_what_it_does_not_reach_and_its_tool(tmp_path: Path, registry: Registry) -> None:
+    path = make_path(False)
+    assert path.missing is not None
+    assert path.tightest is not None
+    result = results.make()
+    cls = registry.get("export", "files").cls
+    sites = (replace(result.sites[0], path=path), *result.sites[1:])
+    cls(frame="both", paths=("csv",)).run(
+        replace(result, sites=sites), tmp_path, registry.writers, registry.path_writers
+    )
+    for place, T in (("", np.eye(4)), ("scan_frame", invert_pose(result.pose))):
+        folder = OutputFolder(tmp_path / place, {"sites": [{"id": 1}], "units": "mm"})
+        read, unreached = folder.read_path(1), folder.read_mesh("path/site-1.unreached.ply")
+        tool = folder.read_mesh("path/site-1.tool.ply")
+        assert read is not None
+        assert unreached is not None
+        assert tool is not None
+        assert np.abs(read.points - (path.points @ T[:3, :3].T + T[:3, 3])).max() < 1e-5
+        assert (read.on == path.on).all()
+        assert read.layer.max() == path.layers
+        assert Solid(unreached.vertices, unreached.faces).volume == pytest.approx(path.unreached_volume, rel=1e-3)
+        point = T[:3, :3] @ path.tightest[0] + T[:3, 3]
+        # the beam ends at the bead, half a bead's width round the point
+        assert np.linalg.norm(tool.vertices - point, axis=1).min() == pytest.approx(path.width / 2, rel=1e-6)
 
 
 @pytest.mark.parametrize("rotary", ["AC", "BC"])

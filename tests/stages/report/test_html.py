@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -15,6 +16,7 @@ from damageest.artefacts import Pose, Reason
 from damageest.findings import Verdict
 from damageest.stages.report.html import Html
 from tests import damaged_box
+from tests.path_shapes import dent, plan
 from tests.stages.report import pages
 
 DATES = re.compile("<!-- dates and times: begin -->.*?<!-- dates and times: end -->", re.DOTALL)
@@ -55,6 +57,22 @@ def test_it_needs_no_other_file(page: Page) -> None:
     style = pages.write(pages.two_sites()).read_text().split("<style>")[1].split("</style>")[0]
     assert "@import" not in style
     assert "url(" not in style
+
+
+def test_the_path_is_shown_layer_by_layer_with_its_tool_and_what_it_does_not_reach() -> None:
+    path, plain = plan(dent(), simulate=False, direction=(0.0, 0.0, 1.0)), pages.two_sites()
+    result = replace(plain, sites=(replace(plain.sites[0], path=path), plain.sites[1]))
+    text = pages.write(result).read_text()
+    found = re.search(r'<script type="application/json" id="scene">(.*?)</script>', text, re.DOTALL)
+    assert found
+    objects = [item for item in json.loads(found[1])["objects"] if item["site"] == 1]
+    passes = [item for item in objects if item["layer"] == "path"]
+    assert [item["height"] for item in passes] == [*range(1, path.layers + 1)]
+    assert passes[-1]["minutes"] <= path.minutes * 1.01
+    assert sorted(item["minutes"] for item in passes) == [item["minutes"] for item in passes]
+    tools = [item["height"] for item in objects if item["layer"] == "tool" and item["alone"]]
+    assert sorted(tools) == sorted(2 * [*range(1, path.layers + 1)])  # nozzle and beam
+    assert sum(item["layer"] == "unreached" for item in objects) == 1
 
 
 def test_it_shows_the_values_of_each_site(page: Page) -> None:

@@ -11,15 +11,20 @@
     return !box || box.checked;
   };
 
-  const isBelow = (height) => {
+  // the tool of a site that has fewer layers than the slider stands at its last one
+  const last = {};
+  for (const item of scene.objects) last[item.site] = Math.max(last[item.site] || 0, item.height);
+
+  const isBelow = (item) => {
     const slider = document.getElementById("height");
-    return !slider || !height || height <= Number(slider.value);
+    if (!slider || !item.height) return true;
+    return item.alone ? item.height === Math.min(Number(slider.value), last[item.site]) : item.height <= Number(slider.value);
   };
 
   function showObjects() {
     for (const item of scene.objects) {
       const object = view3d.getObjectById(item.id);
-      if (object) object.visible = isChecked("layer", item.layer) && (!item.site || isChecked("site", item.site)) && isBelow(item.height);
+      if (object) object.visible = isChecked("layer", item.layer) && (!item.site || isChecked("site", item.site)) && isBelow(item);
     }
     const form = document.getElementById("form");
     if (form) form.hidden = !isChecked("layer", "form");
@@ -98,15 +103,26 @@
     return view3d.setTime(factor).then(showObjects);
   }
 
+  function sayLayers() {
+    const slider = document.getElementById("height"), done = {};
+    for (const item of scene.objects) {
+      if (item.minutes !== undefined && item.height <= Number(slider.value)) done[item.site] = item.minutes;
+    }
+    const sites = Object.keys(done), times = sites.map((site) => (sites.length > 1 ? `site ${site}: ` : "") + `${done[site]} min`);
+    const upTo = slider.value === slider.max ? `all ${slider.max}` : `1 to ${slider.value} of ${slider.max}`;
+    document.getElementById("height-text").textContent = `${upTo} · ${times.join(", ")}`;
+  }
+
   function listen() {
     for (const box of find("input.layer, input.site")) box.addEventListener("change", showObjects);
     for (const id of ["clip-axis", "clip-flip", "clip-at"]) document.getElementById(id).addEventListener("input", clip);
     const slider = document.getElementById("height");
     if (slider) {
       slider.addEventListener("input", () => {
-        document.getElementById("height-text").textContent = `1 to ${slider.value} of ${slider.max}`;
+        sayLayers();
         showObjects();
       });
+      sayLayers();
     }
     const form = document.getElementById("exaggerate");
     if (form) form.addEventListener("input", exaggerate);

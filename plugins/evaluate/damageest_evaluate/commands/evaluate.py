@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from damageest_evaluate.commands import adapt, budget, difference, honesty, path, realistic, speed, steady
+from damageest_evaluate.commands import adapt, budget, difference, honesty, path, prepare, realistic, speed, steady
 from damageest_evaluate.commands._counted import AsJson, format_command, show_table
 from damageest_evaluate.commands.intervals import run_intervals
 
@@ -27,6 +27,7 @@ app.command("realistic")(realistic.command)
 app.command("steady")(steady.command)
 app.command("speed")(speed.command)
 app.command("path")(path.command)
+app.command("prepare")(prepare.command)
 
 Vary = Annotated[
     list[str] | None,

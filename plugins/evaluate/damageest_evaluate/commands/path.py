@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 from dataclasses import asdict
@@ -27,7 +26,9 @@ def command(
     part: Annotated[
         list[Path] | None, typer.Option(help="A part's file, in mm; it gets as many losses as --each says.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(dir_okay=False, help="File for the rows, as JSON.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="JSON Lines file for the rows. A run goes on from it.")
+    ] = None,
     write: Annotated[
         Path | None, typer.Option(help="Text file. Its lines between the path marks are replaced by the table.")
     ] = None,
@@ -39,7 +40,7 @@ def command(
     files of --part the bead is 1.2 mm wide, or less on a small part. The checks share no code with the planner.
     """
     from damageest.registry import Registry
-    from damageest_evaluate.paths.run import describe_row, make_table, run_scenes
+    from damageest_evaluate.paths.run import describe_row, make_demands, make_table, run_scenes
     from damageest_evaluate.paths.scenes import make_scenes
     from damageest_evaluate.readme import describe_measurement, replace_between_marks
 
@@ -47,12 +48,10 @@ def command(
         replace_between_marks(write, None, "path")
     scenes = make_scenes(jobs or [], each, random, part or [], Registry.discover())
     rows = []
-    for row in run_scenes(scenes):
+    for row in run_scenes(scenes, out):
         rows.append(row)
         typer.echo(describe_row(row), err=True)
-        if out:
-            out.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
-    table = make_table(rows)
+    table = "\n\n".join([make_demands(rows), make_table(rows)])
     show_table(table, list(map(asdict, rows)), as_json)
     if write:
         words = [word for word in sys.argv[1:] if not word.startswith("--write")]

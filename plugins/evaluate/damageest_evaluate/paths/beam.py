@@ -22,8 +22,8 @@ THIN = 0.9
 ACROSS, DEEP = 5, 5
 """Places across a bead and down into it that are looked at."""
 FLIP, UPRIGHT = 45.0, 5.0
-"""Degrees: a turn of the rotary axis about z from one point to the next that is a flip, and the tilt below which that
-axis may turn freely, since it does not move the tool."""
+"""Degrees: a turn of the rotary axis about z from one point to the next that is a flip, and the angle between tool
+and z, upward or downward, below which that axis may turn freely, since it does not move the tool."""
 
 
 class _Places(NamedTuple):
@@ -61,10 +61,12 @@ def _sample(path: DepositPath, step: float) -> _Places:
 def measure_shaded(path: DepositPath, metal: Solid, step: float) -> float:
     """The share of the points of the passes, ``step`` apart, from which metal stands in the beam.
 
-    Looked at are the beam's axis from the bead to the nozzle's tip, and its border from half a bead's width up. The
-    border is not looked at where the surface of the metal is farther from the axis than that.
+    Looked at are the beam's axis from the bead to the nozzle's tip, and its border from half a bead's width up, as far
+    as it lies above the plane of the bead's top: where a tilted beam meets metal beside the bead at that height or
+    below, nothing stands between nozzle and bead. The border is not looked at where the surface of the metal is farther
+    from the axis than that.
     """
-    points, axes, _, _ = _sample(path, step)
+    points, axes, move, _ = _sample(path, step)
     if not len(points):
         return 0.0
     radius = path.width / 2
@@ -80,8 +82,9 @@ def measure_shaded(path: DepositPath, metal: Solid, step: float) -> float:
     near = distance_to_mesh(middle.reshape(-1, 3), metal).reshape(-1, HEIGHTS) <= radius
     place, height = np.nonzero(near)
     border = middle[place, height][:, None] + round_ @ turns[open_[place]]
-    hit = is_inside(border.reshape(-1, 3), metal).reshape(-1, AROUND).any(axis=1)
-    shaded[open_[place[hit]]] = True
+    up = np.einsum("nai,ni->na", border - points[open_[place], None], path.normals[move[open_[place]]])
+    hit = is_inside(border.reshape(-1, 3), metal).reshape(-1, AROUND) & (up > 1e-6 * radius)
+    shaded[open_[place[hit.any(axis=1)]]] = True
     return float(shaded.mean())
 
 
@@ -113,5 +116,6 @@ def count_flips(path: DepositPath) -> int:
     tilt = np.degrees(np.arctan2(np.hypot(axes[:, 0], axes[:, 1]), axes[:, 2]))
     turn = np.degrees(np.arctan2(axes[:, 1], axes[:, 0]))
     turned = np.abs((np.diff(turn) + 180) % 360 - 180)
+    tilt = np.minimum(tilt, 180 - tilt)  # a tool from below turns about the same axis
     steep = np.minimum(tilt[1:], tilt[:-1]) > UPRIGHT
     return int((steep & (turned > FLIP) & path.on[1:]).sum())

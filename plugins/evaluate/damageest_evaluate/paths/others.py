@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Part
 from damageest.geometry.solids import to_manifold
 from damageest.geometry.vectors import normalise
 from damageest_evaluate.damages import PlacePicker
@@ -38,15 +38,21 @@ def make_lump(rng: np.random.Generator, radius: float) -> Any:
     return ball.scale((radius, radius * float(rng.uniform(0.6, 1.0)), radius * float(rng.uniform(0.5, 1.0))))
 
 
-def make_on_part(path: Path, number: int) -> tuple[Any, Any, float]:
+def read_file(path: Path, registry: Any) -> Part:
+    """The part in a file of any format that a plugin reads, in mm. Raises InputError where it is no solid."""
+    from damageest import read_part
+    from damageest.job import load
+
+    scan = {"use": "simulate"}  # a job has a scan; this one is not made
+    return read_part(load({"version": 1, "units": "mm", "part": str(path), "scan": scan}, registry), registry)
+
+
+def make_on_part(part: Part, name: str, number: int) -> tuple[Any, Any, float]:
     """A part and the tool that takes its loss away, Manifolds about the part's middle, and the width of a bead.
 
     Odd numbers are at edges. Raises LookupError where no tool leaves one piece of a size that beads can fill.
     """
-    from damageest.io.parts import read_part
-
-    part = read_part(path, "mm")
-    rng = np.random.default_rng([4713, number, len(path.stem)])
+    rng = np.random.default_rng([4713, number, len(name)])
     picker = PlacePicker(part, rng)
     origin = part.bounds.mean(axis=0)
     body = to_manifold(part, origin)
@@ -59,4 +65,4 @@ def make_on_part(path: Path, number: int) -> tuple[Any, Any, float]:
         lost = body ^ tool
         if lost.volume() > 20 * width**3:
             return body, tool, width
-    raise LookupError(f"{path.name}: no loss fits")
+    raise LookupError(f"{name}: no loss {number + 1} fits")

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from damageest_paths.layers import Layers
 
+from damageest.artefacts import DepositPath
 from damageest_evaluate.paths.beam import count_flips, measure_shaded, measure_sunk
 from damageest_evaluate.paths.check import count_crossings, measure_built, measure_nozzle
 from damageest_evaluate.paths.scenes import Scene
+from damageest_evaluate.rows import read_rows
 
 BEADS = 100.0
 """The volume of a deposit in cubes of the bead's width; it is less wide where the deposit is thin."""
@@ -25,8 +29,9 @@ class PathRow:
     ``built``: the same from beads that were laid before; ``claimed``: by the planner. All three in bead widths, as
     ``spill``; ``void`` in heights. Shares of the deposit: ``unreached``, ``surplus`` (what the beads add beyond it),
     and ``sunk`` (what of the beads lies in metal, by the independent check); of the reachable: ``filled``; of the way
-    along passes: ``shaded`` (metal in the beam) and ``travel``. ``flips``: jumps of the rotary axis. ``seconds``: of
-    the processor, to plan; ``checked``: to check."""
+    along passes: ``shaded`` (metal in the beam), ``travel``, and ``between`` (travel without the first way in and the
+    last way out). ``why``: what of the deposit is out of reach, by reason. ``flips``: jumps of the rotary axis.
+    ``seconds``: of the processor, to plan; ``checked``: to check."""
 
     kind: str
     name: str
@@ -49,8 +54,10 @@ class PathRow:
     passes: int
     layers: int
     travel: float
+    between: float
     seconds: float
     checked: float
+    why: dict[str, float]
 
 
 def choose_options(scene: Scene) -> dict[str, object]:
@@ -97,17 +104,34 @@ def evaluate_scene(scene: Scene, axes: int) -> PathRow:
         passes=path.passes,
         layers=path.layers,
         travel=path.travel / path.length if is_some else np.nan,
+        between=_measure_between(path) / path.length if is_some else np.nan,
         seconds=planned - before,
         checked=0.0,
+        why={item.why: item.volume / scene.body.volume for item in path.unreached},
     )
     return replace(row, checked=time.process_time() - planned)
 
 
-def run_scenes(scenes: Sequence[Scene]) -> Iterator[PathRow]:
-    """The rows of all scenes, first with 5 axes, then with 3."""
+def _measure_between(path: DepositPath) -> float:
+    """The length of the moves between passes, from the start of the first to the end of the last."""
+    on = np.flatnonzero(path.on)
+    inside = np.arange(on[0], on[-1] + 1)
+    return float(path.moves[inside[~path.on[inside]]].sum())
+
+
+def run_scenes(scenes: Sequence[Scene], out: Path | None = None) -> Iterator[PathRow]:
+    """The rows of all scenes, first with 5 axes, then with 3. Those that the file ``out`` has are taken from it, others
+    are appended to it."""
+    known = {(row["kind"], row["name"], row["axes"]): PathRow(**row) for row in read_rows(out)}
     for axes in (5, 3):
         for scene in scenes:
-            yield evaluate_scene(scene, axes)
+            row = known.get((scene.kind, scene.name, axes))
+            if row is None:
+                row = evaluate_scene(scene, axes)
+                if out:
+                    with out.open("a", encoding="utf-8") as file:
+                        file.write(json.dumps(asdict(row)) + "\n")
+            yield row
 
 
 def describe_row(row: PathRow) -> str:
@@ -115,6 +139,58 @@ def describe_row(row: PathRow) -> str:
     return " ".join(
         f"{key}={value:.4g}" if isinstance(value, float) else f"{key}={value}" for key, value in asdict(row).items()
     )
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What is asked of each path that is not mostly out of reach: ``least`` or ``most`` of a value of its row."""
+
+    words: str
+    name: str
+    form: str
+    least: float = -np.inf
+    most: float = np.inf
+
+    def find_worst(self, rows: Sequence[PathRow]) -> PathRow:
+        sign = 1 if np.isfinite(self.most) else -1
+        return max(rows, key=lambda row: sign * float(getattr(row, self.name)))
+
+    def holds(self, row: PathRow) -> bool:
+        return self.least <= float(getattr(row, self.name)) <= self.most
+
+
+DEMANDS = (
+    Demand("no point of the beam in metal", "shaded", ".1%", most=0.0),
+    Demand("sunk at most 5 % of the deposit", "sunk", ".1%", most=0.05),
+    Demand("spill at most 1.1 bead widths", "spill", ".2f", most=1.1),
+    Demand("filled at least 99.5 % of what is reachable", "filled", ".2%", least=0.995),
+    Demand("travel at most twice the deposition", "travel", ".2f", most=2.0),
+    Demand("nozzle clear of metal, bead widths", "gap", ".2f", least=1e-9),
+    Demand("nozzle clear of earlier beads, bead widths", "built", ".2f", least=1e-9),
+    Demand("no jump of the rotary axis", "flips", "d", most=0),
+)
+TRAVEL = 0.2
+"""Median of travel over deposition that is asked for."""
+
+
+def make_demands(rows: Sequence[PathRow], axes: int = 5) -> str:
+    """A Markdown table: a line for each demand, on how many paths it holds, and the worst of them."""
+    from damageest_evaluate.readme import format_markdown
+
+    own = [row for row in rows if row.axes == axes and row.unreached < MUCH and row.passes]
+    lines = [["demand", "holds on", "worst", "there"]]
+    for demand in DEMANDS if own else ():
+        worst = demand.find_worst(own)
+        value = format(getattr(worst, demand.name), demand.form)
+        lines.append([demand.words, f"{sum(map(demand.holds, own))} of {len(own)}", value, worst.name])
+    if own:
+        middle = float(np.median([row.travel for row in own]))
+        between = float(np.median([row.between for row in own]))
+        words = f"{between:.0%} without the way in and out"
+        lines.append(
+            [f"median travel at most {TRAVEL:.0%}", "yes" if middle <= TRAVEL else "no", f"{middle:.0%}", words]
+        )
+    return format_markdown(lines)
 
 
 def make_table(rows: Sequence[PathRow]) -> str:

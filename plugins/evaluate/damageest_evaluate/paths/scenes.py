@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,11 @@ from damageest.geometry.solids import to_manifold, to_solid
 from damageest.stages.scan.scanner import apply_tools
 from damageest_evaluate.damages import KINDS, make_random_damage
 from damageest_evaluate.parts import PARTS
-from damageest_evaluate.paths.others import make_on_part
+from damageest_evaluate.paths.others import make_on_part, read_file
 from damageest_evaluate.paths.tight import TIGHT
+
+LARGE = 30_000
+"""Triangles of a part from which a deposit on it comes late."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +126,7 @@ def make_random(seed: int) -> list[Scene]:
     name, kind = list(PARTS)[seed % len(PARTS)], list(KINDS)[(seed + seed // len(PARTS)) % len(KINDS)]
     part = PARTS[name]()
     found = make_random_damage(part, 900 + seed, (kind,), 1)
-    return _split("random", f"{name} {found.kinds[0]}", part, found.damage)
+    return _split("random", f"{seed + 1} {name} {found.kinds[0]}", part, found.damage)
 
 
 def _split(kind: str, name: str, part: Part, damage: Solid) -> list[Scene]:
@@ -145,29 +149,34 @@ def read_job(path: Path, registry: Any) -> list[Scene]:
     return _split("job", path.stem, part, damage) if damage is not None else []
 
 
-def make_on_others(path: Path, each: int) -> list[Scene]:
-    """Losses of a part that others made."""
+def make_on_others(path: Path, each: int, registry: Any) -> list[Scene]:
+    """Losses of a part that others made; those that fit."""
+    read = read_file(path, registry)
     found = []
     for number in range(each):
-        part, tool, width = make_on_part(path, number)
-        for scene in _cut("others", f"{path.stem} {number + 1}", part, tool)[:1]:
+        try:
+            part, tool, width = make_on_part(read, path.stem, number)
+        except LookupError:
+            continue
+        for scene in _cut("others", f"{path.name} {number + 1}", part, tool)[:1]:
             found.append(replace(scene, width=width))
     return found
 
 
 def make_scenes(jobs: Sequence[Path], each: int, random: int, parts: Sequence[Path], registry: Any) -> list[Scene]:
     """Deposits of the jobs, ``each`` of the kinds that are made to measure and on each of the ``parts``, and ``random``
-    of the suite."""
-    scenes = [scene for path in jobs for scene in read_job(path, registry)]
+    of the suite. They come in turn, one of each kind, part and job, those that take a minute each at the end: so what a
+    run has done when it is stopped is of all the others."""
+    groups = [make_on_others(path, each, registry) for path in parts]
+    numbers = range(each)
     for kind, make in MAKERS.items():
-        for number in range(each):
-            scenes += make(np.random.default_rng([4711, number, len(kind)]), f"{kind} {number + 1}")[:1]
+        seeds = [np.random.default_rng([4711, number, len(kind)]) for number in numbers]
+        groups.append([make(seed, f"{kind} {number + 1}")[0] for number, seed in zip(numbers, seeds, strict=True)])
     for kind, lose in TIGHT.items():
-        for number in range(each):
-            loss = lose(np.random.default_rng([4712, number, len(kind)]))
-            scenes += _cut(kind, f"{kind} {number + 1}", loss.part, loss.tool)[:1]
-    for seed in range(random):
-        scenes += make_random(seed)[:1]
-    for path in parts:
-        scenes += make_on_others(path, each)
-    return scenes
+        losses = [lose(np.random.default_rng([4712, number, len(kind)])) for number in numbers]
+        names = [f"{kind} {number + 1}" for number in numbers]
+        groups.append([_cut(kind, name, *loss)[0] for name, loss in zip(names, losses, strict=True)])
+    groups.append([scene for seed in range(random) for scene in make_random(seed)[:1]])
+    groups += [read_job(path, registry) for path in jobs]
+    scenes = [scene for turn in zip_longest(*groups) for scene in turn if scene is not None]
+    return sorted(scenes, key=lambda scene: scene.kind == "bore" or len(scene.left.faces) > LARGE)

@@ -1,0 +1,44 @@
+"""`damageest evaluate prepare`: what it gains to open ragged damages before deposition."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from damageest_evaluate.commands._counted import AsJson, show_table
+
+
+def command(
+    count: Annotated[int, typer.Option(min=1, help="Number of damages.")] = 20,
+    out: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="JSON Lines file for the rows. A run goes on from it.")
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="Text file. Its lines between the prepare marks are replaced by the table.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Open ragged damages before deposition, and compare what a path of 3 axes reaches of them without and with it."""
+    from damageest.registry import Registry
+    from damageest_evaluate.paths.prepare import make_prepare_table, run_prepare
+    from damageest_evaluate.readme import describe_measurement, replace_between_marks
+
+    if write:
+        replace_between_marks(write, None, "prepare")
+    rows = []
+    for row in run_prepare(count, Registry.discover(), out):
+        rows.append(row)
+        typer.echo(
+            f"{row.name}: {row.before:.1%} {row.after:.1%} {row.milled:.2f} {row.convex:.2f} {row.why}", err=True
+        )
+    table = make_prepare_table(rows)
+    show_table(table, list(map(asdict, rows)), as_json)
+    if write:
+        words = [word for word in sys.argv[1:] if not word.startswith("--write")]
+        measured = describe_measurement(f"`{shlex.join(['damageest', *words])}`")
+        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "prepare"), encoding="utf-8")
