@@ -18,7 +18,7 @@ RUN apt-get update \
  && apt-get install -y --no-install-recommends python3-venv \
  && rm -rf /var/lib/apt/lists/*
 RUN python3 -m venv /opt/uv && /opt/uv/bin/pip install --no-cache-dir uv==${UV}
-ENV UV_PROJECT_ENVIRONMENT=/opt/damageest UV_PYTHON=/usr/bin/python3 UV_LINK_MODE=copy UV_NO_CACHE=1
+ENV UV_PROJECT_ENVIRONMENT=/opt/damageest UV_PYTHON=/usr/bin/python3 UV_LINK_MODE=copy UV_NO_CACHE=1 UV_COMPILE_BYTECODE=1
 WORKDIR /src
 COPY . /src
 

@@ -17,6 +17,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -138,8 +139,9 @@ def fuzz(
     whole: float = 0.0,
     names: list[str] | None = None,
     tell: Callable[[Row], None] = lambda row: None,
+    first: int = 0,
 ) -> list[Row]:
-    """The outcome of each spoiled file."""
+    """The outcome of each spoiled file, from the number ``first`` on."""
     worker, rows = Worker(), list[Row]()
     with tempfile.TemporaryDirectory() as held:
         folder = Path(held)
@@ -147,7 +149,7 @@ def fuzz(
         if whole:
             make_earlier(folder, worker)
         try:
-            for number, case in enumerate(make_cases(count, seed, names or NAMES, whole)):
+            for number, case in islice(enumerate(make_cases(count, seed, names or NAMES, whole)), first, None):
                 before = damaged_box.content(folder / KEPT) if case.whole else {}
                 row = worker.try_job(write_case(folder, case), "run" if case.whole else "read")
                 if case.whole and (lost := find_loss(folder / KEPT, before, row["outcome"])):
@@ -174,7 +176,8 @@ def find_loss(folder: Path, before: dict[str, bytes], outcome: str) -> str:
 
     if outcome != "done":
         after = damaged_box.content(folder)
-        return ", ".join(sorted(name for name in {*before, *after} if before.get(name) != after.get(name)))
+        other = sorted(name for name in {*before, *after} if before.get(name) != after.get(name))
+        return ", ".join(name for name in other if not name.startswith("stages/"))  # kept stages are no result
     changes = find_changes(folder, open_output(folder).content)
     left = [one.name for one in folder.parent.iterdir() if one.name != folder.name]
     return "; ".join([*(one for one in changes if not one.startswith("input ")), *left])
@@ -200,6 +203,7 @@ def main() -> None:
     parser.add_argument("--names", default="")
     parser.add_argument("--whole", type=float, default=0.1, help="share of the jobs that are run to their end")
     parser.add_argument("--log", default="", help="a file that gets a line of JSON for each file that was tried")
+    parser.add_argument("--first", type=int, default=0, help="number of the file to begin with, to go on after a break")
     parser.add_argument("--keep", default="", help="a folder for the files with a bad outcome")
     given = parser.parse_args()
     names = given.names.split(",") if given.names else NAMES
@@ -209,7 +213,7 @@ def main() -> None:
             with open(given.log, "a") as stream:
                 print(json.dumps(row), file=stream)
 
-    rows = fuzz(given.count, given.seed, given.whole, names, tell)
+    rows = fuzz(given.count, given.seed, given.whole, names, tell, given.first)
     print(make_table(rows))
     bad = [row for row in rows if row["outcome"] not in GOOD]
     for row in bad:
