@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import tempfile
 from collections.abc import Callable
@@ -117,6 +116,7 @@ def _read_machine(path: Path, registry: Any) -> None:
     from damageest_machines.lazy import list_writers
 
     from damageest.stages.export import PathSettings
+
     machine = read_machine(path)
     writer = list_writers()[{"kuka": "krl"}.get(path.stem.split("_")[1], "sinumerik")]
     writer.write(path.with_suffix(".out"), short_path(), PathSettings("mm", "fuzz", machine=path))

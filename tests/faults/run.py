@@ -2,7 +2,7 @@
 
 Usage: python -m tests.faults.run [--count 2000] [--seed 0] [--whole 0.1] [--names part.step,part.iges] [--log FILE]
 
-`--whole` is the share of the jobs that are run to their end over an earlier output, instead of their inputs alone being read.
+`--whole` is the share of the jobs that are run to their end over an earlier output; of the others the inputs are read.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ SECONDS = 60.0
 """Time that one file may take; a sound one takes less than one second, OpenCASCADE's start three."""
 OUTCOMES = ("refused", "stopped", "done", "unexpected", "crash", "hang", "memory", "lost")
 GOOD = OUTCOMES[:3]
-"""refused: exit status 2; stopped: a stage refused it, exit status 1; done: a result. lost: the earlier output is not
-whole, and no new one is."""
+"""refused: exit status 2; stopped: a stage refused it, exit status 1; done: a result. lost: neither the earlier output
+nor a new one is whole."""
 NAMES = [*seeds.SCANS, *seeds.PARTS, *seeds.JOBS, *others.FILES]
 Row = dict[str, Any]
 
@@ -105,7 +105,7 @@ class Worker:
 
 
 def make_cases(count: int, seed: int, names: list[str], share: float = 0.0) -> Iterator[Case]:
-    """Spoiled files. The same arguments, the same files; the first ones of a larger count are those of a smaller one."""
+    """Spoiled files. The same arguments, the same files; the first of a larger count are those of a smaller one."""
     for number in range(count):
         name = names[number % len(names)]
         kind = KINDS[number // len(names) % len(KINDS)]
@@ -169,8 +169,8 @@ def make_earlier(folder: Path, worker: Worker) -> None:
 
 
 def find_loss(folder: Path, before: dict[str, bytes], outcome: str) -> str:
-    """What is wrong with an output folder after a run: nothing where a run that gave no result left it as it was, and one
-    that did left a whole one."""
+    """What is wrong with an output folder after a run: a run that gave no result has to leave it as it was, and one that
+    did has to leave a whole one."""
     from damageest.output.folder import open_output
     from damageest.output.verification import find_changes
 

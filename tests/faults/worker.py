@@ -33,8 +33,8 @@ def _measure_peak() -> int:
 
 
 def try_job(path: Path, mode: str, registry: Any) -> dict[str, Any]:
-    """Reads a file, the inputs of a job, or runs the whole of it over an earlier output: the outcome, and the message of
-    an error."""
+    """Reads a file or the inputs of a job, or runs the whole job over an earlier output: the outcome, and the message
+    of an error."""
     import damageest
     from damageest.errors import DamageestError
     from damageest.isolation import Limits
