@@ -36,7 +36,8 @@ from damageest.output.verification import DATED, find_changes
 from tests import damaged_box
 
 MAIN = "from damageest.cli import main; main()"
-APP = """import sys, pathlib
+APP = """import pathlib, signal, sys
+signal.signal(signal.SIGINT, signal.SIG_DFL)
 from damageest_app.runner import Runner
 done = Runner().call(sys.argv[1:], pathlib.Path())
 sys.stdout.write(done.printed)
@@ -168,6 +169,7 @@ def try_once(place: Place, way: str, moment: float, rng: np.random.Generator) ->
     faults = []
     with contextlib.ExitStack() as undo:
         time.sleep(moment)
+        family = _family(child.pid)
         if child.poll() is None:
             _stop(child, way, bool(rng.random() < 0.5), place.home, rng, undo)
         try:
@@ -176,7 +178,7 @@ def try_once(place: Place, way: str, moment: float, rng: np.random.Generator) ->
             os.killpg(child.pid, signal.SIGKILL)
             out, err = child.communicate()
             faults.append("hangs")
-        if running := _wait_for_all(child.pid):
+        if running := _wait_for_all([*family, *_family(child.pid)]):
             faults.append(f"goes on: {running}")
     stages = [line.split(":")[0].strip() for line in err.splitlines() if line.startswith("  ")]
     words = (out + err)[-600:]
@@ -216,24 +218,25 @@ def _stop(
 
 
 def _family(session: int) -> list[psutil.Process]:
-    """The processes of a session that have not ended."""
+    """The processes of a session, and those that its first one has started."""
     found = []
     for one in psutil.process_iter():
         with contextlib.suppress(psutil.Error, OSError):
-            if os.getsid(one.pid) == session and one.status() != psutil.STATUS_ZOMBIE:
+            if os.getsid(one.pid) == session:
                 found.append(one)
+    with contextlib.suppress(psutil.Error):
+        found += psutil.Process(session).children(recursive=True)
     return found
 
 
-def _wait_for_all(session: int) -> list[str]:
+def _wait_for_all(family: list[psutil.Process]) -> list[str]:
     """The names of processes that go on 20 s after the command; they are ended then."""
-    for _ in range(200):
-        if not (left := _family(session)):
-            return []
-        time.sleep(0.1)
-    names = [" ".join(one.cmdline())[:200] for one in left]
+    _, left = psutil.wait_procs(family, timeout=20)
+    names = []
     for one in left:
-        one.kill()
+        with contextlib.suppress(psutil.Error):
+            names.append(" ".join(one.cmdline())[:200])
+            one.kill()
     return names
 
 

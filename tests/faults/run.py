@@ -32,8 +32,8 @@ SECONDS = 60.0
 """Time that one file may take; a sound one takes less than one second, OpenCASCADE's start three."""
 OUTCOMES = ("refused", "stopped", "done", "unexpected", "crash", "hang", "memory", "lost")
 GOOD = OUTCOMES[:3]
-"""refused: exit status 2; stopped: a stage refused it, exit status 1; done: a result. lost: neither the earlier output
-nor a new one is whole."""
+"""refused: exit status 2; stopped: a stage refused it, exit status 1; done: a result. Of the others, lost says that
+neither the earlier nor a new output is whole."""
 NAMES = [*seeds.SCANS, *seeds.PARTS, *seeds.JOBS, *others.FILES]
 Row = dict[str, Any]
 
@@ -169,8 +169,8 @@ def make_earlier(folder: Path, worker: Worker) -> None:
 
 
 def find_loss(folder: Path, before: dict[str, bytes], outcome: str) -> str:
-    """What is wrong with an output folder after a run: a run that gave no result has to leave it as it was, and one that
-    did has to leave a whole one."""
+    """What is wrong with an output folder after a run: a run that gave no result has to leave it as it was, and one
+    that did has to leave a whole one."""
     from damageest.output.folder import open_output
     from damageest.output.verification import find_changes
 
