@@ -6,6 +6,7 @@ import contextlib
 import select
 import socket
 import socketserver
+from collections import Counter
 from urllib.parse import urlsplit
 
 PIECE = 1 << 16
@@ -15,6 +16,7 @@ class _Handler(socketserver.BaseRequestHandler):
     """One connection: CONNECT to a host, or a plain request by its whole address."""
 
     server: CountingProxy
+    host = ""
 
     def handle(self) -> None:
         head = b""
@@ -25,12 +27,13 @@ class _Handler(socketserver.BaseRequestHandler):
         first, rest = head.split(b"\r\n", 1)
         method, address, version = first.decode("latin-1").split(" ", 2)
         if method == "CONNECT":
-            host, port = address.rsplit(":", 1)
-            other = socket.create_connection((host, int(port)), timeout=60)
+            self.host, port = address.rsplit(":", 1)
+            other = socket.create_connection((self.host, int(port)), timeout=60)
             self.request.sendall(b"HTTP/1.1 200 Connection established\r\n\r\n")
         else:
             parts = urlsplit(address)
-            other = socket.create_connection((parts.hostname or "", parts.port or 80), timeout=60)
+            self.host = parts.hostname or ""
+            other = socket.create_connection((self.host, parts.port or 80), timeout=60)
             path = address.split(parts.netloc, 1)[1] or "/"
             lines = [line for line in rest.split(b"\r\n") if not line.lower().startswith((b"proxy-", b"connection:"))]
             # one request a connection, since the next one may be for another host
@@ -49,18 +52,18 @@ class _Handler(socketserver.BaseRequestHandler):
                     return
                 (self.request if one is other else other).sendall(data)
                 if one is other:
-                    self.server.count += len(data)
+                    self.server.counts[self.host] += len(data)
 
 
 class CountingProxy(socketserver.ThreadingTCPServer):
-    """``count``: bytes that came back so far. Its address is ``http://127.0.0.1:<port>``."""
+    """``counts``: bytes that came back so far, by host. Its address is ``http://127.0.0.1:<port>``."""
 
     daemon_threads = True
     allow_reuse_address = True
 
     def __init__(self) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
-        self.count = 0
+        self.counts: Counter[str] = Counter()
 
     @property
     def address(self) -> str:

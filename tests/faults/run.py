@@ -32,14 +32,14 @@ SECONDS = 60.0
 """Time that one file may take; a sound one takes less than one second, OpenCASCADE's start three."""
 OUTCOMES = ("refused", "stopped", "done", "unexpected", "crash", "hang", "memory", "lost")
 GOOD = OUTCOMES[:3]
-"""refused: exit status 2; stopped: a stage refused it, exit status 1; done: a result. Of the others, lost says that
+"""refused: exit status 2; stopped: a stage refused it, exit status 1; done: a result. Of the others, lost means that
 neither the earlier nor a new output is whole."""
 NAMES = [*seeds.SCANS, *seeds.PARTS, *seeds.JOBS, *others.FILES]
 Row = dict[str, Any]
 
 
 class Case(NamedTuple):
-    """A spoiled file: the name of the sound one, the way of spoiling, the bytes, and whether a job is run to its end."""
+    """A spoiled file: name of the sound one, way of spoiling, bytes, and whether a job is run to its end."""
 
     name: str
     kind: str
