@@ -229,10 +229,8 @@ JOBS = {
     "datums.yaml": lambda: re.sub("align: .*\n", "", JOB + DATUMS, count=1).replace("points.npy", "dense.npy").encode(),
     "path.yaml": lambda: (JOB + PATH).encode(),
 }
-NATIVE = ("part.step", "part.iges", "part.brep")
+NATIVE = (".step", ".iges", ".brep")
 """Read by OpenCASCADE, with the plugin cadquery."""
-PLUGINS = {"path.yaml": "paths"}
-"""Jobs that need a plugin."""
 
 
 @cache
