@@ -174,5 +174,7 @@ def describe_missing_library(error: BaseException) -> StageError | None:
         return missing
     if isinstance(error, ImportError):
         text = " ".join(str(error).split())[:400]
+        if "failed to map segment" in text or "cannot allocate memory" in text.lower():
+            return StageError(f"ran out of memory, for {text.partition(':')[0]}", "more memory (--memory)")
         return StageError(f"a Python module cannot be loaded: {text}", "--debug shows which; install it again")
     return None

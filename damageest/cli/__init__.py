@@ -142,6 +142,8 @@ def fail(error: Exception) -> NoReturn:
         traceback.print_exception(error)
     elif isinstance(error, DamageestError):
         say(f"error: {error}", err=True)
+    elif isinstance(error, MemoryError):  # outside of stages and steps, which name themselves
+        say("error: ran out of memory\n  try: more memory (--memory), or fewer jobs at once", err=True)
     else:
         say(
             f"error: unexpected {type(error).__name__}: {clean_message(error)}\n"
