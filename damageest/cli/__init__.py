@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import traceback
 from typing import NoReturn
@@ -132,6 +133,7 @@ def _call_app() -> NoReturn:
 
 
 def _stop_interrupted() -> NoReturn:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the second one, of who is impatient, changes nothing
     say(_interrupt.text, err=True)
     sys.exit(INTERRUPTED)
 

@@ -182,7 +182,8 @@ def try_once(place: Place, way: str, moment: float, rng: np.random.Generator) ->
             faults.append(f"goes on: {running}")
     stages = [line.split(":")[0].strip() for line in err.splitlines() if line.startswith("  ")]
     words = (out + err)[-600:]
-    faults += [f"says {word}" for word in ("Traceback", "unexpected") if word in out + err]
+    is_before = child.returncode == -signal.SIGINT and "_call_app" not in err  # Python was reading the modules
+    faults += [f"says {word}" for word in ("Traceback", "unexpected") if word in out + err and not is_before]
     trial = Trial(
         place.command, way, child.returncode != 0, child.returncode, stages[-1] if stages else "", faults, words
     )
