@@ -14,7 +14,7 @@ from damageest import __version__
 from damageest.cli import _interrupt, _process, _streams
 from damageest.cli._commands import Commands
 from damageest.cli._streams import say
-from damageest.errors import DamageestError, clean_message, describe_missing_library, is_interrupt
+from damageest.errors import DamageestError, clean_message, describe_missing_library, describe_shortage, is_interrupt
 from damageest.io.files import working_folder
 from damageest.isolation.one_thread import ONE_THREAD
 from damageest.isolation.supervise import note_status
@@ -127,7 +127,7 @@ def _call_app() -> NoReturn:
     except Exception as error:
         if is_interrupt(error):
             _stop_interrupted()
-        fail(describe_missing_library(error) or error)
+        fail(describe_missing_library(error) or describe_shortage(error) or error)
     finally:
         _process.bound_end(sys.exc_info()[1])
 
@@ -144,8 +144,6 @@ def fail(error: Exception) -> NoReturn:
         traceback.print_exception(error)
     elif isinstance(error, DamageestError):
         say(f"error: {error}", err=True)
-    elif isinstance(error, MemoryError):  # outside of stages and steps, which name themselves
-        say("error: ran out of memory\n  try: more memory (--memory), or fewer jobs at once", err=True)
     else:
         say(
             f"error: unexpected {type(error).__name__}: {clean_message(error)}\n"
