@@ -27,8 +27,8 @@ from damageest.pipeline.cache import describe_unwritable
 TIMEOUT = 3600.0
 """Default time limit of a job, in seconds."""
 UNWRITABLE = (
-    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.ENOENT, errno.ENOTDIR,
-    errno.EEXIST, errno.ENAMETOOLONG,
+    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.ENOENT,
+    errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG,
 )  # fmt: skip
 """Errors of files, not of connections to a cluster."""
 Tell = Callable[[Sequence[BatchJob], Mapping[str, Row], set[str]], None]

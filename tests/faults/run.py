@@ -184,13 +184,14 @@ def find_loss(folder: Path, before: dict[str, bytes], outcome: str) -> str:
 
 
 def make_table(rows: list[Row]) -> str:
-    """A table in Markdown: how many files of each format had each outcome."""
-    lines = ["| format | files | run | " + " | ".join(OUTCOMES) + " | slowest, s | most memory, MB |"]
-    lines += ["|---" * (len(OUTCOMES) + 5) + "|"]
+    """A table in Markdown: how many files of each format had each outcome. ``faults``: those of damageest, by kind."""
+    lines = ["| format | files | run | " + " | ".join(GOOD) + " | faults | slowest, s | most memory, MB |"]
+    lines += ["|---" * (len(GOOD) + 6) + "|"]
     for name in [*dict.fromkeys(row["name"] for row in rows), "all"]:
         own = [row for row in rows if name in (row["name"], "all")]
         counts = Counter(row["outcome"] for row in own)
-        cells = [name, len(own), sum(row["whole"] for row in own), *(counts[one] for one in OUTCOMES)]
+        faults = ", ".join(f"{one} {counts[one]}" for one in OUTCOMES if one not in GOOD and counts[one])
+        cells = [name, len(own), sum(row["whole"] for row in own), *(counts[one] for one in GOOD), faults or 0]
         cells += [f"{max(row['seconds'] for row in own):.1f}", f"{max(row['peak'] for row in own) / 1e6:.0f}"]
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     return "\n".join(lines)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import pytest
 
 from tests.faults import others, seeds
-from tests.faults.mutations import KINDS, fix_pages
+from tests.faults.mutations import KINDS, fix_pages, spoil
 from tests.faults.run import GOOD, NAMES, Case, Row, Worker, find_seed, fuzz, make_cases, write_case
 from tests.needs import find_obstacle
 
@@ -58,3 +59,18 @@ def test_the_same_seed_gives_the_same_files() -> None:
     assert {case.kind for case in cases} == set(KINDS)
     whole = seeds.seed("scan.e57")
     assert fix_pages(whole) == whole, "its checksums are those of the format"
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "seed"), [("binary.pcd", "splice", "0/binary.pcd/94"), ("adapt.npz", "inside", "0/adapt.npz/5935")]
+)
+def test_what_failed_once_is_refused(name: str, kind: str, seed: str, tmp_path: Path) -> None:
+    """Found among 10,000: a scan without a clear normal in a given pose, an array whose header is no Python."""
+    seeds.write_others(tmp_path)
+    worker = Worker()
+    try:
+        case = Case(name, kind, spoil(find_seed(name), name, kind, random.Random(seed)))
+        row = worker.try_job(write_case(tmp_path, case), "run")
+    finally:
+        worker.stop()
+    assert row["outcome"] in GOOD, row
