@@ -124,6 +124,7 @@ class Place:
             [sys.executable, "-c", code, *words],
             cwd=self.home, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
             env={**os.environ, "COLUMNS": "200"},
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it
         )  # fmt: skip
 
     def run_again(self, tolerance: float) -> list[str]:
