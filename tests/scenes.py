@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ from manifold3d import Manifold
 
 from damageest.artefacts import Deviation, Floats, Mesh, Part, Samples, Scan, Sites, Solid
 from damageest.geometry.solids import to_arrays
+from damageest.pipeline.skin_points import sample_near_damage
 from damageest.stages.cluster.dbscan import Dbscan
-from damageest.stages.sample.edge_aware import EdgeAware
 from damageest.stages.segment.mesh_distance import MeshDistance
 
 NOISE = 0.02
@@ -28,12 +28,16 @@ class Scene:
     aligned: Scan
     deviation: Deviation
     sites: Sites
-    samples: Samples
     tolerance: float = TOLERANCE
 
     def inputs(self) -> dict[str, Any]:
-        names = ("part", "aligned", "deviation", "sites", "samples", "tolerance")
+        names = ("part", "aligned", "deviation", "sites", "tolerance")
         return {name: getattr(self, name) for name in names}
+
+    @cached_property
+    def nearby(self) -> Samples:
+        """Points on the skin near the damage."""
+        return sample_near_damage(**self.inputs())
 
     def of_sites(self) -> Floats:
         return self.aligned.points[self.sites.label > 0]
@@ -101,13 +105,8 @@ def spread(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Floats, Fl
     return a * (1 - u) + b * u * (1 - v) + c * u * v, mesh.cross[face] / area[face, None]
 
 
-@lru_cache
-def _samples(part: Part) -> Samples:
-    return EdgeAware().run(part=part, tolerance=TOLERANCE)
-
-
 def _seen(part: Part, truth: Solid, points: Floats, spacing: float) -> Scene:
     aligned = Scan(points, noise=NOISE, spacing=spacing)
     deviation = MeshDistance().run(aligned=aligned, part=part, tolerance=TOLERANCE)
     sites = Dbscan().run(aligned=aligned, deviation=deviation, tolerance=TOLERANCE)
-    return Scene(part, truth, aligned, deviation, sites, _samples(part))
+    return Scene(part, truth, aligned, deviation, sites)

@@ -33,6 +33,7 @@ def test_a_corner_lost_from_a_step_part() -> None:
     assert all(site.evidence.consistent for site in result.sites)
 
 
+@pytest.mark.slow
 def test_its_twin_in_inches_is_named_as_such() -> None:
     scan = damageest.run({**job("featuretype.STEP", pose="identity"), "align": "none"}).scan
     with pytest.raises(InputError, match=r"part\.unit: in"):

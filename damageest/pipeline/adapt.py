@@ -49,11 +49,11 @@ BY_FORM = "another_part"
 )  # fmt: skip
 def adapt_part(
     engine: Engine, state: JobState
-) -> tuple[AdaptedPart | None, Part, Scan, Pose, Samples, AskedFit | None, Reasons]:  # fmt: skip
+) -> tuple[AdaptedPart | None, Part, Scan, Pose, Samples | None, AskedFit | None, Reasons]:  # fmt: skip
     """Calls `adapt`, unless the job takes the part as designed, and puts what it gives in the place of the part, with
-    the scan and its pose moved onto it, and samples on its skin. Where the fit of the model was measured to ask whether
-    the part is as designed, and the part stays so, it gives that too. Raises the refusal of stage `align` where the
-    adapted part does not explain the scan either."""
+    the scan and its pose moved onto it, and samples on its skin where an implementation takes them. Where the fit of
+    the model was measured to ask whether the part is as designed, and the part stays so, it gives that too. Raises the
+    refusal of stage `align` where the adapted part does not explain the scan either."""
     called, asked, failed = call_adapt(engine, state)
     as_designed = (None, state.part, state.aligned, state.pose, state.samples, asked)
     if called is None or called.get(Adapt.gives) is None:
@@ -69,7 +69,7 @@ def adapt_part(
     moved = state.with_value(JobState.aligned, aligned, digest("aligned", key))
     moved = moved.with_value(JobState.part, adapted.part, digest("part", key))
     own = engine.make_silent()
-    samples: Samples = own.call(Sample, moved).get(Sample.gives)
+    samples: Samples | None = None if state.samples is None else own.call(Sample, moved).get(Sample.gives)
     if pose.doubts or pose.free:
         with suppress(StageError):  # a given pose, which the adapted part moves away from, keeps its doubts
             pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)

@@ -242,6 +242,8 @@ def start(engine: Engine) -> JobState:
     state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
     state = state.with_value(JobState.path_writers, registry.path_writers, digest(sorted(registry.path_writers)))
     state = state.with_value(JobState.conversions, registry.conversions, digest(sorted(registry.conversions)))
+    for name in ("samples", "nearby"):  # until an implementation takes them
+        state = state.with_named(name, None, digest(None))
     for name in ("candidates", "found", "failures", "warnings"):
         state = state.with_named(name, (), digest(()))
     return state.with_value(JobState.wanted, None)

@@ -46,6 +46,7 @@ from damageest.pipeline.sites import (
     take_enclosures,
     where_damaged,
 )
+from damageest.pipeline.skin_points import sample_near_damage, where_taken
 from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_budget, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
@@ -56,6 +57,8 @@ from damageest.pipeline.writing import (
     write_output,
     write_sections,
 )
+from damageest.stages.align import Align
+from damageest.stages.background import Background
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
 from damageest.stages.cluster import Cluster
@@ -78,7 +81,10 @@ ACQUIRE: Route = (
     correct_temperature,  # scan, temperature -> scan, thermal_scale
     measure_scan,  # scan, part -> noise, spacing, depth_step
     take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
-    Sample,  # part, tolerance -> samples
+    where_taken(  # samples
+        Sample,  # part, tolerance -> samples
+        by=(Align, Segment, EncloseAll),
+    ),
     align_scan,  # calls Align: adapter, tolerance, asked_tolerance, noise, part, scan, samples -> pose, refusal
     place_scan,  # scan, pose -> aligned, noise, spacing
     note_pose,  # pose -> +warnings
@@ -101,8 +107,8 @@ ACQUIRE: Route = (
     Cluster,  # aligned, deviation, tolerance -> sites
     check_clusters,  # sites, deviation, tolerance, part ->
     look_for_sheets,  # part, aligned, deviation, tolerance -> sheets
-    find_surplus,  # calls Cluster, EncloseAll: unit, sheets, aligned, deviation, tolerance, part, sites, samples
-    #     -> surplus, deviation, +warnings
+    find_surplus,  # calls Cluster, EncloseAll: unit, sheets, aligned, deviation, tolerance, part, sites, samples,
+    #     nearby -> surplus, deviation, +warnings
     fit_model,  # part, aligned, adapted, deviation, surplus, tolerance, unit, views, corrected_scale, asked_fit
     #     -> fitted, +warnings
     set_explained_aside,  # part, aligned, deviation, sites, sheets, views, tolerance, aligner, accept
@@ -113,6 +119,10 @@ BY_SITE: Route = (
     take_clusters,  # aligned, sites, encloser, wanted -> candidates
     Reconstruct,  # points, part, tolerance, spacing, noise -> surface
     Boundary,  # surface, part, tolerance -> rims
+    where_taken(  # samples
+        Sample,  # part, tolerance -> samples
+        by=(Background,),
+    ),
     enclose_grouped,  # calls Background, Enclose: candidates, aligned, sites, part, tolerance, spacing, intact, samples
     #     -> candidates, +failures
     Repair,  # enclosure, tolerance -> solid
@@ -120,7 +130,11 @@ BY_SITE: Route = (
     gather_sites,  # candidates, aligned, deviation, sites, part, tolerance, unit -> found, +failures, +warnings
 )
 AT_ONCE: Route = (
-    EncloseAll,  # part, aligned, deviation, sites, samples, tolerance -> enclosures
+    where_taken(  # nearby
+        sample_near_damage,  # part, aligned, deviation, sites, tolerance -> nearby
+        by=(EncloseAll,),
+    ),
+    EncloseAll,  # part, aligned, deviation, sites, samples, nearby, tolerance -> enclosures
     take_enclosures,  # enclosures, aligned, sites, encloser_at_once -> candidates, +failures
     Boolean,  # solid, part -> damage
     gather_sites,  # candidates, aligned, deviation, sites, part, tolerance, unit -> found, +failures, +warnings

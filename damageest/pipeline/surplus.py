@@ -18,6 +18,7 @@ from damageest.geometry.solids import to_manifold, to_solid
 from damageest.geometry.threads import count_threads
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.sites import find_place
+from damageest.pipeline.skin_points import sample_near_damage
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules.two_sheets import EXPLAINED, OF_SCAN
@@ -191,7 +192,11 @@ def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces
     deviation = label_strays(turned.deviation, DAMAGE, kept)
     box = complement_part(part, points[members], MARGIN * turned.tolerance)
     state = turned.with_value(JobState.part, box).with_value(JobState.deviation, deviation)
-    state = state.with_value(JobState.sites, kept).with_value(JobState.samples, complement_samples(turned.samples))
+    state = state.with_value(JobState.sites, kept)
+    if turned.samples is not None:
+        state = state.with_value(JobState.samples, complement_samples(turned.samples))
+    nearby = sample_near_damage(part, turned.aligned, deviation, kept, turned.tolerance)
+    state = state.with_value(JobState.nearby, complement_samples(nearby))
     origin = part.bounds.mean(axis=0)
     whole = to_manifold(part, origin)
     reach = max(2 * turned.tolerance, turned.aligned.spacing)

@@ -34,7 +34,8 @@ def run(whole: Manifold, left: Manifold, known: bool = True, views: list[list[in
 
 
 @pytest.mark.parametrize(
-    "name", ["wall of one tolerance", "wall of two", "pin", pytest.param("wall of four", marks=pytest.mark.slow)]
+    "name",
+    ["wall of one tolerance", "pin", *(pytest.param(f"wall of {n}", marks=pytest.mark.slow) for n in ("two", "four"))],
 )
 def test_what_broke_off_is_a_proven_site(name: str) -> None:
     result = run(BASE + LOST[name], BASE)

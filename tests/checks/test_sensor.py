@@ -68,6 +68,7 @@ def test_an_undamaged_part_has_no_site_in_a_scan_by_a_depth_camera(name: str) ->
     assert len(result.sites) <= 1
 
 
+@pytest.mark.slow
 def test_places_below_a_tolerance_that_the_sensor_does_not_allow_are_no_sites() -> None:
     """They stay in the total's high end, and are named in one line."""
     part = PARTS["lever"]()

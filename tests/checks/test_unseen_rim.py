@@ -37,7 +37,7 @@ def test_a_rim_that_the_scan_shows_has_no_share() -> None:
     assert result.sites[0].verdict.level == "proven"
 
 
-@pytest.mark.parametrize(("kept", "share"), [(0.0, 0.5), (3.0, 0.38)])
+@pytest.mark.parametrize(("kept", "share"), [pytest.param(0.0, 0.5, marks=pytest.mark.slow), (3.0, 0.38)])
 def test_the_share_is_that_of_the_rim_in_the_unseen_skin(kept: float, share: float) -> None:
     result, damage = scan_dent(kept)
     assert measure(result, damage) == pytest.approx(share, abs=0.12)

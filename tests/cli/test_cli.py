@@ -98,6 +98,7 @@ def test_init_writes_a_job_that_runs(tmp_path: Path) -> None:
     assert "--force" in refused.stderr
 
 
+@pytest.mark.slow
 def test_the_first_run_takes_what_init_read(tmp_path: Path) -> None:
     damaged_box.write(tmp_path)
     assert call("init", "box.stl", "scan.ply", "--job", "new.yaml", cwd=tmp_path).returncode == 0

@@ -46,7 +46,7 @@ def test_an_interrupt_says_what_is_kept_and_leaves_nothing_hidden(tmp_path: Path
     text += process.stderr.read().decode()
     assert process.wait() == 130
     kept = tmp_path / "out/job/stages"
-    assert f"interrupted in enclose: implicit; kept in {kept}: part, scan, sample, align, segment, cluster;" in text
+    assert f"interrupted in enclose: implicit; kept in {kept}: part, scan, align, segment, cluster;" in text
     assert text.splitlines()[-1].startswith("interrupted")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["job"]
     again = subprocess.run([*MAIN, "run", str(job)], capture_output=True, text=True)
@@ -106,7 +106,7 @@ def test_stages_that_do_nothing_are_not_listed_and_stay_in_the_result(tmp_path: 
     assert done.returncode == 0, done.stderr
     assert "boolean: manifold, site 1" in done.stderr
     listed = re.findall(r"^  (\w+): \w+", done.stderr, re.MULTILINE)
-    assert listed == ["part", "scan", "sample", "align", "segment", "cluster", "enclose", "boolean", "export"]
+    assert listed == ["part", "scan", "align", "segment", "cluster", "enclose", "boolean", "export"]
     stages = json.loads((tmp_path / "out/job/result.json").read_text())["stages"]
     assert {("allowance", "none"), ("path", "none")} <= {(one["stage"], one["use"]) for one in stages}
 

@@ -8,8 +8,10 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -73,9 +75,16 @@ OFTEN = ("run", "run --json", "validate", "schema", "help")
 WORDS = {">/dev/full": b"No space left on device", ">&-": b"Bad file descriptor"}
 
 
+def mark_slow(ways: Iterable[str]) -> list[Any]:
+    """Each of `OFTEN` with each of the ways: runs with the first, and with the others in the slow tests."""
+    first, *others = ways
+    rest = [(name, way) for name in OFTEN for way in others]
+    slow = [pytest.param(*pair, marks=pytest.mark.slow) if pair[0].startswith("run") else pair for pair in rest]
+    return [(name, first) for name in OFTEN] + slow
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
-@pytest.mark.parametrize("stream", WORDS)
-@pytest.mark.parametrize("name", OFTEN)
+@pytest.mark.parametrize(("name", "stream"), mark_slow(WORDS))
 def test_standard_output_that_takes_nothing_is_named(name: str, stream: str, ready: Path) -> None:
     ran = shell(f"{COMMANDS[name]} {stream}", ready)
     assert ran.returncode == 1
@@ -87,15 +96,20 @@ def test_standard_output_that_takes_nothing_is_named(name: str, stream: str, rea
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
-@pytest.mark.parametrize("stream", ["2>/dev/full", "2>&-"])
-@pytest.mark.parametrize("name", OFTEN)
+@pytest.mark.parametrize(("name", "stream"), mark_slow(["2>/dev/full", "2>&-"]))
 def test_standard_error_that_takes_nothing_changes_nothing(name: str, stream: str, ready: Path) -> None:
     ran = shell(f"{COMMANDS[name]} {stream}", ready)
     assert ran.returncode == 0
     assert ran.stdout
 
 
-@pytest.mark.parametrize("stream", [">&- 2>&-", "<&- >&- 2>&-", ">/dev/full 2>/dev/full"])
+@pytest.mark.parametrize(
+    "stream",
+    [
+        "<&- >&- 2>&-",
+        *(pytest.param(one, marks=pytest.mark.slow) for one in (">&- 2>&-", ">/dev/full 2>/dev/full")),
+    ],
+)
 def test_a_run_without_any_stream_writes_its_result(stream: str, ready: Path) -> None:
     shutil.rmtree(ready / "out/job")
     assert shell(f"run job.yaml {stream}", ready).returncode == 1
@@ -103,8 +117,7 @@ def test_a_run_without_any_stream_writes_its_result(stream: str, ready: Path) ->
     assert shell(f"run job.yaml -q {stream}", ready).returncode == 0, "it prints nothing, so nothing is missing"
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
-@pytest.mark.parametrize("name", OFTEN)
+@pytest.mark.parametrize(("name", "encoding"), mark_slow(["ascii", "latin-1"]))
 def test_another_encoding_shows_what_it_can(name: str, encoding: str, ready: Path) -> None:
     env = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
     ran = shell(COMMANDS[name], ready, env)
@@ -208,7 +221,9 @@ def test_notes_and_failures_are_shown_as_they_are(ready: Path, capsys: pytest.Ca
     assert said.splitlines()[-1] == f"written to {ready / 'final [v2]'}"
 
 
-@pytest.mark.parametrize("output", ["final [v2]", "[red]x", ":bomb:", "a\tb\x1b[1m"])
+@pytest.mark.parametrize(
+    "output", ["[red]a\tb\x1b[1m", *(pytest.param(one, marks=pytest.mark.slow) for one in ("final [v2]", ":bomb:"))]
+)
 def test_the_printed_path_is_that_of_the_folder(output: str, ready: Path) -> None:
     ran = subprocess.run(
         [sys.executable, "-c", "from damageest.cli import main; main()", "run", "job.yaml", "-o", output],

@@ -103,6 +103,7 @@ def test_the_result_says_what_it_was_made_with(home: Path) -> None:
     assert "Python 3." in provenance["system"]
 
 
+@pytest.mark.slow
 def test_arrays_are_hashed_and_cannot_be_read_again(tmp_path: Path) -> None:
     job = {"version": 1, "tolerance": 0.4, "align": "none", "report": "none"}
     box = damaged_box.box()

@@ -39,9 +39,11 @@ from damageest.geometry import (
     remaining,
     sampling,
     shapes,
+    skin_near,
     slivers,
     smooth_faces,
     solids,
+    spreading,
     stiff_modes,
     touching,
     transforms,
@@ -136,6 +138,20 @@ CALLS: dict[str, Callable[[Rows], None]] = {
         shapes.Shape("cylinder", np.zeros(3), np.eye(3)[2], 1.0).find_slopes(r.points), (r.count, 6)
     ),
     "shapes.recognise_shape": lambda r: expect(np.asarray(shapes.recognise_shape(r.mesh.triangles) is None), ()),
+    "skin_near.NearCubes": lambda r: expect(
+        skin_near.find_cubes_near(CUBE, CUBE.vertices, r.points, 1.0).touches(r.mesh.triangles), (len(r.mesh.faces),)
+    ),
+    "skin_near.find_cubes_near": lambda r: expect(
+        skin_near.find_cubes_near(CUBE, r.points, r.points, 1.0).holds(r.points), (r.count,)
+    ),
+    "skin_near.sample_near": lambda r: expect(
+        skin_near.sample_near(PART, skin_near.find_cubes_near(PART, r.points, r.points, 1.0), 1.0).points, (None, 3)
+    ),
+    "spreading.spread_on_faces": lambda r: expect(spreading.spread_on_faces(r.mesh, 0.5), (None, 3), (None,)),
+    "spreading.spread_points": lambda r: expect(
+        spreading.spread_points(r.mesh.triangles, np.arange(len(r.mesh.faces)), 0.5), (None, 3), (None,)
+    ),
+    "spreading.thin": lambda r: expect(spreading.thin(r.points, 0.5, 0.5), (None,)),
     "stiff_modes.name_modes": lambda r: expect(np.asarray(stiff_modes.name_modes(r.points, r.points)[1]), ()),
     "undoing.undo": lambda r: expect(undoing.undo(STILL, r.points), (r.count, 3)),
     "undoing.cut_to_follow": lambda r: expect(undoing.cut_to_follow(r.mesh, np.copy, 1.0)[0], (None, 3)),

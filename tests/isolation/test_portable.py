@@ -82,7 +82,9 @@ def test_isolated_calls_give_values_and_their_faults_are_errors(tmp_path: Path) 
     assert done.stdout.splitlines()[-1:] == ["done"], done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("more", ["", "method: surface\n"], ids=["implicit", "surface"])
+@pytest.mark.parametrize(
+    "more", ["", pytest.param("method: surface\n", marks=pytest.mark.slow)], ids=["implicit", "surface"]
+)
 def test_a_job_runs(tmp_path: Path, more: str) -> None:
     """`method: surface` has an isolated stage."""
     job = damaged_box.write(tmp_path, damaged_box.JOB + more)

@@ -151,6 +151,14 @@ def test_an_observer_that_fails_does_not_stop_the_run(tmp_path: Path) -> None:
     assert watched.damage_volume == damageest.run(path).damage_volume
 
 
+def test_points_on_all_of_the_skin_are_made_only_where_a_stage_takes_them(tmp_path: Path) -> None:
+    path = damaged_box.write(tmp_path)
+    results = [damageest.run(path, settings=settings) for settings in ([], ["segment=cloud_distance"])]
+    assert ["sample" in {record.stage for record in result.stages} for result in results] == [False, True]
+    for result in results:
+        assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.02)
+
+
 def test_only_what_changed_runs_again(tmp_path: Path) -> None:
     """Another scan under the same name leaves what came from the part alone, and nothing that came from the scan."""
     path = damaged_box.write(tmp_path)
@@ -162,9 +170,9 @@ def test_only_what_changed_runs_again(tmp_path: Path) -> None:
     write_points(tmp_path / "scan.ply", {"x": x, "y": y, "z": z})
     again = damageest.run(path, output=True)
     # `path: none` takes nothing, so nothing has changed for it
-    assert {record.stage for record in again.stages if record.cached} == {"part", "sample", "path"}
+    assert {record.stage for record in again.stages if record.cached} == {"part", "path"}
     assert again.scan.points.shape == (15_000, 3)
     nearby = damageest.run(path, output=True, settings=["cluster.neighbours=11"])
     cached = {record.stage for record in nearby.stages if record.cached}
-    assert {"part", "scan", "sample", "align", "segment"} <= cached
+    assert {"part", "scan", "align", "segment"} <= cached
     assert "cluster" not in cached

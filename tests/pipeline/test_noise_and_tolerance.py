@@ -30,7 +30,7 @@ def test_points_too_far_apart_to_show_the_noise_are_not_refused() -> None:
     assert not result.sites
 
 
-@pytest.mark.parametrize("pose", ["known", "unknown"])
+@pytest.mark.parametrize("pose", ["known", pytest.param("unknown", marks=pytest.mark.slow)])
 def test_noise_below_the_tolerance_that_alone_makes_very_many_places_is_refused(pose: str) -> None:
     part = PARTS["lever"]()
     scan = Simulate(points=60_000, noise=0.2, pose="identity" if pose == "known" else "random", seed=3).run("mm", part)

@@ -27,7 +27,7 @@ class Killer:
 
 damageest.run(sys.argv[1], output=True, registry=Registry.discover([Killer()]), settings=["cluster.neighbours=9"])
 """
-ROUTE = ["part", "scan", "sample", "align", "segment", "cluster", "enclose", "boolean", "allowance", "export", "report"]
+ROUTE = ["part", "scan", "align", "segment", "cluster", "enclose", "boolean", "allowance", "export", "report"]
 
 
 @pytest.mark.parametrize(
@@ -59,14 +59,7 @@ def test_only_what_depends_on_a_change_runs_again(tmp_path: Path) -> None:
     result = damageest.run(path, output=True, settings=["export.format=ply"])
     assert [r.stage for r in result.stages if not r.cached] == ["export", "report"]
     result = damageest.run(path, output=True, settings=["enclose.screening=2"])
-    assert not {r.stage for r in result.stages if not r.cached} & {
-        "part",
-        "scan",
-        "sample",
-        "align",
-        "segment",
-        "cluster",
-    }
+    assert not {r.stage for r in result.stages if not r.cached} & {"part", "scan", "align", "segment", "cluster"}
 
 
 def test_what_is_not_ours_stays(tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ DATUMS = [
     ("align", "source", "offset", "scale"),
     [
         pytest.param("none", "probing_size", 0.03, 1.0, marks=pytest.mark.slow),
-        ("icp", "probing_size", 0.03, 1.0),
+        pytest.param("icp", "probing_size", 0.03, 1.0, marks=pytest.mark.slow),
         ("icp", "length", 0.0, 1.005),
         ("datums", "probing_size", 0.02, 1.0),
     ],

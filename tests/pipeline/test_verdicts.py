@@ -55,6 +55,7 @@ def test_a_few_stray_points_are_no_failure(count: int) -> None:
     assert beside.damage_volume == pytest.approx(2 / 3 * np.pi * 4**3, rel=0.03)
 
 
+@pytest.mark.slow
 def test_stray_points_under_intact_ones_are_doubtful_and_no_damage_unless_accepted(tmp_path: Path) -> None:
     points = scan_with_strays(60, dents=1)
     result = run(points)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +33,9 @@ APART = 0.02
 """Distance of two poses, in diagonals, below which they are counted once: copies that the fit cannot distinguish, or
 one that slid a little."""
 
-FIRST_POINTS, SECOND_POINTS = 1500, 10_000
-"""Number of points for the first comparison of poses and the fits before it, and for the second comparison."""
+FIRST_POINTS, SECOND_POINTS, THIRD_POINTS = 1500, 4000, 10_000
+"""Number of points for the first comparison of poses and the fits before it, and for those that follow: most poses that
+are one tooth off are worse by then, and cost no more."""
 
 MANY = 8
 """Number of poses from which on the symmetries of the part are asked for: to fit fewer costs less."""
@@ -73,7 +75,7 @@ def choose_pose(poses: Floats, part: PreparedPart, scan: OrientedPoints, points:
     target, field = part.surface, part.grid
     poses, axis = _add_counterparts(poses, field, scan)
     if axis is not None:
-        some = points[:SECOND_POINTS]
+        some = points[:THIRD_POINTS]
         head = fit(target, _keep_near(field, points[:FIRST_POINTS], poses[0]), poses[0], COARSE, noise, 12)
         cost = robust_cost(_measure_distance(target, field, some, head.pose), head.band)
         if _is_continuous(axis, head.pose, cost, target, field, some, noise, COARSE, head.band):
@@ -112,7 +114,7 @@ def _compare(
     first = select_distinct(poses, -np.array([cost.sum() for cost in costs]), 0.25 * COARSE, MAX_POSES)
     poses, costs = poses[first], [costs[k] for k in first]
     fitted, means = poses, np.array([cost.mean() for cost in costs])
-    for start, stop in ((FIRST_POINTS, SECOND_POINTS), (SECOND_POINTS, len(points))):
+    for start, stop in pairwise((FIRST_POINTS, SECOND_POINTS, THIRD_POINTS, len(points))):
         kept = np.flatnonzero(_select_equal(costs))
         poses, more = poses[kept], points[start:stop]
         added = [robust_cost(_measure_distance(target, field, more, pose), band) for pose in poses]

@@ -94,7 +94,10 @@ class EncloseAll(Stage, ABC):
         deviation: for each scan point its signed distance to the part (positive outside), the nearest triangle of the
             part, and its label.
         sites: for each scan point the number of its site, from 1; 0 for a point of no site.
-        samples: points on all of the part's skin, with normals.
+        samples: points on all of the part's skin, with normals; made only for an implementation that takes them.
+        nearby: points on the faces of the skin round the damage, about a tolerance apart, with normals: in the cubes of
+            40 tolerances with damaged points, those connected to them with few points of the scan, and those round
+            both. Cheaper than ``samples`` on a part of many triangles.
         tolerance: depth from which a point counts as damage.
 
     Returns:
@@ -134,5 +137,12 @@ class EncloseAll(Stage, ABC):
     @asked_by_name
     @abstractmethod
     def run(
-        self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
+        self,
+        part: Part,
+        aligned: Scan,
+        deviation: Deviation,
+        sites: Sites,
+        samples: Samples,
+        nearby: Samples,
+        tolerance: float,
     ) -> Enclosures: ...

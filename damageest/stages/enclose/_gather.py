@@ -18,7 +18,7 @@ from damageest.geometry.neighbourhoods import (
 from damageest.geometry.poisson import Grid, GridValues, refine_field
 from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.stages.enclose._loss_surface import build_surface
-from damageest.stages.enclose._skin import SkinSamples, find_held, push_outward, sample_skin_near
+from damageest.stages.enclose._skin import SkinSamples, find_held, look_at_skin, push_outward
 
 OF_SITE = 0.05
 """Share of the points of a site from which a group holds the site; a few stray ones do not."""
@@ -92,14 +92,14 @@ class IntactSkin:
 
 
 def sort_losses(
-    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float, band: float
+    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, nearby: Samples, tolerance: float, band: float
 ) -> tuple[tuple[LossGroup, ...], IntactSkin]:
     """Sorts scan points and skin samples into losses and intact skin.
 
     ``band``: width of skin round the damaged points that counts as neither lost nor intact, in tolerances.
     """
     points, label, grown, of_scan = _grow_to_rim(aligned, deviation, sites, tolerance)
-    skin = sample_skin_near(part, aligned, deviation, sites, grown, samples, tolerance)
+    skin = look_at_skin(part, aligned, deviation, grown, nearby, tolerance)
     beside = np.maximum(band * tolerance, 1.6 * skin.usual)
     away = find_neighbours(skin.points, 1, points, float(beside.max(initial=0.0)))[0][:, 0]
     free = away < beside

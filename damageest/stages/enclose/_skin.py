@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Part, Samples, Scan, Sites
+from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Part, Samples, Scan
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours, pick_one_per_cube
-from damageest.geometry.voxels import VoxelGrid, measure_bounds
+from damageest.geometry.skin_near import CUBE, NearCubes
+from damageest.geometry.voxels import measure_bounds
 
 NEARER = 0.4
 """Skin is held where an intact point is nearer than this share of the distance to the damaged points."""
@@ -29,19 +30,20 @@ class SkinSamples:
     usual: Floats
 
 
-def sample_skin_near(
-    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, grown: Flags, samples: Samples, tolerance: float
+def look_at_skin(
+    part: Part, aligned: Scan, deviation: Deviation, grown: Flags, nearby: Samples, tolerance: float
 ) -> SkinSamples:
-    """The skin in the neighbourhood of the sites, and as far from them as it is bare."""
+    """The samples ``nearby``, with what the scan shows on each."""
     intact = (deviation.label == INTACT) & ~grown
     added = deviation.label == ADDED
-    flat = samples.kind == 0
-    points, normals = samples.points[flat], samples.normals[flat]
-    skin, hits = _select_cubes(aligned.points, sites.label > 0, intact | added, points, 40 * tolerance)
-    points, normals = points[skin], normals[skin]
+    flat = nearby.kind == 0
+    points, normals = nearby.points[flat], nearby.normals[flat]
+    if not len(points):
+        return SkinSamples(points, normals, np.zeros(0, bool), np.zeros(0))
+    hits = NearCubes.around(points, CUBE * tolerance).holds(aligned.points)
     keep = np.flatnonzero(hits & intact)
     hit = aligned.points[keep]
-    if not len(hit) or not len(points):
+    if not len(hit):
         return SkinSamples(points, normals, np.ones(len(points), bool), np.full(len(points), aligned.spacing))
     thin = pick_one_per_cube(hit, 0.35 * tolerance)
     hit, face = hit[thin], deviation.face[keep][thin]
@@ -104,31 +106,6 @@ def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:
     radius = find_neighbours(some, count, hit)[0][:, -1]
     _, index = find_neighbours(points, 6, some)
     return np.asarray(np.median(radius[index], axis=1))
-
-
-def _select_cubes(scan: Floats, damaged: Flags, intact: Flags, skin: Floats, size: float) -> tuple[Flags, Flags]:
-    """Which skin samples (S,) and which intact points (N,) are near the damage, by the cubes of a coarse grid.
-
-    These are cubes with damage, cubes connected to them whose skin has few intact points, and the cubes round both.
-    """
-    from scipy.ndimage import binary_dilation, label
-
-    low, high = measure_bounds(np.concatenate([measure_bounds(scan), measure_bounds(skin)]))
-    low = low - 2 * size
-    shape = np.ceil((high - low) / size).astype(np.int64) + 3
-    grid = VoxelGrid(low, size, shape)
-    flat = [grid.number_cells(points) for points in (scan, skin)]
-    total = int(np.prod(shape))
-    seen = np.bincount(flat[0][intact], minlength=total)
-    expected = np.bincount(flat[1], minlength=total)
-    usual = np.median(seen[expected > 0] / expected[expected > 0])
-    has_damage = np.bincount(flat[0][damaged], minlength=total) > 0
-    poor = (expected > 0) & (seen < 0.15 * usual * expected)
-    joined, _ = label((has_damage | poor).reshape(shape), np.ones((3, 3, 3), bool))
-    core = np.isin(joined, np.unique(joined.ravel()[has_damage]))
-    wide = binary_dilation(core, np.ones((3, 3, 3), bool))
-    wider = binary_dilation(wide, np.ones((3, 3, 3), bool))
-    return wide.ravel()[flat[1]], intact & wider.ravel()[flat[0]]
 
 
 def push_outward(part: Part, skin: Floats, outward: Floats, push: float) -> Floats:

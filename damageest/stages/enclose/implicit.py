@@ -48,7 +48,7 @@ class Implicit(EncloseAll):
     )
 
     def run(
-        self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
+        self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, nearby: Samples, tolerance: float
     ) -> Enclosures:
         """Raises StageError where no closed surface can be reconstructed."""
         from damageest.geometry.isosurface import extract_region
@@ -58,7 +58,7 @@ class Implicit(EncloseAll):
 
         if not sites.count:
             return Enclosures(())
-        groups, skin = sort_losses(part, aligned, deviation, sites, samples, tolerance, self.band)
+        groups, skin = sort_losses(part, aligned, deviation, sites, nearby, tolerance, self.band)
         grids = [self._make_grid(np.concatenate([group.points, group.lost]), tolerance) for group in groups]
         gathered = push_intact(part, groups, skin, grids, self.push * tolerance)
         items = []

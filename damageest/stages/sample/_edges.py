@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.spreading import thin
 from damageest.geometry.vectors import normalise
-from damageest.stages.sample._spread import thin
 
 ON_EDGE, ON_CORNER = 1, 2
 

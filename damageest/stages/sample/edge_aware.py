@@ -10,16 +10,14 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Mesh, Part, Samples
 from damageest.errors import InputError
+from damageest.geometry.spreading import spread_on_faces
 from damageest.io.digests import digest
 from damageest.io.part_store import Arrays, recall
 from damageest.stages.sample import Sample
 from damageest.stages.sample._edges import place_sharp_points
-from damageest.stages.sample._spread import spread_points, thin
 
 COSTLY = 50_000
 """Triangles from which on the points of a part are kept for later runs with the same part and tolerance."""
-FINE = 0.4
-"""Step of the first points on faces that are too small for a grid of their own, in spacings."""
 
 
 class EdgeAware(Sample):
@@ -71,24 +69,13 @@ def _pack(samples: Samples) -> Arrays:
 
 
 def _sample(part: Mesh, spacing: float, angle: float) -> Samples:
-    triangles = part.triangles
-    cross = part.cross
-    double_area = np.linalg.norm(cross, axis=1)
-    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
-    # A triangle without area has no normal, and the points of its neighbours cover it.
-    usable = double_area > 1e-12 * part.diagonal * longest
-    # One grid per triangle wastes points on small or thin triangles: these share one thinned set of points.
-    large = usable & (double_area > 0.5 * spacing * longest) & (longest > spacing)
-    points, face = spread_points(triangles, np.flatnonzero(large), spacing)
-    fine, fine_face = spread_points(triangles, np.flatnonzero(usable & ~large), FINE * spacing)
-    kept = thin(fine, 0.5 * spacing, (1 - FINE) * spacing)
+    points, face = spread_on_faces(part, spacing)
     edge_points, edge_normals, edge_face, edge_kind = place_sharp_points(part, spacing, angle)
-    faces = np.concatenate([face, fine_face[kept]])
-    normals: Floats = cross[faces] / double_area[faces, None]
+    normals: Floats = part.cross[face] / np.linalg.norm(part.cross[face], axis=1)[:, None]
     return Samples(
-        points=np.concatenate([points, fine[kept], edge_points]),
+        points=np.concatenate([points, edge_points]),
         normals=np.concatenate([normals, edge_normals]),
-        face=np.concatenate([faces, edge_face]),
-        kind=np.concatenate([np.zeros(len(faces), np.uint8), edge_kind]),
+        face=np.concatenate([face, edge_face]),
+        kind=np.concatenate([np.zeros(len(face), np.uint8), edge_kind]),
         spacing=spacing,
     )

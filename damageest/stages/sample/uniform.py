@@ -9,8 +9,8 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Part, Samples
 from damageest.errors import InputError
+from damageest.geometry.spreading import spread_points, thin
 from damageest.stages.sample import Sample
-from damageest.stages.sample._spread import spread_points, thin
 
 FINE = 0.3
 """Step of the first points, in spacings: each place of the surface is within it of one of them."""

@@ -25,7 +25,7 @@ from damageest.stages.export import ExportedFiles
 from damageest.stages.export.files import Files
 from tests.needs import import_for, needs_plugin
 
-pytestmark = [needs_plugin("cadquery"), pytest.mark.xdist_group("adapted")]  # one scene for all
+pytestmark = needs_plugin("cadquery")
 cq = import_for("cadquery", "cadquery")
 
 TOLERANCE = 0.2

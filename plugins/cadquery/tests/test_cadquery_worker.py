@@ -21,6 +21,7 @@ pytestmark = needs_plugin("cadquery")
 cq = import_for("cadquery", "cadquery")
 
 
+@pytest.mark.slow
 def test_a_terminated_run_leaves_no_process_at_its_export(tmp_path: Path) -> None:
     """The whole command, stopped while OpenCASCADE works in a process of a process of its own."""
     cq.exporters.export(cq.Workplane().box(20, 20, 12), str(tmp_path / "block.step"))

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from damageest.artefacts import Deviation, Enclosure, Enclosures, Part, Samples, Scan, Sites
+from damageest.artefacts import Deviation, Enclosure, Enclosures, Part, Scan, Sites
 from damageest.errors import StageError
 from damageest.isolation import require_memory
 from damageest.stages.enclose import EncloseAll
@@ -59,9 +59,7 @@ class Octree(EncloseAll):
             raise ValueError("depth and cell both set the size of the cells; give one of them")
         return self
 
-    def run(
-        self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
-    ) -> Enclosures:
+    def run(self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) -> Enclosures:
         """Raises StageError where the cells do not fit into memory, are too fine for the scan, or none is lost."""
         from damageest_octree.solid import close_loss, count_box_cells, find_losses
 

@@ -17,7 +17,6 @@ from damageest.artefacts import (
     Ints,
     Mesh,
     Part,
-    Samples,
     Scan,
     Sites,
 )
@@ -50,9 +49,7 @@ class PoissonSubtract(EncloseAll):
     )
     scale: float = Field(1.1, gt=1, le=4, description="edge of the octree's cube, in edges of the scan's bounding cube")
 
-    def run(
-        self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, samples: Samples, tolerance: float
-    ) -> Enclosures:
+    def run(self, part: Part, aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) -> Enclosures:
         """Raises StageError where the scan has too few points, where no closed body can be reconstructed, or where no
         part of the metal is outside it."""
         from manifold3d import Manifold

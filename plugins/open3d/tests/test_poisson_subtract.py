@@ -12,7 +12,7 @@ from damageest_open3d.poisson_subtract import PoissonSubtract
 from manifold3d import Manifold
 
 import damageest
-from damageest.artefacts import Enclosures, Floats, Mesh, Part, Samples, Scan, Solid
+from damageest.artefacts import Enclosures, Floats, Mesh, Part, Scan, Solid
 from damageest.errors import JobError, StageError
 from damageest.geometry.solids import iou, to_arrays, to_manifold, to_solid, unite
 from damageest.job import load
@@ -29,7 +29,6 @@ TOOLS: dict[str, Any] = {
     "end": lambda: Manifold.cube((40, 60, 60), True).rotate((0, 12, 7)).translate((28, 0, 0)),
     "middle": lambda: Manifold.cube((9, 60, 60), True).rotate((0, 15, 0)),
 }
-NO_SAMPLES = Samples(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, int), np.empty(0, np.uint8), 1.0)
 
 pytestmark = needs_plugin("open3d")
 
@@ -56,7 +55,7 @@ def inputs(points: Floats) -> dict[str, Any]:
     given["tolerance"] = TOLERANCE
     given["deviation"] = MeshDistance().run(**given)
     sites = Dbscan().run(given["aligned"], given["deviation"], TOLERANCE)
-    return {**given, "sites": sites, "samples": NO_SAMPLES}
+    return {**given, "sites": sites}
 
 
 @lru_cache

@@ -98,6 +98,7 @@ def test_a_lost_end_is_predicted_from_other_parts() -> None:
     assert (prior.parts, prior.is_used) == (8, True)
 
 
+@pytest.mark.slow
 def test_few_parts_give_a_wider_interval() -> None:
     many, few, one = (measure(adapt(write_others(count))) for count in (8, 4, 1))
     assert many[1] < few[1]

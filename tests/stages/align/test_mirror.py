@@ -33,6 +33,7 @@ def test_the_waves_of_a_camera_are_no_mirror_image() -> None:
     assert measure_apart(part, pose.T_part_scan, scan) < 0.03
 
 
+@pytest.mark.slow
 def test_a_strip_of_a_mirror_image_is_not_refused() -> None:
     """A few faces have a mirror image that fits another place of the part: too little to refuse a scan for."""
     part, scan = cut_strip("block", 1000, 0.1, points=6000)

@@ -51,6 +51,7 @@ def test_the_pose_does_not_depend_on_signs(outward: tuple[Part, Scan], kind: str
     assert not pose.doubts
 
 
+@pytest.mark.slow
 def test_a_run_with_flipped_normals_finds_the_damage_alone() -> None:
     part, scan = scene("block", seed=3, clutter=0.0, points=25_000)
     assert scan.truth is not None

@@ -77,6 +77,7 @@ def test_both_ends_of_a_cylinder_are_listed() -> None:
     assert min(ends) < -0.99 < 0.99 < max(ends)
 
 
+@pytest.mark.slow
 def test_two_fractures_that_are_nearly_parallel_to_the_skin() -> None:
     """A third of the metal is gone, half of the scan lies inside the part, and tilted poses fit the fractures."""
     part = PARTS["cuboid"]()

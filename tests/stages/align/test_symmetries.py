@@ -51,6 +51,7 @@ def test_all_symmetries_of_a_part_are_found_and_no_others(body: Manifold, count:
     assert apart.min() > 0.01
 
 
+@pytest.mark.slow
 def test_the_true_pose_of_a_prism_is_among_those_that_are_listed() -> None:
     body = prism(60)
     part = trimesh.Trimesh(*to_arrays(body))

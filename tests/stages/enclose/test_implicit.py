@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +15,13 @@ from damageest.stages.enclose.implicit import Implicit
 from tests.scenes import TOLERANCE, Scene, scene
 
 
+def enclose_with(case: Scene, stage: Implicit | None = None, **changed: Any) -> Enclosures:
+    return (stage or Implicit()).run(**{**case.inputs(), "nearby": case.nearby, **changed})
+
+
 @lru_cache
 def enclose(name: str) -> Enclosures:
-    return Implicit().run(**scene(name).inputs())
+    return enclose_with(scene(name))
 
 
 def intersect_pieces(case: Scene, enclosures: Enclosures) -> list[object]:
@@ -53,9 +58,8 @@ def test_every_site_is_in_an_enclosure_and_none_in_two() -> None:
 def test_a_site_of_two_places_is_in_one_enclosure() -> None:
     """Stage cluster may link points over a wider gap than the enclosure does; it was in two, which is not valid."""
     case = scene("two")
-    inputs = case.inputs()
     sites = Sites(np.minimum(case.sites.label, 1).astype(np.int32), 1)
-    enclosures = Implicit().run(**inputs | {"sites": sites})
+    enclosures = enclose_with(case, sites=sites)
     assert [item.sites for item in enclosures.items] == [(1,)]
     assert iou(to_solid(unite(intersect_pieces(case, enclosures))), case.truth) > 0.9
 
@@ -65,19 +69,19 @@ def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
     away = np.linalg.norm(case.aligned.points - [26, 3, 12], axis=1) < 3
     assert away.sum() > 100
     partial = case.without(away)
-    pieces = intersect_pieces(partial, Implicit().run(**partial.inputs()))
+    pieces = intersect_pieces(partial, enclose_with(partial))
     assert iou(to_solid(unite(pieces)), case.truth) > 0.97
 
 
 def test_the_same_input_gives_the_same_bytes() -> None:
-    first, again = enclose("pit").items[0], Implicit().run(**scene("pit").inputs()).items[0]
+    first, again = enclose("pit").items[0], enclose_with(scene("pit")).items[0]
     assert first.solid.vertices.tobytes() == again.solid.vertices.tobytes()
     assert first.solid.faces.tobytes() == again.solid.faces.tobytes()
 
 
 def test_a_loss_too_large_for_its_grid_is_solved_coarsely_and_a_note_says_so() -> None:
     case = scene("end")
-    (item,) = Implicit(most_cells=60_000).run(**case.inputs()).items
+    (item,) = enclose_with(case, Implicit(most_cells=60_000)).items
     assert "cells of" in item.notes[0]
     (piece,) = (to_solid(body) for body in (to_manifold(case.part) ^ to_manifold(item.solid)).decompose()[:1])
     assert iou(piece, case.truth) > 0.9
@@ -85,7 +89,7 @@ def test_a_loss_too_large_for_its_grid_is_solved_coarsely_and_a_note_says_so() -
 
 def test_detail_spares_triangles_and_moves_the_surface_by_no_more() -> None:
     case = scene("pit")
-    fine, coarse = (Implicit(detail=detail).run(**case.inputs()).items[0].solid for detail in (0.0, 0.1))
+    fine, coarse = (enclose_with(case, Implicit(detail=detail)).items[0].solid for detail in (0.0, 0.1))
     assert len(coarse.faces) < 0.5 * len(fine.faces)
     assert distance_to_mesh(coarse.vertices, fine).max() < 0.1 * TOLERANCE
     gone = distance_to_mesh(fine.vertices, coarse)
@@ -96,7 +100,7 @@ def test_detail_spares_triangles_and_moves_the_surface_by_no_more() -> None:
 def test_no_site_no_enclosure() -> None:
     case = scene("pit")
     none = Sites(np.zeros(len(case.aligned.points), np.int32), 0)
-    assert Implicit().run(**{**case.inputs(), "sites": none}).items == ()
+    assert enclose_with(case, sites=none).items == ()
 
 
 def test_the_void_outside_the_part_is_only_taken_near_the_loss() -> None:
@@ -113,7 +117,7 @@ def test_more_points_give_a_better_surface_where_it_is_curved() -> None:
     case = scene("rough")
     errors = []
     for seen in (case, case.without(np.arange(len(case.aligned.points)) % 12 > 0)):
-        (piece,) = intersect_pieces(seen, Implicit().run(**seen.inputs()))
+        (piece,) = intersect_pieces(seen, enclose_with(seen))
         differs = to_manifold(case.truth) - to_manifold(piece), to_manifold(piece) - to_manifold(case.truth)
         errors.append(sum(body.volume() for body in differs) / (case.truth.area / 2) / TOLERANCE)
     assert errors[0] < 0.08

@@ -29,9 +29,6 @@ def write(result: Result, folder: Path, **options: object) -> ExportedFiles:
     return Files.model_validate(options).run(result, folder, Registry.discover().writers)
 
 
-pytestmark = pytest.mark.xdist_group("nominal")  # one run for all
-
-
 @pytest.fixture(scope="module")
 def bent(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Path]:
     place = tmp_path_factory.mktemp("nominal")

@@ -16,8 +16,6 @@ from damageest.artefacts import Mesh
 from damageest.findings import Coverage, Surplus, UnseenRegion
 from tests.stages.report import browser, pages
 
-pytestmark = pytest.mark.xdist_group("browser")
-
 
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
@@ -158,6 +156,7 @@ def test_a_section_has_outline_and_points(shown: browser.Shown) -> None:
         assert shown.page.locator(f"#section-{site}-scan-points use").count() > 20
 
 
+@pytest.mark.slow
 def test_in_the_dark_on_a_tablet_and_on_paper(chromium: Any) -> None:
     report = browser.Shown(chromium, pages.write(pages.two_sites()), "#site-2", color_scheme="dark")
     assert "chosen" in report.page.get_attribute("#row-2", "class")

@@ -21,7 +21,9 @@ DOTS = [
 
 
 @pytest.mark.parametrize(
-    ("scene", "seed"), [({}, 2), ({"surroundings": CLAMPS, "added": DOTS}, 0)], ids=["table", "table, clamps and dots"]
+    ("scene", "seed"),
+    [pytest.param({}, 2, marks=pytest.mark.slow), ({"surroundings": CLAMPS, "added": DOTS}, 0)],
+    ids=["table", "table, clamps and dots"],
 )
 def test_the_loss_is_right_beside_fixtures(scene: dict[str, Any], seed: int) -> None:
     scan: dict[str, Any] = {"use": "simulate", "damage": [LOSS], "points": 90_000, "noise": 0.04, "scanners": 12}

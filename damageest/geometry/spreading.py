@@ -1,10 +1,13 @@
-"""Spreads points over triangles, and thins them."""
+"""Spreads points over triangles, and thins them.
+
+Triangles, points and lengths are in one unit and one frame.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints
+from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.threads import count_threads
 from damageest.geometry.voxels import measure_bounds, number_cubes
@@ -12,6 +15,28 @@ from damageest.isolation.memory import require_memory
 
 SPREAD_BYTES, THIN_BYTES, TRIANGLE_BYTES = 170, 210, 260
 """Memory to spread a point, to choose from it, and for each triangle, measured."""
+FINE = 0.4
+"""Step of the first points on triangles that are too small for a grid of their own, in spacings."""
+
+
+def spread_on_faces(mesh: Mesh, spacing: float) -> tuple[Floats, Ints]:
+    """Points (N,3) on all faces of a mesh, and the face (N,) of each; every place is within ``spacing`` of one.
+
+    A face without area has none: it has no normal, and the points of its neighbours cover it. The same mesh gives the
+    same points.
+    """
+    if not len(mesh.faces):
+        return np.empty((0, 3)), np.empty(0, np.int64)
+    triangles = mesh.triangles
+    double_area = np.linalg.norm(mesh.cross, axis=1)
+    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    usable = double_area > 1e-12 * mesh.diagonal * longest
+    # One grid per triangle wastes points on small or thin triangles: these share one thinned set of points.
+    large = usable & (double_area > 0.5 * spacing * longest) & (longest > spacing)
+    points, face = spread_points(triangles, np.flatnonzero(large), spacing)
+    fine, fine_face = spread_points(triangles, np.flatnonzero(usable & ~large), FINE * spacing)
+    kept = thin(fine, 0.5 * spacing, (1 - FINE) * spacing)
+    return np.concatenate([points, fine[kept]]), np.concatenate([face, fine_face[kept]])
 
 
 def spread_points(triangles: Floats, chosen: Ints, step: float) -> tuple[Floats, Ints]:

@@ -1,0 +1,128 @@
+"""The part's skin near some places of it: which cubes of space it lies in, and points on it, without the rest.
+
+Part and points are in one unit and one frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Samples
+from damageest.geometry.refinement import bisect_faces
+from damageest.geometry.spreading import spread_on_faces, spread_points
+from damageest.geometry.voxels import MOST_ALONG, VoxelGrid, measure_bounds
+
+CUBE = 40.0
+"""Edge of a cube, in tolerances."""
+POOR = 0.15
+"""Share of the usual number of intact points for its skin below which a cube has few of them."""
+PLACES = 8
+"""Places along a cube's edge at which the area of the skin in it is measured."""
+SMALL = 0.5
+"""Largest edge of a triangle that is sampled as a whole, in cubes: a larger one is halved, and only its halves near the
+places are."""
+MOST_POINTS = 400_000
+"""Points from which on the spacing grows."""
+
+
+@dataclass(frozen=True, eq=False)
+class NearCubes:
+    """The ``cubes`` of a ``grid`` that are near (one flag each, in the grid's order)."""
+
+    grid: VoxelGrid
+    cubes: Flags
+
+    @classmethod
+    def around(cls, points: Floats, size: float) -> NearCubes:
+        """The cubes with one of the points (N,3), and those that touch them."""
+        low, high = measure_bounds(points) + 2 * size * np.array([[-1.0], [1.0]])
+        grid = VoxelGrid(low, size, np.ceil((high - low) / size).astype(np.int64) + 1)
+        return cls(grid, grid.mark_around(points, 1))
+
+    def holds(self, points: Floats) -> Flags:
+        """Which of the points (N,3) lie in these cubes; the outermost cubes of the grid are none of them."""
+        return np.asarray(self.cubes[self.grid.number_cells(points)])
+
+    def touches(self, triangles: Floats) -> Flags:
+        """Which of the triangles (F,3,3) have bounds that reach into these cubes."""
+        shape = self.grid.shape
+        sums = np.zeros(shape + 1, np.int64)
+        sums[1:, 1:, 1:] = self.cubes.reshape(shape).cumsum(0).cumsum(1).cumsum(2)
+        at = [(end(triangles, axis=1) - self.grid.low) / self.grid.size for end in (np.min, np.max)]
+        low, high = (np.clip(np.floor(one).astype(np.int64), 0, shape - 1) for one in at)
+        count = np.zeros(len(triangles), np.int64)
+        for corner in range(8):
+            is_high = np.array([corner >> axis & 1 for axis in range(3)], bool)
+            x, y, z = np.where(is_high, high + 1, low).T
+            count += sums[x, y, z] * (1 if is_high.sum() % 2 else -1)
+        return count > 0
+
+
+def find_cubes_near(part: Mesh, places: Floats, intact: Floats, tolerance: float) -> NearCubes:
+    """The cubes of the part's skin near damage.
+
+    These are the cubes with one of the damaged ``places`` (N,3), cubes connected to them whose skin has few of the
+    ``intact`` points (M,3), and the cubes round both.
+    """
+    from scipy.ndimage import binary_dilation, label
+
+    every = [measure_bounds(points) for points in (part.vertices, places, intact) if len(points)]
+    low, high = measure_bounds(np.concatenate(every))
+    size = max(CUBE * tolerance, float((high - low).max()) / MOST_ALONG)
+    low = low - 2 * size
+    grid = VoxelGrid(low, size, np.ceil((high - low) / size).astype(np.int64) + 3)
+    total = int(np.prod(grid.shape))
+    on_skin, area = _spread_area(part, size / PLACES)
+    expected = np.bincount(grid.number_cells(on_skin), weights=area, minlength=total)
+    seen = np.bincount(grid.number_cells(intact), minlength=total)
+    has_skin = expected > 0
+    usual = np.median(seen[has_skin] / expected[has_skin])
+    has_damage = np.bincount(grid.number_cells(places), minlength=total) > 0
+    poor = has_skin & (seen < POOR * usual * expected)
+    around = np.ones((3, 3, 3), bool)
+    joined, _ = label((has_damage | poor).reshape(grid.shape), around)
+    core = np.isin(joined, np.unique(joined.ravel()[has_damage]))
+    return NearCubes(grid, binary_dilation(core, around).ravel())
+
+
+def _spread_area(part: Mesh, step: float) -> tuple[Floats, Floats]:
+    """Points (N,3) on the part, with gaps up to ``step`` on large triangles, and the area (N,) each stands for."""
+    triangles = part.triangles
+    area = np.linalg.norm(part.cross, axis=1) / 2
+    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    is_large = (longest > step) & (area > 0)
+    points, face = spread_points(triangles, np.flatnonzero(is_large), step)
+    share = area / np.maximum(np.bincount(face, minlength=len(area)), 1)
+    return np.concatenate([points, triangles[~is_large].mean(axis=1)]), np.concatenate([share[face], area[~is_large]])
+
+
+def sample_near(part: Part, near: NearCubes, spacing: float) -> Samples:
+    """Points on the faces of the part's skin in some cubes, none on edges.
+
+    Every place of this skin is within the samples' spacing of a point: ``spacing``, or more where that would need more
+    than `MOST_POINTS`. The same part and cubes give the same points.
+    """
+    vertices, faces, origin = _cut_near(part, near)
+    piece = Mesh(vertices, faces)
+    spacing = max(spacing, float(np.sqrt(1.25 * piece.area / MOST_POINTS))) if len(faces) else spacing
+    points, face = spread_on_faces(piece, spacing)
+    inside = near.holds(points)
+    face = origin[face[inside]]
+    return Samples(points[inside], part.face_normals[face], face, np.zeros(len(face), np.uint8), spacing)
+
+
+def _cut_near(part: Part, near: NearCubes) -> tuple[Floats, Ints, Ints]:
+    """Vertices, the faces (F,3) of the part that reach into the cubes, with large ones cut, and the face (F,) of the
+    part that each of them is a piece of."""
+    vertices, origin = part.vertices, np.flatnonzero(near.touches(part.triangles))
+    faces, edge = part.faces[origin], SMALL * near.grid.size
+    while True:
+        corners = vertices[faces]
+        length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1, initial=0.0)
+        if not (length > edge).any():
+            return vertices, faces, origin
+        vertices, faces, parent = bisect_faces(vertices, faces, np.flatnonzero(length > edge))
+        kept = near.touches(vertices[faces])
+        faces, origin = faces[kept], origin[parent[kept]]
