@@ -34,7 +34,7 @@ class UnseenRegion:
     ``centre`` (3,) and ``bounds`` (2,3) of its cells; ``faces``: numbers of its CAD faces, empty where the part has
     none; ``volume``: the most that can be lost behind it without a trace in the scan. ``why``: `hidden`: the part
     itself is between it and every scanner position; `outside`: no view reached there; `no points`: a view reached there
-    and gave no points; `unknown`: no scanner position is known.
+    and gave no points; `unknown`: no scanner position is known; `earlier scan`: the part is one, and does not show it.
     """
 
     area: float
@@ -42,7 +42,7 @@ class UnseenRegion:
     bounds: Floats
     faces: tuple[int, ...]
     volume: float
-    why: Literal["unknown", "hidden", "outside", "no points"] = "unknown"
+    why: Literal["unknown", "hidden", "outside", "no points", "earlier scan"] = "unknown"
 
 
 @dataclass(frozen=True, eq=False)

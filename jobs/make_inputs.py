@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cadquery as cq
 import numpy as np
+from damageest_evaluate.differences import BALL, EARLY, LATE, Pair, draw_pair
 from damageest_evaluate.parts import PARTS
 
 from damageest.artefacts import Part, Solid
@@ -57,10 +58,22 @@ def worn_shaft() -> None:
     write_stl(HERE / "parts" / "keyed_shaft.stl", PARTS["keyed_shaft"]())
 
 
+def two_months() -> None:
+    """Two scans of some sides of one block, each in a frame of its own: since the first, a corner was chipped off."""
+    pair = Pair(
+        "", "block", (BALL, 5, (20, 15, 10)), before=EARLY, after=LATE, first=(36_000, 0.03), second=(28_000, 0.04)
+    )
+    drawn = draw_pair(pair, 3)
+    for name, scan in (("block_may", drawn.before), ("block_june", drawn.after)):
+        names = ("x", "y", "z", "nx", "ny", "nz")
+        write_points(HERE / "scans" / f"{name}.ply", dict(zip(names, scan.astype(np.float32).T, strict=True)))
+
+
 def main() -> None:
     gear_step()
     half_torus_step()
     worn_shaft()
+    two_months()
     for name in ("block", "ribbed_plate", "cylinder"):
         write_stl(HERE / "parts" / f"{name}.stl", PARTS[name]())
     blade = to_manifold(PARTS["blade"]()).simplify(0.02)  # mm, and a quarter of the triangles

@@ -74,6 +74,9 @@ def test_pages_show_commands() -> None:
     assert {page.name for page, _ in SHOWN} >= {"README.md", "first-repair.md", "your-own-scan.md", "measurements.md"}
 
 
+MONTHS = ("scans/block_may.ply", "scans/block_june.ply")
+
+
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that the jobs in the documentation name."""
@@ -83,7 +86,15 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(ROOT / "jobs" / "parts" / "block.stl", folder / "parts")
     for name in ("part.step", "parts/gear.step"):
         shutil.copy(ROOT / "jobs" / "parts" / "gear.step", folder / name)
-    for name in ("scan.ply", "view-1.ply", "view-2.ply", "scans/block_wedge.ply", "scans/gear.ply", "patches/1.ply"):
+    for name in (
+        "scan.ply",
+        "view-1.ply",
+        "view-2.ply",
+        "scans/block_wedge.ply",
+        "scans/gear.ply",
+        "patches/1.ply",
+        *MONTHS,
+    ):
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / "jobs" / "scans" / "block_wedge.ply", folder / name)
     return folder

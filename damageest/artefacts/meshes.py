@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from damageest.artefacts.arrays import Floats, Ints
+from damageest.artefacts.arrays import Flags, Floats, Ints
 from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
 
 ROUNDING = 1e-9
@@ -165,6 +165,10 @@ class Part(Solid):
     ``face_kinds`` what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds
     the distance between the CAD surface and the triangles. ``cad_scale``: one length of the CAD file, as its reader
     takes it, in ``unit``; 0 where the file was a mesh. ``notes`` say what was repaired or converted.
+
+    Where an earlier scan stands in place of the design: ``unseen`` (F,) has the triangles that only close the surface,
+    since that scan has no points there, ``scan_noise`` the standard deviation of its points, and ``scan_spacing`` how
+    far they lie apart. None and 0 for a part as designed.
     """
 
     unit: str = "mm"
@@ -176,8 +180,13 @@ class Part(Solid):
     tessellation_error: float = 0.0
     notes: tuple[str, ...] = ()
     cad_scale: float = 0.0
-    _dtypes: ClassVar[dict[str, Any]] = {**Mesh._dtypes, "faces_brep": np.int64}
-    _ranges: ClassVar[dict[str, Range]] = {"tessellation_error": (0.0, MOST), "cad_scale": (0.0, MOST)}
+    unseen: Flags | None = None
+    scan_noise: float = 0.0
+    scan_spacing: float = 0.0
+    _dtypes: ClassVar[dict[str, Any]] = {**Mesh._dtypes, "faces_brep": np.int64, "unseen": np.bool_}
+    _ranges: ClassVar[dict[str, Range]] = dict.fromkeys(
+        ("tessellation_error", "cad_scale", "scan_noise", "scan_spacing"), (0.0, MOST)
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -186,3 +195,5 @@ class Part(Solid):
             for name in ("face_names", "face_kinds"):
                 if known := getattr(self, name):
                     require_index("faces_brep", self.faces_brep, len(known), name)
+        if self.unseen is not None:
+            require_shape("unseen", self.unseen, len(self.faces))

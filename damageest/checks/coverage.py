@@ -22,7 +22,8 @@ MOST_REGIONS = 50
 VOLUME_POINTS = 10_000
 """Random points in the part that the volume behind each region is counted from."""
 
-Why = Literal["unknown", "hidden", "outside", "no points"]
+CLOSING: Literal["earlier scan"] = "earlier scan"
+Why = Literal["unknown", "hidden", "outside", "no points", "earlier scan"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +43,11 @@ def measure_coverage(part: Part, skin: SkinView, losses: Sequence[Solid], tolera
     """Describes what the scan shows. ``losses``: the damage volumes; skin that they remove was seen to be gone."""
     cells, rays = skin.cells, skin.rays
     seen = skin.seen | _find_removed(cells, skin.seen, losses, max(tolerance, spacing))
-    label = cells.label_connected(~seen)
+    is_skin = np.ones(len(seen), bool) if part.unseen is None else ~part.unseen[cells.parent]
+    label, closing = cells.label_connected(~seen & is_skin), cells.label_connected(~seen & ~is_skin)
+    label = np.where(closing >= 0, closing + label.max(initial=-1) + 1, label)
     regions, region = _describe_regions(part, cells, label, rays, (LEAST_EDGE * max(tolerance, spacing)) ** 2)
-    share = float(cells.areas[seen].sum() / cells.areas.sum())
+    share = float(cells.areas[seen & is_skin].sum() / max(cells.areas[is_skin].sum(), 1e-300))
     lost = rays.lost if rays else np.zeros(len(seen), bool)
     distance = np.where(skin.seen, skin.distance, np.nan)
     return Coverage(share, regions, cells.mesh, seen, distance, lost, region)
@@ -101,7 +104,9 @@ def _describe_regions(
                 np.array([corners.min(axis=0), corners.max(axis=0)]),
                 faces,
                 volume,
-                _explain(own, weight, rays),
+                _explain(own, weight, rays)
+                if part.unseen is None or not part.unseen[cells.parent[own[0]]]
+                else CLOSING,
             )
         )
     return tuple(out), region

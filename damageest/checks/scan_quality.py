@@ -32,6 +32,9 @@ MOST_SPURIOUS = 100
 REACH = 4.5
 """Standard deviations up to which scatter alone reaches, in a scan of some 100,000 points."""
 
+ROUNDED = 0.6
+"""Least tolerance where an earlier scan stands for the part, in its spacings: its edges are rounded by about a third
+of them."""
 ALIKE = 0.5
 """Least number of points beyond the tolerance outside, for each of those inside, where scatter puts them there."""
 
@@ -49,7 +52,9 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
             f"across; give {low:.2g} to {high:.4g}, or auto; is `units` right?"
         )
     least = 1e-4 * part.diagonal
-    auto = max(AUTO_TOLERANCE * scan.noise, AUTO_STEPS * step, 2 * part.tessellation_error, least)
+    noise = float(np.hypot(scan.noise, part.scan_noise))
+    auto = max(AUTO_TOLERANCE * noise, AUTO_STEPS * step, 2 * part.tessellation_error, least)
+    auto = max(auto, ROUNDED * part.scan_spacing)
     tolerance = wanted or auto
     unit = part.unit
     found: list[Reason] = []

@@ -44,6 +44,8 @@ ASKED = 2000
 AROUND, NOISY = 7, 3.0
 """Scan points about the deepest one, it among them, that tell whether it lies in a corner of the inner surface; and by
 how many standard deviations of their noise the deepest of many points is deeper than those where it does not."""
+POINT_GAP = 1.1
+"""Spacing of points in square roots of the area that each stands for, as `measure_noise_and_spacing` gives it."""
 MOST = 50_000
 """Scan points whose largest depth is taken."""
 
@@ -153,7 +155,7 @@ def measure_site_error(
     shares = find_shares(scanner, damage, inner, (deepest.at, deepest.normal), pose, adapted is not None)
     depth_by = {
         "spacing": DEPTH_GAP * surface.gap,
-        "noise": DEPTH_NOISE * aligned.noise,
+        "noise": DEPTH_NOISE * float(np.hypot(aligned.noise, part.scan_noise)),
         "pose": by_pose,
         "adapt": bent_depth,
         "form": max(form, systematic),
@@ -162,12 +164,15 @@ def measure_site_error(
     }
     told = float((shares.depth**2).sum())
     beside = sum(depth_by[name] ** 2 for name in depth_by if name not in ("spacing", "noise")) + told
+    beside += (DEPTH_NOISE * part.scan_noise) ** 2
+    # of skin that is the mean of the points of an earlier scan, each of which stands for an area
+    skin_noise = part.scan_noise * float(np.sqrt(skin_area)) * part.scan_spacing / POINT_GAP
     by_point = float(np.sqrt(aligned.noise**2 + beside))
     # in a corner of the inner surface no point may be as deep as it is; where the floor is level, one is
     corner = min(max(deepest.rise - NOISY * aligned.noise, 0.0), WIDTH * depth_by["spacing"])
     return SiteError(
         volume=damage.volume,
-        noise=surface.noise,
+        noise=float(np.hypot(surface.noise, skin_noise)),
         spacing=surface.spacing,
         rim=surface.rim,
         excess=surface.excess,

@@ -34,6 +34,7 @@ UNSEEN_WHY = {
     "hidden": "hidden by the part from every scanner position",
     "outside": "outside every view",
     "no points": "in view, but without points",
+    "earlier scan": "not in the earlier scan either",
 }
 
 
@@ -168,14 +169,15 @@ def _print_coverage(result: Result, show: Show) -> None:
         return
     unit = result.units
     show(f"tolerance: {result.tolerance:.4g} {unit}; the scan shows {coverage.seen:.0%} of the skin")
-    for region in coverage.unseen[:MOST_UNSEEN]:
+    regions = [region for region in coverage.unseen if region.why != "earlier scan"]  # a note tells of those
+    for region in regions[:MOST_UNSEEN]:
         x, y, z = region.centre
         why = "" if region.why == "unknown" else f" ({UNSEEN_WHY[region.why]})"
         show(
             f"unseen: {region.area:.4g} {unit}² near ({x:.4g}, {y:.4g}, {z:.4g}){why}; a loss of up to "
             f"{region.volume:.4g} {unit}³ there would not show"
         )
-    if more := coverage.unseen[MOST_UNSEEN:]:
+    if more := regions[MOST_UNSEEN:]:
         show(f"unseen: {len(more)} smaller regions, {sum(one.area for one in more):.4g} {unit}²")
 
 
@@ -237,7 +239,9 @@ def _print_table(result: Result, target: Path) -> None:
             table.add_row(str(site.id), *numbers, describe_interval(site.volume_95), site.method, verdict)
         console.print(table)
         known = "" if result.volume_95 is None else f" (95 %: {describe_interval(result.volume_95)})"
-        show(f"damage volume: {result.damage_volume:.6g} {unit}³{known}; part volume: {result.part.volume:.6g} {unit}³")
+        # what an earlier scan shows bounds no volume of its own
+        whole = "" if result.part.unseen is not None else f"; part volume: {result.part.volume:.6g} {unit}³"
+        show(f"damage volume: {result.damage_volume:.6g} {unit}³{known}{whole}")
         if result.not_in_budget:
             show(f"not known, and in no interval: {', '.join(result.not_in_budget)}")
     elif not result.failures:

@@ -244,7 +244,8 @@ def _describe_open(vertices: Floats, faces: Ints) -> str:
         parts.append(f"{open_edges(faces)} edges whose two triangles have opposite windings")
     return (
         f"not watertight: {'; '.join(parts)} ({len(faces)} triangles in {bodies} "
-        f"piece{'s' * (bodies != 1)}). Export the part again as a solid, or close the mesh in a mesh editor"
+        f"piece{'s' * (bodies != 1)}). Export the part again as a solid, or close the mesh in a mesh editor; "
+        "a scan in place of a part:  part: {use: earlier_scan, path: ...}"
     )
 
 

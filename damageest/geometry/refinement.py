@@ -88,7 +88,8 @@ def cut_part(part: Part, edge: float) -> Part:
     """The part with no edge longer than ``edge``, as `cut_into_cells` cuts it; its triangles keep their CAD faces."""
     mesh, origin = cut_into_cells(part, edge)
     brep = None if part.faces_brep is None else part.faces_brep[origin]
-    return replace(part, vertices=mesh.vertices, faces=mesh.faces, faces_brep=brep)
+    unseen = None if part.unseen is None else part.unseen[origin]
+    return replace(part, vertices=mesh.vertices, faces=mesh.faces, faces_brep=brep, unseen=unseen)
 
 
 def bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, Ints]:

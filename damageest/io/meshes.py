@@ -55,7 +55,10 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
         raise_environment_fault(error)
         raise InputError(f"{path}: cannot be read as a {suffix} mesh ({shorten_error(error)})") from None
     if not meshes:
-        raise InputError(f"{path}: the file has no triangles; a part must be a closed mesh. Are part and scan swapped?")
+        raise InputError(
+            f"{path}: the file has no triangles; a part must be a closed mesh. Are part and scan "
+            "swapped? Of an earlier scan in place of the part:  part: {use: earlier_scan, path: ...}"
+        )
     vertices, faces = trimesh.util.append_faces(*zip(*meshes, strict=True))
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(f"{path}: a triangle refers to a vertex that is not in the file; the file may be truncated")

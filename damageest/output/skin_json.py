@@ -20,9 +20,9 @@ class UnseenReport(JsonModel):
     bounds: tuple[Vector, Vector]
     faces: list[int] = Field(description="numbers of its CAD faces; empty without B-rep")
     volume: float = Field(description="of the part behind it: the most that can be lost without a trace in the scan")
-    why: Literal["unknown", "hidden", "outside", "no points"] = Field(
+    why: Literal["unknown", "hidden", "outside", "no points", "earlier scan"] = Field(
         description="hidden: by the part itself; outside: of every view; no points: though a view shows its place; "
-        "unknown: no scanner position is known"
+        "unknown: no scanner position is known; earlier scan: the part is one, which does not show it either"
     )
 
 

@@ -38,6 +38,7 @@ from damageest.pipeline.scanner import correct_temperature, weigh_scanner
 from damageest.pipeline.sections import cut_sections
 from damageest.pipeline.selections import check_selections
 from damageest.pipeline.sensor import fold_hidden, look_for_sheets, measure_sensor, set_explained_aside
+from damageest.pipeline.shared import keep_shared
 from damageest.pipeline.sites import (
     gather_sites,
     number_sites,
@@ -92,6 +93,7 @@ ACQUIRE: Route = (
         add_points_near_damage,  # reader, scan, pose, part, tolerance, unit, thermal_scale -> scan
         place_scan,  # scan, pose -> aligned, noise, spacing
     ),
+    keep_shared,  # scan, aligned, part, tolerance, unit -> scan, aligned, +warnings
     correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner, warnings
     #     -> views, pose, aligned, noise, spacing, tolerance, warnings
     hold_datums,  # calls Align: views, pose, aligned, scan, part, tolerance, aligner, warnings, unit, samples

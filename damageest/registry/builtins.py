@@ -41,6 +41,7 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.enclose.implicit import Implicit
     from damageest.stages.enclose.shortest_path import ShortestPath
     from damageest.stages.export.files import Files
+    from damageest.stages.part.earlier_scan import EarlierScan
     from damageest.stages.part.file import PartFile
     from damageest.stages.part.reconstruct import PartFromScan
     from damageest.stages.path.none import NoPath as NoPath
@@ -61,7 +62,7 @@ def damageest_stages() -> list[type[Stage]]:
         AutoAdapt, MeshDistance, Dbscan, PyVista, LargestLoop, AllLoops, Offset, BoundingBox, Capsule,
         CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
         NoRepair, Manifold, NoAllowance, Milling, NoPath, Files, Uniform, CloudDistance, SignedDistance,
-        PartFromScan, Html, NoReport,
+        PartFromScan, EarlierScan, Html, NoReport,
     ]  # fmt: skip
 
 

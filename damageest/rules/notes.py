@@ -31,6 +31,7 @@ RUN_CODES: dict[str, RunCode] = {
     "thin_walls": RunCode("the tolerance is more than half the thickness of walls: no damage can be found there", 0),
     "tolerance_small": RunCode("the tolerance is so small that intact skin may be mistaken for damage", 0),
     "tolerance_raised": RunCode("tolerance: auto was raised, since intact skin deviates by more than the noise", 0),
+    "earlier_scan": RunCode("the part is an earlier scan: only skin that both scans show is compared", 0),
     "few_points": RunCode("the scan has too few points to show the skin between them", 0),
     "fell_back": RunCode("method auto took the route surface, since implicit failed", 1),
     "below_noise": RunCode("shallow places that errors of the scan explain are no sites", 0),

@@ -23,7 +23,10 @@ CAUSES = {
     "rim": ("where the inner surface meets the skin", "a smaller tolerance, if the noise allows it"),
     "spacing": ("the gaps between the points", "scan this place more densely"),
     "noise": ("the noise of the points", "scan with less noise, or more often"),
-    "tessellation": ("triangles in place of the CAD surface", "a finer part.chord"),
+    "tessellation": (
+        "triangles in place of the CAD surface, or the surface of an earlier scan",
+        "a finer part.chord, or a denser earlier scan",
+    ),
 }
 """Each cause in words, and what makes it smaller."""
 

@@ -30,6 +30,7 @@ PAIRS = [[((p - _POSE[:3, 3]) @ _POSE[:3, :3]).tolist(), p.tolist()] for p in (*
 WITH: dict[str, dict[str, Any]] = {
     "part file": {"options": {"path": FOLDER / "prism.stl"}, "volume": VOLUME},
     "part reconstruct": {"options": {"path": FOLDER / "prism.ply"}, "volume": VOLUME, "error": 0.02},
+    "part earlier_scan": {"options": {"path": FOLDER / "prism.ply"}, "volume": VOLUME, "error": 0.02},
     "part brep": {
         "options": {"path": Path(__file__).parents[2] / "jobs/parts/half_torus.step"},
         "volume": np.pi**2 * 28 * 10**2,

@@ -31,7 +31,7 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
     on = np.abs(distance) < band
     jacobian = np.column_stack([np.cross(at[on], target.normals[face[on]]), target.normals[face[on]]])
     stiffness, motions = np.linalg.eigh(jacobian.T @ jacobian / max(int(on.sum()), 1))
-    surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
+    surface = orient_surface(target.known, 5000, np.random.default_rng(0)).points
     here = robust_cost(distance, band)
     for twist in motions.T[stiffness < 0.01]:
         for D in make_motions(np.stack([twist, -twist]) * 6 * band):
@@ -69,7 +69,7 @@ def note_ambiguity(choice: Choice, part: PreparedPart) -> tuple[Reason, ...]:
         motions = motions[~np.array(known)]
     if not len(motions):
         return ()
-    surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
+    surface = orient_surface(target.known, 5000, np.random.default_rng(0)).points
     if band > 2 * SAME:
         # poses of a coarse scan are less exact than the part: the motions are fitted, and a hole that is larger counts
         moved = [fit(target, move_points(surface, D), np.eye(4), band, SAME / 4, 12).pose @ D for D in motions]

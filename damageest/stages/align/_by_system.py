@@ -193,7 +193,7 @@ def _doubt_open(frame: Frame, patches: Patches, free: Floats) -> tuple[Reason, .
     leave ``free`` (6,F), which move the part's skin but none that was seen."""
     if not free.shape[1]:
         return ()
-    points, face = sample_by_area(frame.target.mesh, SAMPLES, np.random.default_rng(0))
+    points, face = sample_by_area(frame.target.known, SAMPLES, np.random.default_rng(0))
     normals = frame.target.normals[face]
     rows = np.concatenate([np.cross(points, normals), normals], axis=1)
     seen = _restrict(patches, free).basis

@@ -59,7 +59,7 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
     fitted = check_pose(frame.target, near, points, dense, band)
 
     D = near.pose @ np.linalg.inv(start)
-    surface = orient_surface(frame.target.mesh, 3000, rng).points
+    surface = orient_surface(frame.target.known, 3000, rng).points
     moved = float(np.quantile(np.abs(frame.target.closest(move_points(surface, D))[0]), 0.98)) * frame.size
     gain, beside = fitted.on - given.on, given.beside - fitted.beside
     differs = fitted.is_acceptable and moved > tolerance

@@ -9,7 +9,7 @@ import numpy as np
 from damageest.artefacts import Floats, Reason
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
-from damageest.stages.align._field import PartSurface
+from damageest.stages.align._field import UNKNOWN, PartSurface
 from damageest.stages.align._fine import Fit
 from damageest.stages.align._points import draw_stratified, orient_surface
 
@@ -28,6 +28,9 @@ outside it, but near: a part that lost a third of its metal at two large fractur
 
 NEAR = 0.05
 """Distance outside the part, in diagonals, from which a point shows something beside the part, such as a table."""
+
+MIN_FACING = 0.2
+"""Share of the scanned area that has to face skin, of a part that is an earlier scan: the shares are of that."""
 
 CHECKED_POINTS = 15_000
 """Number of points that each share is estimated from; enough for half a percent."""
@@ -104,13 +107,19 @@ def check_pose(target: PartSurface, best: Fit, even: Floats, raw: Floats, tolera
     even, raw = (points[draw_stratified(len(points), CHECKED_POINTS, rng)] for points in (even, raw))
     at = move_points(even, best.pose)
     distance = target.closest(at)[0]
+    faces_skin = distance > UNKNOWN
+    share = float(faces_skin.mean())
+    if share < MIN_FACING:
+        return PoseCheck(0.0, 0.0, 1.0, 0.0, 0.0, float("inf"), 0.0)
+    even, at, distance = even[faces_skin], at[faces_skin], distance[faces_skin]
     on = np.abs(distance) <= band
-    surface = orient_surface(target.mesh, 5000, np.random.default_rng(0)).points
+    surface = orient_surface(target.known, 5000, np.random.default_rng(0)).points
     cover = 0.0
     if on.sum() > 10:
-        gap = 3 * float(np.sqrt(target.mesh.area / len(even)))
+        gap = 3 * float(np.sqrt(target.known.area / len(even)))
         cover = float(np.isfinite(cKDTree(at[on]).query(surface, distance_upper_bound=max(gap, 0.02))[0]).mean())
     raw_distance = target.closest(move_points(raw, best.pose))[0]
+    raw_distance = raw_distance[raw_distance > UNKNOWN]
     hit = np.abs(raw_distance) <= band
     rms = float(np.sqrt((raw_distance[hit] ** 2).mean())) if hit.any() else float("inf")
     return PoseCheck(

@@ -46,7 +46,7 @@ def turn_poses(poses: Floats, target: PartSurface, field: PlaneGrid, scan: Orien
 
 def _make_turns(target: PartSurface) -> Floats:
     """Motions (M,4,4) of the part about its principal axes."""
-    points = orient_surface(target.mesh, 4000, np.random.default_rng(0)).points
+    points = orient_surface(target.known, 4000, np.random.default_rng(0)).points
     middle = points.mean(axis=0)
     axes = np.linalg.eigh((points - middle).T @ (points - middle))[1].T
     angles = np.radians(np.arange(0, 360, STEP))

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Floats, Ints, Mesh
+from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.distance import SurfaceTree
 
 Floats32 = NDArray[np.float32]
@@ -17,11 +17,23 @@ CELLS = 220_000
 """Number of cells of the grid; on a compact part each is about 1/100 of the diagonal."""
 
 
+UNKNOWN = -10.0
+"""Signed distance, in diagonals, of points below or above skin that only closes an earlier scan: as of a point deep
+inside, which may be anything and speaks for no pose and against none."""
+
+
 @dataclass(frozen=True)
 class PartSurface:
-    """The part, centred and scaled to a diagonal of 1, for exact closest-point queries."""
+    """The part, centred and scaled to a diagonal of 1, for exact closest-point queries. ``unseen`` (F,): triangles that
+    only close an earlier scan; None: of a part as designed."""
 
     mesh: Mesh
+    unseen: Flags | None = None
+
+    @cached_property
+    def known(self) -> Mesh:
+        """The triangles that are skin."""
+        return self.mesh if self.unseen is None else Mesh(self.mesh.vertices, self.mesh.faces[~self.unseen])
 
     @cached_property
     def _tree(self) -> SurfaceTree:
@@ -40,7 +52,10 @@ class PartSurface:
         """
         distance, face, foot = self._tree.closest(points)
         outward = np.einsum("ij,ij->i", points - foot, self.normals[face])
-        return np.copysign(distance, outward), foot, face
+        signed = np.copysign(distance, outward)
+        if self.unseen is not None:
+            signed[self.unseen[face]] = UNKNOWN
+        return signed, foot, face
 
 
 @dataclass(frozen=True)

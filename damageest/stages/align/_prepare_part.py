@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh
+from damageest.artefacts import Floats
 from damageest.io.part_store import Arrays, recall
 from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._pairs import PairTable
@@ -54,7 +54,7 @@ class _Asked:
 
 def prepare_part(surface: PartSurface, seed: int) -> PreparedPart:
     """The data of a part, from the last call or an earlier run where the mesh and the seed are the same."""
-    asked = _Asked(_digest(surface.mesh), seed, surface)
+    asked = _Asked(_digest(surface), seed, surface)
     if len(surface.mesh.faces) > MOST_KEPT:
         return _prepare(asked)
     return _prepare_once(asked)
@@ -72,7 +72,7 @@ _prepare_once = functools.lru_cache(maxsize=1)(_prepare)
 def _compute(asked: _Asked) -> Arrays:
     """The grid and the table of pairs as arrays, in types that take little space."""
     surface, rng = asked.surface, np.random.default_rng([asked.seed, 1])
-    points = orient_surface(surface.mesh, SURFACE_POINTS, rng)
+    points = orient_surface(surface.known, SURFACE_POINTS, rng)
     grid, pairs = PlaneGrid.build(surface), PairTable.build(points, rng)
     return {
         "low": grid.low, "cell": np.array(grid.cell), "shape": np.array(grid.shape),
@@ -89,8 +89,9 @@ def _unpack(arrays: Arrays) -> tuple[PlaneGrid, PairTable]:
     return grid, PairTable(points, *(arrays[name].astype(np.int64) for name in ("i", "j", "key")))
 
 
-def _digest(mesh: Mesh) -> str:
+def _digest(surface: PartSurface) -> str:
     found = hashlib.blake2b(digest_size=16)
-    for array in (mesh.vertices, mesh.faces):
+    unseen = () if surface.unseen is None else (surface.unseen,)
+    for array in (surface.mesh.vertices, surface.mesh.faces, *unseen):
         found.update(np.ascontiguousarray(array).data)
     return found.hexdigest()

@@ -36,8 +36,8 @@ def find_symmetries(target: PartSurface, grid: PlaneGrid, pairs: PairTable, seed
     verified, and closed under composition, so that most need no fit of their own.
     """
     rng = np.random.default_rng([seed, 2])
-    cloud = orient_surface(target.mesh, 3000, rng)
-    surface = orient_surface(target.mesh, 4000, rng).points
+    cloud = orient_surface(target.known, 3000, rng)
+    surface = orient_surface(target.known, 4000, rng).points
     corners = target.mesh.vertices[rng.permutation(len(target.mesh.vertices))[:MOST_CORNERS]]
     group, failures = np.eye(4)[None], 0
     generators: list[Floats] = []

@@ -43,7 +43,7 @@ class KnownPose(Align):
         # fewer points show no pose to compare the given one with
         doubts = check_given(T, scan, part, tolerance) if len(scan.points) >= MIN_POINTS else ()
         points = scan.points[:: max(1, len(scan.points) // 100_000)]
-        distance = PartSurface(part).closest(move_points(points, T))[0]
+        distance = PartSurface(part, part.unseen).closest(move_points(points, T))[0]
         hit = np.abs(distance) <= tolerance
         rms = float(np.sqrt((distance[hit] ** 2).mean())) if hit.any() else 0.0
         return Pose(T, rms, float(hit.mean()), notes=tuple(map(str, doubts)), doubts=doubts)

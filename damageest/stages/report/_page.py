@@ -38,6 +38,7 @@ WHY = {
     "hidden": "hidden by the part from every scanner position",
     "outside": "outside every view",
     "no points": "in view, but without points",
+    "earlier scan": "not in the earlier scan either",
     "unknown": "not known",
 }
 

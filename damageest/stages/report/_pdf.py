@@ -23,6 +23,7 @@ from damageest.rules.notes import fold_notes
 from damageest.stages.report._drawing import draw
 from damageest.stages.report._page import choose_tone
 from damageest.stages.report._pdf_book import Book, Letterhead, clean_line
+from damageest.stages.report._pdf_budget import show_budget
 from damageest.stages.report._pdf_parts import (
     FOOT,
     HEAD,
@@ -69,6 +70,8 @@ def write_pdf(
     story: list[Any] = [*_summarise(book, _draw_part(result, remains, direction))]
     if result.sections:
         story += [PageBreak(), *show_sections(book)]
+    if result.budget is not None and len(result.sites) > 1:
+        story += [PageBreak(), *show_budget(book, result.budget, book.words.tell("damage volume"), f"{book.unit}³")]
     for site, shown in zip(result.sites, sites, strict=True):
         story += [PageBreak(), *_show_site(book, site, shown)]
     numbered = book.words.tell("page {page} of {pages}")
@@ -263,6 +266,11 @@ def _show_site(book: Book, site: Site, shown: Shown) -> list[Any]:
     story.append(head(tell("Reasons")))
     reasons = shown.reasons or [tell("Nothing in the scan speaks against it.")]
     story += [write(f"– {text}", 8) for text in reasons]
+    known = site.uncertainty
+    if known is not None and known.budget is not None:
+        story += show_budget(book, known.budget, tell("volume"), f"{unit}³")
+    if known is not None and known.depth_budget is not None:
+        story += show_budget(book, known.depth_budget, tell("depth"), unit)
     return story
 
 

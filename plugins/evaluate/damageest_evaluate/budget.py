@@ -3,8 +3,9 @@ goes through the whole route, the fit of the pose included.
 
 The parts are small and have few triangles, so that a draw takes about a second. Each draw has new points, noise, a
 smooth field of form errors, an offset of the surface, a scale of the scanner, another temperature and expansion than
-the job tells, and another pose. What the budget says is compared with how often the truth lies in the interval, and
-with how far the results scatter.
+the job tells, and another pose. The damage is the same in all draws of a part, or another in each: of another size, in
+another place, turned. What the budget says is compared with how often the truth lies in the interval, and with how far
+the results scatter.
 """
 
 from __future__ import annotations
@@ -39,6 +40,9 @@ WAVES = 200
 """Waves of which the field of form errors is made."""
 TURN, SHIFT = 0.02, 0.3
 """Largest turn about an axis, in radians, and shift in mm of the part in the scan."""
+TOOL_TURN, TOOL_SHIFT, TOOL_SIZE = 20.0, 1.0, 0.2
+"""Largest turn of a damage about an axis, in degrees, its shift in mm, and change of its size, where each draw has
+another one."""
 
 
 def _make_block() -> tuple[Any, Any]:
@@ -81,16 +85,19 @@ PARTS: dict[str, Callable[[], tuple[Any, Any]]] = {
 
 @dataclass(frozen=True)
 class BudgetCase:
-    """Some ``draws`` on one part, all in one process. ``source``: digest of the code."""
+    """Some ``draws`` on one part, all in one process. ``source``: digest of the code. ``is_same``: whether the damage
+    is the same in each."""
 
     part: str
     seed: int
     draws: int
     source: str = ""
+    is_same: bool = True
     varied: Mapping[str, float | str] = field(default_factory=dict)
 
     def compute_key(self) -> str:
-        return digest("budget", self.part, self.seed, self.draws, self.source)
+        other = () if self.is_same else ("other damages",)
+        return digest("budget", self.part, self.seed, self.draws, self.source, *other)
 
     def make_blank_row(self) -> Row:
         row: Row = {"key": self.compute_key(), "part": self.part, "seed": self.seed, "varied": dict(self.varied)}
@@ -100,16 +107,21 @@ class BudgetCase:
         """The row with each draw's results against the truth."""
         from damageest.registry import Registry
 
-        start, registry, scene = time.perf_counter(), Registry.discover(), make_scene(self.part)
-        draws = [scene.run(np.random.default_rng([self.seed, k]), registry) for k in range(self.draws)]
+        start, registry, scene, draws = time.perf_counter(), Registry.discover(), make_scene(self.part), []
+        for number in range(self.draws):
+            rng = np.random.default_rng([self.seed, number])
+            drawn = scene if self.is_same else make_scene(self.part, rng)
+            draws.append(drawn.run(rng, registry))
         return self.make_blank_row() | {"draws": draws, "seconds": time.perf_counter() - start}
 
 
-def make_budget_cases(parts: Sequence[str], draws: int, batch: int, seed: int, source: str) -> list[BudgetCase]:
+def make_budget_cases(
+    parts: Sequence[str], draws: int, batch: int, seed: int, source: str, is_same: bool = True
+) -> list[BudgetCase]:
     """Cases of at most ``batch`` draws, the parts in turn, until each part has ``draws``."""
     starts = range(0, draws, batch)
     return [
-        BudgetCase(name, 1_000_000 * seed + start, min(batch, draws - start), source, {"part": name})
+        BudgetCase(name, 1_000_000 * seed + start, min(batch, draws - start), source, is_same, {"part": name})
         for start in starts
         for name in parts
     ]
@@ -185,9 +197,14 @@ class Scene:
         }
 
 
-def make_scene(name: str) -> Scene:
-    """The scene of a part."""
+def make_scene(name: str, rng: np.random.Generator | None = None) -> Scene:
+    """The scene of a part, with its own damage, or with one that ``rng`` draws about it."""
     body, tool = PARTS[name]()
+    if rng is not None:
+        centre = np.array(tool.bounding_box()).reshape(2, 3).mean(axis=0)
+        turns, size = rng.uniform(-TOOL_TURN, TOOL_TURN, 3), 1 + rng.uniform(-TOOL_SIZE, TOOL_SIZE)
+        moved = centre + rng.uniform(-TOOL_SHIFT, TOOL_SHIFT, 3)
+        tool = tool.translate(-centre).rotate(turns).scale((size, size, size)).translate(moved)
     vertices, faces = to_arrays(body)
     part = Part(vertices, faces, unit="mm", path=name)
     metal, damage = to_solid(to_manifold(part) - tool), to_solid(to_manifold(part) ^ tool)

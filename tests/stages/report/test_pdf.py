@@ -31,7 +31,7 @@ def run(folder: Path, language: str) -> list[str]:
 
 
 def test_the_pdf_has_a_summary_sections_and_a_page_for_each_site(tmp_path: Path) -> None:
-    summary, sections, site = run(tmp_path, "en")
+    summary, sections, site, budget = run(tmp_path, "en")
     for text in (
         "Müller & Söhne",
         "1 site: 1",
@@ -39,15 +39,19 @@ def test_the_pdf_has_a_summary_sections_and_a_page_for_each_site(tmp_path: Path)
         "95 % interval",
         "SHA-256",
         "released by",
-        "page 1 of 3",
+        "page 1 of 4",
     ):
         assert text in summary, text
     assert "line profile" in sections
     assert "Site 1" in site
+    assert "Budget of uncertainty: volume" in site + budget
+    assert "Budget of uncertainty: depth" in budget
+    assert "combined standard uncertainty" in budget
     first = (tmp_path / "out/report.pdf").read_bytes()
     german = run(tmp_path, "de")
     assert "Schadensbericht" in german[0]
-    assert "Seite 1 von 3" in german[0]
+    assert "Seite 1 von 4" in german[0]
+    assert "kombinierte Standardunsicherheit" in german[3]
     assert re.search(r"Toleranz\s+0,20+ mm", german[0])
     run(tmp_path, "en")
     assert (tmp_path / "out/report.pdf").read_bytes() == first

@@ -12,6 +12,7 @@ def command(
     draws: Annotated[int, typer.Option(min=1, help="Scans that are drawn of each part.")] = 200,
     parts: Annotated[str, typer.Option(metavar="A,B", help="Names of parts. Default: all five.")] = "",
     batch: Annotated[int, typer.Option(min=1, help="Draws of one part in one process.")] = 25,
+    same: Annotated[bool, typer.Option("--same/--other", help="The same damage in all draws of a part.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all draws.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes that run at the same time.")] = 2,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a process is stopped.")] = 3600,
@@ -32,7 +33,7 @@ def command(
     for name in names:
         if name not in PARTS:
             raise InputError(f"--parts: there is no part '{name}'{suggest(name, list(PARTS))}")
-    cases = make_budget_cases(names, draws, batch, seed, fingerprint_code(Registry.discover()))
+    cases = make_budget_cases(names, draws, batch, seed, fingerprint_code(Registry.discover()), same)
 
     def describe(row: dict[str, Any]) -> str:
         known = [one for one in row["draws"] if not one["error"]]

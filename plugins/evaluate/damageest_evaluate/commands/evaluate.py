@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from damageest_evaluate.commands import adapt, budget, honesty, path, realistic, speed, steady
+from damageest_evaluate.commands import adapt, budget, difference, honesty, path, realistic, speed, steady
 from damageest_evaluate.commands._counted import format_command
 from damageest_evaluate.commands.intervals import run_intervals
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 app = typer.Typer(no_args_is_help=True, help="Measure accuracy and cost against known truth.")
 app.command("adapt")(adapt.command)
 app.command("budget")(budget.command)
+app.command("difference")(difference.command)
 app.command("honesty")(honesty.command)
 app.command("realistic")(realistic.command)
 app.command("steady")(steady.command)

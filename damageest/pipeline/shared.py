@@ -1,0 +1,40 @@
+"""The step that leaves what can be compared, where an earlier scan stands for the part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import Part, Reason, Scan
+from damageest.checks.shared_skin import find_unshared
+from damageest.errors import StageError
+from damageest.pipeline.state import Reasons
+from damageest.pipeline.steps import step
+
+FEWEST = 100
+"""Points on skin that both scans show, below which nothing can be compared."""
+
+
+@step(gives=("scan", "aligned", "warnings"))
+def keep_shared(scan: Scan, aligned: Scan, part: Part, tolerance: float, unit: str) -> tuple[Scan, Scan, Reasons]:
+    """Sets the points aside that show skin which the earlier scan does not. Raises StageError where nearly none is
+    left. Nothing is changed where the part is as designed."""
+    if part.unseen is None:
+        return scan, aligned, ()
+    unseen, other = find_unshared(aligned.points, aligned.spacing, part, tolerance)
+    kept = ~(unseen | other)
+    if kept.sum() < FEWEST:
+        raise StageError(
+            "the two scans have no skin in common in the pose found", "scan sides that the earlier scan shows as well"
+        )
+    area = float(np.linalg.norm(part.cross[~part.unseen], axis=1).sum() / 2)
+    text = (
+        f"the part is an earlier scan, which shows {area:.4g} {unit}² of skin: what is said holds there alone; "
+        f"{1 - kept.mean():.0%} of the later scan's points show other skin and were set aside"
+    )
+    if other.any():
+        text += f", {int(other.sum())} of them below the skin, on surfaces that may have been there before"
+    remedy = "if it is the scan that shows the part as designed, part and scan are swapped"
+    told = Reason("earlier_scan", text, amount=float(1 - kept.mean()), remedy=remedy)
+    return (replace(scan, notes=(*scan.notes, text)).take(kept), aligned.take(kept), [told])

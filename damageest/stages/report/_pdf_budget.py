@@ -1,0 +1,70 @@
+"""Budgets of uncertainty as tables of the PDF."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from reportlab.platypus import KeepTogether
+
+from damageest.findings import Budget
+from damageest.stages.report._pdf_book import Book
+from damageest.stages.report._pdf_parts import SOFT, WIDTH, grid_table, head, write
+
+N_ = str
+"""Marks texts that are translated where they are shown."""
+TOLD = (
+    N_("normal"), N_("rectangular"),
+    N_("noise of the points on the inner surface"),
+    N_("surface between the points, calibrated on simulated damages"),
+    N_("where the inner surface meets the skin, calibrated on simulated damages"),
+    N_("pose, as the intact points fix it"),
+    N_("field that the part was adapted by"),
+    N_("intact skin that deviates over whole areas"),
+    N_("skin that lies as far outside the part"),
+    N_("views that differ where they overlap"),
+    N_("triangles in place of the CAD surface"),
+    N_("probing form error beyond the noise and the form that the scan shows"),
+    N_("probing size error: half of it is an offset of the surface"),
+    N_("length measurement error over the part's diagonal, as a scale"),
+    N_("temperature of the part"),
+    N_("coefficient of expansion of the part"),
+    N_("scale of the scan, fitted to the part"),
+    N_("motions that the scan does not exclude"),
+    N_("inner surface closed across what was not seen"),
+    N_("no points show the inner surface"),
+    N_("skin beside it is not seen"),
+    N_("it fades out beyond its rim"),
+    N_("sites that are not accepted, and places that may be damage"),
+    N_("ends at what the scan points show"),
+)  # fmt: skip
+"""Words of the rows and bounds of a budget."""
+
+
+def show_budget(book: Book, budget: Budget, name: str, unit: str) -> list[Any]:
+    """The budget of a quantity called ``name``, in its ``unit``: rows, sums, and the bounds that are in no row."""
+    tell, number = book.words.tell, book.words.number
+    rows = [[tell("source"), tell("type"), tell("distribution"), tell("standard uncertainty"), tell("sensitivity"),
+             tell("contribution, {unit}", unit=unit), tell("share")]]  # fmt: skip
+    for row in budget.rows:
+        rows.append([tell(row.text), row.type, tell(row.distribution), f"{number(row.uncertainty, 3)} {row.unit}",
+                     number(row.sensitivity, 3), number(row.contribution, 3), book.words.share(row.share)])  # fmt: skip
+    rows.append([tell("combined standard uncertainty"), "", "", "", "", number(budget.combined, 3), ""])
+    expanded = tell("expanded uncertainty, k = {k}", k=number(budget.k, 2))
+    rows.append([expanded, "", "", "", "", number(budget.expanded, 3), ""])
+    widths = [share * WIDTH for share in (0.27, 0.05, 0.12, 0.19, 0.15, 0.13, 0.09)]
+    title = head(tell("Budget of uncertainty: {name}", name=name))
+    story: list[Any] = [KeepTogether([title, grid_table(rows, widths, 7)])]
+    if budget.correction:
+        shift = f"{'+' if budget.correction > 0 else '−'} {number(abs(budget.correction), 3)} {unit}"
+        story.append(_write(tell("The middle of the interval is the value {shift}, its mean error.", shift=shift)))
+    for bound in budget.bounds:
+        ends = [("−", -bound.low), ("+", bound.high)]
+        told = [f"{sign} {number(size, 3)} {unit}" for sign, size in ends if size and math.isfinite(size)]
+        text = tell("Not in the budget, moves an end of the interval: {bound}", bound=tell(bound.text))
+        story.append(_write(f"{text}{': ' * bool(told)}{', '.join(told)}"))
+    return story
+
+
+def _write(text: str) -> Any:
+    return write(f"– {text}", 7, colour=SOFT)
