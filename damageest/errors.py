@@ -159,6 +159,22 @@ def find_missing_library(error: BaseException) -> str:
     return ""
 
 
+MORE_MEMORY = "a larger tolerance, fewer scan points (scan.most_points), or a larger --memory"
+
+
+def describe_shortage(error: BaseException) -> StageError | None:
+    """A message for the user where memory or threads ran out; None for another error."""
+    if isinstance(error, MemoryError):
+        return StageError("ran out of memory", MORE_MEMORY, code="memory")
+    if isinstance(error, RuntimeError) and "can't start new thread" in str(error):
+        return StageError(
+            "no thread can be started: memory, or the number of processes, is at its limit",
+            "a larger --memory, or a higher limit of processes (ulimit -u)",
+            code="memory",
+        )
+    return None
+
+
 def describe_missing_library(error: BaseException) -> StageError | None:
     """A message for the user where a Python module or a shared library does not load; None for another error."""
     if library := find_missing_library(error):
@@ -183,6 +199,10 @@ def describe_missing_library(error: BaseException) -> StageError | None:
         return missing
     if isinstance(error, ImportError):
         text = " ".join(str(error).split())[:400]
+        if "failed to map segment" in text or "cannot allocate memory" in text.lower():
+            return StageError(
+                f"ran out of memory, for {text.partition(':')[0]}", "more memory (--memory)", code="memory"
+            )
         return StageError(
             f"a Python module cannot be loaded: {text}", "--debug shows which; install it again", code="missing"
         )

@@ -7,7 +7,7 @@ import unicodedata
 
 import pytest
 
-from damageest.errors import MOST_TEXT, clean_message
+from damageest.errors import MOST_TEXT, clean_message, describe_missing_library, describe_shortage
 
 
 @pytest.mark.parametrize("code", [*range(0x20), *range(0x7F, 0xA0), 0x200F, 0x2028, 0x202E, 0x2067, 0xD800, 0xDFFF])
@@ -39,3 +39,11 @@ def test_an_error_without_text_is_named() -> None:
             raise RuntimeError("no words")
 
     assert clean_message(Mute()) == "(a Mute without text)"
+
+
+def test_want_of_memory_is_not_taken_for_a_broken_installation() -> None:
+    fault = describe_missing_library(ImportError("libopenblas.so: failed to map segment from shared object"))
+    assert str(fault).startswith("ran out of memory, for libopenblas.so")
+    assert str(describe_shortage(MemoryError())).startswith("ran out of memory")
+    assert str(describe_shortage(RuntimeError("can't start new thread"))).startswith("no thread can be started")
+    assert describe_shortage(RuntimeError("other")) is None

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import uuid
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,9 +22,15 @@ from damageest.geometry.threads import count_cores
 from damageest.io.files import expand_home, working_folder
 from damageest.isolation import measure_free_memory
 from damageest.isolation.limits import STAGE_SECONDS
+from damageest.pipeline.cache import describe_unwritable
 
 TIMEOUT = 3600.0
 """Default time limit of a job, in seconds."""
+UNWRITABLE = (
+    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.ENOENT,
+    errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG,
+)  # fmt: skip
+"""Errors of files, not of connections to a cluster."""
 Tell = Callable[[Sequence[BatchJob], Mapping[str, Row], set[str]], None]
 """Called with all jobs, the rows that there are by name, and the names of those that run now."""
 
@@ -70,7 +77,7 @@ def batch(
     rows = _find_done(found, folder) if options.cache else {}
     rows |= {job.name: _row(job, folder, outcome="refused", error=job.fault) for job in found if job.fault}
     waiting = [job for job in found if job.name not in rows]
-    with contextlib.ExitStack() as stack:
+    with _name_unwritable(folder), contextlib.ExitStack() as stack:
         stack.callback(lambda: write_page(_in_order(found, rows), folder))
         tables = stack.enter_context(contextlib.closing(Tables([job.name for job in found], rows.values(), folder)))
         if waiting and client is None:
@@ -86,6 +93,17 @@ def batch(
                 if tell:
                     tell(found, rows, active)
     return _in_order(found, rows)
+
+
+@contextlib.contextmanager
+def _name_unwritable(folder: Path) -> Iterator[None]:
+    """Raises JobError where the tables cannot be written, as on a full disk."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in UNWRITABLE:
+            raise
+        raise describe_unwritable(error, folder) from None
 
 
 def _in_order(jobs: Sequence[BatchJob], rows: Mapping[str, Row]) -> list[Row]:

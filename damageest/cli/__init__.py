@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import traceback
 from typing import NoReturn
@@ -15,7 +16,7 @@ from damageest.cli._commands import Commands
 from damageest.cli._errors import describe_failure, say_error
 from damageest.cli._json import say_json
 from damageest.cli._streams import say
-from damageest.errors import DamageestError, describe_missing_library, is_interrupt
+from damageest.errors import DamageestError, describe_missing_library, describe_shortage, is_interrupt
 from damageest.io.files import working_folder
 from damageest.isolation.one_thread import ONE_THREAD
 from damageest.isolation.supervise import note_status
@@ -128,12 +129,13 @@ def _call_app() -> NoReturn:
     except Exception as error:
         if is_interrupt(error):
             _stop_interrupted()
-        fail(describe_missing_library(error) or error)
+        fail(describe_missing_library(error) or describe_shortage(error) or error)
     finally:
         _process.bound_end(sys.exc_info()[1])
 
 
 def _stop_interrupted() -> NoReturn:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the second one, of who is impatient, changes nothing
     say(_interrupt.text, err=True)
     sys.exit(INTERRUPTED)
 

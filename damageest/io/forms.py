@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -129,7 +130,7 @@ def read_form(path: Path) -> MeasuredForm:
             _read_texts(arrays["scan"]), tuple(np.asarray(arrays["marks"], float).ravel().tolist()), str(path),
         )  # fmt: skip
     except (OSError, EOFError, ValueError, LookupError, TypeError, ArtefactError, zipfile.BadZipFile, zlib.error,
-            NotImplementedError, MemoryError) as error:  # fmt: skip
+            NotImplementedError, MemoryError, SyntaxError, TokenError) as error:  # fmt: skip
         why = " ".join(str(error).split())[:120] or type(error).__name__
         raise InputError(f"{path}: is no form of a measured part, or damaged ({why}); {AGAIN}") from None
 

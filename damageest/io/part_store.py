@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -100,7 +101,7 @@ def _read(path: Path) -> Arrays | None:
         if seal != _seal(path, arrays):
             return None
         os.utime(path)  # it was used now
-    except (OSError, EOFError, ValueError, LookupError, zipfile.BadZipFile, zlib.error):
+    except (OSError, EOFError, ValueError, LookupError, SyntaxError, TokenError, zipfile.BadZipFile, zlib.error):
         return None
     return arrays
 

@@ -109,7 +109,7 @@ def note_status(status: object) -> None:
 def _end_now() -> None:
     if _status is None:
         return
-    with contextlib.suppress(OSError, ValueError):
+    with contextlib.suppress(OSError, ValueError, MemoryError):
         for one in gc.get_objects():  # a file that a plugin has left open
             if type(one) in (io.TextIOWrapper, io.BufferedWriter, io.BufferedRandom) and not one.closed:
                 one.flush()

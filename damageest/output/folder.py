@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Mesh
 from damageest.errors import InputError
-from damageest.io.files import read_json
+from damageest.io.files import read_json, shorten_error
 from damageest.io.meshes import read_mesh
 
 PLY_TYPES = {"double": "<f8", "float": "<f4", "uchar": "u1", "int": "<i4"}
@@ -126,16 +126,23 @@ class OutputFolder:
 
     @cached_property
     def scan(self) -> LabelledScan | None:
-        """The aligned scan; None where the folder has none."""
+        """The aligned scan; None where the folder has none. Raises InputError for a file that is damaged."""
         path = self.place / "scan.ply"
         if not path.is_file():
             return None
-        head, body = path.read_bytes().split(b"end_header\n", 1)
-        words = [line.split() for line in head.decode().splitlines()]
-        dtype = [(line[2], PLY_TYPES[line[1]]) for line in words if line[0] == "property"]
-        table = np.frombuffer(body, dtype)
-        points = np.stack([table["x"], table["y"], table["z"]], axis=1)
-        return LabelledScan(points, table["distance"].astype(np.float64), table["site"])
+        try:
+            head, body = path.read_bytes().split(b"end_header\n", 1)
+            words = [line.split() for line in head.decode("ascii").splitlines()]
+            (count,) = (int(line[2]) for line in words if line[:2] == ["element", "vertex"])
+            dtype = [(line[2], PLY_TYPES[line[1]]) for line in words if line[:1] == ["property"]]
+            table = np.frombuffer(body, dtype)
+            if len(table) != count:
+                raise ValueError(f"{len(table)} of {count} points")
+            points = np.stack([table["x"], table["y"], table["z"]], axis=1)
+            return LabelledScan(points, table["distance"].astype(np.float64), table["site"])
+        except (ValueError, LookupError, TypeError) as error:
+            why = shorten_error(error)
+            raise InputError(f"{path}: is not as the run wrote it ({why}); run the job again") from None
 
     def check_site(self, site: int) -> None:
         """Raises InputError where the result has no site of that number."""

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from damageest.errors import InputError, StageError, clean_message
 from damageest.isolation import Limits, ProcessError, at_work, call_isolated
+from damageest.isolation.lost_threads import raise_lost
 from damageest.registry.registry import Implementation
 from damageest.stages import Stage
 
@@ -63,7 +64,8 @@ def call_guarded(function: Callable[[], T], owner: str) -> T:
     """What a function of ``owner`` gives. An error of Python's that would end more than the stage, as SystemExit or
     GeneratorExit, becomes a StageError; Ctrl-C stays what it is."""
     try:
-        return function()
+        with raise_lost():
+            return function()
     except (Exception, KeyboardInterrupt):
         raise
     except SystemExit as end:

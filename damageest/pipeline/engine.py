@@ -10,12 +10,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from damageest.artefacts import ArtefactError
-from damageest.errors import StageError, clean_message, is_interrupt
+from damageest.errors import StageError, clean_message, describe_shortage, is_interrupt
 from damageest.isolation import Limits, at_work
+from damageest.isolation.lost_threads import raise_lost
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache, digest
 from damageest.pipeline.calls import call_guarded, run_stage
-from damageest.pipeline.stage_errors import MORE_MEMORY, locate_error
+from damageest.pipeline.stage_errors import locate_error
 from damageest.pipeline.state import Candidate, FoundSite, JobState
 from damageest.pipeline.steps import GATHERED, Step
 from damageest.registry.contracts import DEFAULTS, Contract
@@ -131,8 +132,11 @@ class Engine:
         try:
             with at_work(what, self.limits.seconds):
                 _, given = self.remember(step.name, key, lambda: self._run(step, state), step.kept)
-        except MemoryError:
-            raise StageError(f"{what}: ran out of memory", MORE_MEMORY, code="memory") from None
+        except (MemoryError, RuntimeError) as error:
+            short = describe_shortage(error)
+            if short is None:
+                raise
+            raise StageError(f"{what}: {short.message}", short.remedy, code="memory") from None
         seconds = time.perf_counter() - start - sum(record.seconds for record in self.records[called:])
         self.steps.append(StepRecord(step.name, round(seconds, 3)))
         _tell(self.registry.hooks.hook.damageest_after_step, step=what, seconds=seconds)
@@ -148,7 +152,8 @@ class Engine:
 
     def _run(self, step: Step[..., Any], state: JobState) -> Any:
         own = {"engine": self, "state": state.select(step.takes)}
-        return step.function(**{name: own[name] if name in own else state.get(name) for name in step.passed})
+        with raise_lost():
+            return step.function(**{name: own[name] if name in own else state.get(name) for name in step.passed})
 
     def describe(self, contract: Contract) -> str:
         """A key of the job's implementation of a contract with all its options; the same for each job without one."""

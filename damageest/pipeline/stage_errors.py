@@ -7,12 +7,19 @@ from pathlib import Path
 import numpy as np
 
 from damageest.artefacts import ArtefactError, Scan, Sites
-from damageest.errors import DamageestError, InputError, JobError, StageError, clean_message, describe_missing_library
+from damageest.errors import (
+    DamageestError,
+    InputError,
+    JobError,
+    StageError,
+    clean_message,
+    describe_missing_library,
+    describe_shortage,
+)
 from damageest.pipeline.cache import describe_unwritable
 from damageest.pipeline.state import Candidate, FoundSite, JobState
 from damageest.registry.registry import Implementation
 
-MORE_MEMORY = "a larger tolerance, fewer scan points (scan.most_points), or a larger --memory"
 READERS = {"part": "part_file", "scan": "scan_file"}
 """Stages that read files, and the code of an error for one that cannot be used."""
 
@@ -53,8 +60,8 @@ def describe_points(sites: Sites, aligned: Scan, clusters: tuple[int, ...]) -> s
 def _explain(error: Exception, provider: str) -> StageError:
     """An error that a stage did not raise on purpose, in words for the user and the author."""
     first = next(iter(clean_message(error, 400).splitlines()), "")
-    if isinstance(error, MemoryError):
-        return StageError("ran out of memory", MORE_MEMORY, code="memory")
+    if short := describe_shortage(error):
+        return short
     if isinstance(error, ArtefactError):
         return StageError(
             f"gave a result that is not valid: {first}",

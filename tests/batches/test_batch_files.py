@@ -11,6 +11,8 @@ import pytest
 from damageest.batches import files
 from damageest.batches.files import NEW_ROWS, Tables, read_rows, write_tables
 from damageest.batches.rows import Row, read_row
+from damageest.batches.run import batch
+from damageest.errors import JobError
 
 EVIL = "<script>alert(1)</script>\n\"quote'"
 
@@ -73,3 +75,10 @@ def test_tables_are_written_while_a_batch_runs(tmp_path: Path, monkeypatch: pyte
     tables.add([Row("a", "a.yaml", str(tmp_path / "a"), "ok")])
     assert len(json.loads((tmp_path / "batch.json").read_text())["jobs"]) == 1
     tables.close()
+
+
+@pytest.mark.parametrize("output", ["job.yaml/out", "a" * 300])
+def test_a_place_that_cannot_be_written_is_named_before_anything_runs(output: str, tmp_path: Path) -> None:
+    (tmp_path / "job.yaml").write_text("version: 1\n")
+    with pytest.raises(JobError, match="cannot be written"):
+        batch(tmp_path / "job.yaml", output=tmp_path / output)

@@ -94,15 +94,17 @@ def _value(data: bytes, rng: random.Random) -> bytes:
 
 
 def _spoil_inside(data: bytes, name: str, rng: random.Random) -> bytes:
-    """Spoils what a container holds, so that the container itself stays sound: the XML of a 3MF, the pages of an E57, a
-    line of a job."""
+    """Spoils what a container holds, so that the container itself stays sound: the XML of a 3MF, the arrays of a form,
+    the pages of an E57, a line of a job."""
     kind = rng.choice(KINDS[:-1])
-    if name.endswith(".3mf"):
+    if name.endswith((".3mf", ".npz")):
         stream = io.BytesIO()
         with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as new:
             for one in old.namelist():
                 content = old.read(one)
-                new.writestr(zipfile.ZipInfo(one), spoil(content, one, kind, rng) if "model" in one else content)
+                new.writestr(
+                    zipfile.ZipInfo(one), spoil(content, one, kind, rng) if "model" in one or ".npy" in one else content
+                )
         return stream.getvalue()
     if name.endswith(".e57"):
         return fix_pages(spoil(data, "", kind, rng))

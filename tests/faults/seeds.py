@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import struct
 import tempfile
 import zipfile
@@ -29,6 +30,7 @@ align: {use: none, T_part_scan: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0
 cluster: &near {use: dbscan, neighbours: 10}
 method: auto
 sites: {drop: [], keep: {min: [-99, -99, -99], max: [99, 99, 99]}}
+accept: all
 output: out/fuzz
 """
 
@@ -38,6 +40,12 @@ def points() -> np.ndarray[Any, Any]:
     """(N,3) points on the damaged box."""
     every = damaged_box.scan()
     return every[:: len(every) // POINTS][:POINTS].round(4)
+
+
+@cache
+def dense() -> np.ndarray[Any, Any]:
+    """As `points`, enough of them to find the pose."""
+    return damaged_box.scan(6000).round(4)
 
 
 @cache
@@ -126,6 +134,32 @@ def _cad(suffix: str) -> bytes:
         return Path(path).read_bytes()
 
 
+def _gltf(kind: str) -> bytes:
+    """A scene that is one file: .glb, or .gltf with its data in it."""
+    import base64
+    import json
+
+    scene = trimesh.Scene(trimesh.PointCloud(points() / 1000))
+    if kind == "glb":
+        return bytes(scene.export(file_type="glb"))
+    files = scene.export(file_type="gltf")
+    content = json.loads(files["model.gltf"])
+    for buffer in content["buffers"]:
+        data = base64.b64encode(files[buffer["uri"]]).decode()
+        buffer["uri"] = f"data:application/octet-stream;base64,{data}"
+    return json.dumps(content).encode()
+
+
+def _vtk(suffix: str, text: bool) -> bytes:
+    import pyvista
+
+    cloud = pyvista.PolyData(points())
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f"a{suffix}")
+        (cloud.cast_to_unstructured_grid() if suffix == ".vtu" else cloud).save(path, binary=not text)
+        return path.read_bytes()
+
+
 def _mesh(kind: str) -> bytes:
     data = mesh().export(file_type=kind)
     return data.encode() if isinstance(data, str) else bytes(data)
@@ -147,6 +181,15 @@ SCANS = {
     "scan.laz": lambda: _las(".laz"),
     "scan.obj": lambda: "".join("v {} {} {}\n".format(*p) for p in points()).encode(),
     "scan.off": lambda: f"OFF\n{POINTS} 0 0\n".encode() + "".join("{} {} {}\n".format(*p) for p in points()).encode(),
+    "scan.pts": lambda: f"{POINTS}\n".encode() + "".join("{} {} {} 100\n".format(*p) for p in points()).encode(),
+    "scan.txt": lambda: b"//X;Y;Z\n" + "".join("{};{};{}\n".format(*p) for p in points()).encode(),
+    "scan.asc": lambda: b"# mm\n" + "".join("{:.4f} {:.4f} {:.4f}\n".format(*p) for p in points()).encode(),
+    "scan.glb": lambda: _gltf("glb"),
+    "scan.gltf": lambda: _gltf("gltf"),
+    "text.vtk": lambda: _vtk(".vtk", True),
+    "scan.vtk": lambda: _vtk(".vtk", False),
+    "scan.vtp": lambda: _vtk(".vtp", False),
+    "text.vtu": lambda: _vtk(".vtu", True),
 }
 PARTS = {
     "part.stl": lambda: _mesh("stl"),
@@ -159,8 +202,34 @@ PARTS = {
     "part.iges": lambda: _cad(".iges"),
     "part.brep": lambda: _cad(".brep"),
 }
-JOBS = {"job.yaml": lambda: JOB.encode()}
-NATIVE = ("part.step", "part.iges", "part.brep")
+SECTIONS = """sections:
+  - {along: axis, count: 3}
+  - {z: 5, name: top}
+  - {plane: {point: [0, 0, 4], normal: [0, 0.2, 1]}, kind: contour}
+  - {line: {from: [-19, 0, 10], to: [19, 0, 10]}}
+temperature: {part: 26, uncertainty: 1, expansion: 11.5e-6}
+"""
+DATUMS = """align:
+  use: register
+  datum: {A: [{facing: {direction: [0, 0, -1], angle: 5}}], B: [{at: [-20, 0, 0]}], C: [{at: [0, -15, 0]}]}
+allowance: {use: milling, outer: 0.5}
+"""
+PATH = """path:
+  use: layers
+  height: 2
+  width: 4
+  feed: 480
+  nozzle: {tip_radius: 3, cone_angle: 25, length: 90, body_radius: 15}
+  process: [{set: {power: 1800}}, {layer: 1, set: {power: 2200}}]
+export: {use: files, format: [stl, 3mf], paths: [csv, apt, krl], machine: kuka}
+"""
+JOBS = {
+    "job.yaml": lambda: JOB.encode(),
+    "sections.yaml": lambda: (JOB + SECTIONS).encode(),
+    "datums.yaml": lambda: re.sub("align: .*\n", "", JOB + DATUMS, count=1).replace("points.npy", "dense.npy").encode(),
+    "path.yaml": lambda: (JOB + PATH).encode(),
+}
+NATIVE = (".step", ".iges", ".brep")
 """Read by OpenCASCADE, with the plugin cadquery."""
 
 
@@ -175,9 +244,10 @@ def write_others(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     mesh().export(folder / "box.stl")
     np.save(folder / "points.npy", points())
+    np.save(folder / "dense.npy", dense())
 
 
 def make_job(name: str) -> str:
     """The job that reads a file of this name: as scan, as part, or as the job itself."""
     part, scan = (name, "points.npy") if name in PARTS else ("box.stl", name)
-    return f"version: 1\ntolerance: 0.5\npart: {part}\nscan: {scan}\nalign: none\n"
+    return f"version: 1\ntolerance: 0.5\npart: {part}\nscan: {scan}\nalign: none\naccept: all\n"

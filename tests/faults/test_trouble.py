@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 
 import damageest
@@ -19,7 +20,7 @@ from damageest.errors import DamageestError, InputError, JobError
 from damageest.registry import Registry
 from damageest.registry.hookspecs import hookimpl
 from tests import damaged_box
-from tests.faults.kill import kill_runs, strip
+from tests.faults.kill import APP, COMMANDS, stop_runs, strip
 
 SLOW = pytest.mark.slow
 
@@ -123,11 +124,27 @@ def test_odd_names(name: str, tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == [name], "nothing is written elsewhere"
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(100, marks=[pytest.mark.slow, pytest.mark.timeout(3000)])])
-def test_killed_at_random_moments(count: int, tmp_path: Path) -> None:
-    """Runs end by SIGKILL at any moment: the earlier output is whole, and the next run gives the same bytes."""
-    found = kill_runs(tmp_path, count)
-    assert not found.spoiled
-    assert not found.other
-    assert found.hit >= count / 2
-    assert found.hit + found.late == count
+@pytest.mark.parametrize(
+    ("count", "commands"),
+    [(3, ("run",)), pytest.param(60, COMMANDS, marks=[pytest.mark.slow, pytest.mark.timeout(3000)])],
+)
+def test_stopped_at_random_moments(count: int, commands: tuple[str, ...]) -> None:
+    """Runs end by signals or for want of memory: one of the two results is whole, and the next run gives the second."""
+    trials = stop_runs(count, 0, commands, ("kill", "int", "memory"))
+    assert not [trial for trial in trials if trial.faults]
+    assert sum(trial.hit for trial in trials) >= count / 2
+
+
+def test_a_run_of_the_app_ends_with_the_app(tmp_path: Path) -> None:
+    """However the app ends: else its run goes on unseen, and the next one is refused."""
+    damaged_box.write_small(tmp_path)
+    app = subprocess.Popen([sys.executable, "-c", APP, "run", "job.yaml", "--no-cache"], cwd=tmp_path)
+    while not (tmp_path / "out/.job.partial/stages").is_dir():  # it has begun
+        time.sleep(0.02)
+        assert app.poll() is None
+    family = psutil.Process(app.pid).children(recursive=True)
+    assert family
+    app.kill()
+    app.wait()
+    assert not psutil.wait_procs(family, timeout=20)[1]
+    assert not (tmp_path / "out/job").exists()

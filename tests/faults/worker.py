@@ -1,7 +1,9 @@
-"""A process that runs spoiled jobs one after the other. For each line of its input, the path of a job, it prints a line
-of JSON with the outcome. `tests.faults.run` starts it, and starts another one where it dies.
+"""A process that runs spoiled jobs one after the other. For each line of its input it prints a line of JSON with
+the outcome. `tests.faults.run` starts it, and starts another one where it dies.
 
-Usage: python -m tests.faults.worker read|run
+Each line is a mode, read or run, and a path.
+
+Usage: python -m tests.faults.worker
 """
 
 from __future__ import annotations
@@ -11,12 +13,16 @@ import os
 import resource
 import sys
 import time
+import traceback
+from pathlib import Path
 from typing import Any
 
 MEMORY = 2 << 30
 """Bytes that reading a hostile file may take at most."""
 SECONDS = 60.0
 """Time limit of an isolated stage; a reader has a sixth of it."""
+KEPT = "out/kept"
+"""Folder of the earlier output that a whole run is to replace, or to leave as it is."""
 ADDRESS_SPACE = 12 << 30
 """Bytes of addresses, so that one wrong allocation cannot take the memory of the machine."""
 
@@ -26,8 +32,9 @@ def _measure_peak() -> int:
         return next(int(line.split()[1]) for line in stream if line.startswith("VmHWM")) * 1024
 
 
-def try_job(path: str, whole: bool, registry: Any) -> dict[str, Any]:
-    """Reads the inputs of a job, or runs the whole of it: the outcome, and the message of an error."""
+def try_job(path: Path, mode: str, registry: Any) -> dict[str, Any]:
+    """Reads a file or the inputs of a job, or runs the whole job over an earlier output: the outcome, and the message
+    of an error."""
     import damageest
     from damageest.errors import DamageestError
     from damageest.isolation import Limits
@@ -36,12 +43,18 @@ def try_job(path: str, whole: bool, registry: Any) -> dict[str, Any]:
     from damageest.pipeline.prepare import crop_scan
     from damageest.stages.part import ReadPart
     from damageest.stages.scan import ReadScan
+    from tests.faults import others
 
     try:
+        if path.name in others.FILES:
+            others.FILES[path.name][1](path, registry)
+            return {"outcome": "done"}
         job = load(path, registry, ["report=none"])
-        if whole:
-            result = damageest.run(job, registry=registry, limits=Limits(seconds=SECONDS))
-            return {"outcome": "done", "volume": result.damage_volume, "words": "; ".join(map(str, result.warnings))}
+        if mode == "run":
+            result = damageest.run(job, output=path.parent / KEPT, registry=registry, limits=Limits(seconds=SECONDS))
+            words = "; ".join(map(str, (*result.failures, *result.warnings)))
+            outcome = "unexpected" if "failed unexpectedly" in words else "done"
+            return {"outcome": outcome, "volume": result.damage_volume, "words": words}
         engine = Engine(job, registry, limits=Limits(seconds=SECONDS))
         state = follow((ReadPart, ReadScan, crop_scan), engine, start(engine))
         part, scan = state.part, state.scan
@@ -52,7 +65,7 @@ def try_job(path: str, whole: bool, registry: Any) -> dict[str, Any]:
             return {"outcome": "unexpected", "words": words}
         return {"outcome": "refused" if error.exit_status == 2 else "stopped", "words": words}
     except BaseException as error:
-        return {"outcome": "unexpected", "words": f"{type(error).__name__}: {error}"}
+        return {"outcome": "unexpected", "words": f"{type(error).__name__}: {error}", "where": traceback.format_exc()}
 
 
 def main() -> None:
@@ -67,14 +80,13 @@ def main() -> None:
     registry = Registry.discover()
     print("ready", file=answers, flush=True)
     for line in sys.stdin:
+        mode, _, path = line.strip().partition(" ")
         with open("/proc/self/clear_refs", "w") as stream:
             stream.write("5")  # begins a new peak
         start = time.perf_counter()
-        row = try_job(line.strip(), sys.argv[1] == "run", registry)
+        row = try_job(Path(path), mode, registry)
         row["seconds"] = round(time.perf_counter() - start, 2)
         row["peak"] = _measure_peak()
-        if row["peak"] > MEMORY:
-            row["outcome"] = "memory"
         print(json.dumps(row), file=answers, flush=True)
 
 

@@ -35,6 +35,8 @@ the first, with the second beside the part in the given pose, where no damage ex
 
 TRIALS = 60_000
 """Number of candidate poses of the mirrored scan, where the given pose agrees badly with the part."""
+LEAST_ORIENTED = 10
+"""Points with a clear normal below which no mirror image can be searched for."""
 
 
 def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Reason, ...]:
@@ -78,7 +80,8 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
             topic="pose",
         )
     doubts = given.note_doubts()
-    if given.beside > MIN_BESIDE and given.agreement < 1 - LEAST_OFF:  # metal outside: no damage puts it there
+    is_off = given.beside > MIN_BESIDE and given.agreement < 1 - LEAST_OFF  # metal outside: no damage puts it there
+    if is_off and len(oriented.points) >= LEAST_ORIENTED:
         test = MirrorTest(prepare_part(frame.target, 0), oriented, points, dense, noise, band, TRIALS)
         doubts += ask_handedness(test, Fit(start, near.band, 0.0), given, rng).doubts
     if differs and gain > SMALL_GAIN:

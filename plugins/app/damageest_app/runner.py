@@ -17,8 +17,15 @@ from typing import Any
 
 from damageest_app.events import PIPE
 
-COMMAND = (sys.executable, "-c", "from damageest.cli import main; main()")
-"""The command line of this installation, as a process."""
+LEASH = "DAMAGEEST_APP_LEASH"
+"""The environment variable with the number of a pipe whose other end the app holds open as long as it lives."""
+_MAIN = f"""import os
+from damageest.isolation import end_with_parent
+end_with_parent(int(os.environ.pop("{LEASH}")))
+from damageest.cli import main
+main()"""
+COMMAND = (sys.executable, "-c", _MAIN)
+"""The command line of this installation, as a process that ends with the app, however that ends."""
 SHARES = {
     "part": 2, "scan": 3, "sample": 3, "align": 20, "adapt": 4, "segment": 2, "cluster": 1, "reconstruct": 5,
     "boundary": 1, "background": 1, "enclose": 25, "repair": 1, "boolean": 3, "allowance": 5, "path": 20, "export": 3,
@@ -89,24 +96,30 @@ class Runner:
             raise RuntimeError("a run is in progress")
         self.progress, self._stopped = Progress(), False
         ours, theirs = os.pipe()
+        leash, held = os.pipe()
         try:
             self._process = process = subprocess.Popen(
                 [*COMMAND, *words],
                 cwd=folder,
-                env={**os.environ, PIPE: str(theirs)},
+                env={**os.environ, PIPE: str(theirs), LEASH: str(leash)},
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 text=True,
                 errors="replace",
-                pass_fds=(theirs,),
+                pass_fds=(theirs, leash),
                 start_new_session=True,  # so that all of its processes can be ended
             )
+        except OSError:
+            os.close(held)
+            raise
         finally:
             os.close(theirs)
+            os.close(leash)
         reader = threading.Thread(target=self._follow, args=(ours,), daemon=True)
         reader.start()
         printed, said = process.communicate()
+        os.close(held)
         reader.join(timeout=2)
         seconds = time.monotonic() - self.progress.began
         return Outcome(process.returncode, said.strip(), seconds, self._stopped, printed)
