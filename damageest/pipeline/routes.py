@@ -47,7 +47,7 @@ from damageest.pipeline.sites import (
     take_enclosures,
     where_damaged,
 )
-from damageest.pipeline.skin_points import sample_near_damage, where_taken
+from damageest.pipeline.skin_points import note_unused, sample_near_damage, where_taken
 from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_budget, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
@@ -169,6 +169,7 @@ CLOSE: Route = (
     #     views -> volume_95
     sum_budget,  # found, volume_95, scanner_errors, aligned, part, unit, adapted, folded, views -> budget
     cut_sections,  # asked_sections, part, aligned, adapted, pose_error, sensor, tolerance, unit -> sections, +warnings
+    note_unused,  # samples -> +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
     #     coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions, sections
     #     -> result

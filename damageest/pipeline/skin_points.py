@@ -8,9 +8,11 @@ from typing import Any
 from damageest.artefacts import ADDED, INTACT, Deviation, Part, Samples, Scan, Sites
 from damageest.geometry.skin_near import find_cubes_near, sample_near
 from damageest.pipeline.engine import Branch, Engine, follow
-from damageest.pipeline.state import JobState
+from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import Step, step
-from damageest.registry.contracts import Contract
+from damageest.registry.contracts import DEFAULTS, Contract
+from damageest.rules.notes import make_notes
+from damageest.stages.sample import Sample
 
 
 def where_taken(item: Contract | Step[..., Any], by: Sequence[Contract]) -> Branch:
@@ -25,6 +27,15 @@ def where_taken(item: Contract | Step[..., Any], by: Sequence[Contract]) -> Bran
         return follow((item,), engine, state)
 
     return Branch("where_taken", (name,), ((item,),), run)
+
+
+@step(gives="warnings")
+def note_unused(engine: Engine, samples: Samples | None) -> Reasons:
+    """Names stage `sample` where the job changes it and nothing took its points."""
+    stage, usual = engine.job.stages[Sample], engine.registry.get(Sample.stage, DEFAULTS[Sample])
+    if samples is not None or (stage.use == usual.name and stage == usual.cls.model_validate({})):
+        return ()
+    return make_notes(Sample.stage, (f"sample: {stage.use} did not run, since no stage took its points",))
 
 
 @step(gives="nearby")

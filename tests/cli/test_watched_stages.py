@@ -57,7 +57,8 @@ FAULTS = {
 
 def write_job(folder: Path, name: str, fault: str) -> Path:
     path = folder / f"{name}.yaml"
-    path.write_text(f"{damaged_box.JOB}sample: {{use: faulty, fault: {json.dumps(fault)}}}\n")
+    takes_samples = "segment: cloud_distance\n"
+    path.write_text(f"{damaged_box.JOB}{takes_samples}sample: {{use: faulty, fault: {json.dumps(fault)}}}\n")
     return path
 
 

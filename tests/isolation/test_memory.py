@@ -22,7 +22,7 @@ from damageest.artefacts import DAMAGE, INTACT, Deviation, Mesh, Part, Scan, Sit
 from damageest.checks import skin_cells
 from damageest.geometry import distance, distance_by_cells, local_fits, neighbourhoods, poisson, refinement
 from damageest.stages.cluster import _density
-from damageest.stages.sample import _spread
+from damageest.geometry import spreading as _spread
 from damageest.stages.segment import _wear
 from damageest_octree import octree
 

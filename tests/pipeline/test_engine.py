@@ -157,6 +157,9 @@ def test_points_on_all_of_the_skin_are_made_only_where_a_stage_takes_them(tmp_pa
     assert ["sample" in {record.stage for record in result.stages} for result in results] == [False, True]
     for result in results:
         assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.02)
+    assert not any("did not run" in note for note in map(str, results[0].warnings))
+    named = damageest.run(path, settings=["sample=uniform"])
+    assert "sample: uniform did not run, since no stage took its points" in map(str, named.warnings)
 
 
 def test_only_what_changed_runs_again(tmp_path: Path) -> None:
