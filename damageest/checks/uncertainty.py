@@ -41,9 +41,10 @@ damage puts skin outside."""
 ASKED = 2000
 """Scan points among which the deepest ones of a site are looked for."""
 
-AROUND, NOISY = 7, 3.0
-"""Scan points about the deepest one, it among them, that tell whether it lies in a corner of the inner surface; and by
-how many standard deviations of their noise the deepest of many points is deeper than those where it does not."""
+AROUND, NOISY, SLOPE = 25, 3.0, 0.7
+"""Scan points about the deepest one, it among them, that tell whether it lies in a corner of the inner surface; by how
+many standard deviations of their noise the deepest of many points is deeper than those where it does not; and the share
+of what it is deeper by, by which a corner goes beyond it: these points are two gaps away, the deepest about one."""
 POINT_GAP = 1.1
 """Spacing of points in square roots of the area that each stands for, as `measure_noise_and_spacing` gives it."""
 MOST = 50_000
@@ -72,11 +73,11 @@ class SiteError:
     ``inside`` (where points do not bound it), ``beside``, ``fading``: by how much the loss may be larger; ``less``: by
     how much it may be smaller, since the inner surface was closed across what was not seen. ``depth``: of the damage
     volume, corrected for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free
-    motions. ``measured``: the largest depth of a scan point, with what its noise, the pose and the skin may be off, and
-    how far a corner of the inner surface goes beyond it. ``probing_form``, ``scanner`` (T,): by the certificate and the
-    temperature, signed, by the terms of `ScannerErrors`; ``depth_scanner`` (T,): the same of the depth, and
-    ``depth_by``: the other causes of ``depth_error``, by name. ``exposed``: the area that is moved against the skin by
-    what deviates; ``curved``: that of skin made of chords.
+    motions. ``corner``: how far a corner of the inner surface goes beyond the volume and its scan points. ``measured``:
+    the largest depth of a scan point, with what its noise, the pose and the skin may be off, and the corner.
+    ``probing_form``, ``scanner`` (T,): by the certificate and the temperature, signed, by the terms of `ScannerErrors`;
+    ``depth_scanner`` (T,): the same of the depth, and ``depth_by``: the other causes of ``depth_error``, by name.
+    ``exposed``: the area that is moved against the skin by what deviates; ``curved``: that of skin made of chords.
     """
 
     volume: float
@@ -98,6 +99,7 @@ class SiteError:
     fading: float = 0.0
     depth: float = 0.0
     depth_error: float = 0.0
+    corner: float = 0.0
     measured: float = np.inf
     depth_free: float = 0.0
     probing_form: float = 0.0
@@ -169,7 +171,7 @@ def measure_site_error(
     skin_noise = part.scan_noise * float(np.sqrt(skin_area)) * part.scan_spacing / POINT_GAP
     by_point = float(np.sqrt(aligned.noise**2 + beside))
     # in a corner of the inner surface no point may be as deep as it is; where the floor is level, one is
-    corner = min(max(deepest.rise - NOISY * aligned.noise, 0.0), WIDTH * depth_by["spacing"])
+    corner = min(SLOPE * max(deepest.rise - NOISY * aligned.noise, 0.0), WIDTH * depth_by["spacing"])
     return SiteError(
         volume=damage.volume,
         noise=float(np.hypot(surface.noise, skin_noise)),
@@ -189,6 +191,7 @@ def measure_site_error(
         less=damage.volume * evidence.ids_unseen if hole else 0.0,
         depth=deepest.depth - surface.depth_excess,
         depth_error=float(np.sqrt(surface.depth**2 + beside)),
+        corner=corner,
         measured=deepest.measured + WIDTH * by_point + corner,
         depth_free=sum(
             max(-one.low, one.high) * abs(float(one.move(deepest.at[None])[0] @ deepest.normal)) for one in free
@@ -226,9 +229,12 @@ def measure_shifts(part: Part, fields: Floats, places: Floats, normals: Floats) 
 
 
 def combine_site(error: SiteError) -> tuple[Interval, Interval]:
-    """The 95 % intervals of volume and depth of one site. No depth is beyond what its scan points show."""
+    """The 95 % intervals of volume and depth of one site. No depth is beyond what its scan points show.
+
+    A surface through points rounds a corner, always to the same side: that moves the high end of the depth alone.
+    """
     depth = min(error.depth, error.measured)
-    depth_high = min(depth + WIDTH * error.depth_error, error.measured) + error.depth_free
+    depth_high = min(depth + WIDTH * error.depth_error + error.corner, error.measured) + error.depth_free
     depth_low = depth - WIDTH * error.depth_error - error.depth_free
     return combine_total(error.volume, [error]), (max(depth_low, 0.0), depth_high)
 
@@ -301,7 +307,7 @@ def _find_deepest(damage: Solid, inner: Flags, part: Part, members: Floats, reac
     asked = members[:: max(1, len(members) // MOST)]
     depths = distance_to_mesh(asked, part)
     first = int(depths.argmax())
-    _, beside = find_neighbours(asked[first : first + 1], AROUND, asked)
+    _, beside = find_neighbours(asked[first : first + 1], min(AROUND, max(7, len(asked) // 4)), asked)
     rise = float(depths[first] - np.median(depths[beside]))
     place = (near if len(near) else vertices)[at]
     return _Place(float(distance[at]), float(depths[first]), rise, place, part.face_normals[face[at]])
