@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from damageest.artefacts import Floats, Mesh, Part, Samples
+from damageest.artefacts import Mesh, Part, Samples
 from damageest.errors import InputError
 from damageest.geometry.spreading import spread_on_faces
 from damageest.io.digests import digest
@@ -71,10 +71,9 @@ def _pack(samples: Samples) -> Arrays:
 def _sample(part: Mesh, spacing: float, angle: float) -> Samples:
     points, face = spread_on_faces(part, spacing)
     edge_points, edge_normals, edge_face, edge_kind = place_sharp_points(part, spacing, angle)
-    normals: Floats = part.cross[face] / np.linalg.norm(part.cross[face], axis=1)[:, None]
     return Samples(
         points=np.concatenate([points, edge_points]),
-        normals=np.concatenate([normals, edge_normals]),
+        normals=np.concatenate([part.face_normals[face], edge_normals]),
         face=np.concatenate([face, edge_face]),
         kind=np.concatenate([np.zeros(len(face), np.uint8), edge_kind]),
         spacing=spacing,

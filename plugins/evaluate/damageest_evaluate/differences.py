@@ -15,6 +15,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats
 from damageest.errors import DamageestError, InputError, StageError
 from damageest.geometry.solids import to_arrays
+from damageest.geometry.vectors import normalise
 from damageest.io.digests import digest
 from damageest.result import Result
 from damageest_evaluate.processes import Row
@@ -249,8 +250,7 @@ def _scan(body: Any, views: Views, count: int, noise: float, rng: np.random.Gene
 
 
 def _is_seen(normals: Floats, views: Views) -> Flags:
-    axes = np.array(views, float)
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    axes = normalise(np.array(views, float))
     return np.asarray((normals @ axes.T).max(axis=1) > GRAZING)
 
 

@@ -79,7 +79,7 @@ def make_settings(item: Implementation, scene: MatrixJob) -> dict[str, Any] | st
     job: dict[str, Any] = {key: value for key, value in scene.values.items() if key != "scan"}
     own_part, own_scan, moved = item.contract is ReadPart, item.contract is ReadScan, np.eye(4)
     if stage == "part":
-        choices = {"file": "part.stl", "reconstruct": "specimen.ply"}
+        choices = {"file": "part.stl", "reconstruct": "specimen.ply", "earlier_scan": "specimen.ply"}
         if use not in choices and not scene.part_path.endswith(tuple(item.cls.reads) or "\0"):
             return "does not read the file format of the job's part"
         options["path"] = str(scene.folder / choices[use]) if use in choices else scene.part_path
