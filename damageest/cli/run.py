@@ -19,7 +19,7 @@ from damageest.cli._streams import keep_for_results, say, say_result
 from damageest.errors import clean_message
 from damageest.geometry.threads import use_threads
 from damageest.isolation.limits import STAGE_SECONDS, Limits, limit_this_process, parse_memory
-from damageest.isolation.notes import note_job
+from damageest.isolation.notes import at_work, note_job
 
 if TYPE_CHECKING:
     from damageest.findings import Sensor, Surplus
@@ -38,6 +38,10 @@ UNSEEN_WHY = {
     "no points": "in view, but without points",
     "earlier scan": "not in the earlier scan either",
 }
+
+IMPORT, IMPORT_SECONDS = "import of the pipeline", 300.0
+"""The first step of a run, and after how many seconds it is ended. Without byte-code and from a slow disk it takes a
+minute."""
 
 
 def command(
@@ -128,7 +132,8 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
         output = given.output or job.output
         try:
             with progress.show_job(job.name):
-                with progress.show_step("import of the pipeline"):  # after the first line: it takes time
+                # after the first line: it takes time, and where memory ran out, OpenBLAS tries for ever
+                with progress.show_step(IMPORT), at_work(IMPORT, IMPORT_SECONDS):
                     from damageest.api import run
 
                 result = run(
