@@ -12,10 +12,12 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Samples
 from damageest.geometry.refinement import bisect_faces
 from damageest.geometry.spreading import spread_on_faces, spread_points
-from damageest.geometry.voxels import MOST_ALONG, VoxelGrid, measure_bounds
+from damageest.geometry.voxels import VoxelGrid, measure_bounds
 
 CUBE = 40.0
 """Edge of a cube, in tolerances."""
+MOST_ALONG = 100
+"""Largest number of cubes along an axis: on a part of more tolerances they are larger."""
 POOR = 0.15
 """Share of the usual number of intact points for its skin below which a cube has few of them."""
 PLACES = 8
@@ -36,8 +38,11 @@ class NearCubes:
 
     @classmethod
     def around(cls, points: Floats, size: float) -> NearCubes:
-        """The cubes with one of the points (N,3), and those that touch them."""
-        low, high = measure_bounds(points) + 2 * size * np.array([[-1.0], [1.0]])
+        """The cubes of edge ``size``, or more where there were too many, with one of the points (N,3), and those that
+        touch them."""
+        low, high = measure_bounds(points)
+        size = max(size, float((high - low).max()) / MOST_ALONG)
+        low, high = low - 2 * size, high + 2 * size
         grid = VoxelGrid(low, size, np.ceil((high - low) / size).astype(np.int64) + 1)
         return cls(grid, grid.mark_around(points, 1))
 
