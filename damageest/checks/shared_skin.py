@@ -7,6 +7,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours, thin_points
+from damageest.geometry.point_pieces import number_pieces
 
 STEP = 2.0
 """Edge of the cubes in which deep points are joined, in spacings of the scan."""
@@ -65,12 +66,5 @@ def find_unshared(scan: Floats, spacing: float, part: Part, tolerance: float) ->
 
 def _join(points: Floats, edge: float) -> Ints:
     """The number (N,) of the surface that each of the points (N,3) belongs to."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
-
     means = thin_points(points, edge)[0]
-    pairs = cKDTree(means).query_pairs(JOINED * edge, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(means), len(means)))
-    label = np.asarray(connected_components(links, directed=False)[1])
-    return np.asarray(label[find_neighbours(points, 1, means)[1][:, 0]])
+    return np.asarray(number_pieces(means, JOINED * edge)[find_neighbours(points, 1, means)[1][:, 0]])

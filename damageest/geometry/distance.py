@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import list_used
 from damageest.geometry.pseudonormals import keep_signed_mesh
-from damageest.geometry.vectors import normalise
+from damageest.geometry.vectors import measure_longest_edges, normalise
 from damageest.geometry.voxels import order_by_place
 from damageest.isolation.memory import FEWER_POINTS, require_memory
 
@@ -160,7 +160,7 @@ def _group_by_size(mesh: Mesh) -> list[Ints]:
     those of the small triangles. Measured on a damage volume: four times the time.
     """
     triangles = mesh.triangles
-    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    longest = measure_longest_edges(triangles)
     large = longest > LARGE * np.median(longest)
     return [np.flatnonzero(~large), np.flatnonzero(large)] if large.any() else [np.arange(len(longest))]
 
@@ -263,7 +263,7 @@ def _find_faults(mesh: Mesh) -> tuple[Flags, Flags]:
 def _find_flat(mesh: Mesh, scale: float) -> Flags:
     """Whether the height of each triangle over its longest edge (F,) is below what float64 coordinates resolve."""
     triangles = mesh.triangles
-    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    longest = measure_longest_edges(triangles)
     result: Flags = np.linalg.norm(mesh.cross, axis=1) <= 1e-10 * scale * np.maximum(longest, 1e-10 * scale)
     return result
 

@@ -12,6 +12,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Samples
 from damageest.geometry.refinement import bisect_faces
 from damageest.geometry.spreading import spread_on_faces, spread_points
+from damageest.geometry.vectors import measure_longest_edges
 from damageest.geometry.voxels import VoxelGrid, measure_bounds
 
 CUBE = 40.0
@@ -96,7 +97,7 @@ def _spread_area(part: Mesh, step: float) -> tuple[Floats, Floats]:
     """Points (N,3) on the part, with gaps up to ``step`` on large triangles, and the area (N,) each stands for."""
     triangles = part.triangles
     area = np.linalg.norm(part.cross, axis=1) / 2
-    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    longest = measure_longest_edges(triangles)
     is_large = (longest > step) & (area > 0)
     points, face = spread_points(triangles, np.flatnonzero(is_large), step)
     share = area / np.maximum(np.bincount(face, minlength=len(area)), 1)
@@ -124,10 +125,9 @@ def _cut_near(part: Part, near: NearCubes) -> tuple[Floats, Ints, Ints]:
     vertices, origin = part.vertices, np.flatnonzero(near.touches(part.triangles))
     faces, edge = part.faces[origin], SMALL * near.grid.size
     while True:
-        corners = vertices[faces]
-        length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1, initial=0.0)
-        if not (length > edge).any():
+        long = np.flatnonzero(measure_longest_edges(vertices[faces]) > edge)
+        if not len(long):
             return vertices, faces, origin
-        vertices, faces, parent = bisect_faces(vertices, faces, np.flatnonzero(length > edge))
+        vertices, faces, parent = bisect_faces(vertices, faces, long)
         kept = near.touches(vertices[faces])
         faces, origin = faces[kept], origin[parent[kept]]

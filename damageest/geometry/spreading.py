@@ -10,6 +10,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.threads import count_threads
+from damageest.geometry.vectors import measure_longest_edges
 from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.isolation.memory import require_memory
 
@@ -29,7 +30,7 @@ def spread_on_faces(mesh: Mesh, spacing: float) -> tuple[Floats, Ints]:
         return np.empty((0, 3)), np.empty(0, np.int64)
     triangles = mesh.triangles
     double_area = np.linalg.norm(mesh.cross, axis=1)
-    longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    longest = measure_longest_edges(triangles)
     usable = double_area > 1e-12 * mesh.diagonal * longest
     # One grid per triangle wastes points on small or thin triangles: these share one thinned set of points.
     large = usable & (double_area > 0.5 * spacing * longest) & (longest > spacing)

@@ -10,3 +10,8 @@ from damageest.artefacts import Floats
 def normalise(vectors: Floats, least: float = 1e-300) -> Floats:
     """(...,3) the vectors scaled to length 1; 0 stays 0, and one shorter than ``least``, which is rounding, short."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), least))
+
+
+def measure_longest_edges(triangles: Floats) -> Floats:
+    """(F,) the length of the longest edge of each of the triangles (F,3,3), in their unit."""
+    return np.asarray(np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1))

@@ -277,6 +277,9 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "transforms.remove_rigid": lambda r: expect(transforms.remove_rigid(r.points, r.points, r.ones), (r.count, 3)),
     "units.diagnose_scale": lambda r: units.diagnose_scale(r.points, CUBE.vertices) and None,
     "units.diagnose_size": lambda r: units.diagnose_size(r.points, "mm") and None,
+    "vectors.measure_longest_edges": lambda r: expect(
+        vectors.measure_longest_edges(r.mesh.triangles), (len(r.mesh.faces),)
+    ),
     "vectors.normalise": lambda r: expect(vectors.normalise(r.points), (r.count, 3)),
     "views.choose_view": lambda r: expect(
         views.choose_view(rays.RayCaster(CUBE), r.mesh, CUBE.bounds, 10.0).direction, (3,)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from damageest.geometry.vectors import normalise
+from damageest.geometry.vectors import measure_longest_edges, normalise
 
 ROOT = Path(__file__).parents[2]
 BY_HAND = re.compile(
@@ -42,3 +42,9 @@ def test_nobody_normalises_rows_by_hand(folder: str) -> None:
         if "tests" not in path.parts and "conformance" not in path.parts
     }
     assert {name: hits for name, hits in found.items() if hits and name not in own} == {}
+
+
+@given(arrays(np.float64, (4, 3, 3), elements=SIZES))
+def test_the_longest_edge_is_the_largest_distance_of_two_corners(triangles: np.ndarray) -> None:
+    wanted = [max(np.linalg.norm(a - b) for a in one for b in one) for one in triangles]
+    np.testing.assert_allclose(measure_longest_edges(triangles), wanted)

@@ -36,8 +36,7 @@ def look_at_skin(
     """The samples ``nearby``, with what the scan shows on each."""
     intact = (deviation.label == INTACT) & ~grown
     added = deviation.label == ADDED
-    flat = nearby.kind == 0
-    points, normals = nearby.points[flat], nearby.normals[flat]
+    points, normals = nearby.points, nearby.normals
     if not len(points):
         return SkinSamples(points, normals, np.zeros(0, bool), np.zeros(0))
     hits = NearCubes.around(points, CUBE * tolerance).holds(aligned.points)

@@ -14,6 +14,7 @@ from damageest.geometry.local_fits import smooth_points
 from damageest.geometry.neighbourhoods import find_neighbours, measure_local_areas, thin_points
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.poisson import make_grid, solve_coarse_to_fine
+from damageest.geometry.smooth_faces import label_smooth_faces
 
 HOLD_OUT = 20
 SCREENING = 4.0
@@ -29,6 +30,8 @@ RIM = 4.0
 """Width of the margin beside what has no points, in spacings, that counts as unseen: the surface bends away there."""
 SPOT = 12.0
 """Area in squares of the spacing up to which a spot without points is no opening."""
+ANY_ANGLE = -2.0
+"""Cosine below that of every angle: triangles are connected by their edges alone."""
 DISAGREE = 0.05
 """Share of neighbouring points with opposite normals from which on signs mean nothing."""
 
@@ -146,16 +149,6 @@ def _drop_unseen_pieces(mesh: Mesh, unseen: Flags) -> tuple[Mesh, Flags]:
 
 def _label_pieces(mesh: Mesh, chosen: Flags) -> Ints:
     """The number (F,) of the piece of each chosen triangle, connected by edges; -1 for the others."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    edges = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    code = edges[:, 0] * len(mesh.vertices) + edges[:, 1]
-    order = np.argsort(code, kind="stable")
-    same = np.flatnonzero(np.diff(code[order]) == 0)
-    first, second = order[same] // 3, order[same + 1] // 3
-    both = chosen[first] & chosen[second]
-    count = len(mesh.faces)
-    links = coo_array((np.ones(int(both.sum())), (first[both], second[both])), shape=(count, count))
-    label = np.asarray(connected_components(links, directed=False)[1], np.int64)
-    return np.where(chosen, label, -1)
+    label = np.full(len(chosen), -1, np.int64)
+    label[chosen] = label_smooth_faces(mesh.faces[chosen], mesh.face_normals[chosen], ANY_ANGLE)
+    return label

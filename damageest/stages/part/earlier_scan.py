@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 from typing import Literal
 
@@ -11,7 +10,7 @@ from pydantic import Field
 from damageest.artefacts import Part
 from damageest.errors import InputError
 from damageest.geometry.units import UnitOption
-from damageest.io.files import file_sha256
+from damageest.io.files import files_sha256
 from damageest.stages import JobPath
 from damageest.stages.part import ReadPart
 
@@ -68,7 +67,7 @@ def read_earlier(
         made = close_surface(scan, cell, most_cells)
     except InputError as fault:
         raise InputError(f"{name}: {fault}") from None
-    digest = hashlib.sha256("".join(map(file_sha256, paths)).encode()).hexdigest()
+    digest = files_sha256(paths)
     note = (
         f"stands for the part as an earlier scan of {len(scan.points)} points shows it, in that scan's frame: "
         f"{made.seen_area:.4g} {unit}² of skin, with a noise of {made.noise:.3g}, edges rounded by about "

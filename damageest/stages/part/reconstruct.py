@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +13,7 @@ from damageest.errors import InputError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.threads import count_threads
 from damageest.geometry.units import UnitOption
-from damageest.io.files import file_sha256
+from damageest.io.files import files_sha256
 from damageest.io.scans import read_scan
 from damageest.stages import JobPath
 from damageest.stages.part import ReadPart
@@ -68,7 +67,7 @@ class PartFromScan(ReadPart):
             openings = _note_openings(vertices, faces, scan.points)
         except InputError as fault:
             raise InputError(f"{', '.join(map(str, paths))}: {fault}") from None
-        digest = hashlib.sha256("".join(map(file_sha256, paths)).encode()).hexdigest()
+        digest = files_sha256(paths)
         note = (
             f"reconstructed from {len(scan.points)} points of a scan, not from CAD: its surface has an error of up to "
             f"{error:.3g} (of 95 % of held-out points, their noise of {noise:.3g} included), sharp edges are rounded "

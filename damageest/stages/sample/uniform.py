@@ -10,6 +10,7 @@ from pydantic import Field
 from damageest.artefacts import Floats, Part, Samples
 from damageest.errors import InputError
 from damageest.geometry.spreading import spread_points, thin
+from damageest.geometry.vectors import measure_longest_edges
 from damageest.stages.sample import Sample
 
 FINE = 0.3
@@ -43,7 +44,7 @@ class Uniform(Sample):
         spacing = max(self.spacing * tolerance, float(np.sqrt(1.3 * area / self.max_points)))
         triangles, cross = part.triangles, part.cross
         double_area = np.linalg.norm(cross, axis=1)
-        longest = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+        longest = measure_longest_edges(triangles)
         usable = np.flatnonzero(double_area > 1e-12 * part.diagonal * longest)
         while True:
             candidates, of = spread_points(triangles, usable, FINE * spacing)

@@ -67,6 +67,16 @@ def show_report(
         write.write_text(replace_between_marks(write, make(False), name), encoding="utf-8")
 
 
+def write_measured(table: str, name: str, write: Path | None) -> None:
+    """Writes a table between the marks ``name`` of the file ``write``, with the command and the versions below it."""
+    from damageest_evaluate.readme import describe_measurement, replace_between_marks
+
+    if write:
+        words = [word for word in sys.argv[1:] if not word.startswith("--write")]
+        measured = describe_measurement(f"`{shlex.join(['damageest', *words])}`")
+        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", name), encoding="utf-8")
+
+
 def parse_numbers(option: str, text: str) -> list[int]:
     """The whole numbers in ``text``; raises InputError for anything else."""
     from damageest.errors import InputError

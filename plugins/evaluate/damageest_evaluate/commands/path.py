@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from damageest_evaluate.commands._counted import AsJson, show_table
+from damageest_evaluate.commands._counted import AsJson, show_table, write_measured
 
 
 def command(
@@ -42,7 +40,7 @@ def command(
     from damageest.registry import Registry
     from damageest_evaluate.paths.run import describe_row, make_demands, make_table, run_scenes
     from damageest_evaluate.paths.scenes import make_scenes
-    from damageest_evaluate.readme import describe_measurement, replace_between_marks
+    from damageest_evaluate.readme import replace_between_marks
 
     if write:
         replace_between_marks(write, None, "path")
@@ -53,7 +51,4 @@ def command(
         typer.echo(describe_row(row), err=True)
     table = "\n\n".join([make_demands(rows), make_table(rows)])
     show_table(table, list(map(asdict, rows)), as_json)
-    if write:
-        words = [word for word in sys.argv[1:] if not word.startswith("--write")]
-        measured = describe_measurement(f"`{shlex.join(['damageest', *words])}`")
-        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "path"), encoding="utf-8")
+    write_measured(table, "path", write)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from damageest_evaluate.commands._counted import AsJson, show_table
+from damageest_evaluate.commands._counted import AsJson, show_table, write_measured
 
 
 def command(
@@ -26,7 +24,7 @@ def command(
     """Open ragged damages before deposition, and compare what a path of 3 axes reaches of them without and with it."""
     from damageest.registry import Registry
     from damageest_evaluate.paths.prepare import make_prepare_table, run_prepare
-    from damageest_evaluate.readme import describe_measurement, replace_between_marks
+    from damageest_evaluate.readme import replace_between_marks
 
     if write:
         replace_between_marks(write, None, "prepare")
@@ -38,7 +36,4 @@ def command(
         )
     table = make_prepare_table(rows)
     show_table(table, list(map(asdict, rows)), as_json)
-    if write:
-        words = [word for word in sys.argv[1:] if not word.startswith("--write")]
-        measured = describe_measurement(f"`{shlex.join(['damageest', *words])}`")
-        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", "prepare"), encoding="utf-8")
+    write_measured(table, "prepare", write)
