@@ -13,6 +13,7 @@ import typer
 
 from damageest.cli._errors import describe_failure, say_error
 from damageest.cli._json import say_json
+from damageest.cli._streams import keep_for_results
 from damageest.errors import StageError
 from damageest.isolation import supervise as watching
 from damageest.isolation.supervise import IS_POSSIBLE, end_like_fork, supervise
@@ -24,8 +25,13 @@ is_command = False
 """Whether this process runs the command line alone. In another program, such as one with tests, it must not fork."""
 
 
-def end_with(work: Callable[[], int]) -> NoReturn:
-    """As `end_with_each`, for work that is one item."""
+def end_with(work: Callable[[], int], as_json: bool = False) -> NoReturn:
+    """As `end_with_each`, for work that is one item. ``as_json``: nothing but its result is written to standard output,
+    by whatever code."""
+
+    def work_clean(_: int) -> int:
+        with keep_for_results(as_json, for_good=is_command):
+            return work()
 
     def report(error: StageError, _: str) -> int:
         if "--json" in sys.argv:
@@ -33,7 +39,7 @@ def end_with(work: Callable[[], int]) -> NoReturn:
         say_error(error)
         return error.exit_status
 
-    end_with_each(lambda _: work(), [""], report)
+    end_with_each(work_clean, [""], report)
 
 
 def end_with_each(

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from damageest.cli import _process
 from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
-from damageest.cli._streams import keep_for_results, say
+from damageest.cli._streams import say
 
 if TYPE_CHECKING:
     from damageest.stages.part import CadFace
@@ -24,12 +23,7 @@ def command(
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """List a part's CAD faces: number, name, kind, area, centre, and normal, or axis and radius."""
-    end_with(lambda: _list_clean(part, units, as_json))
-
-
-def _list_clean(part: Path, units: str, as_json: bool) -> int:
-    with keep_for_results(as_json, for_good=_process.is_command):
-        return _list_faces(part, units, as_json)
+    end_with(lambda: _list_faces(part, units, as_json), as_json)
 
 
 def _list_faces(part: Path, units: str, as_json: bool) -> int:

@@ -9,10 +9,9 @@ from typing import Annotated
 
 import typer
 
-from damageest.cli import _process
 from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
-from damageest.cli._streams import keep_for_results, say
+from damageest.cli._streams import say
 
 
 class StepName(StrEnum):
@@ -36,14 +35,7 @@ def command(
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Say what is missing and what is over after a step of a repair, and add it to the record in OUT."""
-    end_with(lambda: _inspect_clean(folder, scan, step.value, tolerance, same_setup, as_json))
-
-
-def _inspect_clean(
-    folder: Path, scan: Path, step: str, tolerance: float | None, same_setup: bool, as_json: bool
-) -> int:
-    with keep_for_results(as_json, for_good=_process.is_command):
-        return _inspect(folder, scan, step, tolerance, same_setup, as_json)
+    end_with(lambda: _inspect(folder, scan, step.value, tolerance, same_setup, as_json), as_json)
 
 
 def _inspect(folder: Path, scan: Path, step: str, tolerance: float | None, same_setup: bool, as_json: bool) -> int:

@@ -8,11 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
-from damageest.cli import _process
 from damageest.cli._errors import say_help
 from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
-from damageest.cli._streams import keep_for_results, say
+from damageest.cli._streams import say
 
 
 def command(
@@ -26,12 +25,7 @@ def command(
 ) -> None:
     """Check jobs without computing a result, and list all errors with line and column. Where a job selects faces or
     skin of the part, the part is read."""
-    end_with(lambda: _check_clean(jobs, settings or [], as_json))
-
-
-def _check_clean(jobs: list[Path], settings: list[str], as_json: bool) -> int:
-    with keep_for_results(as_json, for_good=_process.is_command):
-        return _check(jobs, settings, as_json)
+    end_with(lambda: _check(jobs, settings or [], as_json), as_json)
 
 
 def _check(jobs: list[Path], settings: list[str], as_json: bool) -> int:

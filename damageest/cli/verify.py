@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from damageest.cli import _process
 from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
-from damageest.cli._streams import keep_for_results, say
+from damageest.cli._streams import say
 
 
 def command(
@@ -22,12 +21,7 @@ def command(
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Check files and inputs of an output folder against the hashes in its result.json."""
-    end_with(lambda: _check_clean(folder, rerun, as_json))
-
-
-def _check_clean(folder: Path, rerun: bool, as_json: bool) -> int:
-    with keep_for_results(as_json, for_good=_process.is_command):
-        return _check(folder, rerun, as_json)
+    end_with(lambda: _check(folder, rerun, as_json), as_json)
 
 
 def _check(folder: Path, rerun: bool, as_json: bool) -> int:
