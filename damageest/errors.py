@@ -7,6 +7,7 @@ line: 2 where the job or an input is at fault, 1 where the job is right but a st
 from __future__ import annotations
 
 import difflib
+import errno
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -164,7 +165,7 @@ MORE_MEMORY = "a larger tolerance, fewer scan points (scan.most_points), or a la
 
 def describe_shortage(error: BaseException) -> StageError | None:
     """A message for the user where memory or threads ran out; None for another error."""
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
         return StageError("ran out of memory", MORE_MEMORY, code="memory")
     if isinstance(error, RuntimeError) and "can't start new thread" in str(error):
         return StageError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import time
 import unicodedata
 
@@ -44,6 +45,7 @@ def test_an_error_without_text_is_named() -> None:
 def test_want_of_memory_is_not_taken_for_a_broken_installation() -> None:
     fault = describe_missing_library(ImportError("libopenblas.so: failed to map segment from shared object"))
     assert str(fault).startswith("ran out of memory, for libopenblas.so")
-    assert str(describe_shortage(MemoryError())).startswith("ran out of memory")
+    for error in (MemoryError(), OSError(errno.ENOMEM, "Cannot allocate memory", "package/checks")):
+        assert str(describe_shortage(error)).startswith("ran out of memory")
     assert str(describe_shortage(RuntimeError("can't start new thread"))).startswith("no thread can be started")
     assert describe_shortage(RuntimeError("other")) is None

@@ -5,10 +5,13 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import signal
+import threading
 from collections.abc import Iterator
+from multiprocessing import resource_tracker
 from typing import Any
 
-from damageest.errors import InputError
+from damageest.errors import InputError, StageError
 from damageest.geometry.threads import count_cores
 
 CONNECT_SECONDS = 30
@@ -58,5 +61,36 @@ def open_client(scheduler: str, workers: int, processes: bool = True) -> Iterato
         # the limit of memory is the job's process' own, so Dask's, which restarts workers, is off
         size = {"n_workers": workers if processes else 1, "threads_per_worker": 1 if processes else workers}
         fixed: dict[str, Any] = {"memory_limit": 0, "dashboard_address": None, "silence_logs": 50}
-        with LocalCluster(processes=processes, **size, **fixed) as cluster, Client(cluster) as client:
+        with contextlib.ExitStack() as stack:
+            with _keep_interrupts():
+                try:
+                    cluster = stack.enter_context(LocalCluster(processes=processes, **size, **fixed))
+                    client = stack.enter_context(Client(cluster))
+                except RuntimeError as error:
+                    raise StageError(
+                        f"batch: a worker process did not start ({error})",
+                        "fewer --workers; more free memory; `damageest run` needs no worker",
+                        code="memory",
+                    ) from None
             yield client
+
+
+@contextlib.contextmanager
+def _keep_interrupts() -> Iterator[None]:
+    """Ctrl-C waits until the block has ended, and processes that are started in it never get it: Dask's workers would
+    print tracebacks, where this process ends them anyhow.
+
+    A program inherits that a signal is ignored. A signal that is blocked as well is kept, on Linux, until it is
+    unblocked, and then meets the handler of that moment.
+    """
+    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    resource_tracker.ensure_running()  # it unblocks the signal, if it is started later
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

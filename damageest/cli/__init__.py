@@ -21,9 +21,6 @@ from damageest.io.files import working_folder
 from damageest.isolation.one_thread import ONE_THREAD
 from damageest.isolation.supervise import note_status
 
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells give it."""
-
 app = typer.Typer(
     name="damageest",
     cls=Commands,
@@ -116,7 +113,7 @@ def _call_app() -> NoReturn:
         app()
         sys.exit(0)
     except SystemExit as end:
-        if end.code == INTERRUPTED:  # typer turns KeyboardInterrupt into it
+        if end.code == _interrupt.STATUS:  # typer turns KeyboardInterrupt into it
             _stop_interrupted()
         raise
     except DamageestError as error:
@@ -137,7 +134,7 @@ def _call_app() -> NoReturn:
 def _stop_interrupted() -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the second one, of who is impatient, changes nothing
     say(_interrupt.text, err=True)
-    sys.exit(INTERRUPTED)
+    sys.exit(_interrupt.STATUS)
 
 
 def fail(error: Exception) -> NoReturn:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import threading
 import time
@@ -11,6 +12,7 @@ from typing import NoReturn
 
 import typer
 
+from damageest.cli import _interrupt
 from damageest.cli._errors import describe_failure, say_error
 from damageest.cli._json import say_json
 from damageest.cli._streams import keep_for_results
@@ -60,6 +62,9 @@ def end_with_each(
         if end.error is None:
             if end.late:
                 sys.stderr.write(LATE)
+            if end.status == -signal.SIGINT:  # the fork could not say so itself
+                sys.stderr.write(f"\n{_interrupt.text}\n")
+                end_like_fork(_interrupt.STATUS)
             end_like_fork(end.status if end.status < 0 else max(status, end.status))
         if sys.stderr.isatty():
             sys.stderr.write("\x1b[?25h")  # a live display hides the cursor

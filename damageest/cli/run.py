@@ -39,7 +39,7 @@ UNSEEN_WHY = {
     "earlier scan": "not in the earlier scan either",
 }
 
-IMPORT, IMPORT_SECONDS = "import of the pipeline", 300.0
+IMPORT, IMPORT_SECONDS = "import of the pipeline", 120.0
 """The first step of a run, and after how many seconds it is ended. Without byte-code and from a slow disk it takes a
 minute."""
 

@@ -118,15 +118,21 @@ def _end_now() -> None:
 
 
 def _wait(child: int, page: Page) -> tuple[int, bool]:
-    """The exit status of the fork, as of subprocess, and whether it was killed since it was late."""
-    clock, late = Clock(page), False
+    """The exit status of the fork, as of subprocess, and whether it was killed since it was late.
+
+    A crash after Ctrl-C counts as an end by it: native code that calls Python may abort where the call is interrupted.
+    """
+    clock, late, is_interrupted = Clock(page), False, False
     while True:
         ended, status = os.waitpid(child, os.WNOHANG)
         if ended:
-            return os.waitstatus_to_exitcode(status), late
+            code = os.waitstatus_to_exitcode(status)
+            return -signal.SIGINT if is_interrupted and code < 0 and not late else code, late
         found = signal.sigtimedwait({*PASSED, signal.SIGCHLD}, TICK)
-        if found and found.si_signo in PASSED and found.si_code <= _USER:
-            os.kill(child, found.si_signo)
+        if found and found.si_signo in PASSED:
+            is_interrupted |= found.si_signo == signal.SIGINT
+            if found.si_code <= _USER:
+                os.kill(child, found.si_signo)
         if clock.find_late() and not late:
             late = True
             os.kill(child, signal.SIGKILL)

@@ -254,6 +254,19 @@ def test_a_killed_batch_goes_on(tmp_path: Path) -> None:
     assert not (tmp_path / "b" / NEW_ROWS).exists()
 
 
+@pytest.mark.parametrize("seconds", [0.6, 1.2, 2.0])
+def test_ctrl_c_while_workers_start_gives_one_line(seconds: float, tmp_path: Path) -> None:
+    """Workers of a cluster that got the signal of the terminal too would print tracebacks."""
+    write_night(tmp_path, 2)
+    with start(tmp_path, "--workers", "2") as batch:
+        time.sleep(seconds)
+        os.killpg(batch.pid, signal.SIGINT)
+        _, err = batch.communicate(timeout=60)
+    assert batch.returncode == 130, err
+    assert err.strip().startswith("interrupted; ")
+    assert err.count("\n") == 1
+
+
 @pytest.mark.slow
 def test_an_interrupted_batch_goes_on(tmp_path: Path) -> None:
     write_night(tmp_path, 3)
@@ -264,6 +277,7 @@ def test_an_interrupted_batch_goes_on(tmp_path: Path) -> None:
         _, err = batch.communicate(timeout=60)
     assert batch.returncode == 130, err
     assert "interrupted; the jobs that were done are in" in err
+    assert "Traceback" not in err
     first = json.loads((tmp_path / "b/batch.json").read_text())["jobs"]
     assert [row["outcome"] for row in first] == ["ok"]
     with start(tmp_path, "--workers", "1") as batch:

@@ -184,6 +184,30 @@ def test_the_process_that_works_ends_with_the_one_that_watches(how: str, site: S
         os.close(terminal)
 
 
+def test_a_crash_after_ctrl_c_is_an_end_by_ctrl_c(site: Site, tmp_path: Path) -> None:
+    """Native code that calls Python may abort where it is interrupted."""
+    site.add("acme-bad", FAULTY)
+    damaged_box.write(tmp_path)
+    mark = tmp_path / "mark"
+    job = write_job(
+        tmp_path, "job", "import os, signal, time; signal.signal(signal.SIGINT, lambda *_, end=os.abort: end()); "
+        f"open({str(mark)!r}, 'w').close(); time.sleep(600)",
+    )  # fmt: skip
+    with subprocess.Popen(
+        [*MAIN, str(job)], stderr=subprocess.PIPE, text=True, env=environment(site), start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as child:  # fmt: skip
+        end = time.monotonic() + 60
+        while not mark.exists():
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        os.killpg(child.pid, signal.SIGINT)
+        _, err = child.communicate(timeout=60)
+    assert child.returncode == 130, err
+    assert "interrupted; finished stages are kept" in err
+    assert "error" not in err
+
+
 def _read(terminal: int) -> bytes:
     try:
         return os.read(terminal, 1 << 12)

@@ -50,7 +50,7 @@ SIGNALS = {"kill": signal.SIGKILL, "term": signal.SIGTERM, "int": signal.SIGINT}
 TOLERANCES = (0.4, 0.5)
 DISK = 48 << 20
 """Bytes of the small file system that the files of `disk` are on."""
-SECONDS = 90.0
+SECONDS = 150.0
 """Time after which what was stopped and has not ended hangs."""
 
 
