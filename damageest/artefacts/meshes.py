@@ -129,7 +129,8 @@ class Deposit(Solid):
     where stock was asked for, None where none was; ``touched``: the numbers of the CAD faces that stock stands on, as
     in `Part.faces_brep`, empty where the part has none. ``heights``: of the damage's CAD faces by number, how high the
     job wants the stock on it, -1 where that is not the same all over it; ``overlap``: how far the stock covers the
-    intact skin. ``notes`` are warnings.
+    intact skin. ``notes`` are warnings. ``opening``: where the cavity was opened, a solid that takes it out of the part
+    and stands out of it: no face of it lies on the skin, so that a difference leaves nothing over the opening.
     """
 
     cavity: Solid | None = None
@@ -141,6 +142,7 @@ class Deposit(Solid):
     overlap: float = 0.0
     notes: tuple[str, ...] = ()
     milled: Solid | None = None
+    opening: Solid | None = None
     _ranges: ClassVar[dict[str, Range]] = dict.fromkeys(
         ("stock_volume", "cut_back_volume", "thickness", "overlap"), (0.0, MOST)
     )

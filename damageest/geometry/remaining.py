@@ -16,14 +16,18 @@ LIFT = 1e-7
 """By how much the outer faces of what is taken off are lifted off the skin, as a share of the part's diagonal."""
 
 
-def subtract_from_part(part: Part, lost: Sequence[Solid], union: Any = None) -> Solid | None:
+def subtract_from_part(
+    part: Part, lost: Sequence[Solid], union: Any = None, openings: Sequence[Solid | None] = ()
+) -> Solid | None:
     """The part without ``lost`` solids, which lie inside it; None where nothing is left, the part itself without any.
 
     All are in one frame and unit; ``union``: of ``lost``, as `unite` gives it about the middle of the part's bounds,
-    where it is there already. The outer faces of a damage volume lie on the part's skin but for rounding. The plain
-    difference leaves membranes without thickness there, over up to two fifths of an opening: no volume, but rays and
-    other software see them. So these faces are lifted off the skin first, outwards; the inner damage surface and the
-    rim stay as they are.
+    where it is there already; ``openings``: for each of ``lost`` a solid that takes it out of the part and stands out
+    of it, where there is one (`Deposit.opening`).
+
+    The outer faces of a damage volume lie on the part's skin but for rounding. The plain difference leaves membranes
+    without thickness there, over up to three quarters of an opening: no volume, but rays and other software see them.
+    So these faces are lifted off the skin first, outwards; the inner damage surface and the rim stay as they are.
 
     Raises ValueError where manifold3d rejects one of the solids.
     """
@@ -32,8 +36,12 @@ def subtract_from_part(part: Part, lost: Sequence[Solid], union: Any = None) -> 
     origin = part.bounds.mean(axis=0)
     whole = to_manifold(part, origin)
     plain = unite(lost, origin) if union is None else union
-    lifted = [lift_faces(one, ~find_inner_faces(one, part), LIFT * part.diagonal) for one in lost]
-    left = whole - unite(lifted, origin)
+    known = openings or [None] * len(lost)
+    taken = [
+        lift_faces(one, ~find_inner_faces(one, part), LIFT * part.diagonal) if opening is None else opening
+        for one, opening in zip(lost, known, strict=True)
+    ]
+    left = whole - unite(taken, origin)
     if abs(whole.volume() - plain.volume() - left.volume()) > BALANCE * whole.volume():
         left = subtract_lost(whole, plain)
     return to_solid(left, origin)

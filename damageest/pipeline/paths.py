@@ -46,12 +46,16 @@ def _find_left(sites: list[FoundSite], part: Part) -> Solid | None:
     """The part without the cavities of the sites; None where nothing is left."""
     if not sites:
         return part
-    return subtract_from_part(part, [_find_cavity(site) for site in sites])
+    lost, openings = zip(*map(_find_cavity, sites), strict=True)
+    return subtract_from_part(part, lost, openings=openings)
 
 
-def _find_cavity(site: FoundSite) -> Solid:
+def _find_cavity(site: FoundSite) -> tuple[Solid, Solid | None]:
+    """The cavity of a site, and what takes it out of the part, where that is known."""
     deposit = site.deposit
-    return deposit.cavity if isinstance(deposit, Deposit) and deposit.cavity else site.damage
+    if isinstance(deposit, Deposit) and deposit.cavity:
+        return deposit.cavity, deposit.opening
+    return site.damage, None
 
 
 def _unite_built(before: list[Solid], part: Part) -> Solid | None:

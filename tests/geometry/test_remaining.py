@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import damageest
-from damageest.artefacts import Floats, Mesh, Part, Solid
+from damageest.artefacts import Deposit, Floats, Mesh, Part, Solid
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.remaining import lift_faces, subtract_from_part
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.stages.allowance.milling import Milling
 from tests.geometry.shapes import ball, box
 
 
@@ -76,6 +77,20 @@ def test_lifted_faces_stand_off_and_the_mesh_stays_closed(seed: int, height: flo
     assert 0 < grown < 1.1 * height * shape.area
     kept = {tuple(face) for face in shape.faces[~lifted].tolist()}
     assert kept <= {tuple(face) for face in made.faces.tolist()}
+
+
+def test_nothing_covers_the_opening_of_a_prepared_cavity() -> None:
+    """The faces of a cavity that is opened for deposition are many times smaller than those of the part."""
+    shape = trimesh.creation.cylinder(radius=18, height=120, sections=96)
+    part, damage = take(shape, np.array([14.0, 9.0, 40.0]), 4.0)
+    prepare = {"min_radius": 1.5, "wall_angle": 20.0, "direction": (0.84, 0.54, 0.0)}
+    deposit = Milling.model_validate({"prepare": prepare}).run(damage=damage, part=part, tolerance=0.1, others=None)
+    assert isinstance(deposit, Deposit)
+    assert deposit.cavity is not None
+    left = subtract_from_part(part, [deposit.cavity], openings=[deposit.opening])
+    assert left is not None
+    assert left.volume + deposit.cavity.volume == pytest.approx(part.volume, rel=1e-7)
+    assert find_covered(part, deposit.cavity, left) < 0.002
 
 
 def test_a_run_leaves_no_skin_over_the_opening() -> None:

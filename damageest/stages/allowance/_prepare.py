@@ -51,8 +51,11 @@ class Prepare(Options):
     )
 
 
-def open_cavity(damage: Solid, part: Part, others: Solid | None, prepare: Prepare, tolerance: float) -> Solid:
-    """The cavity that is opened; that of the damage where it is open already.
+def open_cavity(
+    damage: Solid, part: Part, others: Solid | None, prepare: Prepare, tolerance: float
+) -> tuple[Solid, Solid | None]:
+    """The cavity that is opened, and what takes it out of the part (see `Deposit.opening`); that of the damage, and
+    None, where it is open already.
 
     Seen along the direction, the floor of the cavity is a height over a grid of the plane across it. It is lowered to
     the least cone round each of its places (an erosion by a cone, as of a grey image; Serra 1982), whose sides have the
@@ -77,11 +80,12 @@ def open_cavity(damage: Solid, part: Part, others: Solid | None, prepare: Prepar
     floor = _lower_floor(Mesh(vertices, damage.faces), corner, (nx, ny), cell) - prepare.depth
     top = float(high[2]) + tolerance / 4
     floor = np.minimum(floor, top)
-    if np.isfinite(slope):
-        cone: Any = -_draw_cone(deep / slope, cell, slope)
-        floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
+    cone: Any = -_draw_cone(deep / slope, cell, slope) if np.isfinite(slope) else np.zeros((1, 1))
+    floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
     if prepare.min_radius > 0:
+        # a ball leaves upright walls round its lower half, which then lean outward too
         floor = _widen(floor, prepare.min_radius, cell, SHALLOW * cell)
+        floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
     room = _raise_column(floor, corner, cell, top).simplify(tolerance / 8)
     room = room.transform(np.column_stack([turn.T, np.zeros(3)]))
     whole, lost = to_manifold(part, origin), to_manifold(damage, origin)
@@ -89,11 +93,11 @@ def open_cavity(damage: Solid, part: Part, others: Solid | None, prepare: Prepar
     if others is not None:
         milled -= to_manifold(others, origin)
     if milled.volume() <= CRUMB * damage.volume:
-        return damage
+        return damage, None
     cavity = to_solid(lost + milled, origin)
     if cavity is None:
         raise StageError("the opened cavity is no solid", "use a slightly different prepare.wall_angle")
-    return cavity
+    return cavity, to_solid(room + lost, origin)
 
 
 def _find_direction(damage: Solid, part: Part, prepare: Prepare) -> Floats:

@@ -86,8 +86,9 @@ class Milling(Allowance):
         origin: Floats = part.bounds.mean(axis=0)
         plan = StockPlan(self.outer, self.targets, self.keep_out)
         cavity = cut_back(damage, part, others, self.inner, tolerance) if self.inner else damage
+        opening = None
         if self.prepare is not None:
-            cavity = open_cavity(cavity, part, others, self.prepare, tolerance)
+            cavity, opening = open_cavity(cavity, part, others, self.prepare, tolerance)
         hole, whole = to_manifold(cavity, origin), to_manifold(part, origin)
         left = subtract_lost(whole, hole)
         skin = take_skin(cavity, part, plan, origin)
@@ -131,6 +132,7 @@ class Milling(Allowance):
             heights=() if part.faces_brep is None else _find_heights(part, skin),
             overlap=0.0 if band is None else self.overlap,
             notes=tuple(notes),
+            opening=opening,
         )
 
 

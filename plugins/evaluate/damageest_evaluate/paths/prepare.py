@@ -14,6 +14,7 @@ from damageest_paths.layers import Layers
 
 from damageest.artefacts import Part, Solid
 from damageest.errors import StageError
+from damageest.geometry.remaining import subtract_from_part
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.geometry.vectors import normalise
 from damageest.stages.allowance import Allowance
@@ -100,7 +101,7 @@ def evaluate_damage(name: str, part: Part, seed: int, milling: type[Any]) -> Pre
     assert before is not None
     after, why = before, ""
     if deposit is not None and deposit.cavity is not None:
-        rest = to_solid(body - to_manifold(deposit.cavity, origin), origin)
+        rest = subtract_from_part(part, [deposit.cavity], openings=[deposit.opening])
         planned = Layers.model_validate(options).run(
             body=Solid(deposit.vertices, deposit.faces), left=rest, built=None, tolerance=tolerance
         )
