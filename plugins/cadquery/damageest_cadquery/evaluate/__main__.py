@@ -32,8 +32,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--seconds", type=float, default=1e9, help="start no case after this time")
     parser.add_argument("--step", type=Path, nargs="*", default=[], help="STEP files to use besides the built-in parts")
+    parser.add_argument("--files", type=Path, help="folder of CAD files: a damage on each that --output has no row of")
+    parser.add_argument("--limit", type=float, default=180.0, help="longest time for one of --files, in seconds")
     chosen = parser.parse_args(arguments)
     start = time.perf_counter()
+    if chosen.files:
+        _measure_files(chosen, start)
+        return
     with tempfile.TemporaryDirectory() as place:
         files = [*_write_parts(Path(place)), *chosen.step]
         for number in range(chosen.first, chosen.first + chosen.cases):
@@ -44,6 +49,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
                     stream.write(json.dumps(row) + "\n")
                 print({key: value for key, value in row.items() if key != "tried"}, flush=True)
     print(summarise([json.loads(line) for line in chosen.output.read_text().splitlines()]))
+
+
+def _measure_files(chosen: argparse.Namespace, start: float) -> None:
+    from damageest_cadquery.evaluate.files import measure_folder, read_rows, summarise_files
+
+    for number, row in enumerate(measure_folder(chosen.files, chosen.output, chosen.first, chosen.limit), start=1):
+        print(number, f"{time.perf_counter() - start:.0f} s", row["file"], row.get("error", "measured"), flush=True)
+        if time.perf_counter() - start > chosen.seconds:
+            break
+    print(summarise_files(read_rows(chosen.output)))
 
 
 def _write_parts(folder: Path) -> list[Path]:

@@ -1,0 +1,281 @@
+"""Measures CAD files of others: a damage on each, and what is in the STEP files of damage and deposit when read back."""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+import zlib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+POINTS = 25_000
+NOISE, TOLERANCE = 0.00075, 0.003
+"""Of the scan and of the job, in diagonals of the part."""
+CHORD = 1 / 32
+"""Of the part's triangles, in tolerances: a fourth of the default, so that volumes differ by little because of it."""
+STOCK = 2.0
+"""Height of the stock on the deposits, in tolerances."""
+LIMIT = 60.0
+"""Longest time for the exact form of a damage volume or of a deposit, in seconds of the processor."""
+BALLS = (0.07, 0.045, 0.03, 0.02)
+"""Radii, in diagonals, of the ball that is taken out where the part has no room for a damage of another kind."""
+SAME = 0.003
+"""Largest relative difference between a volume read back and that of the mesh."""
+
+
+def measure_folder(folder: Path, output: Path, first: int, seconds: float) -> Iterator[dict[str, Any]]:
+    """A row for each CAD file of ``folder`` that ``output`` has no row of, also appended to it.
+
+    ``first`` changes the random damages. ``seconds``: the longest time for a file, after which its row has an error.
+    """
+    from damageest.errors import StageError
+    from damageest.isolation import Limits, call_isolated
+    from damageest_cadquery.brep import Brep
+
+    done = {row["file"] for row in read_rows(output)}
+    for path in sorted(each for each in folder.iterdir() if each.suffix.lower() in Brep.reads):
+        if path.name in done:
+            continue
+        try:
+            row = call_isolated(
+                measure_file, {"path": path, "first": first}, worker="damageest_cadquery evaluate",
+                limits=Limits(seconds=seconds), show=False, nested=True,
+            )  # fmt: skip
+        except StageError as error:
+            row = {"file": path.name, "error": shorten(error), "kind": "ended"}
+        with output.open("a") as stream:
+            stream.write(json.dumps(row) + "\n")
+        yield row
+
+
+def read_rows(output: Path) -> list[dict[str, Any]]:
+    """The rows of a file, none where there is no such file; of several rows for one CAD file the last."""
+    if not output.exists():
+        return []
+    rows = [json.loads(line) for line in output.read_text().splitlines()]
+    return list({row["file"]: row for row in rows}.values())
+
+
+def shorten(error: BaseException) -> str:
+    return " ".join(str(error).split())[:300] or type(error).__name__
+
+
+def measure_file(path: Path, first: int) -> dict[str, Any]:
+    """A row: the random damage on the part of a file, and for each site what was written and what is read back; or
+    ``error``, and as ``kind`` whether the file was refused, has no damage, or failed."""
+    from damageest.errors import DamageestError
+    from damageest_cadquery.brep import Brep
+
+    row: dict[str, Any] = {"file": path.name, "seed": (first + zlib.crc32(path.name.encode())) % 100_000}
+    try:
+        diagonal = _measure_diagonal(path)
+        tolerance = TOLERANCE * diagonal
+        rough = Brep(path=path, chord=tolerance / 4).run(unit="mm", tolerance=None)
+    except DamageestError as error:
+        return row | {"error": shorten(error), "kind": "refused"}
+    row |= {"solids": int(rough.body_count) if hasattr(rough, "body_count") else None, "diagonal": diagonal}
+    try:
+        kinds, tools = _draw_damage(rough, row["seed"])
+    except LookupError as error:
+        return row | {"error": shorten(error), "kind": "no damage"}
+    with tempfile.TemporaryDirectory(prefix="damageest-files-") as place:
+        try:
+            return row | {"kinds": kinds} | _measure_run(path, Path(place), tolerance, row["seed"], tools)
+        except DamageestError as error:
+            return row | {"kinds": kinds, "error": shorten(error), "kind": "failed"}
+
+
+def _measure_diagonal(path: Path) -> float:
+    from damageest.errors import InputError
+    from damageest_cadquery._read import read
+    from damageest_cadquery._tessellate import measure_diagonal
+
+    try:
+        model = read(path, path.suffix.lower())
+        diagonal = float(measure_diagonal(model.solids))
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"cannot be read: {shorten(error)}") from error
+    if not np.isfinite(diagonal) or diagonal <= 0:
+        raise InputError("has no size")
+    return diagonal  # OpenCASCADE's lengths are millimetres, but for BREP, which has no unit
+
+
+def _draw_damage(part: Any, seed: int) -> tuple[list[str], list[dict[str, Any]]]:
+    """Kinds and tools of one random damage: a ball at a random place where the part has no room for others. Raises
+    LookupError where the part has no room for that."""
+    from damageest.errors import StageError
+    from damageest.stages.scan.scanner import apply_tools
+    from damageest.stages.scan.tools import SphereTool
+    from damageest_evaluate.damages import KINDS, make_random_damage
+    from damageest_evaluate.scores import sample_surface
+
+    try:
+        drawn = make_random_damage(part, seed, (list(KINDS)[seed % len(KINDS)],), count=1)
+        return list(drawn.kinds), [tool.model_dump(mode="json") for tool in drawn.tools]
+    except (LookupError, StageError, ValueError):
+        pass
+    places = sample_surface(part, 200)[0]
+    rng = np.random.default_rng([49, seed])
+    for share in BALLS:
+        for place in places[rng.permutation(len(places))[:5]]:
+            ball = SphereTool(centre=tuple(place.tolist()), radius=share * part.diagonal)
+            try:
+                lost = apply_tools(part, [ball])[1]
+            except StageError:
+                continue
+            if lost is not None and lost.volume < 0.5 * part.volume:
+                return ["ball"], [ball.model_dump(mode="json")]
+    raise LookupError("no damage fits the part")
+
+
+def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Sequence[Any]) -> dict[str, Any]:
+    import damageest
+
+    output = place / "out"
+    job = {
+        "version": 1, "units": "mm", "tolerance": tolerance, "align": "none",
+        "part": {"use": "brep", "path": str(path), "chord": CHORD * tolerance},
+        "scan": {"use": "simulate", "points": POINTS, "noise": NOISE * tolerance / TOLERANCE, "seed": seed,
+                 "damage": list(tools)},
+        "accept": "all", "report": "none", "allowance": {"use": "milling", "outer": STOCK * tolerance},
+        "export": {"format": ["step"], "solids": "exact", "limit": LIMIT},
+    }  # fmt: skip
+    result = damageest.run(job, output=output, cache=False)
+    said = json.loads((output / "result.json").read_text())
+    coloured = _count_coloured(path)
+    sites = []
+    for site, report in zip(result.sites, said["sites"], strict=True):
+        exact = report.get("exact") or {"form": "none", "tried": ["no exact form was asked for"]}
+        row = {"site": site.id, "exact": exact}
+        if exact["form"] != "none":
+            row["damage"] = read_back(output / f"damage/site-{site.id}.step", site.damage.volume, coloured)
+        made = exact.get("deposit")
+        if made and not made["reason"]:
+            wanted = _measure_deposit(site, result, tolerance)
+            row["deposit"] = read_back(output / f"deposit/site-{site.id}.step", wanted, coloured)
+        elif not made:
+            row["no_deposit"] = str(report.get("deposit_reason") or report.get("reason") or "the run gave no deposit")
+        sites.append(row)
+    if not sites:
+        return {"error": "the run found no damage", "kind": "no site"}
+    return {"coloured": coloured, "sites": sites, "warnings": [str(each)[:200] for each in said.get("warnings", [])]}
+
+
+def _measure_deposit(site: Any, result: Any, tolerance: float) -> float:
+    """The volume of the mesh with stock as high as that of the exact form; the run's is a quarter tolerance higher."""
+    from damageest.errors import StageError
+    from damageest.stages.allowance.milling import Milling
+
+    stage = Milling(outer=(STOCK - 0.25) * tolerance)
+    try:
+        deposit = stage.run(site.damage, result.part, tolerance, None)
+    except StageError:
+        return float("nan")
+    return float("nan") if deposit is None else float(deposit.volume)
+
+
+def _count_coloured(path: Path) -> int:
+    """How many CAD faces of a file have a colour."""
+    from damageest_cadquery._colours import read_colours
+    from damageest_cadquery._read import explore, read
+
+    from OCP.TopAbs import TopAbs_FACE
+
+    solids = read(path, path.suffix.lower()).solids
+    count = sum(len(explore(solid, TopAbs_FACE)) for solid in solids)
+    return sum(colour is not None for colour in read_colours(path, count))
+
+
+def read_back(path: Path, wanted: float, coloured: int) -> dict[str, Any]:
+    """What is in a STEP file. ``wanted``: the mesh's volume. The text says how many solids and faces were written, a
+    new reader how many there are."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.TopAbs import TopAbs_FACE
+
+    from damageest_cadquery._colours import read_colours
+    from damageest_cadquery._read import explore, read
+    from damageest_cadquery._split import measure_volume, triangulate
+
+    text = path.read_text(errors="replace")
+    model = read(path, ".step")
+    faces = [face for solid in model.solids for face in explore(solid, TopAbs_FACE)]
+    names = [model.name_of(face) for face in faces]
+    colours = read_colours(path, len(faces))
+    volume = sum(measure_volume(solid) for solid in model.solids)
+    try:
+        # where an outline on a spline is long, OpenCASCADE's integrals are wrong by percents
+        by_triangles = sum(triangulate(solid, 1e-3 * wanted ** (1 / 3)).volume for solid in model.solids)
+    except Exception:
+        by_triangles = None
+    return {
+        "written_solids": len(re.findall(r"=\s*(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS)\s*\(", text)),
+        "written_faces": len(re.findall(r"=\s*ADVANCED_FACE\s*\(", text)),
+        "solids": len(model.solids),
+        "faces": len(faces),
+        "valid": all(BRepCheck_Analyzer(solid).IsValid() for solid in model.solids),
+        "mesh": wanted,
+        "volume": volume,
+        "by_triangles": by_triangles,
+        "unnamed": sum(not name for name in names),
+        "without_colour": sum(colour is None for colour in colours) if coloured else 0,
+    }
+
+
+def find_faults(read: dict[str, Any]) -> list[str]:
+    """What is wrong in a file that was read back."""
+    faults = []
+    if read["solids"] != read["written_solids"]:
+        faults.append(f"{read['solids']} solids for {read['written_solids']}")
+    if read["faces"] != read["written_faces"]:
+        faults.append(f"{read['faces']} faces for {read['written_faces']}")
+    if not read["valid"]:
+        faults.append("not valid")
+    if not measure_off(read) <= SAME:
+        faults.append(f"volume {measure_off(read):.2%} from the mesh")
+    if read["unnamed"]:
+        faults.append(f"{read['unnamed']} faces without a name")
+    if read["without_colour"]:
+        faults.append(f"{read['without_colour']} faces without a colour")
+    return faults
+
+
+def measure_off(read: dict[str, Any]) -> float:
+    """The relative difference between the volume read back and the mesh's."""
+    if not np.isfinite(read["mesh"]):
+        return float("nan")
+    found = [read["volume"], *([] if read["by_triangles"] is None else [read["by_triangles"]])]
+    return min(abs(volume / read["mesh"] - 1) for volume in found)
+
+
+def summarise_files(rows: Sequence[dict[str, Any]]) -> str:
+    """The figures over all files, in words, and each that is not as wanted by its name."""
+    lost = Counter(row["kind"] for row in rows if "error" in row)
+    sites = [(row["file"], site) for row in rows for site in row.get("sites", [])]
+    lines = [
+        f"{len(rows)} files, {len(rows) - sum(lost.values())} measured, {len(sites)} damages; "
+        f"not measured: {dict(lost)}"
+    ]
+    for what in ("damage", "deposit"):
+        mine = [(file, site[what]) for file, site in sites if what in site]
+        good = sum(not find_faults(read) for _, read in mine)
+        lines.append(
+            f"{what}: exact form on {len(mine)} of {len(sites)}, {good} of them read back without a fault"
+        )
+        lines += [f"  {file}: {', '.join(find_faults(read))}" for file, read in mine if find_faults(read)]
+    for file, site in sites:
+        exact = site["exact"]
+        if exact["form"] == "none":
+            lines.append(f"  {file}, damage: {exact['tried'][-1] if exact['tried'] else 'unknown'}")
+        elif exact.get("deposit") and exact["deposit"]["reason"]:
+            lines.append(f"  {file}, deposit: {exact['deposit']['reason']}")
+        elif "no_deposit" in site:
+            lines.append(f"  {file}, no deposit: {site['no_deposit']}")
+    lines += [f"  {row['file']}, {row['kind']}: {row['error']}" for row in rows if "error" in row]
+    return "\n".join(lines)
