@@ -27,15 +27,23 @@ FINE = 1 / 48
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m damageest_cadquery.evaluate", description=__doc__)
-    parser.add_argument("--output", type=Path, required=True, help="file of rows, one JSON object a line; grows")
+    parser.add_argument("--output", type=Path, help="file of rows, one JSON object a line; grows")
     parser.add_argument("--cases", type=int, default=65, help="random damages, spread over the parts")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--seconds", type=float, default=1e9, help="start no case after this time")
     parser.add_argument("--step", type=Path, nargs="*", default=[], help="STEP files to use besides the built-in parts")
     parser.add_argument("--files", type=Path, help="folder of CAD files: a damage on each that --output has no row of")
+    parser.add_argument("--write", type=Path, help="write the built-in parts as STEP files to this folder, no more")
     parser.add_argument("--limit", type=float, default=180.0, help="longest time for one of --files, in seconds")
     chosen = parser.parse_args(arguments)
     start = time.perf_counter()
+    if chosen.write:
+        from damageest_cadquery.evaluate.write_parts import write_parts
+
+        print(f"{len(write_parts(chosen.write))} files")
+        return
+    if chosen.output is None:
+        parser.error("--output is missing")
     if chosen.files:
         _measure_files(chosen, start)
         return
