@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from manifold3d import Manifold, OpType
 
 from damageest.artefacts import Solid
 from damageest.errors import InputError
@@ -19,8 +20,8 @@ from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, combine, find_twin_pairs, naming, sew, turn_offsets
 from damageest_cadquery._split import triangulate
 
-UNION = 1e-2
-"""Share of a volume by which that of triangles may be wrong."""
+UNION = 3e-3
+"""Largest relative difference between the volume of joined solids and that of the union of their triangles."""
 SAME = 1e-3
 """Largest relative difference between the volume of sewn solids and the sum of theirs, as triangles."""
 DUST = 1e-6
@@ -94,57 +95,69 @@ def _take_triangles(lump: Lump, chord: float) -> Solid:
 def fuse(lumps: Sequence[Lump], chord: float) -> list[Any]:
     """The solids as one, or as few as they touch in: first with those sewn that share no volume, then as they are; last
     one after the other. Where several have faces that nearly coincide, as mitres and walls at a corner, OpenCASCADE
-    leaves pieces out. Offsets of splines become splines, with which a Boolean operation is faster.
+    leaves pieces out, or does not find where they cut each other. Offsets of splines become splines, with which a
+    Boolean operation is faster.
 
     Raises StockError where none of these gives the union.
     """
     groups = sew_groups(lumps, chord)
     if len(groups) == 1:
         return [groups[0].solid]
-    ways = [groups, lumps] if len(groups) < len(lumps) else [groups]
-    for some in ways:
-        solids, volumes = [turn_offsets(lump.solid) for lump in some], _measure_volumes(some, chord)
-        joined = _unite(solids[:1], solids[1:], volumes, chord)
+    for some in [groups, lumps] if len(groups) < len(lumps) else [groups]:
+        solids = [turn_offsets(lump.solid) for lump in some]
+        joined = _unite(solids[:1], solids[1:], _to_manifolds(some, chord), chord)
         if joined is not None:
             return joined
     return _fuse_in_turn(groups, chord)
 
 
+def sew_all(lumps: Sequence[Lump], chord: float) -> list[Any] | None:
+    """All solids sewn; None where they do not close, or have volume in common, as over two sides of a slot."""
+    found = sew([lump.solid for lump in lumps])
+    if found is None:
+        return None
+    wanted = Manifold.batch_boolean(_to_manifolds(lumps, chord), OpType.Add).volume()
+    return found[0] if _has_volume(found[0], wanted, chord) else None
+
+
 def _fuse_in_turn(lumps: Sequence[Lump], chord: float) -> list[Any]:
-    volumes = _measure_volumes(lumps, chord)
-    order = np.argsort(volumes, kind="stable")[::-1].tolist()
+    meshes = _to_manifolds(lumps, chord)
+    order = np.argsort([mesh.volume() for mesh in meshes], kind="stable")[::-1].tolist()
     joined = [turn_offsets(lumps[order[0]].solid)]
     for rank, k in enumerate(order[1:], start=2):
         with naming(lumps[k].faces):
-            found = _unite(joined, [turn_offsets(lumps[k].solid)], [volumes[n] for n in order[:rank]], chord)
+            found = _unite(joined, [turn_offsets(lumps[k].solid)], [meshes[n] for n in order[:rank]], chord)
             if found is None:
-                raise StockError("OpenCASCADE loses stock where it meets that of other faces")
+                raise StockError("OpenCASCADE does not join it soundly with that of other faces")
         joined = found
     return joined
 
 
-def _measure_volumes(lumps: Sequence[Lump], chord: float) -> list[float]:
-    return [_take_triangles(lump, chord).volume for lump in lumps]
+def _to_manifolds(lumps: Sequence[Lump], chord: float) -> list[Manifold]:
+    meshes = [_take_triangles(lump, chord) for lump in lumps]
+    origin = meshes[0].bounds.mean(axis=0)
+    return [to_manifold(mesh, origin) for mesh in meshes]
 
 
-def _unite(solids: Sequence[Any], others: Sequence[Any], volumes: Sequence[float], chord: float) -> list[Any] | None:
-    """The union of solids, whose parts have the ``volumes``; None where OpenCASCADE does not find it. It can leave a
+def _unite(solids: Sequence[Any], others: Sequence[Any], meshes: Sequence[Manifold], chord: float) -> list[Any] | None:
+    """The union of solids, whose parts have the ``meshes``; None where OpenCASCADE does not find it. It can leave a
     slit where a face of one covers those of two others; joined once more with one of the solids, that is gone."""
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
     from OCP.TopAbs import TopAbs_SOLID
 
+    wanted = Manifold.batch_boolean(list(meshes), OpType.Add).volume()
     joined = explore(combine(BRepAlgoAPI_Fuse(), solids, others), TopAbs_SOLID)
-    if not joined or _is_union(joined, volumes, chord):
+    if not joined or _has_volume(joined, wanted, chord):
         return joined or None
     again = explore(combine(BRepAlgoAPI_Fuse(), joined, solids[:1]), TopAbs_SOLID)
-    return again if again and _is_union(again, volumes, chord) else None
+    return again if again and _has_volume(again, wanted, chord) else None
 
 
-def _is_union(joined: Sequence[Any], volumes: Sequence[float], chord: float) -> bool:
-    """Whether solids can be the union of some with the ``volumes`` (N,): their triangles close, and they are at least
-    as large as the largest and at most as all. By triangles: integrals over walls on splines are wrong by percents."""
+def _has_volume(joined: Sequence[Any], wanted: float, chord: float) -> bool:
+    """Whether the triangles of solids close and have a volume. By triangles: integrals over walls on splines are wrong
+    by percents."""
     try:
         volume = sum(triangulate(solid, chord).volume for solid in joined)
     except (InputError, ValueError):
         return False
-    return max(volumes) * (1 - UNION) <= volume <= sum(volumes) * (1 + UNION)
+    return abs(volume / wanted - 1) < UNION

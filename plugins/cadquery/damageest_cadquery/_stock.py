@@ -17,10 +17,10 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from damageest.artefacts import Floats
 from damageest_cadquery._edges import Edge, find_edges, measure_normals
-from damageest_cadquery._join_stock import Lump, fuse
+from damageest_cadquery._join_stock import Lump, fuse, sew_all
 from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
-from damageest_cadquery._solids import StockError, close, explore_faces, naming, orient_solid, sew
+from damageest_cadquery._solids import StockError, close, explore_faces, naming, orient_solid
 from damageest_cadquery._split import Piece, is_watertight, measure_volume
 from damageest_cadquery._walls import build_wall
 
@@ -97,9 +97,9 @@ def join_stock(parts: Sequence[Lump], bases: Sequence[Base]) -> list[Any]:
         return [parts[0].solid]
     apart = all(edge.kind in ("smooth", "convex") for edge in find_edges([base.face for base in bases]))
     with naming(base.number for base in bases):
-        found = sew([part.solid for part in parts]) if apart else None
         chord = min(base.height for base in bases) / CHORDS
-        return _merge(fuse(parts, chord) if found is None else found[0], bases)
+        found = sew_all(parts, chord) if apart else None
+        return _merge(fuse(parts, chord) if found is None else found, bases)
 
 
 def _thicken(faces: Sequence[Any], height: float) -> Any:
