@@ -77,8 +77,7 @@ def _make(request: Request) -> Made:
         if site.deposit is None:
             continue
         if fault := request.skipped.get(name_deposit(site.number)):
-            error = StockError(fault, _list_stock(site))
-            forms[site.number] = DepositForm(reason=error.describe(facts.names))
+            forms[site.number] = DepositForm(reason=StockError(fault, _list_stock(site)).describe(facts.names))
             continue
         try:
             with at_work(name_deposit(site.number), request.seconds):

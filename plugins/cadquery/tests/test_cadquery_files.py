@@ -23,7 +23,7 @@ def write_block(path: Path, nameless: int = 0) -> Path:
 
 
 def take_read(path: Path, mesh: float) -> dict[str, Any]:
-    return read_back(path, mesh, 6) | {"mesh": mesh}
+    return read_back(path, 6) | {"mesh": mesh}
 
 
 def test_faults_of_a_file_are_found(tmp_path: Path) -> None:

@@ -24,8 +24,8 @@ STOCK = 2.0
 """Height of the stock on the deposits, in tolerances."""
 LIMIT = 30.0
 """Longest time for the exact form of a damage volume or of a deposit, in seconds of the processor."""
-BALLS = (0.07, 0.045, 0.03, 0.02)
-"""Radii, in diagonals, of the ball that is taken out where the part has no room for a damage of another kind."""
+SMALLER = (0.7, 0.45, 0.3)
+"""Sizes of the pit that is made where the part has no room for another damage, in those that it would have."""
 SIZES = (100_000, 300_000)
 """Bytes from which a file comes after the smaller ones."""
 SAME = 0.003
@@ -86,7 +86,7 @@ def _measure(path: Path, first: int, seconds: float) -> dict[str, Any]:
                 given = {"path": Path(place) / f"out/{what}/site-{site['site']}.step", "coloured": row["coloured"]}
                 try:
                     site[what] |= call_isolated(
-                        read_back, given | {"wanted": site[what]["mesh"]}, worker="damageest_cadquery reads",
+                        read_back, given, worker="damageest_cadquery reads",
                         limits=read_limits, show=False,
                     )  # fmt: skip
                 except Exception as error:  # OpenCASCADE's exceptions share no base of their own
@@ -148,31 +148,29 @@ def _measure_diagonal(path: Path) -> float:
 
 
 def _draw_damage(part: Any, seed: int) -> tuple[list[str], list[dict[str, Any]]]:
-    """Kinds and tools of one random damage: a ball at a random place where the part has no room for others. Raises
-    LookupError where the part has no room for that."""
-    from damageest_evaluate.damages import KINDS, make_random_damage
-    from damageest_evaluate.scores import sample_surface
+    """Kinds and tools of one random damage: a small pit where the part has no room for others. Raises LookupError where
+    it has no room for that."""
+    from damageest_evaluate.damages import KINDS, PlacePicker, make_random_damage
 
     from damageest.errors import StageError
     from damageest.stages.scan.scanner import apply_tools
-    from damageest.stages.scan.tools import SphereTool
 
     try:
         drawn = make_random_damage(part, seed, (list(KINDS)[seed % len(KINDS)],), count=1)
         return list(drawn.kinds), [tool.model_dump(mode="json") for tool in drawn.tools]
     except (LookupError, StageError, ValueError):
         pass
-    places = sample_surface(part, 200)[0]
-    rng = np.random.default_rng([49, seed])
-    for share in BALLS:
-        for place in places[rng.permutation(len(places))[:5]]:
-            ball = SphereTool(centre=tuple(place.tolist()), radius=share * part.diagonal)
+    picker = PlacePicker(part, np.random.default_rng([49, seed]))
+    for share in SMALLER:
+        picker.size = share * part.diagonal
+        for _ in range(5):
             try:
-                lost = apply_tools(part, [ball])[1]
-            except StageError:
+                tools = KINDS["pit"](picker)
+                lost = apply_tools(part, tools)[1]
+            except (LookupError, StageError):
                 continue
             if lost is not None and lost.volume < 0.5 * part.volume:
-                return ["ball"], [ball.model_dump(mode="json")]
+                return ["small pit"], [tool.model_dump(mode="json") for tool in tools]
     raise LookupError("no damage fits the part")
 
 
@@ -251,9 +249,9 @@ def _count_coloured(path: Path) -> int:
     return sum(colour is not None for colour in read_colours(path, count))
 
 
-def read_back(path: Path, wanted: float, coloured: int) -> dict[str, Any]:
-    """What is in a STEP file. ``wanted``: the mesh's volume. The text says how many solids and faces were written, a
-    new reader how many there are."""
+def read_back(path: Path, coloured: int) -> dict[str, Any]:
+    """What is in a STEP file: its text says how many solids and faces were written, a new reader how many there are.
+    ``coloured``: how many CAD faces have a colour."""
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.TopAbs import TopAbs_FACE
 
@@ -270,7 +268,7 @@ def read_back(path: Path, wanted: float, coloured: int) -> dict[str, Any]:
     volume = sum(measure_volume(solid) for solid in model.solids)
     try:
         # where an outline on a spline is long, OpenCASCADE's integrals are wrong by percents
-        by_triangles = sum(triangulate(solid, 1e-3 * wanted ** (1 / 3)).volume for solid in model.solids)
+        by_triangles = sum(triangulate(solid, 1e-3 * abs(volume) ** (1 / 3)).volume for solid in model.solids)
     except Exception:
         by_triangles = None
     return {
@@ -312,12 +310,12 @@ def measure_off(read: dict[str, Any]) -> float:
     if not np.isfinite(read["mesh"]):
         return float("nan")
     found = [read["volume"], *([] if read["by_triangles"] is None else [read["by_triangles"]])]
-    return min(abs(volume / read["mesh"] - 1) for volume in found)
+    return float(min(abs(volume / read["mesh"] - 1) for volume in found))
 
 
 def measure_outline(row: dict[str, Any], site: dict[str, Any]) -> float:
-    """The share of a deposit by which it is larger than the mesh's because its outline is: stock stands on all skin that
-    the exact damage volume takes."""
+    """The share of a deposit by which it is larger than the mesh's because its outline is: stock stands on all skin
+    that the exact damage volume takes."""
     read, tolerance = site["damage"], TOLERANCE * row["diagonal"]
     return float(STOCK * tolerance * (read["skin"] - site["skin"]) / site["deposit"]["mesh"])
 
