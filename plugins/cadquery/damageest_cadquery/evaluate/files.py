@@ -24,8 +24,6 @@ STOCK = 2.0
 """Height of the stock on the deposits, in tolerances."""
 LIMIT = 30.0
 """Longest time for the exact form of a damage volume or of a deposit, in seconds of the processor."""
-SMALLER = (0.7, 0.45, 0.3)
-"""Sizes of the pit that is made where the part has no room for another damage, in those that it would have."""
 SIZES = (100_000, 300_000)
 """Bytes from which a file comes after the smaller ones."""
 SAME = 0.003
@@ -148,30 +146,16 @@ def _measure_diagonal(path: Path) -> float:
 
 
 def _draw_damage(part: Any, seed: int) -> tuple[list[str], list[dict[str, Any]]]:
-    """Kinds and tools of one random damage: a small pit where the part has no room for others. Raises LookupError where
-    it has no room for that."""
-    from damageest_evaluate.damages import KINDS, PlacePicker, make_random_damage
+    """Kind and tools of one random damage. Raises LookupError where the part has no room for any."""
+    from damageest_evaluate.damages import KINDS, make_random_damage
 
     from damageest.errors import StageError
-    from damageest.stages.scan.scanner import apply_tools
 
     try:
         drawn = make_random_damage(part, seed, (list(KINDS)[seed % len(KINDS)],), count=1)
-        return list(drawn.kinds), [tool.model_dump(mode="json") for tool in drawn.tools]
-    except (LookupError, StageError, ValueError):
-        pass
-    picker = PlacePicker(part, np.random.default_rng([49, seed]))
-    for share in SMALLER:
-        picker.size = share * part.diagonal
-        for _ in range(5):
-            try:
-                tools = KINDS["pit"](picker)
-                lost = apply_tools(part, tools)[1]
-            except (LookupError, StageError):
-                continue
-            if lost is not None and lost.volume < 0.5 * part.volume:
-                return ["small pit"], [tool.model_dump(mode="json") for tool in tools]
-    raise LookupError("no damage fits the part")
+    except (StageError, ValueError) as error:
+        raise LookupError(f"no damage fits the part: {shorten(error)}") from error
+    return list(drawn.kinds), [tool.model_dump(mode="json") for tool in drawn.tools]
 
 
 def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Sequence[Any]) -> dict[str, Any]:
