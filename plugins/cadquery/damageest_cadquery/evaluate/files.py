@@ -201,9 +201,9 @@ def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Se
 def _measure_deposit(site: Any, result: Any, tolerance: float) -> float:
     """The volume of the mesh with stock as high as that of the exact form; the run's is a quarter tolerance higher."""
     from damageest.errors import StageError
-    from damageest.stages.allowance.milling import Milling
+    from damageest.registry import Registry
 
-    stage = Milling(outer=(STOCK - 0.25) * tolerance)
+    stage: Any = Registry.discover().get("allowance", "milling").cls(outer=(STOCK - 0.25) * tolerance)
     try:
         deposit = stage.run(site.damage, result.part, tolerance, None)
     except StageError:
