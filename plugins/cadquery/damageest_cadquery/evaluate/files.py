@@ -203,7 +203,8 @@ def _measure_deposit(site: Any, result: Any, tolerance: float) -> float:
     from damageest.errors import StageError
     from damageest.registry import Registry
 
-    stage: Any = Registry.discover().get("allowance", "milling").cls(outer=(STOCK - 0.25) * tolerance)
+    milling: Any = Registry.discover().get("allowance", "milling").cls
+    stage = milling(outer=(STOCK - 0.25) * tolerance)
     try:
         deposit = stage.run(site.damage, result.part, tolerance, None)
     except StageError:
