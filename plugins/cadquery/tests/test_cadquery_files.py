@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 from damageest_cadquery._assembly import NamedShape, write_assembly
-from damageest_cadquery.evaluate.files import find_faults, measure_folder, read_back, read_rows, summarise_files
+from damageest_cadquery.evaluate.files import measure_folder, read_back
+from damageest_cadquery.evaluate.files_rows import find_faults, read_rows, summarise_files
 
 from tests.needs import import_for, needs_plugin
 

@@ -60,7 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _measure_files(chosen: argparse.Namespace, start: float) -> None:
-    from damageest_cadquery.evaluate.files import measure_folder, read_rows, summarise_files
+    from damageest_cadquery.evaluate.files import measure_folder
+    from damageest_cadquery.evaluate.files_rows import read_rows, summarise_files
 
     for number, row in enumerate(measure_folder(chosen.files, chosen.output, chosen.first, chosen.limit), start=1):
         print(number, f"{time.perf_counter() - start:.0f} s", row["file"], row.get("error", "measured"), flush=True)
