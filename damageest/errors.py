@@ -48,7 +48,7 @@ def clean_message(text: object, most: int = MOST_TEXT) -> str:
 class DamageestError(Exception):
     """Base of all errors that damageest raises on purpose; its text is meant for the user. ``topic``: the word by which
     `damageest explain` says more about it; empty where it does not. ``code``: the sort of error, as in
-    `damageest.rules.error_codes`, which names the page of the documentation for it."""
+    `damageest.error_codes`, which names the page of the documentation for it."""
 
     exit_status = 1
     topic = ""

@@ -23,7 +23,7 @@ def say_help(error: BaseException) -> None:
     """Prints where to read more about an error. Without the libraries that this needs, as numpy, nothing is printed:
     the error is that they are missing then."""
     try:
-        from damageest.rules.error_codes import describe_help
+        from damageest.error_codes import describe_help
     except ImportError:
         return
     say(describe_help(error), err=True)
@@ -31,7 +31,7 @@ def say_help(error: BaseException) -> None:
 
 def describe_failure(error: BaseException, source: str = "") -> dict[str, object]:
     """An error for programs, as a command with --json prints it."""
-    from damageest.rules.error_codes import find_page, name_code
+    from damageest.error_codes import find_page, name_code
 
     status = int(getattr(error, "exit_status", 1))
     said = {"job": source} if source else {}

@@ -45,9 +45,9 @@ def command(
 
 def _collect() -> list[dict[str, Any]]:
     """All that can be explained, in the order in which it is listed; each has a ``word`` and a ``kind``."""
+    from damageest.error_codes import ERROR_CODES, EXIT_STATUSES
     from damageest.registry import Registry
     from damageest.rules.advice import TOPICS
-    from damageest.rules.error_codes import ERROR_CODES, EXIT_STATUSES
     from damageest.rules.notes import RUN_CODES
     from damageest.rules.pose import POSE_CODES
 

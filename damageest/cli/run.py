@@ -109,11 +109,11 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
     """Runs jobs one after the other, all in this process. Gives the exit status."""
     from damageest.cli import _interrupt
     from damageest.cli._progress import Progress
+    from damageest.error_codes import format_help
     from damageest.errors import DamageestError
     from damageest.io.files import read_json
     from damageest.job import load
     from damageest.registry import Registry
-    from damageest.rules.error_codes import format_help
 
     limit_this_process(given.limits.memory)
     progress = Progress(given.quiet, _process.BEGAN if _process.is_command else None)

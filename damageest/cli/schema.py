@@ -29,10 +29,10 @@ def command(
 ) -> None:
     """Print the JSON Schema of the job file, with the options of all installed plugins, or of result.json, or the
     tables of all reasons or errors."""
+    from damageest.error_codes import format_errors
     from damageest.job.schema import job_schema
     from damageest.output.result_json import result_schema
     from damageest.registry import Registry
-    from damageest.rules.error_codes import format_errors
     from damageest.rules.reference import format_reasons
 
     with keep_for_results(for_good=_process.is_command):

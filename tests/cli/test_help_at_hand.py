@@ -15,10 +15,10 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from damageest.cli import app
+from damageest.error_codes import ERROR_CODES, EXIT_STATUSES, STAGE_PAGES, describe_help, format_errors
 from damageest.errors import DamageestError, InputError, StageError
 from damageest.registry.contracts import STAGES
 from damageest.rules.advice import TOPICS
-from damageest.rules.error_codes import ERROR_CODES, EXIT_STATUSES, STAGE_PAGES, describe_help, format_errors
 from tests import damaged_box
 
 ROOT = Path(__file__).parents[2]
@@ -179,3 +179,13 @@ def test_a_failure_in_this_process_has_a_code_too(folder: Path) -> None:
     done = CliRunner().invoke(app, ["verify", str(folder)])
     assert isinstance(done.exception, DamageestError)
     assert done.exception.code == "result_folder"
+
+
+def test_the_help_line_needs_no_libraries() -> None:
+    """Where a run ended for want of memory, to load numpy as well may never end."""
+    code = (
+        "import sys; from damageest.cli._errors import say_help; from damageest.errors import StageError; "
+        "say_help(StageError('ended', 'try', code='crash')); sys.exit('numpy' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr[:29]) == (0, "help: damageest explain crash")

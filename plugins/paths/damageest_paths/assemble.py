@@ -71,7 +71,7 @@ def plan_path(
     groups = [[_to_relative(one, plan) for one in plan.passes] for plan in plans]
     near = _gather_obstacles(groups, plans, around, task.body.bounds - origin, process)
     moves = join_passes(
-        groups, clearance.without_beam().with_obstacles(near), _choose_travel(task, clearance, speeds, process, origin)
+        groups, clearance.during_travel().with_obstacles(near), _choose_travel(task, clearance, speeds, process, origin)
     )
     missing = gather_missing(plans)
     solid = None if missing is None else to_solid(missing, origin)

@@ -78,13 +78,12 @@ def choose_axes(
 
     Returns:
         The pieces in the order of the points. Points in none of them cannot be reached. A pass is one piece with one
-        axis where there is one that is free all along: ``first``, or one that has room to spare and serves many passes
-        of the layer. Else the axis turns along the pass; it is cut where no turn is free.
+        axis where there is one that is free all along: ``first`` where it is for all passes, else one that is for as
+        many as possible. Else the axis turns along the pass; it is cut where no turn is free.
     """
     found = _measure([_keep(line, axes[first]) for line in lines], lines, clearance, limits)
-    going = [k for k, one in enumerate(found) if not _is_free(one, limits)]
-    if len(axes) > 1 and going:
-        going = _try_single_axes(found, going, lines, axes, clearance, limits)
+    if len(axes) > 1 and not all(_is_free(one, limits) for one in found):
+        going = _share_axes(found, lines, axes, first, clearance, limits)
         _let_turn(found, going, lines, axes, clearance, limits)
     return [_cut(one, limits) for one in found]
 
@@ -98,28 +97,36 @@ def _is_free(one: _Found, limits: Limits) -> bool:
     return bool(is_free and one.course.joined.all())
 
 
-def _try_single_axes(
-    found: list[_Found], going: list[int], lines: Sequence[Floats], axes: Floats, clearance: Clearance, limits: Limits
+def _share_axes(
+    found: list[_Found], lines: Sequence[Floats], axes: Floats, first: int, clearance: Clearance, limits: Limits
 ) -> list[int]:
-    """Replaces what was found for passes that one axis serves all along; gives the numbers of the others."""
-    sparse = [np.append(lines[k][:-1:SPARSE], lines[k][-1:], axis=0) for k in going]
+    """Replaces what was found for passes that one axis serves all along; gives the numbers of the others.
+
+    Few axes serve all: between two of them the tool may have to leave a tight place and come back. Each is the one that
+    serves the most of the passes that are left (Chvatal 1979), with room to spare if possible, near to ``first``.
+    """
+    sparse = [np.append(line[:-1:SPARSE], line[-1:], axis=0) for line in lines]
     _, high = _bound_all(np.concatenate(sparse), axes, clearance, limits)
     starts = np.cumsum([0, *(len(each) for each in sparse[:-1])])
     room = np.minimum.reduceat(high, starts, axis=0)
     free, roomy = room >= limits.needed, room >= ROOM * limits.needed
-    popular = (free * 1 + roomy).sum(axis=0)
-    order = [np.lexsort([np.arange(len(axes)), -popular, ~roomy[k]]) for k in range(len(going))]
-    choices = {k: each[free[n][each]][:BEST] for n, (k, each) in enumerate(zip(going, order, strict=True))}
-    for number in range(BEST):
-        tried = [k for k in going if number < len(choices[k])]
-        if not tried:
-            break
-        courses = [_keep(lines[k], axes[choices[k][number]]) for k in tried]
+    free[:, first] = [_is_free(one, limits) for one in found]
+    turn = np.arccos(np.clip(axes @ axes[first], -1, 1))
+    tries = np.full(len(lines), BEST)
+    left = np.ones(len(lines), bool)
+    while (free[left].any(axis=1) & (tries[left] > 0)).any():
+        own = free & (left & (tries > 0))[:, None]
+        number = int(np.lexsort([np.arange(len(axes)), turn, -(own * 1 + (own & roomy)).sum(axis=0)])[0])
+        tried = np.flatnonzero(own[:, number]).tolist()
+        courses = [_keep(lines[k], axes[number]) for k in tried]
         for k, one in zip(tried, _measure(courses, [lines[k] for k in tried], clearance, limits), strict=True):
             if _is_free(one, limits):
+                found[k], left[k] = one, False
+            elif not _is_free(found[k], limits):
                 found[k] = one
-        going = [k for k in going if not _is_free(found[k], limits)]
-    return going
+        free[tried, number] = False
+        tries[tried] -= 1
+    return list(map(int, np.flatnonzero(left)))
 
 
 def _let_turn(

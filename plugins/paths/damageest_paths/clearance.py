@@ -37,7 +37,8 @@ class Clearance:
     ``standoff``: how far the tip is above the point that it works on. ``detail``: how far the obstacles may lie from
     what they stand for; it is taken off each distance. ``floor``: a height below which obstacles do not count;
     ``until``: the last rank of those that stand already. ``beam``: what has to be free between the tip and the bead
-    while the tool deposits; None: it is not checked.
+    while the tool deposits; None: it is not checked. ``endless``: the bounds take the nozzle's body to go on above its
+    end, so that a pose that is free has a straight way out.
     """
 
     nozzle: Nozzle
@@ -47,6 +48,7 @@ class Clearance:
     floor: float = -np.inf
     until: int = 0
     beam: Beam | None = None
+    endless: bool = True
 
     def with_obstacles(self, obstacles: Obstacles | None) -> Clearance:
         """The same nozzle among other obstacles."""
@@ -63,6 +65,10 @@ class Clearance:
     def without_beam(self) -> Clearance:
         """The same while nothing is deposited."""
         return replace(self, beam=None)
+
+    def during_travel(self) -> Clearance:
+        """The same between passes, where the nozzle is as long as it is."""
+        return replace(self, beam=None, endless=False)
 
     @cached_property
     def beams(self) -> list[Clearance]:
@@ -177,7 +183,7 @@ class Clearance:
     def _measure_from(self, points: Floats, pose: Ints, tips: Floats, axes: Floats) -> Floats:
         """Distances (M,) of points (M,3) from the nozzle at a ``pose`` (M,) each; negative inside."""
         assert self.nozzle.profile is not None
-        return measure_points(points, tips.take(pose, 0), axes.take(pose, 0), self.nozzle.profile)
+        return measure_points(points, tips.take(pose, 0), axes.take(pose, 0), self.nozzle.profile, self.endless)
 
     def _dive(self, roots: Ints, tips: Floats, axes: Floats, needed: float, high: Floats) -> None:
         """Lowers ``high`` (N,) straight down the tree: from the nearest of the balls ``roots`` (K,) to the nearest that
@@ -274,12 +280,13 @@ def _take_least(least: Floats, pose: Ints, found: Floats) -> None:
         least[own] = np.minimum(least[own], np.minimum.reduceat(found, starts))
 
 
-def measure_points(points: Floats, tips: Floats, axes: Floats, profile: Floats) -> Floats:
-    """Distances (N,) of points (N,3) to the nozzle with its tip at ``tips`` (N,3) and its axis along ``axes`` (N,3)."""
+def measure_points(points: Floats, tips: Floats, axes: Floats, profile: Floats, endless: bool) -> Floats:
+    """Distances (N,) of points (N,3) to the nozzle with its tip at ``tips`` (N,3) and its axis along ``axes`` (N,3);
+    negative inside. ``endless``: its body goes on above its end."""
     away = points - tips
     height = np.einsum("ij,ij->i", away, axes)
     radius = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - height**2, 0.0))
-    return _measure_to_profile(height, radius, profile)
+    return _measure_to_profile(height, radius, profile, endless)
 
 
 def _carry_over(found: Floats, far: Floats, known: Ints, needed: float) -> Floats:
@@ -290,20 +297,23 @@ def _carry_over(found: Floats, far: Floats, known: Ints, needed: float) -> Float
     return np.where((found == -np.inf) & (implied >= needed), implied, found)
 
 
-def _measure_to_profile(height: Floats, radius: Floats, profile: Floats) -> Floats:
+def _measure_to_profile(height: Floats, radius: Floats, profile: Floats, endless: bool) -> Floats:
     """Distances of points to the surface of a solid of revolution whose ``profile`` (K,2) has height and radius;
     negative inside.
 
-    The profile is that of `Cone`: from the tip upward, never narrower. The body goes on above its last height.
+    The profile is that of `Cone`: from the tip upward, never narrower.
     """
     tip, last = profile[0, 1], profile[-1, 1]
-    rise = profile[1, 0]
+    rise, end = profile[1, 0], np.inf if endless else profile[-1, 0]
     side = np.array([rise - profile[0, 0], profile[1, 1] - tip])
     out = radius - tip
     along = np.clip((height * side[0] + out * side[1]) / (side @ side), 0, 1)
     found = (height - along * side[0]) ** 2 + (out - along * side[1]) ** 2
     np.minimum(found, height**2 + np.maximum(out, 0) ** 2, out=found)
-    np.minimum(found, np.maximum(rise - height, 0) ** 2 + (radius - last) ** 2, out=found)
+    beside = np.maximum(rise - height, 0) + np.maximum(height - end, 0)
+    np.minimum(found, beside**2 + (radius - last) ** 2, out=found)
+    if not endless:
+        np.minimum(found, (height - end) ** 2 + np.maximum(radius - last, 0) ** 2, out=found)
     np.sqrt(found, out=found)
-    inside: Flags = (height > 0) & (radius < last) & (out * side[0] < height * side[1])
+    inside: Flags = (height > 0) & (height < end) & (radius < last) & (out * side[0] < height * side[1])
     return np.asarray(np.where(inside, -found, found))

@@ -121,7 +121,9 @@ class _Work:
             self.layer = []
             for patch in list_patches(sheet, grid, reach, self.floor, self.process):
                 self._fill_patch(patch, number, reach, held - lean, around)
-            self.passes += order_passes(self.layer, self.passes[-1].points[-1] if self.passes else None)
+            self.passes += order_passes(
+                self.layer, self.passes[-1] if self.passes else None, self.standing.clearance.reach
+            )
         self._add_rest()
 
     def _add_rest(self) -> None:

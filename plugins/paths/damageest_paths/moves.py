@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.vectors import normalise
 from damageest_paths.clearance import Clearance
+from damageest_paths.network import Network, measure_way
 from damageest_paths.process import Pass
 
 LIFTS = (1, 2, 4, 8)
@@ -23,8 +24,6 @@ FLAT = 0.01
 """Share of the gap up to which two heights are the same."""
 MOST_EXITS = 12
 """Passes whose axes, and places, are tried where the tool cannot leave along its own axis, as in a bore."""
-MOST_POSES = 2000
-"""Poses at which one leg of a travel is checked at most."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +83,13 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
     gap, number, blocked = np.inf, 0, 0
     before: Pass | None = None
     old, ranks, exits = 0, rank_layers(groups), _list_exits(groups)
+    network = Network(groups, travel.hop, travel.gap, clearance.reach)
     for part, passes in enumerate(groups, 1):
         for one in passes:
             rank = ranks[part - 1, one.layer]
             number += 1
             standing = clearance.after(rank if rank == old else rank - 1)
-            way, way_axes, found = _find_way(before, one, exits, standing, travel)
+            way, way_axes, found = _find_way(before, one, exits, network, standing, travel)
             old = rank
             blocked += found < travel.gap / 2
             gap = min(gap, found)
@@ -103,7 +103,7 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
             before = one
     if before is not None:
         standing = clearance.after(len(ranks))
-        way, way_axes, found = _find_exit(before.points[-1], before.axes[-1], exits, standing, travel)
+        way, way_axes, found = _leave(before.points[-1], before.axes[-1], exits, network, standing, travel)
         blocked += found < travel.gap / 2
         gap = min(gap, found)
         for point, axis in zip(way, way_axes, strict=True):
@@ -180,7 +180,8 @@ def _find_exit(
 
     best = np.empty((0, 3)), np.empty((0, 3)), -np.inf
     for way, axes in _list_ways_out(point, axis, exits, travel, lift):
-        gap = _measure_way(np.concatenate([point[None], way]), np.concatenate([axis[None], axes]), clearance, travel)
+        points, turned = np.concatenate([point[None], way]), np.concatenate([axis[None], axes])
+        gap = measure_way(points, turned, clearance, travel.gap)
         if gap > best[2]:
             best = way, axes, gap
         if gap >= travel.gap / 2:
@@ -188,13 +189,29 @@ def _find_exit(
     return best
 
 
+def _leave(
+    point: Floats, axis: Floats, exits: Sequence[Exit], network: Network, clearance: Clearance, travel: Travel
+) -> tuple[Floats, Floats, float]:
+    """As `_find_exit`, to above everything; where no such way is clear, over poses from which one is."""
+    way, axes, gap = _find_exit(point, axis, exits, clearance, travel)
+    if gap >= travel.gap / 2:
+        return way, axes, gap
+    for found in network.find_exits((point, axis), clearance):
+        place, along = found.points[-1], found.axes[-1]
+        out = _lift(place, along, travel)
+        last = measure_way(np.array([place, out]), np.array([along, along]), clearance, travel.gap)
+        if last >= travel.gap / 2:
+            return np.vstack([found.points, out]), np.vstack([found.axes, along]), min(last, found.gap)
+    return way, axes, gap
+
+
 def _find_way(
-    before: Pass | None, one: Pass, exits: Sequence[Exit], clearance: Clearance, travel: Travel
+    before: Pass | None, one: Pass, exits: Sequence[Exit], network: Network, clearance: Clearance, travel: Travel
 ) -> tuple[Floats, Floats, float]:
     """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
     stop, axis = one.points[0], one.axes[0]
     if before is None:
-        way, axes, gap = _find_exit(stop, axis, exits, clearance, travel)
+        way, axes, gap = _leave(stop, axis, exits, network, clearance, travel)
         return way[::-1], axes[::-1], gap
     start, old = before.points[-1], before.axes[-1]
     if np.linalg.norm(stop - start) < 1e-9 and np.allclose(axis, old):
@@ -209,9 +226,12 @@ def _find_way(
         kept = np.array([factor > 0 or rise > travel.gap * FLAT, factor > 0 or -rise > travel.gap * FLAT])
         axes = np.array([old, axis])
         points = np.concatenate([start[None], way[kept], stop[None]])
-        gap = _measure_way(points, np.concatenate([old[None], axes[kept], axis[None]]), clearance, travel)
+        gap = measure_way(points, np.concatenate([old[None], axes[kept], axis[None]]), clearance, travel.gap)
         if gap >= travel.gap / 2:
             return way[kept], axes[kept], gap
+    found = network.find_way((start, old), (stop, axis), clearance)
+    if found is not None:
+        return found.points, found.axes, found.gap
     return _go_round(start, old, one, exits, clearance, travel)
 
 
@@ -230,7 +250,7 @@ def _go_round(
         if not radius and np.abs(turned[0] - turned[1]).max() > SAME:
             continue
         way, axes = _round_the_sphere(ends, turned, travel) if radius else (ends, turned)
-        gap = min(first, last, _measure_way(way, axes, clearance, travel))
+        gap = min(first, last, measure_way(way, axes, clearance, travel.gap))
         if gap > best[2]:
             points = np.concatenate([out[:-1], way, back[-2::-1]])
             best = points, np.concatenate([out_axes[:-1], axes, back_axes[-2::-1]]), gap
@@ -255,18 +275,3 @@ def _round_the_sphere(way: Floats, axes: Floats, travel: Travel) -> tuple[Floats
     turned = (1 - share) * axes[0] + share * axes[1]
     turned = normalise(turned, 1e-9)
     return travel.centre + inner, turned
-
-
-def _measure_way(points: Floats, axes: Floats, clearance: Clearance, travel: Travel) -> float:
-    """The least distance along a way, as a lower bound between the poses that are measured."""
-    far = np.linalg.norm(np.diff(points, axis=0), axis=1) + clearance.bound_turns(axes)
-    counts = np.clip(np.ceil(far / travel.gap - 1e-9).astype(int), 1, MOST_POSES)
-    share = np.concatenate([*(np.arange(count) / count for count in counts), [0.0]])
-    place = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
-    share[-1] = 1.0
-    dense = points[place] + share[:, None] * (points[place + 1] - points[place])
-    turned = (1 - share)[:, None] * axes[place] + share[:, None] * axes[place + 1]
-    turned = normalise(turned)
-    moves = np.linalg.norm(np.diff(dense, axis=0), axis=1) + clearance.bound_turns(turned)
-    found = clearance.measure_poses(dense, turned, travel.gap)
-    return float(min(found.min(), np.min((found[1:] + found[:-1] - moves) / 2, initial=np.inf)))

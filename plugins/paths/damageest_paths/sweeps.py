@@ -94,7 +94,7 @@ def bound_sweeps(
                 break
             middle, radius = level.middle[ball], level.radius[ball]
             tips = points[pose] + clearance.standoff * axes[pose]
-            away = measure_points(middle, tips, axes[pose], profile)
+            away = measure_points(middle, tips, axes[pose], profile, clearance.endless)
             # the place of the nozzle that comes near is as far from the point it works on as the obstacle, and the
             # distance between them
             far = np.linalg.norm(middle - points[pose], axis=1) + np.maximum(away, 0.0) + radius
@@ -105,7 +105,7 @@ def bound_sweeps(
             kept = value < wanted
             np.minimum.at(found, pose[~kept], value[~kept])
             # a pose at which a place on an obstacle is too near needs no other
-            surface = measure_points(level.one[ball[kept]], tips[kept], axes[pose[kept]], profile)
+            surface = measure_points(level.one[ball[kept]], tips[kept], axes[pose[kept]], profile, clearance.endless)
             hit = np.zeros(len(points), bool)
             hit[pose[kept][surface - shift[pose[kept]] < wanted]] = True
             found[hit] = -np.inf

@@ -29,13 +29,14 @@ def make_poses(count: int) -> tuple[Floats, Floats]:
     return points, axes / np.linalg.norm(axes, axis=1)[:, None]
 
 
-@pytest.mark.parametrize("turned", [False, True])
-def test_the_true_distance_lies_between_the_bounds(turned: bool) -> None:
+@pytest.mark.parametrize(("turned", "length"), [(False, 30.0), (True, 30.0), (False, 6.0)])
+def test_the_true_distance_lies_between_the_bounds(turned: bool, length: float) -> None:
+    """A short nozzle has things behind it, which it does not touch."""
     obstacles, (points, axes) = make_obstacles(), make_poses(300)
     if turned:
         turn = make_frame((1.0, 2.0, 2.0), np.zeros(3)).turn
         obstacles, points, axes = obstacles.turn(turn), points @ turn.T, axes @ turn.T
-    clearance = Clearance(make_nozzle(Cone(1.0, 4.0, 30.0, np.radians(20))), 3.0, obstacles)
+    clearance = Clearance(make_nozzle(Cone(1.0, 4.0, length, np.radians(20))), 3.0, obstacles).during_travel()
     low, high = clearance.bound(points, axes, 0.8)
     exact = np.array([clearance.measure(*pose) for pose in zip(points, axes, strict=True)])
     assert 20 < (exact < 0.8).sum() < 280

@@ -1,5 +1,8 @@
 """The sorts of errors, and what a command's exit status means: for `damageest explain`, for the line below an error,
-and for the tables of docs/command-line.md."""
+and for the tables of docs/command-line.md.
+
+No more is imported than the errors: where memory ran out, to import numpy may never end.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ import re
 from dataclasses import dataclass
 
 from damageest.errors import DamageestError, StageError
-from damageest.rules.advice import TOPICS
 
 
 @dataclass(frozen=True)
@@ -147,9 +149,12 @@ def name_code(error: BaseException) -> str:
 
 def find_page(error: BaseException) -> str:
     """The page of the documentation on an error, with the section where there is one."""
-    for topic in TOPICS:
-        if topic.word == getattr(error, "topic", ""):
-            return topic.page
+    if word := getattr(error, "topic", ""):
+        from damageest.rules.advice import TOPICS
+
+        for topic in TOPICS:
+            if topic.word == word:
+                return topic.page
     if isinstance(error, StageError) and error.code == "stage":
         return STAGE_PAGES.get(error.stage, ERROR_CODES["stage"].page)
     return ERROR_CODES[name_code(error)].page
