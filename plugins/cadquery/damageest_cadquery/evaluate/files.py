@@ -182,7 +182,7 @@ def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Se
         if made and not made["reason"]:
             row["deposit"] = {"mesh": _measure_deposit(site, result, tolerance)}
         elif not made:
-            row["no_deposit"] = str(site.refused or "the run gave none")
+            row["no_deposit"] = " ".join("; ".join(result.failures).split())[:300] or "the run gave none"
         sites.append(row)
     if not sites:
         return {"error": "the run found no damage", "kind": "no site"}
