@@ -47,7 +47,7 @@ def compare_stock(
     """
     from manifold3d import Manifold, OpType
 
-    parts = build_parts(bases) if bases else []
+    parts = [lump.solid for lump in build_parts(bases)] if bases else []
     origin = deposit.bounds.mean(axis=0)
     solids = [to_manifold(triangulate(solid, tolerance / 16), origin) for solid in parts]
     stock = Manifold.batch_boolean(solids, OpType.Add) if solids else Manifold()
@@ -61,8 +61,9 @@ def compare_stock(
     curved = sum(measure_area(face) for solid in parts for face in explore_faces(solid) if not is_plane(face))
     if abs(difference - wider) > VOLUME + part.tessellation_error * curved / deposit.volume:
         raise StockError(
-            f"the volume of its stock differs by {difference:+.2%} of the deposit, of which the outline of the damage "
-            f"explains {wider:+.2%}"
+            f"its volume differs by {difference:+.2%} of the deposit, of which the outline of the damage "
+            f"explains {wider:+.2%}",
+            _find_worst(stock, deposit, part, tolerance, origin),
         )
     if stock.is_empty():
         return 0.0, 0.0, difference
@@ -73,20 +74,48 @@ def compare_stock(
     stretch = _measure_stretch(bases, 1 + max([int(part.faces_brep.max()), *(base.number for base in bases)]))
     far: list[Any] = []
     off: list[Floats] = []
-    strayed = False
+    on: list[Ints] = []
+    strayed: set[int] = set()
     for one, other in ((made, deposit), (deposit, made)):
         points, foot, number = _sample_above(one, part, tolerance)
         off.append(distance_to_mesh(points, other))
         far.append(np.asarray(rim.query(foot)[0]) > OUTLINE * tolerance)
-        strayed |= bool((off[-1] > FARTHEST * tolerance * np.where(far[-1], 1.0, stretch[number])).any())
+        on.append(number)
+        bad = off[-1] > FARTHEST * tolerance * np.where(far[-1], 1.0, stretch[number])
+        strayed |= set(number[bad].tolist())
     farthest = float(max(each.max(initial=0.0) for each in off))
     beyond = max(
         float((each[away] > tolerance / 4).mean()) if away.any() else 0.0 for each, away in zip(off, far, strict=True)
     )
     if beyond > BEYOND or strayed:
-        raise StockError(f"its stock is up to {farthest:.3g} from the mesh, {beyond:.1%} more than a quarter tolerance")
+        apart = [n[away & (each > tolerance / 4)] for n, away, each in zip(on, far, off, strict=True)]
+        raise StockError(
+            f"it is up to {farthest:.3g} from the mesh's, {beyond:.1%} more than a quarter tolerance",
+            strayed | (set(np.concatenate(apart).tolist()) if beyond > BEYOND else set()),
+        )
     inside = [each[away] for each, away in zip(off, far, strict=True)]
     return float(max(np.quantile(each, 0.95) if len(each) else 0.0 for each in inside)), farthest, difference
+
+
+def _find_worst(stock: Any, deposit: Solid, part: Part, tolerance: float, origin: Floats) -> list[int]:
+    """The CAD faces above which stock differs from the mesh's by a fifth of the most on a face, or more."""
+    assert part.faces_brep is not None
+    number = np.empty(0, np.int64)
+    mesh = to_manifold(deposit, origin)
+    for one, other in ((stock, deposit), (mesh, None)):
+        vertices, triangles = to_arrays(one)
+        if not len(triangles) or (other is None and stock.is_empty()):
+            continue
+        against = other if other is not None else Mesh(*_shift(stock, origin))
+        points, _, faces = _sample_above(Mesh(vertices + origin, triangles), part, tolerance)
+        number = np.append(number, faces[distance_to_mesh(points, against) > tolerance / 8])
+    count = np.bincount(number, minlength=1)
+    return np.flatnonzero(count > count.max() / 5).tolist() if count.max() else []
+
+
+def _shift(solid: Any, origin: Floats) -> tuple[Floats, Ints]:
+    vertices, triangles = to_arrays(solid)
+    return vertices + origin, triangles
 
 
 def _compare_outlines(bases: Sequence[Base], lost: Solid, outside: Ints, part: Part) -> float:

@@ -18,13 +18,12 @@ from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import ON_CAD
 from damageest_cadquery._compare_stock import bound_entered, compare_stock
 from damageest_cadquery._read import explore
-from damageest_cadquery._solids import StockError, combine, explore_faces, sew
+from damageest_cadquery._solids import StockError, combine, explore_faces, naming, sew, turn_offsets
 from damageest_cadquery._split import (
     Origin,
     Piece,
     ShapeMap,
     find_corners,
-    is_opencascade_error,
     is_sound,
     is_watertight,
     measure_volume,
@@ -79,6 +78,22 @@ def find_deposit(
         raise StockError("the stock overlaps the intact skin around the damage")
     # OpenCASCADE adds curves to the edges that it works with, which what is left of the part shares
     damage = [replace(piece, shape=BRepBuilderAPI_Copy(piece.shape).Shape()) for piece in damage]
+    heights = dict(deposit.heights)
+    numbers = {number for piece in damage for number, _ in piece.origins if heights.get(number, 0.0) > 0}
+    with naming(numbers):
+        return _find(deposit, lost, damage, rest, faces, part, tolerance, start)
+
+
+def _find(
+    deposit: Deposit,
+    lost: Solid,
+    damage: Sequence[Piece],
+    rest: Sequence[Piece],
+    faces: Sequence[Any],
+    part: Part,
+    tolerance: float,
+    start: float,
+) -> ExactDeposit:
     try:
         bases = [base for piece in damage for base in take_bases(piece, dict(deposit.heights))]
         higher = [replace(base, height=base.height + tolerance / 4) for base in bases]
@@ -90,10 +105,8 @@ def find_deposit(
             (whole / volume - 1 for volume in _measure_parts([*(piece.shape for piece in damage), *stock], tolerance)),
             key=abs,
         )
-    except Exception as error:
-        if is_opencascade_error(error) or isinstance(error, (InputError, ValueError)):
-            raise StockError(f"OpenCASCADE cannot build it ({str(error)[:80] or type(error).__name__})") from None
-        raise
+    except (InputError, ValueError) as error:
+        raise StockError(f"its triangles do not close ({str(error)[:80]})") from None
     volume = sum(measure_volume(piece.shape) for piece in pieces)
     if abs(wrong) > SAME:
         raise StockError(f"its volume differs by {wrong:+.2%} from damage and stock")
@@ -101,8 +114,20 @@ def find_deposit(
     if len(pieces) != bodies:
         raise StockError(f"{len(pieces)} solids for {bodies} pieces")
     if not is_sound(pieces):
-        raise StockError("not valid (BRepCheck)")
+        raise StockError("not valid (BRepCheck)", _find_invalid(pieces))
     return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
+
+
+def _find_invalid(pieces: Sequence[Piece]) -> list[int]:
+    """The CAD faces of which a face in a solid comes that is not valid by itself; none where each is."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    return [
+        number
+        for piece in pieces
+        for face, (number, _) in zip(explore_faces(piece.shape), piece.origins, strict=True)
+        if number >= 0 and not BRepCheck_Analyzer(face).IsValid()
+    ]
 
 
 def _measure_parts(shapes: Sequence[Any], tolerance: float) -> tuple[float, float]:
@@ -133,7 +158,7 @@ def _build(
     from OCP.TopAbs import TopAbs_SOLID
 
     metal = [piece.shape for piece in (*rest, *damage)]
-    cut = explore(combine(BRepAlgoAPI_Cut(), stock, metal), TopAbs_SOLID)
+    cut = explore(combine(BRepAlgoAPI_Cut(), [turn_offsets(solid) for solid in stock], metal), TopAbs_SOLID)
     return [solid for solid in cut if measure_volume(solid) > 1e-6 * deposit.volume]
 
 
@@ -178,7 +203,7 @@ def _unite(damage: Sequence[Piece], stock: Sequence[Any], chord: float) -> tuple
                 known.set(face, damage[number].origins[k])
         return solids, known
     algorithm = BRepAlgoAPI_Fuse()
-    shape = combine(algorithm, shapes, list(stock))
+    shape = combine(algorithm, shapes, [turn_offsets(solid) for solid in stock])
     for piece in damage:
         for face, origin in zip(explore_faces(piece.shape), piece.origins, strict=True):
             note_images(known, algorithm, face, origin)

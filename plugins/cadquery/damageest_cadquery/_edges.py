@@ -16,6 +16,10 @@ SMOOTH = 5e-4
 """Angle between normals, in radians, up to which faces are smooth together."""
 SAMPLES = 33
 """Places along an edge at which its normals are taken."""
+SINGULAR = 1e-7
+"""Ratio of a surface's derivatives below which they have no normal."""
+BESIDE = 1e-4
+"""How far beside such a place the normal is taken, as a share of the way to the middle of the face."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,17 +99,25 @@ def _measure_edge(edge: Any, other: Any, faces: Sequence[Any], first: int, secon
 
 
 def measure_normals(edge: Any, face: Any, parameters: Floats) -> Floats:
-    """(S,3) the outward unit normals of a face along one of its edges."""
+    """(S,3) the outward unit normals of a face along one of its edges.
+
+    At the pole of a sphere and at the apex of a cone, where the derivatives of the surface have no normal, that beside
+    it, towards the middle of the face.
+    """
     from OCP.BRepAdaptor import BRepAdaptor_Curve2d, BRepAdaptor_Surface
+    from OCP.BRepTools import BRepTools
     from OCP.gp import gp_Pnt, gp_Vec
     from OCP.TopAbs import TopAbs_REVERSED
 
     surface, curve = BRepAdaptor_Surface(face, False), BRepAdaptor_Curve2d(edge, face)
     found = np.empty((len(parameters), 3))
+    middle = 0.5 * np.array(BRepTools.UVBounds_s(face)).reshape(2, 2).sum(axis=1)
     for k, parameter in enumerate(parameters.tolist()):
-        at = curve.Value(parameter)
+        place = np.array(curve.Value(parameter).Coord())
         point, u, v = gp_Pnt(), gp_Vec(), gp_Vec()
-        surface.D1(at.X(), at.Y(), point, u, v)
+        surface.D1(*place.tolist(), point, u, v)
+        if min(u.Magnitude(), v.Magnitude()) < SINGULAR * max(u.Magnitude(), v.Magnitude()):
+            surface.D1(*(place + BESIDE * (middle - place)).tolist(), point, u, v)
         found[k] = np.cross(u.Coord(), v.Coord())
     found *= -1.0 if face.Orientation() == TopAbs_REVERSED else 1.0
     return normalise(found)

@@ -17,6 +17,7 @@ from damageest_cadquery._left import FACET, cut_facets
 from damageest_cadquery._planar import build_solid
 from damageest_cadquery._read import explore
 from damageest_cadquery._request import CadFacts, Request, name_file
+from damageest_cadquery._solids import StockError
 from damageest_cadquery._split import Piece
 
 INNER: Colour = (215, 50, 40)
@@ -80,7 +81,7 @@ def write_all(
             made, fault = writing.save(f"{place}{stem}", shape.name, [_move(shape, T)])
             here.update((stem, each) for each in made)
             if fault:
-                _take_fault(writing, stem, fault)
+                _take_fault(writing, stem, fault, deposits)
         writing.exact = [number for number in found if number not in writing.reasons]
         union = (
             [_move(shape, T) for shape in _gather_lost(request, sites)]
@@ -89,16 +90,19 @@ def write_all(
         )
         if left and union:
             here |= _save_whole(writing, place, [_move(shape, T) for shape in left], union)
-        everything = _collect(request.bodies, here, T)
+        everything = _collect(request.bodies, here, T) if request.assembly else []
         if everything:
             writing.save(f"{place}result", "result", everything)
 
 
-def _take_fault(writing: Writing, stem: str, fault: str) -> None:
+def _take_fault(writing: Writing, stem: str, fault: str, deposits: Mapping[int, ExactDeposit]) -> None:
     """Notes that a file with CAD faces could not be written."""
     folder, _, number = stem.partition("/site-")
     if folder == "deposit":
-        writing.forms[int(number)] = DepositForm(reason=f"read back, {fault}")
+        pieces = deposits[int(number)].pieces
+        faces = [face for piece in pieces for face, kind in piece.origins if kind == STOCK and face >= 0]
+        error = StockError(f"read back, {fault}", faces)
+        writing.forms[int(number)] = DepositForm(reason=error.describe(writing.facts.names))
     else:
         writing.reasons[int(number)] = (*writing.reasons.get(int(number), ()), f"read back, {fault}")
 

@@ -18,9 +18,9 @@ class Request:
 
     ``folder``: where to write, and ``scratch``: where files are until they have been read back; ``places``: prefixes of
     the files with the transform (4,4) to their frame; ``unit``: of the files; ``bodies``: what has no exact form, by
-    the stem of its file, for the assembly; ``field``: what moves the part as designed, as its CAD file has it, to
-    ``part``, None for nothing; ``seconds``: processor time that each piece of work has; ``skipped``: those
-    that stopped this process before, by `name_site`, `name_deposit` and `name_file`, and why.
+    the stem of its file, for the assembly, which ``assembly`` asks for; ``field``: what moves the part as designed, as
+    its CAD file has it, to ``part``, None for nothing; ``seconds``: processor time that each piece of work has;
+    ``skipped``: those that stopped this process before, by `name_site`, `name_deposit` and `name_file`, and why.
     """
 
     part: Part
@@ -33,6 +33,7 @@ class Request:
     scratch: str
     places: Mapping[str, Floats | None]
     seconds: float
+    assembly: bool = True
     field: DisplacementField | None = None
     skipped: Mapping[str, str] = dataclasses.field(default_factory=dict)
 

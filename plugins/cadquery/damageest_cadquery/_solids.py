@@ -2,21 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from damageest.artefacts import Floats
 from damageest_cadquery._read import explore
-from damageest_cadquery._split import ShapeMap, measure_volume
+from damageest_cadquery._split import ShapeMap, is_opencascade_error, measure_volume
 
 SEWN = 2e-5
 """Distance in millimetres within which edges of faces are one edge, where they do not claim to be less exact."""
 
 
+MOST_NAMED = 6
+"""Faces that a reason names."""
+
+
 class StockError(Exception):
-    """The stock cannot be made of offsets of CAD faces; the message says why."""
+    """The stock cannot be made of offsets of CAD faces; the message says why. ``faces``: numbers of the CAD faces whose
+    stock it is, none where it is that of all."""
+
+    def __init__(self, message: str, faces: Iterable[int] = ()) -> None:
+        super().__init__(message)
+        self.faces = tuple(sorted(set(faces)))
+
+    def describe(self, names: Sequence[str]) -> str:
+        """The message with the ``names`` of CAD faces by number."""
+        return f"stock on {list_faces(self.faces, names)}: {self}" if self.faces else str(self)
+
+
+def list_faces(numbers: Iterable[int], names: Sequence[str]) -> str:
+    """CAD faces in words, each by its number and, where the file has one, its name."""
+    every = sorted(set(numbers))
+    told = [f"face {n}" if names[n] == f"face {n}" else f"face {n} ({names[n]})" for n in every[:MOST_NAMED]]
+    more = [f"{len(every) - MOST_NAMED} more"] if len(every) > MOST_NAMED else []
+    return ", ".join(told + more)
+
+
+@contextmanager
+def naming(faces: Iterable[int]) -> Iterator[None]:
+    """What fails within is about the stock on these CAD faces. An error of OpenCASCADE becomes a StockError."""
+    try:
+        yield
+    except StockError as error:
+        error.faces = error.faces or tuple(sorted(set(faces)))
+        raise
+    except Exception as error:
+        if not is_opencascade_error(error):
+            raise
+        said = str(error)[:80] or type(error).__name__
+        raise StockError(f"OpenCASCADE cannot build it ({said})", faces) from None
 
 
 def orient_solid(shape: Any) -> Any:
@@ -158,20 +195,51 @@ def _take_solids(sewn: Any) -> list[Any]:
         return []
 
 
+def turn_offsets(shape: Any) -> Any:
+    """The shape with the offsets of splines as splines; itself where it has none."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_OffsetSurface
+    from OCP.ShapeCustom import ShapeCustom
+
+    if all(BRepAdaptor_Surface(face).GetType() != GeomAbs_OffsetSurface for face in explore_faces(shape)):
+        return shape
+    return ShapeCustom.ConvertToBSpline_s(shape, False, False, True)
+
+
+def find_twin_pairs(solids: Sequence[Any], near: float) -> dict[tuple[int, int], float]:
+    """The pairs of solids that have faces in common, and the area of these."""
+    from scipy.spatial import cKDTree
+
+    owned = [(number, face) for number, solid in enumerate(solids) for face in explore_faces(solid)]
+    values = _measure_faces([face for _, face in owned])
+    pairs: dict[tuple[int, int], float] = {}
+    for one, two in sorted(cKDTree(values).query_pairs(near)):
+        first, second = sorted((owned[one][0], owned[two][0]))
+        if first != second:
+            pairs[first, second] = pairs.get((first, second), 0.0) + float(values[one, 3] ** 2)
+    return pairs
+
+
 def _find_twins(faces: Sequence[Any], owners: Sequence[int], near: float) -> Any:
     """(F,) whether another solid has the same face, by its centre and area, within ``near``."""
+    from scipy.spatial import cKDTree
+
+    values = _measure_faces(faces)
+    twins = np.zeros(len(faces), bool)
+    for one, two in cKDTree(values).query_pairs(near):
+        if owners[one] != owners[two]:
+            twins[[one, two]] = True
+    return twins
+
+
+def _measure_faces(faces: Sequence[Any]) -> Floats:
+    """(F,4) centres of faces and the roots of their areas."""
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
-    from scipy.spatial import cKDTree
 
     rows = []
     for face in faces:
         sizes = GProp_GProps()
         BRepGProp.SurfaceProperties_s(face, sizes, 1e-7)
         rows.append((*sizes.CentreOfMass().Coord(), np.sqrt(max(sizes.Mass(), 0.0))))
-    values: Floats = np.array(rows)
-    twins = np.zeros(len(faces), bool)
-    for one, two in cKDTree(values).query_pairs(near):
-        if owners[one] != owners[two]:
-            twins[[one, two]] = True
-    return twins
+    return np.array(rows).reshape(-1, 4)

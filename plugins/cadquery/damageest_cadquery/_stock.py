@@ -16,20 +16,18 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
 from damageest.artefacts import Floats
-from damageest.errors import InputError
 from damageest_cadquery._edges import Edge, find_edges, measure_normals
+from damageest_cadquery._join_stock import Lump, fuse, sew_all
 from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
-from damageest_cadquery._solids import StockError, close, combine, explore_faces, orient_solid, sew
-from damageest_cadquery._split import Piece, is_watertight, measure_volume, triangulate
+from damageest_cadquery._solids import StockError, close, explore_faces, naming, orient_solid
+from damageest_cadquery._split import Piece, is_watertight, measure_volume
 from damageest_cadquery._walls import build_wall
 
 FLAT = 1e-6
 """Volume of a corner, in cubes of the height, below which there is none."""
 SAME = 1e-4
 """Distance between corners of mitres, in extents of what fills the corner, within which they are one."""
-UNION = 1e-2
-"""Share of a volume by which that of triangles may be wrong."""
 CHORDS = 16
 """Chords of triangles in a height of the stock, where it is tried whether triangles of a solid close."""
 
@@ -54,7 +52,7 @@ def take_bases(piece: Piece, heights: Mapping[int, float]) -> list[Base]:
             continue
         height = heights.get(number, 0.0)  # a sliver that the mesh does not have gets none
         if height < 0:
-            raise StockError(f"the height of the stock is not the same all over face {number}")
+            raise StockError("its height is not the same all over the face", (number,))
         if height > 0:
             bases.append(Base(TopoDS.Face_s(face), number, height))
     return bases
@@ -65,34 +63,43 @@ def build_stock(bases: Sequence[Base]) -> list[Any]:
     return join_stock(build_parts(bases), bases)
 
 
-def build_parts(bases: Sequence[Base]) -> list[Any]:
+def build_parts(bases: Sequence[Base]) -> list[Lump]:
     """Solids whose union is the stock: over smooth faces, over sharp edges and at corners. In concave corners they
     share volume. Raises StockError where OpenCASCADE cannot make them."""
     edges = find_edges([base.face for base in bases])
     heights = [base.height for base in bases]
-    if any(edge.kind == "mixed" for edge in edges):
-        raise StockError("an edge between its faces is sharp in part only, or changes between convex and concave")
+    if mixed := [edge for edge in edges if edge.kind == "mixed"]:
+        raise StockError(
+            "an edge between the faces is sharp in part only, or changes between convex and concave",
+            (bases[k].number for edge in mixed for k in (edge.first, edge.second)),
+        )
     joined = [edge for edge in edges if edge.kind == "smooth" and heights[edge.first] == heights[edge.second]]
     rows = ([edge.first for edge in joined], [edge.second for edge in joined])
     graph = coo_array((np.ones(len(joined), bool), rows), shape=(len(bases),) * 2)
     label = connected_components(graph, directed=False)[1]
-    solids = []
+    lumps = []
     for number in range(int(label.max()) + 1):
         mine = [bases[k] for k in np.flatnonzero(label == number).tolist()]
-        solids.append(_thicken([base.face for base in mine], mine[0].height))
+        with naming(base.number for base in mine):
+            solid = _thicken([base.face for base in mine], mine[0].height)
+        lumps.append(Lump(solid, tuple(base.number for base in mine)))
     sharp = [edge for edge in edges if edge.kind == "convex"]
-    solids += [build_mitre(edge, heights[edge.first], heights[edge.second]) for edge in sharp]
-    return solids + _build_corners(sharp, heights)
+    for edge in sharp:
+        numbers = (bases[edge.first].number, bases[edge.second].number)
+        with naming(numbers):
+            lumps.append(Lump(build_mitre(edge, heights[edge.first], heights[edge.second]), numbers))
+    return lumps + _build_corners(sharp, bases)
 
 
-def join_stock(parts: Sequence[Any], bases: Sequence[Base]) -> list[Any]:
+def join_stock(parts: Sequence[Lump], bases: Sequence[Base]) -> list[Any]:
     """The union of the parts of the stock on some faces. Raises StockError where OpenCASCADE cannot make it."""
     if len(parts) == 1:
-        return list(parts)
+        return [parts[0].solid]
     apart = all(edge.kind in ("smooth", "convex") for edge in find_edges([base.face for base in bases]))
-    found = sew(parts) if apart else None
-    least = min(base.height for base in bases)
-    return _merge(_fuse(parts, least / CHORDS) if found is None else found[0], bases)
+    with naming(base.number for base in bases):
+        chord = min(base.height for base in bases) / CHORDS
+        found = sew_all(parts, chord) if apart else None
+        return _merge(fuse(parts, chord) if found is None else found, bases)
 
 
 def _thicken(faces: Sequence[Any], height: float) -> Any:
@@ -106,20 +113,17 @@ def _thicken(faces: Sequence[Any], height: float) -> Any:
     from OCP.TopAbs import TopAbs_REVERSED
     from OCP.TopoDS import TopoDS, TopoDS_Shell
 
-    shape: Any = faces[0]
     builder, shell = BRep_Builder(), TopoDS_Shell()
     builder.MakeShell(shell)
     for face in faces:
         builder.Add(shell, face)
-    if len(faces) > 1:
-        shape = shell
     adaptor = BRepAdaptor_Surface(faces[0])
-    if all(BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane for face in faces):
+    if len(faces) == 1 and adaptor.GetType() == GeomAbs_Plane:  # of several, a prism would be several solids
         plane = adaptor.Plane()
         normal = gp_Vec(plane.Axis().Direction())
         if plane.Direct() == (faces[0].Orientation() == TopAbs_REVERSED):
             normal.Reverse()
-        return orient_solid(BRepPrimAPI_MakePrism(shape, normal.Multiplied(height)).Shape())
+        return orient_solid(BRepPrimAPI_MakePrism(faces[0], normal.Multiplied(height)).Shape())
     border = _find_border(faces)
     for way in (height, -height):  # for some cones OpenCASCADE takes the normal that points the other way
         maker = BRepOffset_MakeSimpleOffset(shell, way)
@@ -174,21 +178,24 @@ def _find_border(faces: Sequence[Any]) -> list[Any]:
     return [edge for key, edge in edges.items() if times[key] == 1]
 
 
-def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]:
+def _build_corners(sharp: Sequence[Edge], bases: Sequence[Base]) -> list[Lump]:
     """The pieces where mitres meet: hulls of the vertex and the upper points of the mitres there."""
     from OCP.TopTools import TopTools_IndexedMapOfShape
 
     index = TopTools_IndexedMapOfShape()
     clouds: dict[int, list[Floats]] = {}
     places: dict[int, Floats] = {}
+    around: dict[int, set[int]] = {}
     for edge in sharp:
+        one, two = bases[edge.first], bases[edge.second]
         for end in (0, -1):
             vertex = edge.vertices[end]
             key = index.Add(vertex)
             place = edge.points[end]
             places.setdefault(key, place)
-            clouds.setdefault(key, []).append(place + find_heads(edge, end, heights[edge.first], heights[edge.second]))
-    solids = []
+            clouds.setdefault(key, []).append(place + find_heads(edge, end, one.height, two.height))
+            around.setdefault(key, set()).update((one.number, two.number))
+    lumps = []
     for key, cloud in clouds.items():
         if len(cloud) < 2:
             continue
@@ -203,8 +210,9 @@ def _build_corners(sharp: Sequence[Edge], heights: Sequence[float]) -> list[Any]
         hull = ConvexHull(points)
         if hull.volume < FLAT * size**3:
             continue
-        solids.append(_build_hull(hull))
-    return solids
+        with naming(around[key]):
+            lumps.append(Lump(_build_hull(hull), tuple(sorted(around[key]))))
+    return lumps
 
 
 def merge_points(points: Floats, near: float) -> Floats:
@@ -229,35 +237,6 @@ def _build_hull(hull: ConvexHull) -> Any:
                        hull.equations[:, :3]) < 0  # fmt: skip
     faces[turned] = faces[turned][:, ::-1]
     return orient_solid(build_solid(Solid(points, faces))[0])
-
-
-def _fuse(solids: Sequence[Any], chord: float) -> list[Any]:
-    """The solids as one, or as few as they touch in. All at once where that is sound, else one after the other: where
-    several have faces that nearly coincide, as mitres and walls at a corner, OpenCASCADE leaves pieces out."""
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
-    from OCP.TopAbs import TopAbs_SOLID
-
-    volumes = [triangulate(solid, chord).volume for solid in solids]
-    joined = explore(combine(BRepAlgoAPI_Fuse(), solids[:1], solids[1:]), TopAbs_SOLID)
-    if _is_union(joined, volumes, chord):
-        return joined
-    order = np.argsort(volumes, kind="stable")[::-1].tolist()
-    joined = [solids[order[0]]]
-    for rank, k in enumerate(order[1:], start=2):
-        joined = explore(combine(BRepAlgoAPI_Fuse(), joined, [solids[k]]), TopAbs_SOLID)
-        if not _is_union(joined, [volumes[n] for n in order[:rank]], chord):
-            raise StockError("OpenCASCADE loses stock where that of several faces meets")
-    return joined
-
-
-def _is_union(joined: Sequence[Any], volumes: Sequence[float], chord: float) -> bool:
-    """Whether solids can be the union of some with the ``volumes`` (N,): their triangles close, and they are at least
-    as large as the largest and at most as all. By triangles: integrals over walls on splines are wrong by percents."""
-    try:
-        volume = sum(triangulate(solid, chord).volume for solid in joined)
-    except (InputError, ValueError):
-        return False
-    return max(volumes) * (1 - UNION) <= volume <= sum(volumes) * (1 + UNION)
 
 
 def _merge(solids: Sequence[Any], bases: Sequence[Base]) -> list[Any]:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from damageest.artefacts import Deposit, Part
+from damageest.geometry.distance import closest_on_mesh
+from damageest.geometry.skin import find_inner_faces
 from damageest.isolation import at_work
 from damageest.stages.export import DepositForm, ExactForm
 from damageest_cadquery._adapted import MovedSolids, move_solids
 from damageest_cadquery._colours import read_colours
 from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit
-from damageest_cadquery._exact import Exact, find_exact, scale_shape, start_solids
+from damageest_cadquery._exact import Exact, SiteInput, find_exact, scale_shape, start_solids
 from damageest_cadquery._files import join_shapes
 from damageest_cadquery._moved import MoveError
 from damageest_cadquery._output import Writing, write_all
@@ -26,7 +30,7 @@ from damageest_cadquery._request import (
     name_deposit,
     name_site,
 )
-from damageest_cadquery._solids import StockError
+from damageest_cadquery._solids import StockError, list_faces
 
 
 def make_exact(request: Request) -> Made:
@@ -65,20 +69,22 @@ def _make(request: Request) -> Made:
             around = rest if site.accepted else solids
             exact, reasons[site.number] = find_exact(site, around, faces, part, request.tolerance, cad.off)
         if exact is None:
+            *before, last = reasons[site.number]
+            reasons[site.number] = (*before, f"{last}; it lies on {_tell_faces(site, part, facts.names)}")
             continue
         found[site.number] = exact
         rest = exact.rest if site.accepted else rest
         if site.deposit is None:
             continue
         if fault := request.skipped.get(name_deposit(site.number)):
-            forms[site.number] = DepositForm(reason=fault)
+            forms[site.number] = DepositForm(reason=StockError(fault, _list_stock(site)).describe(facts.names))
             continue
         try:
             with at_work(name_deposit(site.number), request.seconds):
                 made = find_deposit(site.deposit, site.damage, exact.pieces, exact.rest, faces, part, request.tolerance)
             deposits[site.number], forms[site.number] = made, _describe_deposit(made)
         except StockError as error:
-            forms[site.number] = DepositForm(reason=str(error))
+            forms[site.number] = DepositForm(reason=error.describe(facts.names))
     missing = {number: tried for number, tried in reasons.items() if number not in found}
     writing = Writing(request, facts, missing, forms)
     write_all(writing, found, deposits, rest)
@@ -86,6 +92,20 @@ def _make(request: Request) -> Made:
     said |= {number: _describe(found[number]) for number in writing.exact}
     said = {number: replace(form, deposit=forms[number]) for number, form in said.items()}
     return Made(tuple(writing.files), tuple(writing.notes), said)
+
+
+def _list_stock(site: SiteInput) -> list[int]:
+    """The CAD faces that stock is on."""
+    return (
+        [number for number, height in site.deposit.heights if height > 0] if isinstance(site.deposit, Deposit) else []
+    )
+
+
+def _tell_faces(site: SiteInput, part: Part, names: Sequence[str]) -> str:
+    """The CAD faces that a damage takes skin of."""
+    assert part.faces_brep is not None
+    outer = site.damage.triangles[~find_inner_faces(site.damage, part)].mean(axis=1)
+    return list_faces(part.faces_brep[closest_on_mesh(outer, part)[1]].tolist(), names)
 
 
 def take_solids(model: Model, request: Request) -> MovedSolids:

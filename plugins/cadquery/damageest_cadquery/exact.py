@@ -39,9 +39,10 @@ def write_exact(
     bodies: Mapping[str, Body],
     places: Mapping[str, Floats | None],
     seconds: float,
+    assembly: bool = True,
 ) -> ExportedFiles:
     """Writes damage volumes, what is left of the part, and an assembly of all; see `damageest.stages.export.Writer`."""
-    request = make_request(result, folder, bodies, places, seconds)
+    request = replace(make_request(result, folder, bodies, places, seconds), assembly=assembly)
     if not request.sites:
         return ExportedFiles()
     made = Made((), (), {})
@@ -194,7 +195,7 @@ def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
         if result.undamaged is not None and result.damage is not None:
             bodies["undamaged"] = Body("undamaged", result.undamaged, (0, 0, 0))
             bodies["damage"] = Body("damage", result.damage, (0, 0, 0))
-        done = write_exact(Path(place), chosen, bodies, {"": None}, LIMIT)
+        done = write_exact(Path(place), chosen, bodies, {"": None}, LIMIT, assembly=False)
         folders = {"damage": ("damage/", "doubtful/"), "deposit": ("deposit/",), "undamaged": ("undamaged.step",)}
         wanted = [name for name in done.files if name.startswith(folders[what])]
         if not wanted:

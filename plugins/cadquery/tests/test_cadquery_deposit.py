@@ -212,8 +212,9 @@ def take_damage() -> tuple[Any, Any]:
 
 def test_what_cannot_be_an_offset_is_said(done: Run) -> None:
     pieces, faces = take_damage()
-    with pytest.raises(StockError, match="not the same all over face 2"):
+    with pytest.raises(StockError, match="not the same all over") as caught:
         take_bases(pieces[0], {2: -1.0})
+    assert caught.value.describe(["face 0", "face 1", "Top"]).startswith("stock on face 2 (Top): its height")
     deposit = done.result.sites[0].deposit
     assert isinstance(deposit, Deposit)
     with pytest.raises(StockError, match="overlaps the intact skin"):
@@ -227,5 +228,6 @@ def test_stock_of_another_volume_is_refused(done: Run) -> None:
     pieces, faces = take_damage()
     deposit = done.result.sites[0].deposit
     assert isinstance(deposit, Deposit)
-    with pytest.raises(StockError, match="its stock is up to"):
+    with pytest.raises(StockError, match="from the mesh's") as caught:
         find_deposit(deposit, done.result.sites[0].damage, pieces, (), faces, done.result.part, 0.2)
+    assert caught.value.faces

@@ -273,3 +273,20 @@ def test_bodies_that_touch_in_a_point_are_solids_of_their_own(tmp_path: Path) ->
     done = write_step(tmp_path, "a", [Body("a", Solid(both, np.concatenate([faces, other])), GREY)], "mm")
     assert (done.files, done.notes) == (("a.step",), ())
     assert [solid.Volume() for solid in take_solids(tmp_path / "a.step")] == pytest.approx([1000, 1000])
+
+
+def test_where_integrals_are_wrong_triangles_decide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As over walls on cones: the same solid has other integrals in the file than before."""
+    from damageest_cadquery import _readback
+    from damageest_cadquery._assembly import NamedShape, write_assembly
+
+    shapes = [cq.Workplane().box(10, 10, height).val().wrapped for height in (10, 10.1)]
+    write_assembly(tmp_path / "a.step", "a", [NamedShape("a", shapes[0], GREY)], "mm")
+    assert "volume of a solid" in _readback.find_fault(tmp_path / "a.step", shapes[1])
+
+    def measure(solid: Any) -> float:
+        return 1000.0 if solid.IsSame(shapes[0]) else 1010.0
+
+    monkeypatch.setattr(_readback, "measure_quickly", measure)
+    monkeypatch.setattr(_readback, "measure_volume", measure)
+    assert _readback.find_fault(tmp_path / "a.step", shapes[0]) == ""

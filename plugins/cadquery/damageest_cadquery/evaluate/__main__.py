@@ -27,13 +27,26 @@ FINE = 1 / 48
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m damageest_cadquery.evaluate", description=__doc__)
-    parser.add_argument("--output", type=Path, required=True, help="file of rows, one JSON object a line; grows")
+    parser.add_argument("--output", type=Path, help="file of rows, one JSON object a line; grows")
     parser.add_argument("--cases", type=int, default=65, help="random damages, spread over the parts")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--seconds", type=float, default=1e9, help="start no case after this time")
     parser.add_argument("--step", type=Path, nargs="*", default=[], help="STEP files to use besides the built-in parts")
+    parser.add_argument("--files", type=Path, help="folder of CAD files: a damage on each that --output has no row of")
+    parser.add_argument("--write", type=Path, help="write the built-in parts as STEP files to this folder, no more")
+    parser.add_argument("--limit", type=float, default=180.0, help="longest time for one of --files, in seconds")
     chosen = parser.parse_args(arguments)
     start = time.perf_counter()
+    if chosen.write:
+        from damageest_cadquery.evaluate.write_parts import write_parts
+
+        print(f"{len(write_parts(chosen.write))} files")
+        return
+    if chosen.output is None:
+        parser.error("--output is missing")
+    if chosen.files:
+        _measure_files(chosen, start)
+        return
     with tempfile.TemporaryDirectory() as place:
         files = [*_write_parts(Path(place)), *chosen.step]
         for number in range(chosen.first, chosen.first + chosen.cases):
@@ -44,6 +57,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
                     stream.write(json.dumps(row) + "\n")
                 print({key: value for key, value in row.items() if key != "tried"}, flush=True)
     print(summarise([json.loads(line) for line in chosen.output.read_text().splitlines()]))
+
+
+def _measure_files(chosen: argparse.Namespace, start: float) -> None:
+    from damageest_cadquery.evaluate.files import measure_folder
+    from damageest_cadquery.evaluate.files_rows import read_rows, summarise_files
+
+    for number, row in enumerate(measure_folder(chosen.files, chosen.output, chosen.first, chosen.limit), start=1):
+        print(number, f"{time.perf_counter() - start:.0f} s", row["file"], row.get("error", "measured"), flush=True)
+        if time.perf_counter() - start > chosen.seconds:
+            break
+    print(summarise_files(read_rows(chosen.output)))
 
 
 def _write_parts(folder: Path) -> list[Path]:
