@@ -89,15 +89,17 @@ def open_cavity(
     room = _raise_column(floor, corner, cell, top).simplify(tolerance / 8)
     room = room.transform(np.column_stack([turn.T, np.zeros(3)]))
     whole, lost = to_manifold(part, origin), to_manifold(damage, origin)
-    milled = (whole ^ room) - lost
+    # joined first: where faces coincide, as those of the damage with the skin, volumes may come out wrong
+    opening = room + lost
+    opened = whole ^ opening
     if others is not None:
-        milled -= to_manifold(others, origin)
-    if milled.volume() <= CRUMB * damage.volume:
+        opened = (opened - to_manifold(others, origin)) + lost
+    if opened.volume() - lost.volume() <= CRUMB * damage.volume:
         return damage, None
-    cavity = to_solid(lost + milled, origin)
+    cavity = to_solid(opened, origin)
     if cavity is None:
         raise StageError("the opened cavity is no solid", "use a slightly different prepare.wall_angle")
-    return cavity, to_solid(room + lost, origin)
+    return cavity, to_solid(opening, origin)
 
 
 def _find_direction(damage: Solid, part: Part, prepare: Prepare) -> Floats:
