@@ -121,8 +121,7 @@ def measure_file(path: Path, first: int, place: Path) -> dict[str, Any]:
 
 def _measure_diagonal(path: Path) -> float:
     from damageest.errors import InputError
-    from damageest_cadquery._read import read
-    from damageest_cadquery._tessellate import measure_diagonal
+    from damageest_cadquery.shapes import measure_diagonal, read
 
     try:
         model = read(path, path.suffix.lower())
@@ -217,8 +216,7 @@ def _count_coloured(path: Path) -> int:
     """How many CAD faces of a file have a colour."""
     from OCP.TopAbs import TopAbs_FACE
 
-    from damageest_cadquery._colours import read_colours
-    from damageest_cadquery._read import explore, read
+    from damageest_cadquery.shapes import explore, read, read_colours
 
     solids = read(path, path.suffix.lower()).solids
     count = sum(len(explore(solid, TopAbs_FACE)) for solid in solids)
@@ -231,10 +229,7 @@ def read_back(path: Path, coloured: int) -> dict[str, Any]:
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.TopAbs import TopAbs_FACE
 
-    from damageest_cadquery._check import measure_area
-    from damageest_cadquery._colours import read_colours
-    from damageest_cadquery._read import explore, read
-    from damageest_cadquery._split import measure_volume, triangulate
+    from damageest_cadquery.shapes import explore, measure_area, measure_volume, read, read_colours, triangulate
 
     text = path.read_text(errors="replace")
     model = read(path, ".step")

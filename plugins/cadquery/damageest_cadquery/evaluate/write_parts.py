@@ -9,9 +9,8 @@ def write_parts(folder: Path) -> list[Path]:
     """Writes `parts.PARTS` and `more_parts.PARTS` to a folder; gives the files."""
     import cadquery as cq
 
-    from damageest_cadquery._assembly import NamedShape, write_assembly
-    from damageest_cadquery._solids import explore_faces
     from damageest_cadquery.evaluate import more_parts, parts
+    from damageest_cadquery.shapes import NamedShape, explore_faces, write_assembly
 
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
