@@ -17,7 +17,7 @@ from damageest_paths.stripes import Bead
 Axes = Literal[3, "3+2", 5]
 LESS = 1e-6
 """Share of the extent of a pass by which the ways have to become shorter where passes are put in another order."""
-TURN = 0.25
+TURN = 0.05
 """Share of the nozzle's reach that a turn of the tool by one radian counts as, where passes are put in order."""
 
 
