@@ -60,7 +60,8 @@ def open_client(scheduler: str, workers: int, processes: bool = True) -> Iterato
             return
         # the limit of memory is the job's process' own, so Dask's, which restarts workers, is off
         size = {"n_workers": workers if processes else 1, "threads_per_worker": 1 if processes else workers}
-        fixed: dict[str, Any] = {"memory_limit": 0, "dashboard_address": None, "silence_logs": 50}
+        # any free port: a second batch would warn that the default one is in use
+        fixed: dict[str, Any] = {"memory_limit": 0, "dashboard_address": "127.0.0.1:0", "silence_logs": 50}
         with contextlib.ExitStack() as stack:
             with _keep_interrupts():
                 try:
