@@ -167,6 +167,9 @@ def describe_shortage(error: BaseException) -> StageError | None:
     """A message for the user where memory or threads ran out; None for another error."""
     if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
         return StageError("ran out of memory", MORE_MEMORY, code="memory")
+    if isinstance(error, SystemError) and "without" in str(error) and "exception" in str(error):
+        # Python's words for native code that fails and sets no exception
+        return StageError("a library failed and did not say why, as where memory ran out", MORE_MEMORY, code="memory")
     if isinstance(error, RuntimeError) and "can't start new thread" in str(error):
         return StageError(
             "no thread can be started: memory, or the number of processes, is at its limit",

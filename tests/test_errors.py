@@ -48,4 +48,6 @@ def test_want_of_memory_is_not_taken_for_a_broken_installation() -> None:
     for error in (MemoryError(), OSError(errno.ENOMEM, "Cannot allocate memory", "package/checks")):
         assert str(describe_shortage(error)).startswith("ran out of memory")
     assert str(describe_shortage(RuntimeError("can't start new thread"))).startswith("no thread can be started")
-    assert describe_shortage(RuntimeError("other")) is None
+    assert str(describe_shortage(SystemError("error return without exception set"))).startswith("a library failed")
+    for other in (RuntimeError("other"), SystemError("other")):
+        assert describe_shortage(other) is None
