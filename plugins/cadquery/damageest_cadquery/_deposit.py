@@ -81,41 +81,31 @@ def find_deposit(
     heights = dict(deposit.heights)
     numbers = {number for piece in damage for number, _ in piece.origins if heights.get(number, 0.0) > 0}
     with naming(numbers):
-        return _find(deposit, lost, damage, rest, faces, part, tolerance, start)
-
-
-def _find(
-    deposit: Deposit,
-    lost: Solid,
-    damage: Sequence[Piece],
-    rest: Sequence[Piece],
-    faces: Sequence[Any],
-    part: Part,
-    tolerance: float,
-    start: float,
-) -> ExactDeposit:
-    try:
-        bases = [base for piece in damage for base in take_bases(piece, dict(deposit.heights))]
-        higher = [replace(base, height=base.height + tolerance / 4) for base in bases]
-        figures = compare_stock(higher, deposit, lost, part, tolerance)
-        stock = _build(bases, damage, rest, part, tolerance, deposit)
-        pieces = _join(damage, stock, bases, faces, part, tolerance) if stock else tuple(damage)
-        whole = sum(triangulate(piece.shape, tolerance / 16).volume for piece in pieces)
-        wrong = min(
-            (whole / volume - 1 for volume in _measure_parts([*(piece.shape for piece in damage), *stock], tolerance)),
-            key=abs,
-        )
-    except (InputError, ValueError) as error:
-        raise StockError(f"its triangles do not close ({str(error)[:80]})") from None
-    volume = sum(measure_volume(piece.shape) for piece in pieces)
-    if abs(wrong) > SAME:
-        raise StockError(f"its volume differs by {wrong:+.2%} from damage and stock")
-    bodies = sum(body.volume > SPECK * deposit.volume for body in split_bodies(deposit))
-    if len(pieces) != bodies:
-        raise StockError(f"{len(pieces)} solids for {bodies} pieces")
-    if not is_sound(pieces):
-        raise StockError("not valid (BRepCheck)", _find_invalid(pieces))
-    return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
+        try:
+            bases = [base for piece in damage for base in take_bases(piece, dict(deposit.heights))]
+            higher = [replace(base, height=base.height + tolerance / 4) for base in bases]
+            figures = compare_stock(higher, deposit, lost, part, tolerance)
+            stock = _build(bases, damage, rest, part, tolerance, deposit)
+            pieces = _join(damage, stock, bases, faces, part, tolerance) if stock else tuple(damage)
+            whole = sum(triangulate(piece.shape, tolerance / 16).volume for piece in pieces)
+            wrong = min(
+                (
+                    whole / volume - 1
+                    for volume in _measure_parts([*(piece.shape for piece in damage), *stock], tolerance)
+                ),
+                key=abs,
+            )
+        except (InputError, ValueError) as error:
+            raise StockError(f"its triangles do not close ({str(error)[:80]})") from None
+        volume = sum(measure_volume(piece.shape) for piece in pieces)
+        if abs(wrong) > SAME:
+            raise StockError(f"its volume differs by {wrong:+.2%} from damage and stock")
+        bodies = sum(body.volume > SPECK * deposit.volume for body in split_bodies(deposit))
+        if len(pieces) != bodies:
+            raise StockError(f"{len(pieces)} solids for {bodies} pieces")
+        if not is_sound(pieces):
+            raise StockError("not valid (BRepCheck)", _find_invalid(pieces))
+        return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
 
 
 def _find_invalid(pieces: Sequence[Piece]) -> list[int]:

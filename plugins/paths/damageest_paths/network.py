@@ -144,10 +144,8 @@ class _Graph:
         free = np.append(network._is_free, np.ones(len(ends), bool))
         self._pairs = joined[free[joined].all(axis=1)]
         self._cost = np.linalg.norm(places[self._pairs[:, 0]] - places[self._pairs[:, 1]], axis=1) + 1e-9
-        for k, pair in enumerate(map(tuple, self._pairs.tolist())):
-            if pair in network._shut:
-                self._cost[k] = np.inf
         self._number = {pair: k for k, pair in enumerate(map(tuple, self._pairs.tolist()))}
+        self._cost[[self._number[pair] for pair in network._shut & self._number.keys()]] = np.inf
         self._own: dict[tuple[int, int], float] = {}
         self._checks = 0
 
