@@ -67,8 +67,7 @@ def compare_stock(
         )
     if stock.is_empty():
         return 0.0, 0.0, difference
-    vertices, faces = to_arrays(stock)
-    made = Mesh(vertices + origin, faces)
+    made = _take_mesh(stock, origin)
     rim = cKDTree(lost.vertices[np.unique(find_rim(lost.faces[outside]))])
     assert part.faces_brep is not None
     stretch = _measure_stretch(bases, 1 + max([int(part.faces_brep.max()), *(base.number for base in bases)]))
@@ -100,22 +99,21 @@ def compare_stock(
 def _find_worst(stock: Any, deposit: Solid, part: Part, tolerance: float, origin: Floats) -> list[int]:
     """The CAD faces above which stock differs from the mesh's by a fifth of the most on a face, or more."""
     assert part.faces_brep is not None
+    if stock.is_empty():
+        return []
+    made = _take_mesh(stock, origin)
     number = np.empty(0, np.int64)
-    mesh = to_manifold(deposit, origin)
-    for one, other in ((stock, deposit), (mesh, None)):
-        vertices, triangles = to_arrays(one)
-        if not len(triangles) or (other is None and stock.is_empty()):
-            continue
-        against = other if other is not None else Mesh(*_shift(stock, origin))
-        points, _, faces = _sample_above(Mesh(vertices + origin, triangles), part, tolerance)
-        number = np.append(number, faces[distance_to_mesh(points, against) > tolerance / 8])
+    for one, other in ((made, deposit), (deposit, made)):
+        points, _, faces = _sample_above(one, part, tolerance)
+        number = np.append(number, faces[distance_to_mesh(points, other) > tolerance / 8])
     count = np.bincount(number, minlength=1)
     return np.flatnonzero(count > count.max() / 5).tolist() if count.max() else []
 
 
-def _shift(solid: Any, origin: Floats) -> tuple[Floats, Ints]:
+def _take_mesh(solid: Any, origin: Floats) -> Mesh:
+    """The triangles of a Manifold about ``origin``."""
     vertices, triangles = to_arrays(solid)
-    return vertices + origin, triangles
+    return Mesh(vertices + origin, triangles)
 
 
 def _compare_outlines(bases: Sequence[Base], lost: Solid, outside: Ints, part: Part) -> float:
