@@ -13,7 +13,7 @@ from damageest.geometry.transforms import move_points
 from damageest.stages.align._counterparts import turn_poses
 from damageest.stages.align._evidence import DECISIVE, weigh_poses
 from damageest.stages.align._field import PartSurface, PlaneGrid
-from damageest.stages.align._fine import fit, robust_cost
+from damageest.stages.align._fine import fit, fit_each, robust_cost
 from damageest.stages.align._points import OrientedPoints
 from damageest.stages.align._prepare_part import PreparedPart
 from damageest.stages.align._search import refine, score, select_distinct
@@ -106,9 +106,10 @@ def _compare(
     poses: Floats, axis: Axis | None, target: PartSurface, field: PlaneGrid, points: Floats, noise: float
 ) -> Choice:
     """The best of the poses (H,4,4), each fitted to the triangles, and the others that fit as well."""
-    fits = [fit(target, _keep_near(field, points[:FIRST_POINTS], pose), pose, COARSE, noise, 12) for pose in poses]
+    near = [_keep_near(field, points[:FIRST_POINTS], pose) for pose in poses]
+    fits = fit_each(target, near, list(poses), COARSE, noise, 12)
     poses = np.array([one.pose for one in fits])
-    distances = [_measure_distance(target, field, points[:FIRST_POINTS], pose) for pose in poses]
+    distances = _measure_distances(target, field, points[:FIRST_POINTS], poses)
     band = fits[int(np.argmin([robust_cost(distance, 0.75 * COARSE).sum() for distance in distances]))].band
     costs = [robust_cost(distance, band) for distance in distances]
     first = select_distinct(poses, -np.array([cost.sum() for cost in costs]), 0.25 * COARSE, MAX_POSES)
@@ -117,7 +118,7 @@ def _compare(
     for start, stop in pairwise((FIRST_POINTS, SECOND_POINTS, THIRD_POINTS, len(points))):
         kept = np.flatnonzero(_select_equal(costs))
         poses, more = poses[kept], points[start:stop]
-        added = [robust_cost(_measure_distance(target, field, more, pose), band) for pose in poses]
+        added = [robust_cost(distance, band) for distance in _measure_distances(target, field, more, poses)]
         costs = [np.concatenate([costs[k], cost]) for k, cost in zip(kept, added, strict=True)]
     best = int(np.argmin([cost.sum() for cost in costs]))
     equal = np.array([not is_worse(cost, costs[best]) for cost in costs])
@@ -157,8 +158,8 @@ def _add_rivals(
     rivals = together[kept[kept >= len(known)]][:MAX_RIVALS]
     if axis is not None and len(rivals):
         rivals = rivals[~np.array([axis.is_turn(known @ np.linalg.inv(one)).any() for one in rivals])]
-    open_ = [weigh_poses(target, points, pose, one, noise) < DECISIVE for one in rivals]
-    return np.concatenate([others, rivals[np.array(open_, bool)]])
+    open_ = weigh_poses(target, points, pose, rivals, noise) < DECISIVE
+    return np.concatenate([others, rivals[open_]])
 
 
 def _is_continuous(
@@ -191,12 +192,18 @@ def _keep_near(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
 
 
 def _measure_distance(target: PartSurface, field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
-    """Signed distances (N,) of the moved points: exact near the surface, from the grid far from it."""
-    at = move_points(points, pose)
+    """As `_measure_distances`, in one pose (4,4)."""
+    return np.asarray(_measure_distances(target, field, points, pose[None])[0])
+
+
+def _measure_distances(target: PartSurface, field: PlaneGrid, points: Floats, poses: Floats) -> Floats:
+    """Signed distances (H,N) of the points (N,3) in each of the poses (H,4,4): exact near the surface, from the grid
+    far from it."""
+    at = np.concatenate([move_points(points, pose) for pose in poses])
     distance = field.distance[field.find_cell(at.astype(np.float32))].astype(np.float64)
     near = np.abs(distance) < FAR
     distance[near] = target.closest(at[near])[0]
-    return distance
+    return distance.reshape(len(poses), len(points))
 
 
 def _add_counterparts(poses: Floats, field: PlaneGrid, scan: OrientedPoints) -> tuple[Floats, Axis | None]:

@@ -27,23 +27,27 @@ DECISIVE = 8.0
 """Logarithm of the odds from which one pose is right and the other is not."""
 
 
-def weigh_poses(target: PartSurface, points: Floats, pose: Floats, other: Floats, noise: float) -> float:
-    """By how much the scan favours ``pose`` (4,4) over ``other`` (4,4): the logarithm of the odds.
+def weigh_poses(target: PartSurface, points: Floats, pose: Floats, others: Floats, noise: float) -> Floats:
+    """By how much the scan favours ``pose`` (4,4) over each of the ``others`` (K,4,4): logarithms of the odds (K,).
 
     Single points are no independent witnesses: a scanner's steps and waves move neighbours alike. So points are
     averaged over patches, the scatter of the patches is measured and not derived from the noise, and the sum is divided
     by the number of patches that deviate alike. Patches on which the poses hardly differ have no say.
     ``points`` (N,3): in random order, spread evenly over the scan; lengths in diagonals of the part.
     """
+    if not len(others):
+        return np.zeros(0)
     some = points[:POINTS]
     patch, place, count = _group_points(target, some, pose)
     if not len(count):
-        return 0.0
-    first, second = (_average(target, some, one, patch, len(count)) for one in (pose, other))
+        return np.zeros(len(others))
+    first, *seconds = _average(target, some, np.concatenate([pose[None], others]), patch, len(count))
     scatter = max(1.4826 * float(np.median(np.abs(first))), noise / float(np.sqrt(np.median(count))), 1e-5)
-    telling = np.abs(first - second) > TELLING * scatter
-    gain = _weigh(second / scatter) - _weigh(first / scatter)
-    return float(gain[telling].sum()) / _count_alike(first / scatter, place)
+    here, alike = _weigh(first / scatter), _count_alike(first / scatter, place)
+    gains = [
+        float((_weigh(second / scatter) - here)[np.abs(first - second) > TELLING * scatter].sum()) for second in seconds
+    ]
+    return np.array(gains) / alike
 
 
 def _group_points(target: PartSurface, points: Floats, pose: Floats) -> tuple[Ints, Floats, Ints]:
@@ -68,12 +72,14 @@ def _group_points(target: PartSurface, points: Floats, pose: Floats) -> tuple[In
     return patch, place / np.maximum(count[kept], 1)[:, None] / edge, count[kept]
 
 
-def _average(target: PartSurface, points: Floats, pose: Floats, patch: Ints, count: int) -> Floats:
-    """The mean signed distance of each patch (P,) in a pose."""
+def _average(target: PartSurface, points: Floats, poses: Floats, patch: Ints, count: int) -> Floats:
+    """The mean signed distance of each patch in each of the poses (H,4,4): (H,P)."""
     inside = patch >= 0
-    distance = target.closest(move_points(points[inside], pose))[0]
+    moved = [move_points(points[inside], pose) for pose in poses]
+    distance = target.closest(np.concatenate(moved))[0].reshape(len(poses), -1)
     number = patch[inside]
-    return np.asarray(np.bincount(number, distance, count) / np.bincount(number, minlength=count))
+    size = np.bincount(number, minlength=count)
+    return np.array([np.bincount(number, one, count) / size for one in distance])
 
 
 def _weigh(size: Floats) -> Floats:

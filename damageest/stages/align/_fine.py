@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Ints
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align._field import PartSurface
 
@@ -35,12 +36,39 @@ def fit(target: PartSurface, points: Floats, pose: Floats, band: float, noise: f
     ``noise`` each. At the end damage and dirt have no weight. ``points`` (N,3), ``pose`` (4,4), at most ``rounds``
     steps; all lengths in diagonals of the part.
     """
+    return fit_each(target, [points], [pose], band, noise, rounds)[0]
+
+
+def fit_each(
+    target: PartSurface, points: Sequence[Floats], poses: Sequence[Floats], band: float, noise: float, rounds: int
+) -> list[Fit]:
+    """As `fit`, for points (N,3) and a pose (4,4) of each fit. The fits go on side by side: the closest points of all
+    of them are one question, since libigl uses all cores only where many points are asked for."""
+    fits = [_fit(target, some, pose, band, noise, rounds) for some, pose in zip(points, poses, strict=True)]
+    asked, results = {number: next(one) for number, one in enumerate(fits)}, {}
+    while asked:
+        distance, foot, face = target.closest(np.concatenate(list(asked.values())))
+        stop, waiting = 0, {}
+        for number, at in asked.items():
+            own = slice(stop, stop := stop + len(at))
+            try:
+                waiting[number] = fits[number].send((distance[own], foot[own], face[own]))
+            except StopIteration as end:
+                results[number] = end.value
+        asked = waiting
+    return [results[number] for number in range(len(fits))]
+
+
+def _fit(
+    target: PartSurface, points: Floats, pose: Floats, band: float, noise: float, rounds: int
+) -> Generator[Floats, tuple[Floats, Floats, Ints], Fit]:
+    """The steps of one fit: gives the places (N,3) whose distances, closest points and faces it needs next."""
     narrowest = max(REACH * noise, 2e-5)
     step = residue = drift = np.inf
     for step_number in range(rounds):
         at = move_points(points, pose)
         if drift > MAX_DRIFT * band:
-            distance, foot, face = target.closest(at)
+            distance, foot, face = yield at
             if step_number == 0:  # the pose moves by a few bands at most: points farther off are not needed
                 close = np.abs(distance) < 4 * band
                 points, at, distance, foot, face = points[close], at[close], distance[close], foot[close], face[close]

@@ -72,8 +72,8 @@ class MirrorTest:
         return check_pose(self.part.surface, replace(pose, band=band), self.points, self.raw, self.tolerance)
 
     def weigh(self, pose: Fit, other: Fit) -> float:
-        """As `weigh_poses`."""
-        return weigh_poses(self.part.surface, self.points, pose.pose, other.pose, self.noise)
+        """As `weigh_poses`, over one other pose."""
+        return float(weigh_poses(self.part.surface, self.points, pose.pose, other.pose[None], self.noise)[0])
 
 
 @dataclass(frozen=True)

@@ -75,4 +75,4 @@ def test_waves_make_the_evidence_weaker(wave: float, is_decided: bool) -> None:
     points += wave * np.sin(points.sum(axis=1) / (0.1 * size))[:, None]
     moved = np.eye(4)
     moved[0, 3] = 0.4
-    assert (weigh_poses(target, rng.permutation(points), np.eye(4), moved, 0.1) > DECISIVE) == is_decided
+    assert (weigh_poses(target, rng.permutation(points), np.eye(4), moved[None], 0.1)[0] > DECISIVE) == is_decided
