@@ -12,7 +12,7 @@ from damageest.geometry.transforms import move_points
 from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, NEAR, PoseCheck, check_pose
 from damageest.stages.align._choose import COARSE
 from damageest.stages.align._evidence import DECISIVE, weigh_poses
-from damageest.stages.align._fine import Fit, fit
+from damageest.stages.align._fine import Fit, fit, fit_each
 from damageest.stages.align._pairs import propose_poses
 from damageest.stages.align._points import OrientedPoints
 from damageest.stages.align._prepare_part import PreparedPart
@@ -132,17 +132,17 @@ def _fit_reflections(test: MirrorTest, best: Fit) -> list[Fit]:
     target, grid = test.part.surface, test.part.grid
     at = move_points(test.points[:POINTS], best.pose)
     few = at[:1500]
-    fits = []
+    tried: list[Floats] = []
     for middle in (np.zeros(3), np.median(few, axis=0)):
         mirrors = _make_reflections(middle)
         on = [
             float((np.abs(grid.distance[grid.find_cell(move_points(few, one).astype(np.float32))]) < COARSE).mean())
             for one in mirrors
         ]
-        for k in np.argsort(-np.array(on), kind="stable")[:FITTED]:
-            one = fit(target, move_points(at, mirrors[k]), np.eye(4), 3 * COARSE, test.noise, 30)
-            fits.append(Fit(one.pose @ mirrors[k] @ best.pose, one.band, one.residue))
-    return fits
+        tried.extend(mirrors[np.argsort(-np.array(on), kind="stable")[:FITTED]])
+    moved = [move_points(at, mirror) for mirror in tried]
+    fits = fit_each(target, moved, [np.eye(4)] * len(tried), 3 * COARSE, test.noise, 30)
+    return [replace(one, pose=one.pose @ mirror @ best.pose) for one, mirror in zip(fits, tried, strict=True)]
 
 
 def _search_again(test: MirrorTest, rng: np.random.Generator, side: float) -> Fit:
