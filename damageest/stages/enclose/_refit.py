@@ -7,12 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Solid
-from damageest.geometry.neighbourhoods import find_neighbours
+from damageest.geometry.neighbourhoods import make_tree, query_neighbours
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.geometry.vectors import normalise
 
 NEIGHBOURS = 12
 """Points that each vertex is fitted to."""
+NEAR, SOME = 4.0, 20_000
+"""How far from the points vertices are fitted, in usual distances of neighbouring points, beside twice their largest
+move; and of how many points, at most, this distance is measured."""
 SAME_VOLUME = 0.003
 """Share by which the volume may change where triangles are joined."""
 
@@ -37,10 +40,12 @@ def refit_region(region: Solid, points: Floats, normals: Floats, most: float) ->
     mean of their normals, so curvature adds no error of second order. ``normals`` (N,3) point into the region. No
     vertex moves by more than ``most``; vertices without points near them do not move.
     """
-    vertices = region.vertices
-    distance, index = find_neighbours(vertices, NEIGHBOURS, points)
-    near = np.flatnonzero(distance[:, 0] < 2 * most + np.median(distance[:, 0]))
-    fit = fit_places(vertices[near], region.vertex_normals[near], points, -normals, distance[near], index[near])
+    vertices, tree = region.vertices, make_tree(points)
+    usual = float(np.median(query_neighbours(tree, points[:: len(points) // SOME + 1], 2)[0][:, -1]))
+    # Half of the surface may close the region far from all points, where a search without reach takes longest.
+    near = np.flatnonzero(np.isfinite(query_neighbours(tree, vertices, 1, 2 * most + NEAR * usual)[0][:, 0]))
+    distance, index = query_neighbours(tree, vertices[near], min(NEIGHBOURS, len(points)))
+    fit = fit_places(vertices[near], region.vertex_normals[near], points, -normals, distance, index)
     # Beyond the border of the points the fit would extrapolate: a vertex with points on one side only moves less.
     fade = np.clip(2 - 4 * fit.lopsided, 0, 1) * np.clip(2 - np.abs(fit.move) / most, 0, 1) * fit.is_known
     moved = vertices.copy()
