@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import list_used
+from damageest.geometry.long_faces import cut_long_faces
 from damageest.geometry.pseudonormals import keep_signed_mesh
 from damageest.geometry.vectors import measure_longest_edges, normalise
 from damageest.geometry.voxels import order_by_place
@@ -24,16 +25,10 @@ from damageest.isolation.memory import FEWER_POINTS, require_memory
 BYTES_OF_POINT, BYTES_OF_TRIANGLE = 230, 480
 """Memory of `signed_distance` for each point and each triangle, measured."""
 
-LARGE = 16.0
-"""Longest edge of a triangle, in medians of all, from which it is a large one."""
-
 MOST_KEPT = 100_000
 """Triangles up to which the tree of a mesh is kept with the mesh: the result's checks ask one damage volume ten times.
 Of larger meshes the last one keeps its tree, as a part that all checks ask: more would hold memory that the next stages
 need."""
-
-FEW = 1.0
-"""Points for each triangle below which a mesh is prepared once for all calls, and not by libigl for each."""
 
 _faults: WeakKeyDictionary[Mesh, tuple[Flags, Flags]] = WeakKeyDictionary()
 _centred: WeakKeyDictionary[Mesh, SurfaceTree] = WeakKeyDictionary()
@@ -103,16 +98,14 @@ class SurfaceTree:
         self.mesh = mesh
 
     @cached_property
-    def _trees(self) -> list[tuple[Any, Ints, Ints]]:
-        """A tree over triangles of about one size, these triangles (K,3), and their numbers (K,), for each size."""
+    def _tree(self) -> tuple[Any, Floats, Ints, Ints]:
+        """A tree over short pieces of the triangles, and these as `cut_long_faces` gives them."""
         import igl
 
-        trees = []
-        for numbers in _group_by_size(self.mesh):
-            tree, faces = igl.AABB(), np.ascontiguousarray(self.mesh.faces[numbers])
-            tree.init(self.mesh.vertices, faces)
-            trees.append((tree, faces, numbers))
-        return trees
+        vertices, faces, origin = cut_long_faces(self.mesh.vertices, self.mesh.faces)
+        tree = igl.AABB()
+        tree.init(vertices, faces)
+        return tree, vertices, faces, origin
 
     def closest(self, points: Floats) -> Closest:
         """The nearest place on the mesh for each of ``points`` (N,3), as `closest_on_mesh` gives it.
@@ -123,16 +116,11 @@ class SurfaceTree:
             return _find_none()
         _require_some(self.mesh.faces, "triangle")
         order = order_by_place(points)
-        query, found = np.ascontiguousarray(points[order], np.float64), []
-        for tree, faces, numbers in self._trees:
-            squared, face, place = tree.squared_distance(self.mesh.vertices, faces, query)
-            found.append((np.reshape(squared, -1), numbers[np.reshape(face, -1)], np.reshape(place, (-1, 3))))
-        squared, face, place = found[0]
-        for other, its_face, its_place in found[1:]:
-            nearer = other < squared
-            squared, face = np.where(nearer, other, squared), np.where(nearer, its_face, face)
-            place = np.where(nearer[:, None], its_place, place)
-        return Closest(*(_undo_order(order, column) for column in (np.sqrt(squared), face, place)))
+        tree, vertices, faces, origin = self._tree
+        query = np.ascontiguousarray(points[order], np.float64)
+        squared, face, place = tree.squared_distance(vertices, faces, query)
+        found = np.sqrt(np.ravel(squared)), origin[np.ravel(face)], np.reshape(place, (-1, 3))
+        return Closest(*(_undo_order(order, column) for column in found))
 
 
 def _require_some(rows: Ints, what: str) -> None:
@@ -151,18 +139,6 @@ def _undo_order(order: Ints, values: NDArray[Any]) -> NDArray[Any]:
     result = np.empty_like(values)
     result[order] = values
     return result
-
-
-def _group_by_size(mesh: Mesh) -> list[Ints]:
-    """The numbers of the small triangles of a mesh, and those of the large ones where there are some.
-
-    A tree of boxes that holds both is slow: the boxes of long slivers, as flat faces of CAD models are cut into, cover
-    those of the small triangles. Measured on a damage volume: four times the time.
-    """
-    triangles = mesh.triangles
-    longest = measure_longest_edges(triangles)
-    large = longest > LARGE * np.median(longest)
-    return [np.flatnonzero(~large), np.flatnonzero(large)] if large.any() else [np.arange(len(longest))]
 
 
 def winding_number(points: Floats, mesh: Mesh) -> Floats:
@@ -215,12 +191,7 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     used = np.flatnonzero(~flat)
     _require_some(used, "triangle with an area")
     faces = mesh.faces[used]
-    if len(points) < FEW * len(faces):
-        signed, nearest, foot, pseudo = keep_signed_mesh(mesh, vertices, faces).measure(query)
-    else:
-        kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-        signed, nearest, foot, pseudo = igl.signed_distance(query, vertices, faces, sign_type=kind)
-        signed, nearest = np.array(signed, dtype=np.float64), np.asarray(nearest, np.int64)
+    signed, nearest, foot, pseudo = keep_signed_mesh(mesh, vertices, faces).measure(query)
     away = query - foot
     normal = normalise(mesh.cross[used[nearest]])
     beside = np.linalg.norm(np.cross(away, normal), axis=1) > 1e-7 * np.abs(signed)

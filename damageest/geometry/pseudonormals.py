@@ -1,7 +1,7 @@
 """The side of a mesh that points lie on, by the pseudonormals of a mesh that is kept for many questions.
 
-libigl's `signed_distance` builds its tree and its normals anew for each call. Where few points are asked of a mesh with
-many triangles, that is nearly all of its time.
+libigl's `signed_distance` builds its tree and its normals anew for each call, and its tree holds long triangles as they
+are. Where few points are asked of a mesh with many triangles, or triangles are long, that is most of its time.
 """
 
 from __future__ import annotations
@@ -14,6 +14,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.long_faces import cut_long_faces
+from damageest.geometry.threads import cut_evenly
+
+CHUNK = 10_000
+"""Points whose pseudonormals are found at a time, so that intermediate arrays stay in the processor's cache."""
 
 ON_EDGE = 1e-12
 """Barycentric coordinate up to which a place lies on the opposite edge, as libigl takes it."""
@@ -30,12 +35,14 @@ class SignedMesh:
     faces: Ints
 
     @cached_property
-    def _tree(self) -> Any:
+    def _tree(self) -> tuple[Any, Floats, Ints, Ints]:
+        """A tree over short pieces of the triangles, and these as `cut_long_faces` gives them."""
         import igl
 
+        vertices, faces, origin = cut_long_faces(self.vertices, self.faces)
         tree = igl.AABB()
-        tree.init(self.vertices, self.faces)
-        return tree
+        tree.init(vertices, faces)
+        return tree, vertices, faces, origin
 
     @cached_property
     def _normals(self) -> tuple[Floats, Floats, Floats, Ints]:
@@ -63,9 +70,11 @@ class SignedMesh:
             return np.empty(0), np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3))
         if not len(self.faces):  # libigl ends the process by a segmentation fault there
             raise ValueError("no distance: what it is measured to has no triangle; ask only where there is one")
-        squared, face, place = self._tree.squared_distance(self.vertices, self.faces, points)
-        face, place = np.asarray(face, np.int64).ravel(), np.reshape(place, (-1, 3))
-        pseudo = self._find_pseudonormals(face, place)
+        tree, vertices, faces, origin = self._tree
+        squared, found, place = tree.squared_distance(vertices, faces, points)
+        face, place = origin[np.ravel(found)], np.reshape(place, (-1, 3))
+        some = cut_evenly(len(points), CHUNK)
+        pseudo = np.concatenate([self._find_pseudonormals(face[own], place[own]) for own in some])
         outside = np.einsum("ij,ij->i", points - place, pseudo) >= 0
         return np.where(outside, 1.0, -1.0) * np.sqrt(np.ravel(squared)), face, place, pseudo
 

@@ -24,6 +24,7 @@ from damageest.geometry import (
     healing,
     height_spline,
     local_fits,
+    long_faces,
     loops,
     make_part,
     morton,
@@ -190,6 +191,9 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     ),
     "local_fits.average_points": lambda r: expect(
         local_fits.average_points(r.points, r.ones, 0.1, np.arange(r.count)), (r.count, 3), (r.count, 3)
+    ),
+    "long_faces.cut_long_faces": lambda r: expect(
+        long_faces.cut_long_faces(r.mesh.vertices, r.mesh.faces)[1], (None, 3)
     ),
     "loops.trace_loops": lambda r: [expect(loop, (3,)) for loop in loops.trace_loops(r.mesh.faces)] and None,
     "loops.trace_rims": lambda r: [expect(loop, (None,)) for loop in loops.trace_rims(surface(r))] and None,
