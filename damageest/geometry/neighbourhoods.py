@@ -131,15 +131,16 @@ def query_neighbours(tree: Any, points: Floats, count: int, reach: float = np.in
     return distance, index
 
 
-def measure_local_areas(points: Floats) -> Floats:
+def measure_local_areas(points: Floats, among: Floats | None = None) -> Floats:
     """The area (N,) of surface that each of the points (N,3) stands for, from its eight nearest neighbours.
 
+    ``among`` (M,3): the points that have these neighbours, the points themselves with them; by default only these.
     At most four times the median of all, so that single outliers stay small. In the square of the points' unit; 1e-12
     each for fewer than three points.
     """
-    if len(points) < 3:
+    if not len(points) or len(points if among is None else among) < 3:
         return np.full(len(points), 1e-12)
-    distance, _ = find_neighbours(points, 9)
+    distance, _ = find_neighbours(points, 9, among)
     count = distance.shape[1] - 1
     area = np.pi * distance[:, -1] ** 2 / count
     return np.asarray(np.minimum(area, 4 * np.median(area)))

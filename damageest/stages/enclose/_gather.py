@@ -83,12 +83,12 @@ class _Sorted:
 
 @dataclass(frozen=True, eq=False)
 class IntactSkin:
-    """Samples of the skin that is neither lost nor near the losses: ``points`` (K,3), outward ``normals`` (K,3) and the
-    area (K,) that each stands for."""
+    """Samples of the skin that is neither lost nor near the losses: ``points`` (K,3) and outward ``normals`` (K,3), and
+    ``every`` (S,3) sample, of the other skin too."""
 
     points: Floats
     normals: Floats
-    areas: Floats
+    every: Floats
 
 
 def sort_losses(
@@ -108,7 +108,7 @@ def sort_losses(
     above, depth = part.face_normals[deviation.face[of_scan]], -deviation.distance[of_scan]
     groups, lost_by = _group_losses(points, above, depth, label, skin, free, tolerance, aligned.spacing, aligned.noise)
     kept = np.flatnonzero((lost_by < 0) & ~free)
-    return groups, IntactSkin(skin.points[kept], skin.normals[kept], measure_local_areas(skin.points)[kept])
+    return groups, IntactSkin(skin.points[kept], skin.normals[kept], skin.points)
 
 
 def push_intact(
@@ -121,7 +121,8 @@ def push_intact(
         high = grid.origin + grid.cell * (np.array(grid.shape) - 1)
         near[find_in_box(skin.points, grid.origin - push, high + push)] = True
     points, normals = skin.points[near], skin.normals[near]
-    return GatheredLosses(groups, push_outward(part, points, normals, push), normals, skin.areas[near])
+    areas = measure_local_areas(points, skin.every)
+    return GatheredLosses(groups, push_outward(part, points, normals, push), normals, areas)
 
 
 def select_in_grid(gathered: GatheredLosses, grid: Grid) -> tuple[Floats, Floats, Floats]:

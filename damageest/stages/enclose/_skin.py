@@ -8,9 +8,10 @@ import numpy as np
 
 from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Part, Samples, Scan
 from damageest.geometry.distance import closest_on_mesh, signed_distance
+from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours, pick_one_per_cube
 from damageest.geometry.skin_near import CUBE, NearCubes
-from damageest.geometry.voxels import measure_bounds
+from damageest.geometry.voxels import measure_bounds, number_cubes
 
 NEARER = 0.4
 """Skin is held where an intact point is nearer than this share of the distance to the damaged points."""
@@ -99,12 +100,14 @@ def find_held(
 
 
 def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:
-    """Radius (S,) that holds six intact points, measured at the intact points nearest to each skin sample."""
-    count = min(7, len(hit))
-    some = hit[pick_one_per_cube(hit, 3 * tolerance)]
-    radius = find_neighbours(some, count, hit)[0][:, -1]
-    _, index = find_neighbours(points, 6, some)
-    return np.asarray(np.median(radius[index], axis=1))
+    """Radius (S,) that holds six intact points, measured at the intact points nearest to each skin sample. It changes
+    slowly: one sample stands for those of its cube, and far from all intact points a search takes longest."""
+    edge = 3 * tolerance
+    some = hit[pick_one_per_cube(hit, edge)]
+    radius = find_neighbours(some, 7, hit)[0][:, -1]
+    first, cube, _ = group_integers(number_cubes(points, edge)[1])
+    usual = np.median(radius[find_neighbours(points[first], 6, some)[1]], axis=1)
+    return np.asarray(usual[cube])
 
 
 def push_outward(part: Part, skin: Floats, outward: Floats, push: float) -> Floats:
