@@ -14,7 +14,7 @@ from damageest.checks.skin_cells import MOST_CELLS, SkinCells
 from damageest.findings import Coverage, UnseenRegion
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
-from damageest.geometry.rays import RayCaster
+from damageest.geometry.rays import prepare_rays
 
 LEAST_EDGE = 4.0
 """Edge of a square, in tolerances, whose area an unseen region has at least; smaller ones count in the share only."""
@@ -148,7 +148,7 @@ def _measure_volumes_behind(part: Part, cells: SkinCells, region: Ints, count: i
     tried = rng.uniform(low, high, (4 * VOLUME_POINTS, 3))
     # a ray from a point inside leaves the part where it first meets the skin
     direction = np.array([0.36, 0.48, 0.8])
-    _, face = RayCaster(part).find_first(tried, np.broadcast_to(direction, tried.shape))
+    _, face = prepare_rays(part).find_first(tried, np.broadcast_to(direction, tried.shape))
     inside = tried[(face >= 0) & (part.cross[face] @ direction > 0)]
     found = np.zeros(count)
     if len(inside):

@@ -10,7 +10,7 @@ from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.checks.skin_cells import SkinCells
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
-from damageest.geometry.rays import Crossings, RayCaster
+from damageest.geometry.rays import Crossings, RayCaster, prepare_rays
 
 MOST_RAYS = 100_000
 """Scan points whose rays are followed through the part."""
@@ -43,7 +43,7 @@ def trace_rays(
         return None
     used = np.flatnonzero(aligned.view >= 0)
     used = used[np.linspace(0, len(used) - 1, min(len(used), MOST_RAYS)).round().astype(np.int64)]
-    caster = RayCaster(part)
+    caster = prepare_rays(part)
     origins, ends = aligned.viewpoints[aligned.view[used]], aligned.points[used]
     hits = caster.find_crossings(origins, ends)
     margin = max(2 * aligned.noise, 0.5 * tolerance)

@@ -221,13 +221,13 @@ def require_intact(distance: Floats, tolerance: float, part: Part) -> None:
 
 def check_walls(tolerance: float, part: Part) -> list[Reason]:
     """A warning where the tolerance is so large that damage cannot be found in the part's walls; else nothing."""
-    from damageest.geometry.rays import RayCaster
+    from damageest.geometry.rays import prepare_rays
     from damageest.geometry.sampling import sample_by_area
 
     points, face = sample_by_area(part, 2000, np.random.default_rng(0))
     normals = part.face_normals[face]
     start = points - 1e-5 * part.diagonal * normals
-    thickness = RayCaster(part).find_first(start, -normals)[0]
+    thickness = prepare_rays(part).find_first(start, -normals)[0]
     thickness = thickness[np.isfinite(thickness)]
     if not len(thickness):
         return []

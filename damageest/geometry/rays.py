@@ -8,6 +8,7 @@ embreex has no wheel, as on Linux of 64-bit ARM, libigl's tree is asked, in floa
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -101,6 +102,18 @@ class RayCaster:
         seen = self._scene.run(place, directions.astype(np.float32), output=True)
         facing = np.einsum("ij,ij->i", directions, seen["Ng"])
         return start, seen["tfar"].astype(np.float64), seen["primID"].astype(np.int64), facing
+
+
+_last: WeakKeyDictionary[Mesh, RayCaster] = WeakKeyDictionary()
+"""The mesh that was prepared last: more would hold memory that the next stages need."""
+
+
+def prepare_rays(mesh: Mesh) -> RayCaster:
+    """The mesh prepared for rays, as by the last call or now; for the part, which several checks ask."""
+    if (found := _last.get(mesh)) is None:
+        _last.clear()
+        found = _last[mesh] = RayCaster(mesh)
+    return found
 
 
 class _Tree:

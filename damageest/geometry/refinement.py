@@ -6,18 +6,22 @@ Mesh, points and edge lengths are in one unit, mesh and points in one frame.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Mesh, Part
+from damageest.artefacts import Flags, Floats, Ints, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh
-from damageest.geometry.duplicates import find_members
+from damageest.geometry.duplicates import find_members, group_integers
+from damageest.geometry.vectors import measure_longest_edges
 from damageest.isolation.memory import require_memory
 
 BYTES_OF_FACE = 450
 """Memory of one round of refinement, for each triangle before or after it."""
 BYTES_TO_LOOK = 320
 """Memory of the search for long edges, for each triangle, measured."""
+RINGS = 2
+"""Rings of neighbours of the faces to be halved that are looked at first."""
 MOST_ROUNDS = 60
 """Rounds of halving after which refinement stops, even if edges are still too long."""
 
@@ -70,17 +74,17 @@ def cut_into_cells(mesh: Mesh, edge: float, area: float = 0.0) -> tuple[Mesh, In
     needed = BYTES_TO_LOOK * len(mesh.faces)
     require_memory(needed, f"a mesh of {len(mesh.faces):,} triangles that is cut", "a part with fewer triangles")
     vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
-    origin = np.arange(len(faces))
+    origin = asked = np.arange(len(faces))
     for _ in range(MOST_ROUNDS):
-        corners = vertices[faces]
-        long = (np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2) > edge).any(axis=1)
+        corners = vertices[faces[asked]]
+        long = measure_longest_edges(corners) > edge
         if area:
             cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             long &= np.linalg.norm(cross, axis=1) > 2 * area
         if not long.any():
             break
-        vertices, faces, parent = bisect_faces(vertices, faces, np.flatnonzero(long))
-        origin = origin[parent]
+        vertices, faces, parent, kept = _bisect(vertices, faces, asked[long])
+        origin, asked = origin[parent], np.arange(kept, len(faces))  # a face that was not cut is not too long
     return Mesh(vertices, faces), origin
 
 
@@ -98,16 +102,62 @@ def bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, I
 
     Gives vertices, faces, and the face (F,) that each of them came from.
     """
+    return _bisect(vertices, faces, wanted)[:3]
+
+
+def _bisect(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, Ints, int]:
+    """As `bisect_faces`, with the number of faces that stay as they are; these come first.
+
+    Only faces about the ``wanted`` ones are looked at, and more of them where halving goes on to faces beyond.
+    """
     if not len(wanted):
-        return vertices, faces, np.arange(len(faces))
+        return vertices, faces, np.arange(len(faces)), len(faces)
     needed = BYTES_OF_FACE * (len(faces) + 3 * len(wanted))
     require_memory(needed, f"a mesh of {len(faces):,} triangles that is refined", "a larger tolerance")
+    near = np.zeros(len(faces), bool)
+    near[wanted] = True
+    while True:
+        for _ in range(RINGS):
+            touched = np.zeros(len(vertices), bool)
+            touched[faces[near]] = True
+            near = touched[faces].any(axis=1)
+        chosen = np.flatnonzero(near)
+        is_wanted = np.zeros(len(faces), bool)
+        is_wanted[wanted] = True
+        cut = _halve_some(vertices, faces[chosen], np.flatnonzero(is_wanted[chosen]))
+        is_end = np.zeros(len(vertices), bool)
+        is_end[cut.ends] = True
+        if near.all() or not (is_end[faces[~near]].sum(axis=1) > 1).any():
+            break  # no face that was not looked at has an edge that is halved
+    stays = np.ones(len(faces), bool)
+    stays[chosen[cut.parent]] = False
+    kept = np.flatnonzero(stays)
+    return (
+        np.concatenate([vertices, cut.middles]),
+        np.concatenate([faces[kept], cut.faces]),
+        np.concatenate([kept, chosen[cut.parent]]),
+        len(kept),
+    )
+
+
+class _Halves(NamedTuple):
+    """What comes of faces that are halved: the ``ends`` (K,2) of the edges, their ``middles`` (K,3), which are vertices
+    after those of the mesh, the new ``faces`` (P,3), and the ``parent`` (P,) of each among the faces asked."""
+
+    ends: Ints
+    middles: Floats
+    faces: Ints
+    parent: Ints
+
+
+def _halve_some(vertices: Floats, faces: Ints, wanted: Ints) -> _Halves:
+    """Halves the longest edges of the ``wanted`` of these faces (F,3), and those that this asks for among them."""
     corners = vertices[faces]
     length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     longest = length.argmax(axis=1)
     faces = faces[np.arange(len(faces))[:, None], (longest[:, None] + np.arange(3)) % 3]
     ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)
-    edge = np.unique(ends[..., 0] * len(vertices) + ends[..., 1], return_inverse=True)[1].reshape(-1, 3)
+    edge = group_integers((ends[..., 0] * len(vertices) + ends[..., 1]).ravel())[1].reshape(-1, 3)
     marked = np.zeros(int(edge.max()) + 1, dtype=bool)
     marked[edge[wanted, 0]] = True
     while (late := marked[edge].any(axis=1) & ~marked[edge[:, 0]]).any():
@@ -116,18 +166,16 @@ def bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, I
     middle[marked] = len(vertices) + np.arange(int(marked.sum()))
     ends_of = np.zeros((len(marked), 2), dtype=np.int64)
     ends_of[edge.ravel()] = ends.reshape(-1, 2)
-    vertices = np.concatenate([vertices, vertices[ends_of[marked]].mean(axis=1)])
     (a, b, c), (m, n, o) = faces.T, middle[edge].T
     second, third = n >= 0, o >= 0
     index = np.arange(len(faces))
     cut = m >= 0
 
-    def some(where: Ints, *nodes: Ints) -> tuple[Ints, Ints]:
+    def some(where: Flags, *nodes: Ints) -> tuple[Ints, Ints]:
         return np.stack([node[where] for node in nodes], axis=1), index[where]
 
     # The longest edge ab is cut at m in all of them; bc at n and ca at o in some.
     pieces = [
-        some(~cut, a, b, c),
         some(cut & ~third, a, m, c),
         some(cut & third, a, m, o),
         some(cut & third, m, c, o),
@@ -135,7 +183,9 @@ def bisect_faces(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, I
         some(cut & second, m, b, n),
         some(cut & second, m, n, c),
     ]
-    return vertices, np.concatenate([p for p, _ in pieces]), np.concatenate([p for _, p in pieces])
+    halved = ends_of[marked]
+    new, parent = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    return _Halves(halved, vertices[halved].mean(axis=1), new, parent)
 
 
 def _find_new_faces(vertices: Floats, faces: Ints, parent: Ints, face: Ints, foot: Floats) -> Ints:

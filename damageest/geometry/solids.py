@@ -8,11 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from damageest.artefacts import Floats, Ints, Mesh, Solid
+from damageest.artefacts import Floats, Ints, Mesh, Part, Solid
+
+_last: WeakKeyDictionary[Mesh, tuple[Floats, Any]] = WeakKeyDictionary()
+"""The last part, with the origin of its Manifold and this; one alone, as large parts take much memory."""
 
 BALANCE = 1e-7
 """Share of a solid's volume within which the volumes cut off and left have to add up to it."""
@@ -20,7 +24,7 @@ BALANCE = 1e-7
 
 def to_manifold(mesh: Mesh, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
     """A ``manifold3d.Manifold`` of a watertight mesh, its coordinates relative to ``origin`` (3,); an empty one of a
-    mesh without triangles.
+    mesh without triangles. That of the last part is kept: each site asks for it.
 
     Raises ValueError where manifold3d rejects the mesh because it is not closed, or its windings are not consistent.
     """
@@ -28,10 +32,16 @@ def to_manifold(mesh: Mesh, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
 
     if not len(mesh.faces):
         return Manifold()
-    vertices = np.array(mesh.vertices - np.asarray(origin, dtype=np.float64), dtype=np.float64, order="C")
+    about = np.asarray(origin, dtype=np.float64)
+    if isinstance(mesh, Part) and (known := _last.get(mesh)) is not None and np.array_equal(known[0], about):
+        return known[1]
+    vertices = np.array(mesh.vertices - about, dtype=np.float64, order="C")
     body = Manifold(Mesh64(vertices, np.array(mesh.faces, dtype=np.uint64, order="C")))
     if body.status() != Error.NoError:
         raise ValueError(f"manifold3d rejects the mesh: {body.status().name}")
+    if isinstance(mesh, Part):
+        _last.clear()
+        _last[mesh] = about, body
     return body
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Solid, open_edges
-from damageest.geometry.duplicates import list_used
+from damageest.geometry.duplicates import find_duplicates, list_used
 from damageest.geometry.vectors import normalise
 
 ROUNDS = 8
@@ -98,8 +98,7 @@ def _remove_flat(faces: Ints) -> Ints:
     corners = np.sort(faces, axis=1)
     even = (np.argsort(faces, axis=1) @ [1, 3, 9])[:, None] == np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]]) @ [1, 3, 9]
     way = np.where(even.any(axis=1), 1, -1)
-    _, same = np.unique(corners, axis=0, return_inverse=True)
-    same = same.reshape(-1)
+    same = find_duplicates(corners)[1]
     total = np.bincount(same, way)[same].astype(np.int64)
     # of each set of equal triangles as many are kept as are left over
     order = np.lexsort([way, same])

@@ -14,4 +14,8 @@ def normalise(vectors: Floats, least: float = 1e-300) -> Floats:
 
 def measure_longest_edges(triangles: Floats) -> Floats:
     """(F,) the length of the longest edge of each of the triangles (F,3,3), in their unit."""
-    return np.asarray(np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1))
+    squares = []
+    for k in range(3):  # edge by edge: numpy's norm of all at once takes several times as long
+        x, y, z = (triangles[:, k] - triangles[:, k - 1]).T
+        squares.append(x * x + y * y + z * z)
+    return np.asarray(np.sqrt(np.maximum(np.maximum(squares[0], squares[1]), squares[2])))

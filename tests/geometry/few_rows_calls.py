@@ -238,6 +238,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "poisson.solve_poisson": call_poisson(poisson.solve_poisson),
     "poisson.solve_coarse_to_fine": call_poisson(poisson.solve_coarse_to_fine),
     "rays.RayCaster": call_rays,
+    "rays.prepare_rays": lambda r: expect(rays.prepare_rays(r.mesh).find_first(r.points, r.normals)[1], (r.count,)),
     "refinement.find_nearest": lambda r: expect(refinement.find_nearest(CUBE, r.points), (r.count,), (r.count, 3)),
     "refinement.refine_at": call_refine_at,
     "refinement.halve_edges": lambda r: expect(refinement.halve_edges(r.mesh, 5.0).faces, (None, 3)),

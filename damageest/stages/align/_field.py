@@ -10,12 +10,18 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.distance import SurfaceTree
+from damageest.geometry.neighbourhoods import find_neighbours
+from damageest.stages.align._points import OrientedPoints
 
 Floats32 = NDArray[np.float32]
 
 CELLS = 220_000
 """Number of cells of the grid; on a compact part each is about 1/100 of the diagonal."""
 
+
+NEAR = 0.06
+"""Distance from samples of the skin, in diagonals, within which the grid is exact: more than any band in which points
+are compared, and several distances between samples."""
 
 UNKNOWN = -10.0
 """Signed distance, in diagonals, of points below or above skin that only closes an earlier scan: as of a point deep
@@ -74,14 +80,20 @@ class PlaneGrid:
     distance: Floats32
 
     @classmethod
-    def build(cls, target: PartSurface, margin: float = 0.12) -> PlaneGrid:
+    def build(cls, target: PartSurface, samples: OrientedPoints, margin: float = 0.12) -> PlaneGrid:
+        """The grid of a part. Cells farther than `NEAR` from all ``samples`` of its skin get the plane of the nearest
+        sample: exact searches from far away cost most, and there only which side a point lies on counts."""
         low, high = target.mesh.bounds + np.array([[-margin], [margin]])
         cell = float(np.prod(high - low) / CELLS) ** (1 / 3)
         shape = np.ceil((high - low) / cell).astype(int)
         axes = [low[k] + (np.arange(shape[k]) + 0.5) * cell for k in range(3)]
         centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        distance, foot, face = target.closest(centres)
-        normal = target.normals[face]
+        away, index = find_neighbours(centres, 1, samples.points)
+        foot, normal = samples.points[index[:, 0]], samples.normals[index[:, 0]]
+        distance = np.copysign(away[:, 0], np.einsum("ij,ij->i", centres - foot, normal))
+        near = away[:, 0] < (NEAR if target.unseen is None else np.inf)  # samples lie on known skin alone
+        distance[near], foot[near], face = target.closest(centres[near])
+        normal[near] = target.normals[face]
         offset = -np.einsum("ij,ij->i", normal, foot)
         plane = np.column_stack([normal, offset]).astype(np.float32)
         size = (int(shape[0]), int(shape[1]), int(shape[2]))

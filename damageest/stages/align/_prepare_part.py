@@ -73,7 +73,7 @@ def _compute(asked: _Asked) -> Arrays:
     """The grid and the table of pairs as arrays, in types that take little space."""
     surface, rng = asked.surface, np.random.default_rng([asked.seed, 1])
     points = orient_surface(surface.known, SURFACE_POINTS, rng)
-    grid, pairs = PlaneGrid.build(surface), PairTable.build(points, rng)
+    grid, pairs = PlaneGrid.build(surface, points), PairTable.build(points, rng)
     return {
         "low": grid.low, "cell": np.array(grid.cell), "shape": np.array(grid.shape),
         "plane": grid.plane, "distance": grid.distance,
