@@ -14,10 +14,11 @@ from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.geometry.vectors import normalise
 from damageest_cadquery._check import VOLUME, is_plane, measure_area
-from damageest_cadquery._cut import find_rim
+from damageest_cadquery._cut import find_rim, take_faces
+from damageest_cadquery._own_skin import is_film, is_plain, take_own_skin
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, explore_faces
-from damageest_cadquery._split import triangulate
+from damageest_cadquery._split import Piece, triangulate
 from damageest_cadquery._stock import Base, build_parts
 
 BEYOND = 0.02
@@ -38,10 +39,11 @@ def bound_entered(bases: Sequence[Base], part: Part, deposit: Solid) -> float:
 
 
 def compare_stock(
-    bases: Sequence[Base], deposit: Deposit, lost: Solid, part: Part, tolerance: float
+    damage: Sequence[Piece], bases: Sequence[Base], deposit: Deposit, lost: Solid, part: Part, tolerance: float
 ) -> tuple[float, float, float]:
-    """Distance, largest distance and difference of volumes between stock, as high as the mesh's, and the mesh's. Its
-    parts are joined as triangles, which takes a second where OpenCASCADE takes a minute.
+    """Distance, largest distance and difference of volumes between stock, as high as the mesh's, on an exact
+    ``damage`` volume, and the mesh's. Its parts are joined as triangles, which takes a second where OpenCASCADE takes a
+    minute.
 
     Raises StockError where it differs too much.
     """
@@ -52,14 +54,22 @@ def compare_stock(
     solids = [to_manifold(triangulate(solid, tolerance / 16), origin) for solid in parts]
     stock = Manifold.batch_boolean(solids, OpType.Add) if solids else Manifold()
     whole = to_manifold(part, origin)
-    if (stock ^ whole).volume() > bound_entered(bases, part, deposit):
-        stock -= whole
+    entered = (stock ^ whole).volume() > bound_entered(bases, part, deposit)
+    stock = stock - whole if entered else stock
     volume = stock.volume()
     difference = (volume - deposit.stock_volume) / deposit.volume
     outside = np.flatnonzero(~find_inner_faces(lost, part))
     wider = _compare_outlines(bases, lost, outside, part) / deposit.volume
     curved = sum(measure_area(face) for solid in parts for face in explore_faces(solid) if not is_plane(face))
-    if abs(difference - wider) > VOLUME + part.tessellation_error * curved / deposit.volume:
+    room = VOLUME + part.tessellation_error * curved / deposit.volume
+    own = take_own_skin(damage, tolerance)
+    if abs(difference - wider) > room and not (
+        own is not None
+        and is_plain(deposit, lost, outside, part, tolerance, VOLUME * deposit.volume)
+        and _is_same(
+            stock, own.build_stock(deposit, whole if entered else None, tolerance), room, deposit, part, tolerance
+        )
+    ):
         raise StockError(
             f"its volume differs by {difference:+.2%} of the deposit, of which the outline of the damage "
             f"explains {wider:+.2%}",
@@ -71,29 +81,47 @@ def compare_stock(
     rim = cKDTree(lost.vertices[np.unique(find_rim(lost.faces[outside]))])
     assert part.faces_brep is not None
     stretch = _measure_stretch(bases, 1 + max([int(part.faces_brep.max()), *(base.number for base in bases)]))
-    far: list[Any] = []
-    off: list[Floats] = []
-    on: list[Ints] = []
-    strayed: set[int] = set()
-    for one, other in ((made, deposit), (deposit, made)):
-        points, foot, number = _sample_above(one, part, tolerance)
-        off.append(distance_to_mesh(points, other))
-        far.append(np.asarray(rim.query(foot)[0]) > OUTLINE * tolerance)
-        on.append(number)
-        bad = off[-1] > FARTHEST * tolerance * np.where(far[-1], 1.0, stretch[number])
-        strayed |= set(number[bad].tolist())
-    farthest = float(max(each.max(initial=0.0) for each in off))
-    beyond = max(
-        float((each[away] > tolerance / 4).mean()) if away.any() else 0.0 for each, away in zip(off, far, strict=True)
+    sides = (
+        (made, deposit, None if own is None else own.inner),
+        (deposit, made, take_faces(lost, np.setdiff1d(np.arange(len(lost.faces)), outside))),
     )
-    if beyond > BEYOND or strayed:
-        apart = [n[away & (each > tolerance / 4)] for n, away, each in zip(on, far, off, strict=True)]
+    samples = []
+    for one, other, inner in sides:
+        points, foot, number = _sample_above(one, part, tolerance)
+        off = distance_to_mesh(points, other)
+        far = np.asarray(rim.query(foot)[0]) > OUTLINE * tolerance
+        strayed = off > FARTHEST * tolerance * np.where(far, 1.0, stretch[number])
+        odd = strayed | (far & (off > tolerance / 4))
+        if inner is not None and odd.any():  # where the loss fades out, its outline is not known
+            film = is_film(foot[odd], inner, tolerance)
+            strayed[odd], far[odd] = strayed[odd] & ~film, far[odd] & ~film
+        samples.append((off, far, number, strayed))
+    farthest = float(max(off.max(initial=0.0) for off, *_ in samples))
+    beyond = max(float((off[far] > tolerance / 4).mean()) if far.any() else 0.0 for off, far, *_ in samples)
+    stray = {int(each) for _, _, number, strayed in samples for each in number[strayed]}
+    if beyond > BEYOND or stray:
+        apart = {int(each) for off, far, number, _ in samples for each in number[far & (off > tolerance / 4)]}
         raise StockError(
             f"it is up to {farthest:.3g} from the mesh's, {beyond:.1%} more than a quarter tolerance",
-            strayed | (set(np.concatenate(apart).tolist()) if beyond > BEYOND else set()),
+            stray | (apart if beyond > BEYOND else set()),
         )
-    inside = [each[away] for each, away in zip(off, far, strict=True)]
+    inside = [off[far] for off, far, *_ in samples]
     return float(max(np.quantile(each, 0.95) if len(each) else 0.0 for each in inside)), farthest, difference
+
+
+def _is_same(stock: Any, reference: Any, room: float, deposit: Solid, part: Part, tolerance: float) -> bool:
+    """Whether stock is the same as another on one skin, both about the middle of ``deposit``: by volume, and all of it
+    near."""
+    if stock.is_empty() or reference.is_empty():
+        return False
+    if abs(stock.volume() - reference.volume()) > room * deposit.volume:
+        return False
+    meshes = [_take_mesh(each, deposit.bounds.mean(axis=0)) for each in (stock, reference)]
+    for one, other in (meshes, meshes[::-1]):
+        off = distance_to_mesh(_sample_above(one, part, tolerance)[0], other)
+        if off.max(initial=0.0) > tolerance or (off > tolerance / 4).mean() > BEYOND:
+            return False
+    return True
 
 
 def _find_worst(stock: Any, deposit: Solid, part: Part, tolerance: float, origin: Floats) -> list[int]:

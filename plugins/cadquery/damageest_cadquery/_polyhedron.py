@@ -33,6 +33,8 @@ PROBES = 4000
 """Points at which a simplified surface is measured before it is tried."""
 PER_TRIANGLE = 12
 """Points for each triangle to which the simplified surface is fitted."""
+LEAST_FREE = 0.25
+"""Share of a surface for which the rest of it is shifted further."""
 _RANK = 0.05
 """Singular values of the normals below which planes are taken to be parallel."""
 _STIFF = 0.05
@@ -93,6 +95,17 @@ def fit(flat: Flat, cut: Cut, tolerance: float) -> Flat:
     free = np.asarray(~bounds.any(axis=1))
     mesh = _fit_vertices(mesh, free, thin_points(cut.mesh.vertices, PER_TRIANGLE * len(mesh.faces)), tolerance)
     return _settle(Flat(mesh, label, flat.planes), tolerance)
+
+
+def shift_free(flat: Flat, step: float) -> Flat:
+    """The surface with the vertices that bound no plane moved along their normals, by more than ``step`` where others
+    stay: on average it is moved by that."""
+    mesh = flat.mesh
+    free = np.asarray(~_find_bounds(mesh.faces, flat.label, len(flat.planes), len(mesh.vertices)).any(axis=1))
+    areas = np.linalg.norm(mesh.cross, axis=1)
+    share = float(areas @ free[mesh.faces].mean(axis=1)) / max(float(areas.sum()), 1e-300)
+    step /= max(share, LEAST_FREE)
+    return Flat(Mesh(mesh.vertices + step * free[:, None] * mesh.vertex_normals, mesh.faces), flat.label, flat.planes)
 
 
 def _settle(flat: Flat, tolerance: float) -> Flat:

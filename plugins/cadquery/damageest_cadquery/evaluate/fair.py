@@ -55,18 +55,14 @@ class Cad:
     def build_deposit(self, damage: Part, height: float) -> float:
         """The volume of an exact damage volume, as triangles with names, and stock of the stage on its own skin."""
         from damageest.geometry.solids import to_manifold
-        from damageest.stages.allowance._skin import SkinFaces
-        from damageest.stages.allowance._stock import build_stock
+        from damageest.stages.allowance.plain import build_plain_stock
 
         outer = np.array([" inner " not in name for name in damage.face_names])[damage.faces_brep]
-        faces, count = damage.faces[outer], int(outer.sum())
-        skin = SkinFaces(
-            damage.vertices - self.origin, faces, np.zeros(count, np.int64), damage.face_normals[outer],
-            # the stage builds stock a quarter of the tolerance higher
-            np.full(count, height - self.tolerance / 4), np.zeros(count, bool),
-        )  # fmt: skip
+        skin = Mesh(damage.vertices, damage.faces[outer])
+        # the stage's stock is a quarter of the tolerance higher
+        heights = np.full(len(skin.faces), height - self.tolerance / 4)
+        stock = build_plain_stock(skin, heights, self.origin, self.tolerance)
         hole = to_manifold(damage, self.origin)
-        stock = build_stock(skin, self.tolerance / 2)
         rest = (stock ^ (self.fine - hole)).decompose()
         metal = [each for each in rest if 2 * each.volume() > 2 * FINE * self.tolerance * each.surface_area()]
         return float((add([hole, stock]) - add(metal)).volume())
@@ -87,8 +83,14 @@ def read_triangles(path: Path, tolerance: float) -> Part:
 
 
 def measure_fairly(
-    site: dict[str, Any], solids: Sequence[Any], part: Part, mesh: Solid, truth: Mesh | None, place: Path,
-    tolerance: float, height: float,
+    site: dict[str, Any],
+    solids: Sequence[Any],
+    part: Part,
+    mesh: Solid,
+    truth: Mesh | None,
+    place: Path,
+    tolerance: float,
+    height: float,
 ) -> None:
     """Adds to the row of a ``site`` how its exact damage volume and deposit compare with these references; or why
     they do not."""  # fmt: skip
