@@ -24,6 +24,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest_cadquery._cut import Cut
 from damageest_cadquery._flat_faces import Flat, split_regions
 from damageest_cadquery._recognise import ALIKE, Shape, find_neighbours
+from damageest_cadquery._untangle import keep_apart
 
 SMALL = 20
 """Triangles of a region of a plane below which it is not kept as a face of its own."""
@@ -94,6 +95,7 @@ def fit(flat: Flat, cut: Cut, tolerance: float) -> Flat:
     bounds = _find_bounds(mesh.faces, label, len(flat.planes), len(mesh.vertices))
     free = np.asarray(~bounds.any(axis=1))
     mesh = _fit_vertices(mesh, free, thin_points(cut.mesh.vertices, PER_TRIANGLE * len(mesh.faces)), tolerance)
+    mesh = keep_apart(mesh, flat.mesh.vertices)
     return _settle(Flat(mesh, label, flat.planes), tolerance)
 
 
