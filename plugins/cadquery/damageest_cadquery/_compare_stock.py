@@ -14,8 +14,8 @@ from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.geometry.vectors import normalise
 from damageest_cadquery._check import VOLUME, is_plane, measure_area
-from damageest_cadquery._cut import find_rim, take_faces
-from damageest_cadquery._own_skin import is_film, is_plain, take_own_skin
+from damageest_cadquery._cut import find_rim
+from damageest_cadquery._own_skin import build_own_stock, is_plain
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, explore_faces
 from damageest_cadquery._split import Piece, triangulate
@@ -45,7 +45,7 @@ def compare_stock(
     ``damage`` volume, and the mesh's. Its parts are joined as triangles, which takes a second where OpenCASCADE takes a
     minute.
 
-    Raises StockError where it differs too much.
+    Raises StockError where it differs too much, also from what the stage builds on the exact damage volume's own skin.
     """
     from manifold3d import Manifold, OpType
 
@@ -56,57 +56,62 @@ def compare_stock(
     whole = to_manifold(part, origin)
     entered = (stock ^ whole).volume() > bound_entered(bases, part, deposit)
     stock = stock - whole if entered else stock
-    volume = stock.volume()
-    difference = (volume - deposit.stock_volume) / deposit.volume
+    difference = (stock.volume() - deposit.stock_volume) / deposit.volume
     outside = np.flatnonzero(~find_inner_faces(lost, part))
     wider = _compare_outlines(bases, lost, outside, part) / deposit.volume
     curved = sum(measure_area(face) for solid in parts for face in explore_faces(solid) if not is_plane(face))
     room = VOLUME + part.tessellation_error * curved / deposit.volume
-    own = take_own_skin(damage, tolerance)
-    if abs(difference - wider) > room and not (
-        own is not None
-        and is_plain(deposit, lost, outside, part, tolerance, VOLUME * deposit.volume)
-        and _is_same(
-            stock, own.build_stock(deposit, whole if entered else None, tolerance), room, deposit, part, tolerance
-        )
-    ):
-        raise StockError(
+    fault: StockError | None = None
+    distance = farthest = 0.0
+    if not stock.is_empty():
+        distance, farthest, fault = _compare_surfaces(bases, stock, deposit, lost, outside, part, tolerance)
+    if abs(difference - wider) > room:
+        fault = StockError(
             f"its volume differs by {difference:+.2%} of the deposit, of which the outline of the damage "
             f"explains {wider:+.2%}",
             _find_worst(stock, deposit, part, tolerance, origin),
         )
-    if stock.is_empty():
-        return 0.0, 0.0, difference
-    made = _take_mesh(stock, origin)
+    if fault is not None:
+        plain = is_plain(deposit, lost, outside, part, tolerance, VOLUME * deposit.volume)
+        own = build_own_stock(damage, deposit, whole if entered else None, tolerance) if plain else None
+        if own is None or not _is_same(stock, own, room, deposit, part, tolerance):
+            raise fault
+    return distance, farthest, difference
+
+
+def _compare_surfaces(
+    bases: Sequence[Base], stock: Any, deposit: Deposit, lost: Solid, outside: Ints, part: Part, tolerance: float
+) -> tuple[float, float, StockError | None]:
+    """Distance and largest distance between the surfaces of stock and of the mesh's stock, and why it is refused."""
+    made = _take_mesh(stock, deposit.bounds.mean(axis=0))
     rim = cKDTree(lost.vertices[np.unique(find_rim(lost.faces[outside]))])
     assert part.faces_brep is not None
     stretch = _measure_stretch(bases, 1 + max([int(part.faces_brep.max()), *(base.number for base in bases)]))
-    sides = (
-        (made, deposit, None if own is None else own.inner),
-        (deposit, made, take_faces(lost, np.setdiff1d(np.arange(len(lost.faces)), outside))),
-    )
-    samples = []
-    for one, other, inner in sides:
+    far: list[Any] = []
+    off: list[Floats] = []
+    on: list[Ints] = []
+    strayed: set[int] = set()
+    for one, other in ((made, deposit), (deposit, made)):
         points, foot, number = _sample_above(one, part, tolerance)
-        off = distance_to_mesh(points, other)
-        far = np.asarray(rim.query(foot)[0]) > OUTLINE * tolerance
-        strayed = off > FARTHEST * tolerance * np.where(far, 1.0, stretch[number])
-        odd = strayed | (far & (off > tolerance / 4))
-        if inner is not None and odd.any():  # where the loss fades out, its outline is not known
-            film = is_film(foot[odd], inner, tolerance)
-            strayed[odd], far[odd] = strayed[odd] & ~film, far[odd] & ~film
-        samples.append((off, far, number, strayed))
-    farthest = float(max(off.max(initial=0.0) for off, *_ in samples))
-    beyond = max(float((off[far] > tolerance / 4).mean()) if far.any() else 0.0 for off, far, *_ in samples)
-    stray = {int(each) for _, _, number, strayed in samples for each in number[strayed]}
-    if beyond > BEYOND or stray:
-        apart = {int(each) for off, far, number, _ in samples for each in number[far & (off > tolerance / 4)]}
-        raise StockError(
-            f"it is up to {farthest:.3g} from the mesh's, {beyond:.1%} more than a quarter tolerance",
-            stray | (apart if beyond > BEYOND else set()),
-        )
-    inside = [off[far] for off, far, *_ in samples]
-    return float(max(np.quantile(each, 0.95) if len(each) else 0.0 for each in inside)), farthest, difference
+        off.append(distance_to_mesh(points, other))
+        far.append(np.asarray(rim.query(foot)[0]) > OUTLINE * tolerance)
+        on.append(number)
+        bad = off[-1] > FARTHEST * tolerance * np.where(far[-1], 1.0, stretch[number])
+        strayed |= set(number[bad].tolist())
+    farthest = float(max(each.max(initial=0.0) for each in off))
+    beyond = max(
+        float((each[away] > tolerance / 4).mean()) if away.any() else 0.0 for each, away in zip(off, far, strict=True)
+    )
+    inside = [each[away] for each, away in zip(off, far, strict=True)]
+    distance = float(max(np.quantile(each, 0.95) if len(each) else 0.0 for each in inside))
+    if beyond <= BEYOND and not strayed:
+        return distance, farthest, None
+    apart = [n[away & (each > tolerance / 4)] for n, away, each in zip(on, far, off, strict=True)]
+    fault = StockError(
+        f"it is up to {farthest:.3g} from the mesh's, {beyond:.1%} more than a quarter tolerance",
+        strayed | (set(np.concatenate(apart).tolist()) if beyond > BEYOND else set()),
+    )
+    return distance, farthest, fault
 
 
 def _is_same(stock: Any, reference: Any, room: float, deposit: Solid, part: Part, tolerance: float) -> bool:
