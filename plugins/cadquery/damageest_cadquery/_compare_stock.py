@@ -27,6 +27,8 @@ OUTLINE, FARTHEST = 1.5, 4.0
 """Nearer than the first to the outline of the damage, in tolerances, only the second counts: sides stand on the outline
 of the exact damage volume, which the mesh rounds, or draws out where the loss fades. It counts on the skin: over a
 convex face the sides are farther apart by as much as the offset is longer than the face."""
+EXPLAINED = 0.05
+"""Largest share of the deposit that another outline of the damage may be."""
 ENTERED = 1e-4
 """Share of the deposit's volume that the stock may have in the metal that is left."""
 SAMPLES = 6000
@@ -72,7 +74,9 @@ def compare_stock(
             _find_worst(stock, deposit, part, tolerance, origin),
         )
     if fault is not None:
-        plain = is_plain(deposit, lost, outside, part, tolerance, VOLUME * deposit.volume)
+        plain = abs(difference) <= EXPLAINED and is_plain(
+            deposit, lost, outside, part, tolerance, VOLUME * deposit.volume
+        )
         own = build_own_stock(damage, deposit, whole if entered else None, tolerance) if plain else None
         if own is None or not _is_same(stock, own, room, deposit, part, tolerance):
             raise fault
