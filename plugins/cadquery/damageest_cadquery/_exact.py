@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -81,11 +82,19 @@ def start_solids(solids: Sequence[Any]) -> tuple[tuple[Piece, ...], tuple[Any, .
 
 
 def find_exact(
-    site: SiteInput, solids: Sequence[Piece], faces: Sequence[Any], part: Part, tolerance: float, off: float = 0.0
+    site: SiteInput,
+    solids: Sequence[Piece],
+    faces: Sequence[Any],
+    part: Part,
+    tolerance: float,
+    off: float = 0.0,
+    watch: Callable[[str], AbstractContextManager[str]] = lambda form: nullcontext(""),
+    seconds: float = np.inf,
 ) -> tuple[Exact | None, tuple[str, ...]]:
     """The exact damage volume of a site in ``solids``, which are in the job's unit, or None; and what was refused.
 
-    ``off``: how far corners of ``solids`` may lie off their faces.
+    ``off``: how far corners of ``solids`` may lie off their faces. ``watch``: what a form is tried in, by its name; it
+    gives why it must not be tried, or nothing. After ``seconds`` of the processor no further form is tried.
     """
     start, tried = time.process_time(), []
     cut = make_cut(site.damage, site.surface, part, site.enclosures, tolerance)
@@ -98,20 +107,27 @@ def find_exact(
         kind = form.split()[0]
         if kind == refused:
             continue  # another width of the same shapes
-        tool = call(make)
-        for fuzzy in fuzzies if tool is not None else ():
-            assert tool is not None
-            trial = work.split(tool, kind, fuzzy)
-            if shift is not None and trial.is_near:
-                trial = _move(work, balance, trial, shift, kind, fuzzy)
-            measured = trial.measured
-            if not measured.reason:
-                seconds = time.process_time() - start
-                return Exact(trial.pieces, trial.rest, kind, measured, seconds, tuple(tried)), tuple(tried)
-            tried.append(f"{form}: {measured.reason}")
-            if trial.is_final:
-                refused = "shapes" if trial.is_near else refused
-                break
+        if time.process_time() - start > seconds:
+            tried.append(f"it took longer than {seconds:g} s")
+            break
+        with watch(form) as barred:
+            if barred:
+                tried.append(f"{form}: {barred}")
+                continue
+            tool = call(make)
+            for fuzzy in fuzzies if tool is not None else ():
+                assert tool is not None
+                trial = work.split(tool, kind, fuzzy)
+                if shift is not None and trial.is_near:
+                    trial = _move(work, balance, trial, shift, kind, fuzzy)
+                measured = trial.measured
+                if not measured.reason:
+                    spent = time.process_time() - start
+                    return Exact(trial.pieces, trial.rest, kind, measured, spent, tuple(tried)), tuple(tried)
+                tried.append(f"{form}: {measured.reason}")
+                if trial.is_final:
+                    refused = "shapes" if trial.is_near else refused
+                    break
     return None, tuple(tried) or ("no surface could be built that cuts it out of the part",)
 
 
