@@ -35,23 +35,26 @@ class Balance:
     def find_step(self, pieces: Sequence[Piece]) -> float:
         """How far a cut that gave these pieces has to be moved, out of the damage volume; 0 where it is well as it is,
         or where it would be moved too far."""
-        volume, area = sum(measure_volume(piece.shape) for piece in pieces), measure_inner_area(pieces)
-        lacking = self.damage.volume - volume
-        if abs(lacking) <= OFF * self.damage.volume or area <= 0:
+        area, off = measure_inner_area(pieces), self.measure_off(pieces)
+        if area <= 0 or abs(off) <= OFF:
             return 0.0
-        curved = [
-            face
+        step = -off * self.damage.volume / area
+        return 0.0 if abs(step) > MOST * self.tolerance else step
+
+    def measure_off(self, pieces: Sequence[Piece]) -> float:
+        """By what share of the mesh's volume the pieces are larger, beside what the chords of the part's triangles
+        make; 0 where that is not known."""
+        off = sum(measure_volume(piece.shape) for piece in pieces) - self.damage.volume
+        curved = any(
+            number >= 0 and not is_plane(face)
             for piece in pieces
             for face, (number, _) in zip(explore_faces(piece.shape), piece.origins, strict=True)
-            if number >= 0 and not is_plane(face)
-        ]
-        if curved:
-            try:
-                lacking += self.measure_chords(pieces)
-            except (InputError, ValueError):  # triangles that do not close
-                return 0.0
-        step = lacking / area
-        return 0.0 if abs(lacking) <= OFF * self.damage.volume or abs(step) > MOST * self.tolerance else step
+        )
+        try:
+            off -= self.measure_chords(pieces) if curved else 0.0
+        except (InputError, ValueError):  # triangles that do not close
+            return 0.0
+        return float(off) / self.damage.volume
 
     def measure_chords(self, pieces: Sequence[Piece]) -> float:
         """How much larger the pieces are than the mesh because of the chords of the part's triangles alone."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -115,6 +117,37 @@ def test_a_cut_is_moved_to_the_volume_of_the_mesh(monkeypatch: pytest.MonkeyPatc
     found, tried = _exact.find_exact(site, solids, faces, part, TOLERANCE)
     assert found is not None, tried
     assert sum(measure_volume(piece.shape) for piece in found.pieces) == pytest.approx(lost.volume, rel=1e-6)
+
+
+def test_of_forms_that_pass_the_one_with_the_nearest_volume_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a curved part the check of the volume has room for chords; where these are small, it is too much."""
+    from damageest_cadquery import _exact
+    from damageest_cadquery._attempts import Attempt
+    from damageest_cadquery._split import Tool
+
+    shaft = cq.Workplane().cylinder(20, 10)
+    part = replace(mesh_part(shaft, 0.002), tessellation_error=0.1)
+    lost = cut_off(part, 7.0)
+
+    def build(x: float) -> Tool:
+        face = cq.Face.makePlane(40, 40, (x, 0, 0), (1, 0, 0)).wrapped
+        return Tool([face], face)
+
+    corners = np.array([[7, y, z] for y in (-7, 7) for z in (-10, 10)], float)
+    surface = Surface(corners, np.array([[0, 1, 3], [0, 3, 2]]))
+    site = _exact.SiteInput(1, lost, surface, (lost,), np.empty((0, 3)), True)
+    solids, faces = _exact.start_solids([shaft.val().wrapped])
+    monkeypatch.setattr(_exact, "make_cut", lambda *_: object())
+
+    def take(*places: float) -> float:
+        tools = [Attempt(f"facets {k}", partial(build, x), (1e-6,)) for k, x in enumerate(places)]
+        monkeypatch.setattr(_exact, "list_tools", lambda *_: iter(tools))
+        found, tried = _exact.find_exact(site, solids, faces, part, TOLERANCE)
+        assert found is not None, tried
+        return found.measured.volume / lost.volume - 1
+
+    assert abs(take(7.03, 7.001, 7.0)) == pytest.approx(abs(take(7.001)), rel=1e-6), "the first that is near"
+    assert abs(take(7.04, 7.03, 7.035)) == pytest.approx(abs(take(7.03)), rel=1e-6), "the nearest, where none is"
 
 
 def make_folded(height: float) -> Mesh:
