@@ -61,5 +61,6 @@ def _smooth(mesh: Mesh, near: Flags) -> Floats:
     graph = coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
     total = np.maximum(np.asarray(graph.sum(axis=1)).ravel(), 1)
     vertices = mesh.vertices.copy()
-    vertices[near] += 0.5 * ((graph @ vertices)[near] / total[near, None] - vertices[near])
+    around = np.asarray(graph @ vertices)
+    vertices[near] += 0.5 * (around[near] / total[near, None] - vertices[near])
     return vertices

@@ -57,9 +57,9 @@ def write_exact(
         if what in request.skipped:
             break
         names = [what] if what not in (WHOLE, ADAPTING) else [what, *(name_site(each.number) for each in request.sites)]
-        site = what.partition(" for ")[2]
-        if site and sum(name.endswith(f" for {site}") for name in request.skipped) + 1 >= MOST_FORMS:
-            names.append(site)
+        whose = what.partition(" for ")[2]
+        if whose and sum(name.endswith(f" for {whose}") for name in request.skipped) + 1 >= MOST_FORMS:
+            names.append(whose)
         reason = f"{reason} with {ADAPTING}" if what == ADAPTING else reason
         request = replace(request, skipped={**request.skipped, **dict.fromkeys(names, reason)})
         if what == ADAPTING:
