@@ -76,8 +76,13 @@ def _measure_off(vertices: Floats, moved: Floats, faces: Ints, move: Callable[[F
 def count_crossings(mesh: Mesh) -> int:
     """How many edges of a mesh cross one of its faces that they have no vertex in common with, within 1e-6 of its
     size: none where it does not intersect itself."""
+    return len(find_crossings(mesh)[1])
+
+
+def find_crossings(mesh: Mesh) -> tuple[Ints, Ints]:
+    """(N,2) the edges of a mesh and (N,) the faces that they cross, as `count_crossings` counts them."""
     if not len(mesh.faces):
-        return 0
+        return np.empty((0, 2), np.int64), np.empty(0, np.int64)
     ends = np.sort(np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges = np.unique(ends, axis=0)
     found = RayCaster(mesh).find_crossings(mesh.vertices[edges[:, 0]], mesh.vertices[edges[:, 1]])
@@ -87,4 +92,4 @@ def count_crossings(mesh: Mesh) -> int:
     normal = normalise(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     height = np.einsum("nej,nj->ne", mesh.vertices[own] - corners[:, None, 0], normal)
     crosses = (height.min(axis=1) < -TOUCHES * mesh.diagonal) & (height.max(axis=1) > TOUCHES * mesh.diagonal)
-    return int((is_apart & crosses).sum())
+    return own[is_apart & crosses], np.asarray(found.face)[is_apart & crosses]

@@ -157,6 +157,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "undoing.undo": lambda r: expect(undoing.undo(STILL, r.points), (r.count, 3)),
     "undoing.cut_to_follow": lambda r: expect(undoing.cut_to_follow(r.mesh, np.copy, 1.0)[0], (None, 3)),
     "undoing.count_crossings": lambda r: expect(np.asarray(undoing.count_crossings(r.mesh)), ()),
+    "undoing.find_crossings": lambda r: expect(undoing.find_crossings(r.mesh)[0], (None, 2)),
     "distance.SurfaceTree": call_tree,
     "distance.closest_on_mesh": call_both(lambda points, mesh: distance.closest_on_mesh(points, mesh).distance),
     "distance.distance_to_mesh": call_both(distance.distance_to_mesh),

@@ -15,9 +15,10 @@ from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.geometry.vectors import normalise
 from damageest_cadquery._check import VOLUME, is_plane, measure_area
 from damageest_cadquery._cut import find_rim
+from damageest_cadquery._own_skin import build_own_stock, is_plain
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, explore_faces
-from damageest_cadquery._split import triangulate
+from damageest_cadquery._split import Piece, triangulate
 from damageest_cadquery._stock import Base, build_parts
 
 BEYOND = 0.02
@@ -26,6 +27,8 @@ OUTLINE, FARTHEST = 1.5, 4.0
 """Nearer than the first to the outline of the damage, in tolerances, only the second counts: sides stand on the outline
 of the exact damage volume, which the mesh rounds, or draws out where the loss fades. It counts on the skin: over a
 convex face the sides are farther apart by as much as the offset is longer than the face."""
+EXPLAINED = 0.05
+"""Largest share of the deposit that another outline of the damage may be."""
 ENTERED = 1e-4
 """Share of the deposit's volume that the stock may have in the metal that is left."""
 SAMPLES = 6000
@@ -38,12 +41,13 @@ def bound_entered(bases: Sequence[Base], part: Part, deposit: Solid) -> float:
 
 
 def compare_stock(
-    bases: Sequence[Base], deposit: Deposit, lost: Solid, part: Part, tolerance: float
+    damage: Sequence[Piece], bases: Sequence[Base], deposit: Deposit, lost: Solid, part: Part, tolerance: float
 ) -> tuple[float, float, float]:
-    """Distance, largest distance and difference of volumes between stock, as high as the mesh's, and the mesh's. Its
-    parts are joined as triangles, which takes a second where OpenCASCADE takes a minute.
+    """Distance, largest distance and difference of volumes between stock, as high as the mesh's, on an exact
+    ``damage`` volume, and the mesh's. Its parts are joined as triangles, which takes a second where OpenCASCADE takes a
+    minute.
 
-    Raises StockError where it differs too much.
+    Raises StockError where it differs too much, also from what the stage builds on the exact damage volume's own skin.
     """
     from manifold3d import Manifold, OpType
 
@@ -52,22 +56,38 @@ def compare_stock(
     solids = [to_manifold(triangulate(solid, tolerance / 16), origin) for solid in parts]
     stock = Manifold.batch_boolean(solids, OpType.Add) if solids else Manifold()
     whole = to_manifold(part, origin)
-    if (stock ^ whole).volume() > bound_entered(bases, part, deposit):
-        stock -= whole
-    volume = stock.volume()
-    difference = (volume - deposit.stock_volume) / deposit.volume
+    entered = (stock ^ whole).volume() > bound_entered(bases, part, deposit)
+    stock = stock - whole if entered else stock
+    difference = (stock.volume() - deposit.stock_volume) / deposit.volume
     outside = np.flatnonzero(~find_inner_faces(lost, part))
     wider = _compare_outlines(bases, lost, outside, part) / deposit.volume
     curved = sum(measure_area(face) for solid in parts for face in explore_faces(solid) if not is_plane(face))
-    if abs(difference - wider) > VOLUME + part.tessellation_error * curved / deposit.volume:
-        raise StockError(
+    room = VOLUME + part.tessellation_error * curved / deposit.volume
+    fault: StockError | None = None
+    distance = farthest = 0.0
+    if not stock.is_empty():
+        distance, farthest, fault = _compare_surfaces(bases, stock, deposit, lost, outside, part, tolerance)
+    if abs(difference - wider) > room:
+        fault = StockError(
             f"its volume differs by {difference:+.2%} of the deposit, of which the outline of the damage "
             f"explains {wider:+.2%}",
             _find_worst(stock, deposit, part, tolerance, origin),
         )
-    if stock.is_empty():
-        return 0.0, 0.0, difference
-    made = _take_mesh(stock, origin)
+    if fault is not None:
+        plain = abs(difference) <= EXPLAINED and is_plain(
+            deposit, lost, outside, part, tolerance, VOLUME * deposit.volume
+        )
+        own = build_own_stock(damage, deposit, whole if entered else None, tolerance) if plain else None
+        if own is None or not _is_same(stock, own, room, deposit, part, tolerance):
+            raise fault
+    return distance, farthest, difference
+
+
+def _compare_surfaces(
+    bases: Sequence[Base], stock: Any, deposit: Deposit, lost: Solid, outside: Ints, part: Part, tolerance: float
+) -> tuple[float, float, StockError | None]:
+    """Distance and largest distance between the surfaces of stock and of the mesh's stock, and why it is refused."""
+    made = _take_mesh(stock, deposit.bounds.mean(axis=0))
     rim = cKDTree(lost.vertices[np.unique(find_rim(lost.faces[outside]))])
     assert part.faces_brep is not None
     stretch = _measure_stretch(bases, 1 + max([int(part.faces_brep.max()), *(base.number for base in bases)]))
@@ -86,14 +106,31 @@ def compare_stock(
     beyond = max(
         float((each[away] > tolerance / 4).mean()) if away.any() else 0.0 for each, away in zip(off, far, strict=True)
     )
-    if beyond > BEYOND or strayed:
-        apart = [n[away & (each > tolerance / 4)] for n, away, each in zip(on, far, off, strict=True)]
-        raise StockError(
-            f"it is up to {farthest:.3g} from the mesh's, {beyond:.1%} more than a quarter tolerance",
-            strayed | (set(np.concatenate(apart).tolist()) if beyond > BEYOND else set()),
-        )
     inside = [each[away] for each, away in zip(off, far, strict=True)]
-    return float(max(np.quantile(each, 0.95) if len(each) else 0.0 for each in inside)), farthest, difference
+    distance = float(max(np.quantile(each, 0.95) if len(each) else 0.0 for each in inside))
+    if beyond <= BEYOND and not strayed:
+        return distance, farthest, None
+    apart = [n[away & (each > tolerance / 4)] for n, away, each in zip(on, far, off, strict=True)]
+    fault = StockError(
+        f"it is up to {farthest:.3g} from the mesh's, {beyond:.1%} more than a quarter tolerance",
+        strayed | (set(np.concatenate(apart).tolist()) if beyond > BEYOND else set()),
+    )
+    return distance, farthest, fault
+
+
+def _is_same(stock: Any, reference: Any, room: float, deposit: Solid, part: Part, tolerance: float) -> bool:
+    """Whether stock is the same as another on one skin, both about the middle of ``deposit``: by volume, and all of it
+    near."""
+    if stock.is_empty() or reference.is_empty():
+        return False
+    if abs(stock.volume() - reference.volume()) > room * deposit.volume:
+        return False
+    meshes = [_take_mesh(each, deposit.bounds.mean(axis=0)) for each in (stock, reference)]
+    for one, other in (meshes, meshes[::-1]):
+        off = distance_to_mesh(_sample_above(one, part, tolerance)[0], other)
+        if off.max(initial=0.0) > tolerance or (off > tolerance / 4).mean() > BEYOND:
+            return False
+    return True
 
 
 def _find_worst(stock: Any, deposit: Solid, part: Part, tolerance: float, origin: Floats) -> list[int]:

@@ -18,6 +18,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, signe
 from damageest.geometry.loops import trace_loops
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import concatenate_meshes
+from damageest_cadquery._untangle import untangle
 
 RINGS = 3
 """Rings of triangles by which it reaches beyond the skin."""
@@ -75,7 +76,9 @@ def make_cut(damage: Solid, surface: Surface, part: Part, enclosures: Sequence[S
     rows, renumbered = np.unique(faces[chosen], return_inverse=True)
     mesh = Mesh(vertices[rows], renumbered.reshape(-1, 3))
     cut = Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen])
-    return _smooth_outside(_drop_specks(_drop_horns(cut, surface, tolerance), tolerance), part, tolerance)
+    cut = _smooth_outside(_drop_specks(_drop_horns(cut, surface, tolerance), tolerance), part, tolerance)
+    apart = untangle(cut.mesh, 2 * tolerance)
+    return cut if apart is cut.mesh else Cut(apart, signed_distance(apart.vertices, part)[0], cut.core)
 
 
 def _smooth_outside(cut: Cut, part: Part, tolerance: float) -> Cut:

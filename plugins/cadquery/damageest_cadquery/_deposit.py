@@ -84,7 +84,7 @@ def find_deposit(
         try:
             bases = [base for piece in damage for base in take_bases(piece, dict(deposit.heights))]
             higher = [replace(base, height=base.height + tolerance / 4) for base in bases]
-            figures = compare_stock(higher, deposit, lost, part, tolerance)
+            figures = compare_stock(damage, higher, deposit, lost, part, tolerance)
             stock = _build(bases, damage, rest, part, tolerance, deposit)
             pieces = _join(damage, stock, bases, faces, part, tolerance) if stock else tuple(damage)
             whole = sum(triangulate(piece.shape, tolerance / 16).volume for piece in pieces)

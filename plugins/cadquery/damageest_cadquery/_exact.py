@@ -7,53 +7,41 @@ few facets, more. Where planes explain most of it, they come before splines.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh, Part, Solid, Surface
+from damageest.artefacts import Floats, Part, Solid, Surface
 from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
-from damageest_cadquery._check import LIMITS, Measured, check_pieces, measure_inner_area
-from damageest_cadquery._cut import Cut, find_inner, make_cut, take_faces
-from damageest_cadquery._flat_faces import Flat, find_flat_faces
-from damageest_cadquery._polyhedron import Probes, decimate, fit, mark_planes
+from damageest_cadquery._attempts import call, list_tools
+from damageest_cadquery._balance import Balance
+from damageest_cadquery._check import Measured, check_pieces, measure_inner_area
+from damageest_cadquery._cut import make_cut
 from damageest_cadquery._read import explore
-from damageest_cadquery._shapes import build_shapes, find_shapes
-from damageest_cadquery._spline import SPANS, Way, build_splines, drop_tails, find_charts
 from damageest_cadquery._split import (
     Piece,
     Tool,
-    build_flat,
     is_near,
     is_opencascade_error,
     is_sound,
-    is_valid,
     measure_volume,
     split,
     triangulate,
 )
 
-PLANES = (300, 500, 800, 1200, 2000)
-FACETS = (150, 200, 270, 360, 480, 640, 850, 1150, 1550, 2100, 2900, 4000)
-"""Numbers of triangles that are tried; most are given up before a split, by a look at the distances."""
-NARROW = 0.8
-"""Share of the limit of a form within which a simplified surface must be before it is tried."""
 MOST_FACES = 5000
-SOME, MOSTLY = 0.25, 0.6
-"""Share of the surface on planes from which these are faces of their own, and from which they come before splines."""
-MOST_SPLINES = 2
-"""Splines near enough that are tried, the coarsest first: each attempt takes a second or more."""
+VOLUME = "its volume"
+"""How the reason begins where the volume is refused."""
+WANTED = 0.003
+"""Relative difference of the volumes, beside chords, from which later forms are tried too, and the nearest is taken."""
 SPECK = 1e-3
 """Share of the damage volume below which a body of it, or a piece that a split leaves over, is dropped."""
-
-
-Attempt = tuple[str, Callable[[], Tool | None], tuple[float, ...]]
-"""Name of a form, what builds its tool, and the fuzzy values to try it with, in millimetres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,48 +84,122 @@ def start_solids(solids: Sequence[Any]) -> tuple[tuple[Piece, ...], tuple[Any, .
 
 
 def find_exact(
-    site: SiteInput, solids: Sequence[Piece], faces: Sequence[Any], part: Part, tolerance: float, off: float = 0.0
+    site: SiteInput,
+    solids: Sequence[Piece],
+    faces: Sequence[Any],
+    part: Part,
+    tolerance: float,
+    off: float = 0.0,
+    watch: Callable[[str], AbstractContextManager[str]] = lambda form: nullcontext(""),
+    seconds: float = np.inf,
 ) -> tuple[Exact | None, tuple[str, ...]]:
     """The exact damage volume of a site in ``solids``, which are in the job's unit, or None; and what was refused.
 
-    ``off``: how far corners of ``solids`` may lie off their faces.
+    ``off``: how far corners of ``solids`` may lie off their faces. ``watch``: what a form is tried in, by its name; it
+    gives why it must not be tried, or nothing. After ``seconds`` of the processor no further form is tried.
     """
     start, tried = time.process_time(), []
     cut = make_cut(site.damage, site.surface, part, site.enclosures, tolerance)
     if cut is None:
         return None, ("no surface is known that cuts it out of the part",)
-    inner_before = measure_inner_area(solids)
-    bodies = _count_bodies(site.damage, solids, tolerance)
-    refused = ""
-    for form, make, fuzzies in _list_tools(cut, part, tolerance):
-        if form.split()[0] == refused:
+    bodies, refused = _count_bodies(site.damage, solids, tolerance), ""
+    second: Exact | None = None
+    least = np.inf
+    work = _Work(site, solids, faces, part, tolerance, off, bodies, measure_inner_area(solids))
+    balance = Balance(solids, part, site.damage, tolerance)
+    for form, make, fuzzies, shift in list_tools(cut, part, tolerance):
+        kind = form.split()[0]
+        if kind == refused:
             continue  # another width of the same shapes
-        tool = _call(make)
-        for fuzzy in fuzzies if tool is not None else ():
-            assert tool is not None
-            found = _split_all(solids, tool, fuzzy, site.damage, tolerance)
-            if found is None:
-                tried.append(f"{form}: it does not separate the solid")
+        if time.process_time() - start > seconds:
+            tried.append(f"it took longer than {seconds:g} s")
+            break
+        with watch(form) as barred:
+            if barred:
+                tried.append(f"{form}: {barred}")
                 continue
-            pieces, rest = found
-            if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
-                tried.append(f"{form}: more than {MOST_FACES} faces")
-                break
-            cut_off = measure_inner_area(rest) - inner_before
-            measured = check_pieces(
-                form.split()[0], pieces, cut_off, bodies, site.damage, site.surface, part, site.points, tolerance,
-                faces, off,
-            )  # fmt: skip
-            if not measured.reason and not is_sound([piece for piece in rest if piece not in solids]):
-                measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)
-            if not measured.reason:
-                seconds = time.process_time() - start
-                return Exact(pieces, rest, form.split()[0], measured, seconds, tuple(tried)), tuple(tried)
-            tried.append(f"{form}: {measured.reason}")
-            if np.isfinite(measured.farthest) or measured.reason.startswith("its volume"):
-                refused = "shapes"
-                break  # it is sound but not near enough, and another fuzzy value does not change that
+            tool = call(make)
+            for fuzzy in fuzzies if tool is not None else ():
+                assert tool is not None
+                trial = work.split(tool, kind, fuzzy)
+                if shift is not None and trial.is_near:
+                    trial = _move(work, balance, trial, shift, kind, fuzzy)
+                measured = trial.measured
+                if not measured.reason:
+                    spent, off_by = time.process_time() - start, balance.measure_off(trial.pieces)
+                    found = Exact(trial.pieces, trial.rest, kind, measured, spent, tuple(tried))
+                    if abs(off_by) <= WANTED:
+                        return found, tuple(tried)
+                    # room for chords was larger than these: a later form may be nearer
+                    tried.append(f"{form}: {VOLUME} differs by {off_by:+.2%} beside chords")
+                    second = found if abs(off_by) < least else second
+                    least = min(least, abs(off_by))
+                    break
+                tried.append(f"{form}: {measured.reason}")
+                if trial.is_final:
+                    refused = "shapes" if trial.is_near else refused
+                    break
+    if second is not None:
+        return replace(second, seconds=time.process_time() - start, tried=tuple(tried)), tuple(tried)
     return None, tuple(tried) or ("no surface could be built that cuts it out of the part",)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """What a tool gave. ``is_near``: it is sound, and refused by its volume or its distances, if at all."""
+
+    measured: Measured
+    pieces: tuple[Piece, ...] = ()
+    rest: tuple[Piece, ...] = ()
+    is_final: bool = False
+
+    @property
+    def is_near(self) -> bool:
+        reason = self.measured.reason
+        return bool(self.pieces) and (not reason or np.isfinite(self.measured.farthest) or reason.startswith(VOLUME))
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """A site, the solids that it is cut out of, and what the checks need to know of them."""
+
+    site: SiteInput
+    solids: Sequence[Piece]
+    faces: Sequence[Any]
+    part: Part
+    tolerance: float
+    off: float
+    bodies: int
+    inner_before: float
+
+    def split(self, tool: Tool, kind: str, fuzzy: float) -> _Trial:
+        """What a tool gives, checked."""
+        site = self.site
+        found = _split_all(self.solids, tool, fuzzy, site.damage, self.tolerance)
+        if found is None:
+            return _Trial(Measured(0.0, "it does not separate the solid"))
+        pieces, rest = found
+        if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
+            return _Trial(Measured(0.0, f"more than {MOST_FACES} faces"), is_final=True)
+        measured = check_pieces(
+            kind, pieces, measure_inner_area(rest) - self.inner_before, self.bodies, site.damage, site.surface,
+            self.part, site.points, self.tolerance, self.faces, self.off,
+        )  # fmt: skip
+        if not measured.reason and not is_sound([piece for piece in rest if piece not in self.solids]):
+            measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)
+        # where it is sound but not near enough, another fuzzy value does not change that
+        final = np.isfinite(measured.farthest) or measured.reason.startswith(VOLUME)
+        return _Trial(measured, pieces, rest, bool(final))
+
+
+def _move(
+    work: _Work, balance: Balance, trial: _Trial, shift: Callable[[float], Tool | None], kind: str, fuzzy: float
+) -> _Trial:
+    """The trial with the tool moved so that the volume is the mesh's, where that is off and the moved one passes."""
+    step = balance.find_step(trial.pieces)
+    tool = call(partial(shift, step)) if step else None
+    moved = None if tool is None else work.split(tool, kind, fuzzy)
+    return trial if moved is None or moved.measured.reason else moved
 
 
 def _count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> int:
@@ -156,78 +218,6 @@ def _count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> i
             return alone
         count += sum(body.volume() > least for body in common.decompose())
     return count
-
-
-def _list_tools(cut: Cut, part: Part, tolerance: float) -> Iterator[Attempt]:
-    """Names of forms, what builds their tools, and the fuzzy values to try them with, in millimetres."""
-    rows = find_inner(cut)
-    inner = take_faces(cut.mesh, rows)
-    found = find_shapes(inner, tolerance)
-    if found.whole:
-        for beyond in (2.0, 1.0, 4.0):
-            make = partial(build_shapes, inner, found.shapes, found.nearest, tolerance, beyond * tolerance)
-            yield f"shapes {beyond:g}", make, (1e-6,)
-    flat = [k for k, shape in enumerate(found.shapes) if shape.kind == "plane"]
-    area = np.linalg.norm(inner.cross, axis=1)
-    share = area[np.isin(found.label, flat)].sum() / area.sum()
-    if share < MOSTLY:
-        yield from _list_splines(inner, part, tolerance)
-    depth = cut.height[np.unique(cut.mesh.faces[rows])]
-    deep = depth < -tolerance / 4
-    probes = Probes(inner.vertices[deep], np.linalg.norm(inner.vertex_cross, axis=1)[deep])
-    if share > SOME:
-        planes = mark_planes(cut, rows, found.label, found.shapes, tolerance)
-        yield from _list_flat(planes, cut, probes, tolerance, PLANES)
-    if share >= MOSTLY:
-        yield from _list_splines(inner, part, tolerance)
-    yield from _list_flat(mark_planes(cut, rows, found.label, (), tolerance), cut, probes, tolerance, FACETS)
-
-
-def _list_flat(flat: Flat, cut: Cut, probes: Probes, tolerance: float, counts: Sequence[int]) -> Iterator[Attempt]:
-    levels = []
-    for count in sorted(counts, reverse=True):  # each from the one before: the first step takes longest
-        flat = decimate(flat, count)
-        levels.append((count, flat))
-    for count, level in reversed(levels):
-        if len(level.mesh.faces) > 2 * count:
-            continue
-        less = fit(level, cut, tolerance)
-        form = "planes" if (less.label >= 0).any() else "facets"
-        if probes.measure_beyond(less, tolerance / 4) > NARROW * LIMITS[form][0]:
-            continue
-        tool = build_flat(less.mesh.vertices, find_flat_faces(less))
-        if form == "facets" or is_valid(tool):
-            yield f"{form} {count}", partial(_give, tool), (1e-6, 1e-4)
-
-
-def _list_splines(inner: Mesh, part: Part, tolerance: float) -> Iterator[Attempt]:
-    wide, near = drop_tails(inner, 1.2 * tolerance), 0
-    ways: tuple[Way, ...] = ("seen", "disk")
-    for how in ways:
-        charts = find_charts(wide, how, part, tolerance)
-        if charts is None:
-            continue
-        for spans in SPANS:
-            tool = _call(partial(build_splines, charts, part, spans, tolerance))
-            if tool is not None:
-                yield f"spline {spans}", partial(_give, tool), (1e-6,)
-                near += 1
-                if near == MOST_SPLINES:
-                    return
-
-
-def _give(tool: Tool) -> Tool:
-    return tool
-
-
-def _call(make: Callable[[], Tool | None]) -> Tool | None:
-    """A tool, or None where OpenCASCADE cannot build it."""
-    try:
-        return make()
-    except Exception as error:
-        if not is_opencascade_error(error):
-            raise
-        return None
 
 
 def _split_all(

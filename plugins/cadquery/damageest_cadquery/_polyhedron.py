@@ -24,6 +24,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest_cadquery._cut import Cut
 from damageest_cadquery._flat_faces import Flat, split_regions
 from damageest_cadquery._recognise import ALIKE, Shape, find_neighbours
+from damageest_cadquery._untangle import keep_apart
 
 SMALL = 20
 """Triangles of a region of a plane below which it is not kept as a face of its own."""
@@ -33,6 +34,8 @@ PROBES = 4000
 """Points at which a simplified surface is measured before it is tried."""
 PER_TRIANGLE = 12
 """Points for each triangle to which the simplified surface is fitted."""
+LEAST_FREE = 0.25
+"""Share of a surface for which the rest of it is shifted further."""
 _RANK = 0.05
 """Singular values of the normals below which planes are taken to be parallel."""
 _STIFF = 0.05
@@ -92,7 +95,19 @@ def fit(flat: Flat, cut: Cut, tolerance: float) -> Flat:
     bounds = _find_bounds(mesh.faces, label, len(flat.planes), len(mesh.vertices))
     free = np.asarray(~bounds.any(axis=1))
     mesh = _fit_vertices(mesh, free, thin_points(cut.mesh.vertices, PER_TRIANGLE * len(mesh.faces)), tolerance)
+    mesh = keep_apart(mesh, flat.mesh.vertices)
     return _settle(Flat(mesh, label, flat.planes), tolerance)
+
+
+def shift_free(flat: Flat, step: float) -> Flat:
+    """The surface with the vertices that bound no plane moved along their normals, by more than ``step`` where others
+    stay: on average it is moved by that."""
+    mesh = flat.mesh
+    free = np.asarray(~_find_bounds(mesh.faces, flat.label, len(flat.planes), len(mesh.vertices)).any(axis=1))
+    areas = np.linalg.norm(mesh.cross, axis=1)
+    share = float(areas @ free[mesh.faces].mean(axis=1)) / max(float(areas.sum()), 1e-300)
+    step /= max(share, LEAST_FREE)
+    return Flat(Mesh(mesh.vertices + step * free[:, None] * mesh.vertex_normals, mesh.faces), flat.label, flat.planes)
 
 
 def _settle(flat: Flat, tolerance: float) -> Flat:

@@ -20,7 +20,8 @@ class Request:
     the files with the transform (4,4) to their frame; ``unit``: of the files; ``bodies``: what has no exact form, by
     the stem of its file, for the assembly, which ``assembly`` asks for; ``field``: what moves the part as designed, as
     its CAD file has it, to ``part``, None for nothing; ``seconds``: processor time that each piece of work has;
-    ``skipped``: those that stopped this process before, by `name_site`, `name_deposit` and `name_file`, and why.
+    ``skipped``: those that stopped this process before, by `name_site`, `name_form`, `name_deposit` and `name_file`,
+    and why.
     """
 
     part: Part
@@ -55,6 +56,17 @@ ADAPTING = "the CAD faces of the adapted part"
 
 def name_site(number: int) -> str:
     return f"site {number}"
+
+
+def name_form(number: int, form: str) -> str:
+    """``form``: of a damage volume, as it is tried: of recognised shapes and splines the kind alone."""
+    kind = form.split()[0]
+    return f"{kind if kind in ('shapes', 'spline') else form} for site {number}"
+
+
+def limit_form(seconds: float) -> float:
+    """How long a form of a damage volume may take of the ``seconds`` of a site: others are to be tried after it."""
+    return seconds / 3
 
 
 def name_deposit(number: int) -> str:

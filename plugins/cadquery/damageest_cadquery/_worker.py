@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,9 @@ from damageest_cadquery._request import (
     Made,
     Request,
     describe_missing,
+    limit_form,
     name_deposit,
+    name_form,
     name_site,
 )
 from damageest_cadquery._solids import StockError, list_faces
@@ -67,7 +71,9 @@ def _make(request: Request) -> Made:
             continue
         with at_work(name_site(site.number), request.seconds):
             around = rest if site.accepted else solids
-            exact, reasons[site.number] = find_exact(site, around, faces, part, request.tolerance, cad.off)
+            exact, reasons[site.number] = find_exact(
+                site, around, faces, part, request.tolerance, cad.off, partial(_watch, request, site), request.seconds
+            )
         if exact is None:
             *before, last = reasons[site.number]
             reasons[site.number] = (*before, f"{last}; it lies on {_tell_faces(site, part, facts.names)}")
@@ -92,6 +98,14 @@ def _make(request: Request) -> Made:
     said |= {number: _describe(found[number]) for number in writing.exact}
     said = {number: replace(form, deposit=forms[number]) for number, form in said.items()}
     return Made(tuple(writing.files), tuple(writing.notes), said)
+
+
+@contextmanager
+def _watch(request: Request, site: SiteInput, form: str) -> Iterator[str]:
+    """While a form of a site's damage volume is tried: a crash, or too much time, costs this form alone."""
+    name = name_form(site.number, form)
+    with at_work(name, limit_form(request.seconds)):
+        yield request.skipped.get(name, "")
 
 
 def _list_stock(site: SiteInput) -> list[int]:

@@ -19,7 +19,7 @@ from damageest.result import Result
 from damageest.stages.export import Body, ExactForm, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._read import read
-from damageest_cadquery._request import ADAPTING, WHOLE, Made, Request, describe_missing, name_site
+from damageest_cadquery._request import ADAPTING, WHOLE, Made, Request, describe_missing, limit_form, name_site
 from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
 from damageest_cadquery._step import OWNER
 from damageest_cadquery._worker import make_exact, write_part
@@ -29,8 +29,10 @@ NO_FIELD = "the part was adapted to the scan by a stage that gives no field, so 
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
 WORKER = "damageest_cadquery exact"
-MOST_STARTS = 8
-"""How often the process is started; each time without the site that stopped it before."""
+MOST_STARTS = 12
+"""How often the process is started; each time without the form or the site that stopped it before."""
+MOST_FORMS = 3
+"""Forms of a site that may stop it; then the site has none."""
 
 
 def write_exact(
@@ -55,6 +57,9 @@ def write_exact(
         if what in request.skipped:
             break
         names = [what] if what not in (WHOLE, ADAPTING) else [what, *(name_site(each.number) for each in request.sites)]
+        whose = what.partition(" for ")[2]
+        if whose and sum(name.endswith(f" for {whose}") for name in request.skipped) + 1 >= MOST_FORMS:
+            names.append(whose)
         reason = f"{reason} with {ADAPTING}" if what == ADAPTING else reason
         request = replace(request, skipped={**request.skipped, **dict.fromkeys(names, reason)})
         if what == ADAPTING:
@@ -154,9 +159,10 @@ def _run(request: Request, work: Callable[..., Given], **more: str) -> Given | t
                 processor_time=True,
             )  # fmt: skip
         except ProcessError as error:
-            late = f"OpenCASCADE took longer than {request.seconds:g} s"
-            reason = late if error.why == "time" else f"OpenCASCADE stopped ({error.message})"
-            return find_place(error) or WHOLE, reason
+            what = find_place(error) or WHOLE
+            allowed = limit_form(request.seconds) if " for site " in what else request.seconds
+            late = f"OpenCASCADE took longer than {allowed:g} s"
+            return what, late if error.why == "time" else f"OpenCASCADE stopped ({error.message})"
         except Exception as error:  # OpenCASCADE's exceptions share no base of their own
             return find_place(error) or WHOLE, f"OpenCASCADE stopped ({type(error).__name__}: {shorten_error(error)})"
 

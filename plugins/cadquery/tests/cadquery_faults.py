@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-from damageest_cadquery import _worker
+from damageest_cadquery import _exact, _worker
 from damageest_cadquery._request import Made, Request
 
 Find = Callable[..., Any]
@@ -43,6 +43,38 @@ def compute_on_at_first(request: Request) -> Made:
         return find(site, *rest)
 
     return make_with(find_or_compute, request)
+
+
+def abort_with_shapes(request: Request) -> Made:
+    """Aborts where solids are split by recognised shapes."""
+    return _split_with(os.abort, ("shapes",), request)
+
+
+def abort_with_any(request: Request) -> Made:
+    """Aborts at site 1 where solids are split by whatever is tried."""
+    return _split_with(os.abort, ("shapes", "spline", "planes", "facets"), request, 1)
+
+
+def compute_on_with_shapes(request: Request) -> Made:
+    """Computes without end where solids are split by recognised shapes."""
+
+    def compute() -> None:
+        while request:
+            pass
+
+    return _split_with(compute, ("shapes",), request)
+
+
+def _split_with(fault: Callable[[], None], kinds: tuple[str, ...], request: Request, site: int | None = None) -> Made:
+    split = _exact._Work.split
+
+    def split_or_fail(work: Any, tool: Any, kind: str, fuzzy: float) -> Any:
+        if kind in kinds and site in (None, work.site.number):
+            fault()
+        return split(work, tool, kind, fuzzy)
+
+    vars(_exact)["_Work"].split = split_or_fail
+    return _worker.make_exact(request)
 
 
 def compute_on_while_adapting(request: Request) -> Made:

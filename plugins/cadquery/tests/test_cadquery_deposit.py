@@ -231,3 +231,32 @@ def test_stock_of_another_volume_is_refused(done: Run) -> None:
     with pytest.raises(StockError, match="from the mesh's") as caught:
         find_deposit(deposit, done.result.sites[0].damage, pieces, (), faces, done.result.part, 0.2)
     assert caught.value.faces
+
+
+def test_stock_on_another_outline_is_compared_on_its_own_skin(done: Run) -> None:
+    """The exact pit is wider by two tolerances, as where the mesh does not show how a loss fades out."""
+    from damageest_cadquery._compare_stock import compare_stock
+    from damageest_cadquery._split import Piece
+
+    site, part = done.result.sites[0], done.result.part
+    deposit = site.deposit
+    assert isinstance(deposit, Deposit)
+    ((top, high),) = deposit.heights
+    lost = cq.Workplane().box(30, 20, 12).intersect(cq.Workplane().sphere(BALL["radius"] + 0.4).translate((2, 3, 6)))
+    solid = lost.val().Solids()[0].wrapped
+    faces = explore_faces(solid)
+    origins = tuple((top, -1) if cq.Face(face).Center().z > 5.99 else (-1, 0) for face in faces)
+    piece = Piece(solid, 0, origins)
+
+    def compare(height: float, to: Deposit = deposit) -> tuple[float, float, float]:
+        bases = take_bases(piece, {top: height})
+        return compare_stock([piece], bases, to, site.damage, part, 0.2)
+
+    _, farthest, difference = compare(high + 0.05)
+    assert farthest > 0.3, "the mesh ends elsewhere"
+    assert 0.01 < difference < 0.05
+    with pytest.raises(StockError, match=r"mesh's|differs"):
+        compare(high + 0.12)
+    # something took a part of the mesh's stock away: on the exact one it would be there
+    with pytest.raises(StockError, match=r"mesh's|differs"):
+        compare(high + 0.05, replace(deposit, stock_volume=0.98 * deposit.stock_volume))

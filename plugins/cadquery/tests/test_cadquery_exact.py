@@ -203,6 +203,37 @@ def test_a_fault_of_opencascade_costs_only_the_exact_form(
     assert (tmp_path / "out/undamaged.step").is_file()
 
 
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        (cadquery_faults.abort_with_shapes, "shapes 2: OpenCASCADE stopped (its process ended by an abort (SIGABRT))"),
+        pytest.param(
+            cadquery_faults.compute_on_with_shapes, "shapes 2: OpenCASCADE took longer than 2 s", marks=pytest.mark.slow
+        ),
+    ],
+    ids=["abort", "time"],
+)
+def test_a_form_that_stops_opencascade_costs_only_this_form(
+    fault: Any, text: str, done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exact, "make_exact", fault)
+    one = replace(done.result, sites=done.result.sites[:1])
+    told = export_again(one, tmp_path / "out", limit=6).exact[1]
+    assert told.form not in ("none", "shapes")
+    assert told.tried[0] == text
+    (solid,) = take_solids(tmp_path / "out/damage/site-1.step")
+    assert solid.Volume() == pytest.approx(one.sites[0].damage.volume, rel=3e-3)
+
+
+def test_a_site_that_stops_opencascade_again_and_again_costs_no_other(
+    done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exact, "make_exact", cadquery_faults.abort_with_any)
+    told = export_again(done.result, tmp_path / "out")
+    assert [told.exact[k].form for k in (1, 2)] == ["none", "shapes"]
+    assert "SIGABRT" in told.exact[1].tried[0]
+
+
 @pytest.mark.slow
 def test_opencascade_that_never_starts_costs_all_exact_forms(
     done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

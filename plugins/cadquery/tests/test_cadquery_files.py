@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from damageest_cadquery._assembly import NamedShape, write_assembly
 from damageest_cadquery.evaluate.files import measure_folder, read_back
-from damageest_cadquery.evaluate.files_rows import find_faults, read_rows, summarise_files
+from damageest_cadquery.evaluate.files_rows import count_fair, find_faults, measure_fairly, read_rows, summarise_files
 
 from tests.needs import import_for, needs_plugin
 
@@ -38,6 +38,20 @@ def test_faults_of_a_file_are_found(tmp_path: Path) -> None:
     assert find_faults(read | {"written_faces": 7, "valid": False}) == ["6 faces for 7", "not valid"]
 
 
+def test_volumes_are_compared_with_fairer_references_too() -> None:
+    damage = {"mesh": 100.0, "volume": 101.0, "by_triangles": 101.0, "fine": 101.0, "chords": 0.9, "truth": 99.0}
+    damage |= {"iou_mesh": 0.97, "iou_exact": 0.98}
+    deposit = {"mesh": 150.0, "volume": 152.0, "by_triangles": 152.0, "on_own_skin": 151.9}
+    site = {"damage": damage, "deposit": deposit}
+    assert measure_fairly(site, "damage") == pytest.approx(0.001)
+    assert measure_fairly(site, "deposit") == pytest.approx(0.1 / 151.9)
+    assert measure_fairly({"deposit": {"mesh": 150.0, "volume": 152.0, "by_triangles": None}}, "deposit") is None
+    told = count_fair([site, {"damage": damage | {"chords": 0.0}}])
+    assert told[0].startswith("damage: within 0.3% of the mesh 0 of 2; without chords 1 of 2")
+    assert told[1].startswith("deposit: within 0.3% of the mesh 0 of 1; from stock on its own skin 1 of 1")
+    assert told[2].endswith("exact at least as near on 2 of 2")
+
+
 @pytest.mark.slow  # 20 s; run it by -m slow
 def test_each_file_gets_one_row_and_refused_ones_say_why(tmp_path: Path) -> None:
     pytest.importorskip("damageest_evaluate")
@@ -51,6 +65,8 @@ def test_each_file_gets_one_row_and_refused_ones_say_why(tmp_path: Path) -> None
     (site,) = rows["block.step"]["sites"]
     assert find_faults(site["damage"]) == []
     assert site["damage"]["without_colour"] == 0
+    assert site["damage"]["chords"] == pytest.approx(0, abs=1e-9 * site["damage"]["mesh"]), "all faces are planes"
+    assert measure_fairly(site, "deposit") == pytest.approx(0, abs=1e-3)
     assert list(measure_folder(folder, output, 0, 120.0)) == []
     assert len(read_rows(output)) == 2
     assert "2 files, 1 measured" in summarise_files(read_rows(output))

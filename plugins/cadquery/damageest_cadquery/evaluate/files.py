@@ -151,7 +151,9 @@ def _draw_damage(part: Any, seed: int) -> tuple[list[str], list[dict[str, Any]]]
 def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Sequence[Any]) -> dict[str, Any]:
     import damageest
     from damageest.stages.export import Body
+    from damageest_cadquery.evaluate.fair import measure_fairly
     from damageest_cadquery.exact import write_exact
+    from damageest_cadquery.shapes import read, scale_shape
 
     job = {
         "version": 1, "units": "mm", "tolerance": tolerance, "align": "none",
@@ -170,6 +172,7 @@ def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Se
             bodies[f"deposit/site-{site.id}"] = Body(f"deposit site-{site.id}", site.deposit, (0, 0, 0))
     forms = write_exact(place / "out", result, bodies, {"": None}, LIMIT, assembly=False).exact
     coloured = _count_coloured(path)
+    solids = [scale_shape(each, result.part.cad_scale) for each in read(path, path.suffix.lower()).solids]
     sites = []
     for site in result.sites:
         exact = json.loads(json.dumps(dataclasses.asdict(forms[site.id])))
@@ -182,6 +185,9 @@ def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Se
             row["deposit"] = {"mesh": _measure_deposit(site, result, tolerance)}
         elif not made:
             row["no_deposit"] = " ".join("; ".join(result.failures).split())[:300] or "the run gave none"
+        if "damage" in row:
+            truth = result.scan.truth.damage if result.scan.truth else None
+            measure_fairly(row, solids, result.part, site.damage, truth, place / "out", tolerance, STOCK * tolerance)
         sites.append(row)
     if not sites:
         return {"error": "the run found no damage", "kind": "no site"}

@@ -50,6 +50,42 @@ def measure_off(read: dict[str, Any]) -> float:
     return float(min(abs(volume / read["mesh"] - 1) for volume in found))
 
 
+def measure_fairly(site: dict[str, Any], what: str) -> float | None:
+    """The relative difference of a damage volume from the mesh without what the chords of the part's triangles do, or
+    of a deposit from the stage's stock on the exact damage volume's own skin; None where that was not measured."""
+    read = site[what]
+    if what == "damage":
+        return None if "chords" not in read else float((read["fine"] - read["chords"]) / read["mesh"] - 1)
+    if "on_own_skin" not in read or read.get("by_triangles") is None:
+        return None
+    return float(read["by_triangles"] / read["on_own_skin"] - 1)
+
+
+def count_fair(sites: Sequence[dict[str, Any]]) -> list[str]:
+    """In words, how many of the sites are within `SAME` of the mesh and of the fairer references; and how many damage
+    volumes are nearer to the true damage than the mesh."""
+    lines = []
+    for what, how in (("damage", "without chords"), ("deposit", "from stock on its own skin")):
+        mine = [site for site in sites if "volume" in site.get(what, {})]
+        raw = sum(measure_off(site[what]) <= SAME for site in mine)
+        fair = [abs(value) for site in mine if (value := measure_fairly(site, what)) is not None]
+        text = f"{what}: within {SAME:.1%} of the mesh {raw} of {len(mine)}"
+        if fair:
+            text += (
+                f"; {how} {sum(value <= SAME for value in fair)} of {len(fair)}, "
+                f"median {np.median(fair):.3%}, most {max(fair):.3%}"
+            )
+        lines.append(text)
+    both = [(site["damage"]["iou_exact"], site["damage"]["iou_mesh"]) for site in sites if "truth" in site["damage"]]
+    if both:
+        exact, mesh = np.array(both).T
+        lines.append(
+            f"IoU with the true damage: exact median {np.median(exact):.4f}, mesh {np.median(mesh):.4f}; "
+            f"exact at least as near on {(exact >= mesh).sum()} of {len(both)}"
+        )
+    return lines
+
+
 def measure_outline(row: dict[str, Any], site: dict[str, Any]) -> float:
     """The share of a deposit by which it is larger than the mesh's because its outline is: stock stands on all skin
     that the exact damage volume takes."""
@@ -72,6 +108,7 @@ def summarise_files(rows: Sequence[dict[str, Any]]) -> str:
             known = what == "deposit" and "skin" in site and "stock" in row and "mesh" in site["deposit"]
             why = f"; the outline explains {measure_outline(row, site):+.2%}" if known else ""
             lines.append(f"  {row['file']}, {what}: {', '.join(told)}{why}")
+    lines += count_fair([site for _, site in sites if "damage" in site])
     for row, site in sites:
         exact = site["exact"]
         if exact["form"] == "none":

@@ -1,0 +1,66 @@
+"""Takes crossings out of an open surface: OpenCASCADE splits no solid by faces that cross beside their common edges."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+
+from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.undoing import find_crossings
+
+ROUNDS = 40
+"""How often the places round crossings are smoothed."""
+WIDER = 4
+"""Rounds after which a ring of vertices more is smoothed."""
+
+
+def untangle(mesh: Mesh, farthest: float) -> Mesh:
+    """The mesh with the vertices round its crossings moved to the middle of their neighbours, until none is left;
+    itself where it has none, where that does not help, or where a vertex would move by more than ``farthest``."""
+    moved = mesh
+    for number in range(ROUNDS):
+        vertices = _find_vertices(moved)
+        if not len(vertices):
+            break
+        near = np.zeros(len(mesh.vertices), bool)
+        near[vertices] = True
+        for _ in range(number // WIDER):
+            near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
+        moved = Mesh(_smooth(moved, near), mesh.faces)
+        if np.linalg.norm(moved.vertices - mesh.vertices, axis=1).max() > farthest:
+            return mesh
+    else:
+        return mesh
+    return moved
+
+
+def keep_apart(mesh: Mesh, before: Floats) -> Mesh:
+    """The mesh with its vertices round crossings back at the places ``before`` (V,3), from which they were moved."""
+    for number in range(ROUNDS // WIDER):
+        vertices = _find_vertices(mesh)
+        if not len(vertices):
+            break
+        near = np.zeros(len(mesh.vertices), bool)
+        near[vertices] = True
+        for _ in range(number):
+            near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
+        mesh = Mesh(np.where(near[:, None], before, mesh.vertices), mesh.faces)
+    return mesh
+
+
+def _find_vertices(mesh: Mesh) -> Ints:
+    edges, faces = find_crossings(mesh)
+    return np.unique(np.concatenate([edges.ravel(), mesh.faces[faces].ravel()]))
+
+
+def _smooth(mesh: Mesh, near: Flags) -> Floats:
+    """(V,3) the vertices, those that are ``near`` moved half the way to the middle of their neighbours."""
+    count = len(mesh.vertices)
+    ends = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    ends = np.concatenate([ends, ends[:, ::-1]])
+    graph = coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
+    total = np.maximum(np.asarray(graph.sum(axis=1)).ravel(), 1)
+    vertices = mesh.vertices.copy()
+    around = np.asarray(graph @ vertices)
+    vertices[near] += 0.5 * (around[near] / total[near, None] - vertices[near])
+    return vertices
