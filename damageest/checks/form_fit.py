@@ -9,7 +9,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.checks.form_fields import Field, FieldFrame
-from damageest.geometry.distance import SurfaceTree
+from damageest.geometry.distance import SurfaceTree, keep_tree
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.geometry.voxels import number_faced_cubes
@@ -34,8 +34,7 @@ class Skin:
 
     @classmethod
     def build(cls, part: Mesh) -> Skin:
-        origin = part.bounds.mean(axis=0)
-        return cls(SurfaceTree(Mesh(part.vertices - origin, part.faces)), part.face_normals, origin)
+        return cls(keep_tree(part), part.face_normals, part.bounds.mean(axis=0))
 
     def find_feet(self, points: Floats) -> tuple[Floats, Floats, Floats]:
         """For points (N,3) in the part's frame: distance (N,), nearest places (N,3) and the skin's normals there."""

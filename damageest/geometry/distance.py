@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
-from damageest.geometry.duplicates import list_used
+from damageest.geometry.duplicates import find_duplicates, list_used
 from damageest.geometry.long_faces import cut_long_faces
 from damageest.geometry.pseudonormals import keep_signed_mesh
 from damageest.geometry.vectors import measure_longest_edges, normalise
@@ -53,14 +53,19 @@ def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
         return _find_none()
     _require_some(mesh.faces, "triangle")
     centre = mesh.bounds.mean(axis=0)
+    distance, face, place = keep_tree(mesh).closest(points - centre)
+    return Closest(distance, face, place + centre)
+
+
+def keep_tree(mesh: Mesh) -> SurfaceTree:
+    """The tree of a mesh moved to the middle of its bounds, as it was prepared for an earlier question, or now."""
     kept = _centred if len(mesh.faces) <= MOST_KEPT else _large
     if (tree := kept.get(mesh)) is None:
-        tree = SurfaceTree(Mesh(mesh.vertices - centre, mesh.faces))
+        tree = SurfaceTree(Mesh(mesh.vertices - mesh.bounds.mean(axis=0), mesh.faces))
         if kept is _large:
             _large.clear()
         kept[mesh] = tree
-    distance, face, place = tree.closest(points - centre)
-    return Closest(distance, face, place + centre)
+    return tree
 
 
 def distance_to_mesh(points: Floats, mesh: Mesh) -> Floats:
@@ -243,8 +248,8 @@ def _find_unreliable_vertices(mesh: Mesh, flat: Flags, scale: float) -> Flags:
     """Whether each vertex (V,) belongs to a flat triangle or lies at the place of another vertex."""
     unreliable = np.zeros(len(mesh.vertices), bool)
     unreliable[mesh.faces[flat]] = True
-    cell = np.round((mesh.vertices - mesh.bounds[0]) / (1e-9 * scale)).astype(np.int64)
+    cell = np.round((mesh.vertices - mesh.bounds[0]) / (1e-9 * scale))
     used = list_used(mesh.faces)
-    _, inverse, count = np.unique(cell[used], axis=0, return_inverse=True, return_counts=True)
-    unreliable[used[(count > 1)[inverse.ravel()]]] = True
+    inverse = find_duplicates(cell[used])[1]
+    unreliable[used[np.bincount(inverse)[inverse] > 1]] = True
     return unreliable

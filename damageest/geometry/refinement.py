@@ -120,7 +120,7 @@ def _bisect(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, 
         for _ in range(RINGS):
             touched = np.zeros(len(vertices), bool)
             touched[faces[near]] = True
-            near = touched[faces].any(axis=1)
+            near = np.asarray(touched[faces].any(axis=1))
         chosen = np.flatnonzero(near)
         is_wanted = np.zeros(len(faces), bool)
         is_wanted[wanted] = True

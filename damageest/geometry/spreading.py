@@ -16,6 +16,8 @@ from damageest.isolation.memory import require_memory
 
 SPREAD_BYTES, THIN_BYTES, TRIANGLE_BYTES = 170, 210, 260
 """Memory to spread a point, to choose from it, and for each triangle, measured."""
+MANY = 300_000
+"""Points from which on fewer of them are compared in pairs at first; those that are then too far from all are next."""
 FINE = 0.4
 """Step of the first points on triangles that are too small for a grid of their own, in spacings."""
 
@@ -96,7 +98,7 @@ def thin(points: Floats, apart: float, reach: float) -> Ints:
         return np.empty(0, np.int64)
     _require_memory(THIN_BYTES * len(points), len(points))
     # First keep few points per disc: on very fine meshes the pairs of points would not fit in memory.
-    todo = _pick_one_per_cell(points, 0.4 * apart)
+    todo = _pick_one_per_cell(points, (0.4 if len(points) < MANY else 0.8) * apart)
     kept = np.empty(0, np.int64)
     while len(todo):
         kept = np.concatenate([kept, todo[_pick_apart(points[todo], apart)]])

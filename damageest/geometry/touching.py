@@ -98,7 +98,7 @@ def _remove_flat(faces: Ints) -> Ints:
     corners = np.sort(faces, axis=1)
     even = (np.argsort(faces, axis=1) @ [1, 3, 9])[:, None] == np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]]) @ [1, 3, 9]
     way = np.where(even.any(axis=1), 1, -1)
-    same = find_duplicates(corners)[1]
+    same = find_duplicates(corners.astype(np.float64))[1]
     total = np.bincount(same, way)[same].astype(np.int64)
     # of each set of equal triangles as many are kept as are left over
     order = np.lexsort([way, same])

@@ -160,6 +160,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "undoing.find_crossings": lambda r: expect(undoing.find_crossings(r.mesh)[0], (None, 2)),
     "distance.SurfaceTree": call_tree,
     "distance.closest_on_mesh": call_both(lambda points, mesh: distance.closest_on_mesh(points, mesh).distance),
+    "distance.keep_tree": lambda r: expect(distance.keep_tree(CUBE).closest(r.points).distance, (r.count,)),
     "distance.distance_to_mesh": call_both(distance.distance_to_mesh),
     "distance.distance_to_edges": lambda r: expect(
         distance.distance_to_edges(CUBE.vertices, r.mesh.vertices, r.mesh.faces[:, :2]), (8,)
@@ -352,6 +353,7 @@ REFUSALS: dict[str, str] = {
     "crops.crop_points": r"leaves no points; there were none before it",
     "distance.SurfaceTree": NO_TRIANGLE,
     "distance.closest_on_mesh": NO_TRIANGLE,
+    "distance.keep_tree": lambda r: expect(distance.keep_tree(CUBE).closest(r.points).distance, (r.count,)),
     "distance.distance_to_mesh": NO_TRIANGLE,
     "distance.distance_to_edges": NO_TRIANGLE,
     "distance.signed_distance": NO_TRIANGLE,
