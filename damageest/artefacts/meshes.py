@@ -33,7 +33,12 @@ class Mesh(Checked):
     @property
     def triangles(self) -> Floats:
         """(F,3,3) corner coordinates."""
-        return self.vertices[self.faces]
+        return np.take(self.vertices, self.faces, axis=0)  # half the time of indexing
+
+    def take_triangles(self, chosen: Ints | Flags) -> Floats:
+        """(K,3,3) corner coordinates of the ``chosen`` faces, (K,) numbers or (F,) flags: of a large mesh, much faster
+        than to take them from `triangles`."""
+        return np.take(self.vertices, self.faces[chosen], axis=0)
 
     @cached_property
     def cross(self) -> Floats:
@@ -67,7 +72,7 @@ class Mesh(Checked):
     @cached_property
     def bounds(self) -> Floats:
         """(2,3) lowest and highest corner."""
-        return np.array([self.vertices.min(0), self.vertices.max(0)])
+        return np.array([[end(column) for column in self.vertices.T] for end in (np.min, np.max)])
 
     @property
     def diagonal(self) -> float:
@@ -113,7 +118,7 @@ class Solid(Mesh):
     @cached_property
     def volume(self) -> float:
         """By the divergence theorem, about the centre of the bounds (so that far coordinates cost no digits)."""
-        centre = (self.vertices.min(0) + self.vertices.max(0)) / 2
+        centre = (self.bounds[0] + self.bounds[1]) / 2
         a, b, c = np.moveaxis(self.triangles - centre, 1, 0)
         return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 

@@ -161,8 +161,9 @@ def _share_unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, re
     if not len(on_skin):
         return 0.0
     low, high = damage.bounds[0] - 6 * reach, damage.bounds[1] + 6 * reach
-    corners = part.triangles
-    near = ((corners.min(axis=1) < high) & (corners.max(axis=1) > low)).all(axis=1)
+    near = np.ones(len(part.faces), bool)
+    for along, least, most in zip(part.vertices.T, low, high, strict=True):
+        near &= (along < most)[part.faces].any(axis=1) & (along > least)[part.faces].any(axis=1)
     count = int(np.clip(np.linalg.norm(part.cross[near], axis=1).sum() / 2 / (0.7 * reach) ** 2, 1000, 2 * MOST))
     skin = _spread(part, near, count)
     skin = skin[_measure_gap(skin, on_skin, 6 * reach) < 6 * reach]

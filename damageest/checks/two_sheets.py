@@ -144,7 +144,7 @@ def _find_double(
 def _is_straight(aligned: Scan, deviation: Deviation, part: Part, index: Ints, most: float) -> Flags:
     """Which points lie straight over or under their nearest triangle, and not beside an edge of it."""
     face = deviation.face[index]
-    height = np.einsum("ij,ij->i", aligned.points[index] - part.triangles[face, 0], part.face_normals[face])
+    height = np.einsum("ij,ij->i", aligned.points[index] - part.take_triangles(face)[:, 0], part.face_normals[face])
     return np.asarray(np.abs(height - deviation.distance[index]) < most)
 
 

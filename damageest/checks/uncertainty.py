@@ -224,7 +224,7 @@ def measure_adapt(
 def measure_shifts(part: Part, fields: Floats, places: Floats, normals: Floats) -> Floats:
     """How far displacements (J,V,3) of the part's vertices move its skin (J,N) at places (N,3), along normals (N,3)."""
     _, face, at = closest_on_mesh(places, part)
-    corners = find_barycentric(part.triangles[face], at)
+    corners = find_barycentric(part.take_triangles(face), at)
     return np.asarray(np.einsum("nc,jnck,nk->jn", corners, fields[:, part.faces[face]], normals))
 
 

@@ -52,7 +52,8 @@ def heal(vertices: Floats, faces: Ints, gap: float = 0.0) -> tuple[Floats, Ints,
 def _merge_vertices(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
     """Merges equal vertices. While the mesh is still open, merges vertices closer than 1e-7, 1e-6 and 1e-5 of the
     diagonal, if that leaves fewer odd edges."""
-    if not open_edges(faces):
+    is_soup = bool(len(faces)) and int(np.bincount(faces.ravel()).max()) == 1  # as in every STL file: open, surely
+    if not is_soup and not open_edges(faces):
         return vertices, faces
     keep, inverse = find_duplicates(vertices)
     before = len(vertices)

@@ -14,6 +14,9 @@ from damageest.geometry.vectors import measure_longest_edges
 
 SHORT = 0.1
 """Longest edge of a piece, in diagonals of the mesh's bounds."""
+LOOSE = 3.0
+"""Area of half the sides of all boxes, in areas of the triangles, below which boxes are tight, as those of a cylinder's
+slivers along its axis: smaller ones would only be more."""
 MOST_MORE = 100_000
 """Pieces that may be added; beyond that, and beyond one for each triangle, pieces are longer."""
 
@@ -27,8 +30,10 @@ def cut_long_faces(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, Ints]:
     numbers = np.arange(len(faces))
     if not len(faces):
         return vertices, faces, numbers
-    edge = SHORT * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    longest = measure_longest_edges(vertices[faces])
+    edge, corners = SHORT * float(np.linalg.norm(np.ptp(vertices, axis=0))), np.take(vertices, faces, axis=0)
+    longest = measure_longest_edges(corners)
+    if longest.max() <= edge or _measure_looseness(corners) < LOOSE:
+        return vertices, faces, numbers
     while edge and np.sum(longest[longest > edge] / edge) > max(MOST_MORE, len(faces)):
         edge *= 2
     done: list[tuple[Ints, Ints]] = []
@@ -41,6 +46,15 @@ def cut_long_faces(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, Ints]:
     done.append((faces, numbers))
     faces, numbers = (np.concatenate(column) for column in zip(*done, strict=True))
     return vertices, faces, numbers
+
+
+def _measure_looseness(corners: Floats) -> float:
+    """The area of half the sides of the boxes about triangles (F,3,3), in areas of the triangles."""
+    x, y, z = (
+        np.maximum(np.maximum(a, b), c) - np.minimum(np.minimum(a, b), c) for a, b, c in corners.transpose(2, 1, 0)
+    )
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return float((x * y + y * z + z * x).sum() / max(float(np.linalg.norm(cross, axis=1).sum() / 2), 1e-300))
 
 
 def _halve(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:

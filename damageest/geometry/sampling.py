@@ -31,7 +31,7 @@ def sample_by_area(mesh: Mesh, count: int, rng: np.random.Generator, faces: Ints
     face = faces[np.minimum(np.searchsorted(total, at), len(total) - 1)]
     u, v = rng.random((2, count, 1))
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    a, b, c = np.moveaxis(mesh.triangles[face], 1, 0)
+    a, b, c = np.moveaxis(mesh.take_triangles(face), 1, 0)
     return np.asarray(a + u * (b - a) + v * (c - a)), face
 
 

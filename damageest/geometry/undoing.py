@@ -86,7 +86,7 @@ def find_crossings(mesh: Mesh) -> tuple[Ints, Ints]:
     ends = np.sort(np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges = np.unique(ends, axis=0)
     found = RayCaster(mesh).find_crossings(mesh.vertices[edges[:, 0]], mesh.vertices[edges[:, 1]])
-    own, corners = edges[found.ray], mesh.triangles[found.face]
+    own, corners = edges[found.ray], mesh.take_triangles(found.face)
     is_apart = (mesh.faces[found.face][:, :, None] != own[:, None, :]).all(axis=(1, 2))
     # rays are in single precision: of an edge within a plane of faces they cross some
     normal = normalise(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))

@@ -112,6 +112,6 @@ def find_largest(adapted: AdaptedPart) -> Vector | None:
 def _name(adapted: AdaptedPart) -> tuple[list[StiffMode], float]:
     """The displacement's modes over the whole skin."""
     places, face = sample_by_area(adapted.part, PLACES, np.random.default_rng(3))
-    weights = find_barycentric(adapted.part.triangles[face], places)
+    weights = find_barycentric(adapted.part.take_triangles(face), places)
     moved = np.einsum("nc,nck->nk", weights, adapted.displacement[adapted.part.faces[face]])
     return name_modes(places - moved, moved)

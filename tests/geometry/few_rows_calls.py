@@ -353,7 +353,6 @@ REFUSALS: dict[str, str] = {
     "crops.crop_points": r"leaves no points; there were none before it",
     "distance.SurfaceTree": NO_TRIANGLE,
     "distance.closest_on_mesh": NO_TRIANGLE,
-    "distance.keep_tree": lambda r: expect(distance.keep_tree(CUBE).closest(r.points).distance, (r.count,)),
     "distance.distance_to_mesh": NO_TRIANGLE,
     "distance.distance_to_edges": NO_TRIANGLE,
     "distance.signed_distance": NO_TRIANGLE,
