@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from damageest.artefacts import Mesh, open_edges
-from damageest.geometry.refinement import find_nearest, halve_edges, insert_points, refine_at
+from damageest.geometry.refinement import bisect_faces, find_nearest, halve_edges, insert_points, refine_at
 
 
 @settings(max_examples=25, deadline=None)
@@ -38,3 +38,21 @@ def test_halved_everywhere() -> None:
     corners = fine.triangles
     assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() <= 1.0
     assert trimesh.Trimesh(fine.vertices, fine.faces).volume == pytest.approx(rod.volume)
+
+
+@given(seed=st.integers(0, 10**6), share=st.sampled_from([0.0, 0.02, 1.0]))
+@settings(max_examples=25, deadline=None)
+def test_halving_a_few_faces_leaves_the_mesh_closed_and_the_others_as_they_are(seed: int, share: float) -> None:
+    """Only faces about those to be halved are looked at, however far halving goes on."""
+    ball = trimesh.creation.icosphere(4, 10.0)
+    rng = np.random.default_rng(seed)
+    wanted = np.unique(rng.integers(0, len(ball.faces), 1 + int(share * len(ball.faces))))
+    vertices, faces, parent = bisect_faces(np.asarray(ball.vertices), np.asarray(ball.faces), wanted)
+    assert open_edges(faces) == 0
+    same = np.flatnonzero(np.bincount(parent, minlength=len(ball.faces)) == 1)
+    assert not np.isin(wanted, same).any()
+    kept = np.flatnonzero(np.isin(parent, same))
+    np.testing.assert_array_equal(faces[kept], ball.faces[parent[kept]])
+    area = np.linalg.norm(Mesh(vertices, faces).cross, axis=1)
+    of_parent = np.bincount(parent, area, len(ball.faces))
+    np.testing.assert_allclose(of_parent, 2 * ball.area_faces, rtol=1e-9)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
 
-from damageest.artefacts import Mesh, Solid
+from damageest.artefacts import Mesh, Part, Solid
 from damageest.geometry.solids import (
     compose_shells,
     concatenate_meshes,
@@ -117,3 +117,14 @@ def test_shells_are_put_together_with_their_cavities() -> None:
     assert sorted(np.sign([shell.volume() for shell in shells])) == [-1, 1, 1]
     assert compose_shells(shells).volume() == pytest.approx(body.volume(), rel=1e-12)
     assert compose_shells([]).is_empty()
+
+
+def test_the_body_of_a_part_is_kept_for_its_origin_alone() -> None:
+    cube = box(10.0)
+    part = Part(cube.vertices, cube.faces)
+    kept = to_manifold(part)
+    assert to_manifold(part) is kept
+    moved = to_manifold(part, (1.0, 0, 0))
+    assert moved is not kept
+    assert moved.bounding_box()[0] == pytest.approx(kept.bounding_box()[0] - 1)
+    assert to_manifold(Part(2 * cube.vertices, cube.faces), (1.0, 0, 0)).volume() == pytest.approx(8000)
