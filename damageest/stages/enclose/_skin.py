@@ -15,6 +15,8 @@ from damageest.geometry.voxels import measure_bounds, number_cubes
 
 NEARER = 0.4
 """Skin is held where an intact point is nearer than this share of the distance to the damaged points."""
+FAR = 8.0
+"""Distance from intact points, in edges of the cubes that these are thinned in, from which skin samples are far."""
 DEEP = 3.0
 """How far deep points are from skin that is held, in gaps; those are deep that lie deeper than a gap."""
 
@@ -100,14 +102,17 @@ def find_held(
 
 
 def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:
-    """Radius (S,) that holds six intact points, measured at the intact points nearest to each skin sample. It changes
-    slowly: one sample stands for those of its cube, and far from all intact points a search takes longest."""
+    """Radius (S,) that holds six intact points, measured at the intact points nearest to each skin sample. Far from all
+    of them, where a search takes longest, one sample stands for those of its cube."""
     edge = 3 * tolerance
     some = hit[pick_one_per_cube(hit, edge)]
     radius = find_neighbours(some, 7, hit)[0][:, -1]
-    first, cube, _ = group_integers(number_cubes(points, edge)[1])
-    usual = np.median(radius[find_neighbours(points[first], 6, some)[1]], axis=1)
-    return np.asarray(usual[cube])
+    distance, index = find_neighbours(points, 6, some, FAR * edge)
+    far = np.flatnonzero(~np.isfinite(distance[:, -1]))
+    if len(far):
+        first, cube, _ = group_integers(number_cubes(points[far], edge)[1])
+        index[far] = find_neighbours(points[far[first]], index.shape[1], some)[1][cube]
+    return np.asarray(np.median(radius[index], axis=1))
 
 
 def push_outward(part: Part, skin: Floats, outward: Floats, push: float) -> Floats:

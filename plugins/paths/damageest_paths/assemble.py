@@ -20,6 +20,7 @@ from damageest_paths.nozzle import Nozzle
 from damageest_paths.obstacles import Obstacles, draw_passes
 from damageest_paths.planar import Surroundings
 from damageest_paths.process import Pass, Plan, Process
+from damageest_paths.turning import divide_turns
 
 MUCH_TRAVEL, MUCH_SURPLUS, MUCH_SUNK = 0.2, 0.1, 0.05
 DETAIL = 0.01
@@ -117,10 +118,12 @@ def _shift(meshes: Sequence[Mesh], origin: Floats) -> list[Mesh]:
 
 
 def _to_relative(one: Pass, plan: Plan) -> Pass:
-    """A pass turned from the plan's local axes to those of the part, about the frame's origin."""
+    """A pass turned from the plan's local axes to those of the part, about the frame's origin; there the axis about z
+    turns from pose to pose by little."""
     turn = plan.frame.turn
     tightest = None if one.tightest is None else (one.tightest[0] @ turn, one.tightest[1] @ turn)
-    return Pass(one.points @ turn, one.axes @ turn, one.normals @ turn, one.layer, one.gap, tightest, one.kind)
+    poses = divide_turns(one.points @ turn, one.axes @ turn, one.normals @ turn)
+    return Pass(*poses, one.layer, one.gap, tightest, one.kind)
 
 
 def _gather_obstacles(

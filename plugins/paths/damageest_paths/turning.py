@@ -17,6 +17,13 @@ FARTHEST = np.radians(50.0)
 """Angle between two axes up to which the tool turns from one to the other in one go."""
 
 
+ROTARY, UPRIGHT = np.radians(30.0), np.radians(5.0)
+"""Turn of the rotary axis about z from which the poses of a pass are divided, and the angle between tool and z, upward
+or downward, below which that axis may turn freely, since it hardly moves the tool."""
+DIVISIONS = 5
+"""How often two poses are divided at most."""
+
+
 class Course(NamedTuple):
     """``axes`` (N,3) at the points of a pass; ``joined`` (N-1,): whether the pass goes on from each point to the
     next."""
@@ -97,3 +104,24 @@ def turn_evenly(first: Floats, last: Floats, share: Floats) -> Floats:
         return np.tile(last, (len(share), 1))
     found = np.sin((1 - share) * angle)[:, None] * first + np.sin(share * angle)[:, None] * last
     return normalise(found)
+
+
+def divide_turns(points: Floats, axes: Floats, normals: Floats) -> tuple[Floats, Floats, Floats]:
+    """Poses of a pass, (N,3) each, with more of them where the axis about z turns far from one to the next.
+
+    Where the tool passes z at a few degrees, that axis turns by up to half a turn while the tool hardly moves. A
+    control turns it evenly between two poses: with poses close by the tool stays on its way, and the speed of that axis
+    can be told.
+    """
+    for _ in range(DIVISIONS):
+        lying = np.hypot(axes[:, 0], axes[:, 1])
+        turn = np.arctan2(axes[:, 1], axes[:, 0])
+        turned = np.abs((np.diff(turn) + np.pi) % (2 * np.pi) - np.pi)
+        far = np.flatnonzero((turned > ROTARY) & (np.minimum(lying[1:], lying[:-1]) > np.sin(UPRIGHT)))
+        if not len(far):
+            break
+        points = np.insert(points, far + 1, (points[far] + points[far + 1]) / 2, axis=0)
+        axes, normals = (
+            np.insert(rows, far + 1, normalise(rows[far] + rows[far + 1]), axis=0) for rows in (axes, normals)
+        )
+    return points, axes, normals

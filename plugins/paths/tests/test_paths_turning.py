@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from damageest_evaluate.paths.check import measure_nozzle
 from damageest_paths.axes import list_axes
-from damageest_paths.turning import BLOCKED, plan_course, turn_evenly
+from damageest_paths.turning import BLOCKED, divide_turns, plan_course, turn_evenly
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from manifold3d import Manifold
 
 from damageest.artefacts import DepositPath, Floats
+from damageest.geometry.vectors import normalise
 from tests.path_shapes import Loss, cut, plan
 
 AXES = list_axes(np.radians(60))
@@ -76,3 +80,27 @@ def test_turning_saves_cuts_and_touches_nothing() -> None:
     assert 0 < np.degrees(rate.max()) <= 20.0 / turning.width * 1.001
     least = min(turning.clearance, turning.travel_clearance)
     assert measure_nozzle(turning, make_passage().left, 0.1) >= 0.75 * least > 0
+
+
+@given(st.integers(0, 10**6), st.integers(2, 12))
+@settings(max_examples=60, deadline=None)
+def test_the_axis_about_z_turns_by_little_between_poses(seed: int, count: int) -> None:
+    """Also where the tool passes z, upward or downward; the pass itself stays the same."""
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.normal(size=(count, 3)), axis=0)
+    axes = normalise(np.array([0, 0, rng.choice([-1.0, 1.0])]) + rng.normal(0, 0.15, (count, 3)))
+    normals = normalise(np.array([0.0, 0, 1]) + rng.normal(0, 0.1, (count, 3)))
+    more, turned, up = divide_turns(points, axes, normals)
+    lying = np.hypot(turned[:, 0], turned[:, 1])
+    turn = np.degrees(np.arctan2(turned[:, 1], turned[:, 0]))
+    step = np.abs((np.diff(turn) + 180) % 360 - 180)
+    assert (step[np.minimum(lying[1:], lying[:-1]) > np.sin(np.radians(5))] <= 45).all()
+    for rows in (turned, up):
+        assert np.allclose(np.linalg.norm(rows, axis=1), 1)
+    old = [int(np.flatnonzero((more == point).all(axis=1))[0]) for point in points]
+    assert np.array_equal(turned[old], axes)
+    assert np.array_equal(up[old], normals)
+    assert np.linalg.norm(np.diff(more, axis=0), axis=1).sum() == pytest.approx(
+        np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    )
+    assert measure_turns(turned).sum() == pytest.approx(measure_turns(axes).sum())
