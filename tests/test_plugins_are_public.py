@@ -38,6 +38,7 @@ PUBLIC_MODULES = {
 """Public modules, with the modules in them."""
 EXCEPTIONS = {
     "damageest_app": {"damageest.job.yamlfile", "damageest.output.folder"},
+    "damageest_cadquery": {"damageest.stages.allowance.plain_stock"},
     "damageest_evaluate": {
         "damageest.checks.model_fit",
         "damageest.checks.scan_quality",
@@ -52,7 +53,8 @@ EXCEPTIONS = {
     "damageest_machines": {"damageest.job.yamlfile"},
 }
 """Modules that one plugin uses although they are not public: the evaluation makes its scans with the virtual scanner,
-measures single steps of a run, and counts the notes that it prints; the app edits the text of job files, and shows
+measures single steps of a run, and counts the notes that it prints; exact stock is compared with the stage's on the
+exact damage volume's own skin; the app edits the text of job files, and shows
 what a run wrote; machine files are read as job files are. The list in pyproject.toml is the same for what is
 forbidden there."""
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from damageest.artefacts import Floats, Mesh, Part, Solid
+from damageest.artefacts import Part, Solid
 from damageest.stages import Stage, asked_by_name
 
 
@@ -53,23 +53,3 @@ class Allowance(Stage, ABC):
     @asked_by_name
     @abstractmethod
     def run(self, damage: Solid, part: Part, tolerance: float, others: Solid | None) -> Solid | None: ...
-
-
-def build_plain_stock(skin: Mesh, height: Floats, origin: Floats, tolerance: float) -> Any:
-    """Stock as `allowance: milling` builds it, without targets, regions to keep free or overlap: a Manifold about
-    ``origin`` (3,) with stock of ``height`` (F,) on each triangle of ``skin``, whose neighbours share vertices.
-
-    As with that stage, it is up to a quarter of ``tolerance`` higher, reaches a little below the skin, and may lie in
-    metal that stands over the skin.
-    """
-    import numpy as np
-
-    from damageest.stages.allowance._skin import SkinFaces
-    from damageest.stages.allowance._stock import build_stock
-
-    count = len(skin.faces)
-    own = SkinFaces(
-        skin.vertices - origin, skin.faces, np.zeros(count, np.int64), skin.face_normals, np.asarray(height),
-        np.zeros(count, bool),
-    )  # fmt: skip
-    return build_stock(own, tolerance / 2)

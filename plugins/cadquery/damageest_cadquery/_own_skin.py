@@ -16,7 +16,7 @@ from damageest.artefacts import Deposit, Floats, Ints, Mesh, Part, Solid
 from damageest.errors import InputError
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.solids import to_manifold
-from damageest.stages.allowance import build_plain_stock
+from damageest.stages.allowance.plain_stock import build_plain_stock
 from damageest_cadquery._split import Piece
 from damageest_cadquery._tessellate import tessellate
 

@@ -55,7 +55,7 @@ class Cad:
     def build_deposit(self, damage: Part, height: float) -> float:
         """The volume of an exact damage volume, as triangles with names, and stock of the stage on its own skin."""
         from damageest.geometry.solids import to_manifold
-        from damageest.stages.allowance import build_plain_stock
+        from damageest.stages.allowance.plain_stock import build_plain_stock
 
         outer = np.array([" inner " not in name for name in damage.face_names])[damage.faces_brep]
         skin = Mesh(damage.vertices, damage.faces[outer])
