@@ -1,4 +1,5 @@
-"""Distances from points to triangle meshes, and which points lie inside. Only it and `pseudonormals.py` import libigl.
+"""Distances from points to triangle meshes, and which points lie inside. Questions to libigl's tree
+of boxes go through it and `pseudonormals.py`.
 
 Points and mesh are in one unit and one frame; distances are in that unit. Far from the origin, differences of
 coordinates lose digits. So the functions first move points and mesh to the centre of the mesh's bounds, except where a
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import find_duplicates, list_used
-from damageest.geometry.long_faces import cut_long_faces
+from damageest.geometry.long_faces import build_tree
 from damageest.geometry.pseudonormals import keep_signed_mesh
 from damageest.geometry.vectors import measure_longest_edges, normalise
 from damageest.geometry.voxels import order_by_place
@@ -104,13 +105,7 @@ class SurfaceTree:
 
     @cached_property
     def _tree(self) -> tuple[Any, Floats, Ints, Ints]:
-        """A tree over short pieces of the triangles, and these as `cut_long_faces` gives them."""
-        import igl
-
-        vertices, faces, origin = cut_long_faces(self.mesh.vertices, self.mesh.faces)
-        tree = igl.AABB()
-        tree.init(vertices, faces)
-        return tree, vertices, faces, origin
+        return build_tree(self.mesh.vertices, self.mesh.faces)
 
     def closest(self, points: Floats) -> Closest:
         """The nearest place on the mesh for each of ``points`` (N,3), as `closest_on_mesh` gives it.

@@ -7,6 +7,8 @@ a bare cylinder.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
@@ -46,6 +48,16 @@ def cut_long_faces(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, Ints]:
     done.append((faces, numbers))
     faces, numbers = (np.concatenate(column) for column in zip(*done, strict=True))
     return vertices, faces, numbers
+
+
+def build_tree(vertices: Floats, faces: Ints) -> tuple[Any, Floats, Ints, Ints]:
+    """libigl's tree of boxes over short pieces of triangles (F,3), and these as `cut_long_faces` gives them."""
+    import igl
+
+    pieces = cut_long_faces(vertices, faces)
+    tree = igl.AABB()
+    tree.init(*pieces[:2])
+    return tree, *pieces
 
 
 def _measure_looseness(corners: Floats) -> float:

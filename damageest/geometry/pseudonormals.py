@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
-from damageest.geometry.long_faces import cut_long_faces
+from damageest.geometry.long_faces import build_tree
 from damageest.geometry.threads import cut_evenly
 
 CHUNK = 10_000
@@ -36,13 +36,7 @@ class SignedMesh:
 
     @cached_property
     def _tree(self) -> tuple[Any, Floats, Ints, Ints]:
-        """A tree over short pieces of the triangles, and these as `cut_long_faces` gives them."""
-        import igl
-
-        vertices, faces, origin = cut_long_faces(self.vertices, self.faces)
-        tree = igl.AABB()
-        tree.init(vertices, faces)
-        return tree, vertices, faces, origin
+        return build_tree(self.vertices, self.faces)
 
     @cached_property
     def _normals(self) -> tuple[Floats, Floats, Floats, Ints]:

@@ -114,16 +114,15 @@ def _bisect(vertices: Floats, faces: Ints, wanted: Ints) -> tuple[Floats, Ints, 
         return vertices, faces, np.arange(len(faces)), len(faces)
     needed = BYTES_OF_FACE * (len(faces) + 3 * len(wanted))
     require_memory(needed, f"a mesh of {len(faces):,} triangles that is refined", "a larger tolerance")
-    near = np.zeros(len(faces), bool)
-    near[wanted] = True
+    is_wanted = np.zeros(len(faces), bool)
+    is_wanted[wanted] = True
+    near = is_wanted
     while True:
         for _ in range(RINGS):
             touched = np.zeros(len(vertices), bool)
             touched[faces[near]] = True
             near = np.asarray(touched[faces].any(axis=1))
         chosen = np.flatnonzero(near)
-        is_wanted = np.zeros(len(faces), bool)
-        is_wanted[wanted] = True
         cut = _halve_some(vertices, faces[chosen], np.flatnonzero(is_wanted[chosen]))
         is_end = np.zeros(len(vertices), bool)
         is_end[cut.ends] = True

@@ -194,6 +194,9 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "local_fits.average_points": lambda r: expect(
         local_fits.average_points(r.points, r.ones, 0.1, np.arange(r.count)), (r.count, 3), (r.count, 3)
     ),
+    "long_faces.build_tree": lambda r: expect(
+        long_faces.build_tree(CUBE.vertices, CUBE.faces)[2], (len(CUBE.faces), 3)
+    ),
     "long_faces.cut_long_faces": lambda r: expect(
         long_faces.cut_long_faces(r.mesh.vertices, r.mesh.faces)[1], (None, 3)
     ),

@@ -11,7 +11,7 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh, Part
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_edges, distance_to_mesh, is_inside
-from damageest.geometry.rays import RayCaster
+from damageest.geometry.rays import prepare_rays
 from damageest.geometry.selectors import Mask
 from damageest.geometry.solids import to_arrays
 from damageest.geometry.threads import count_threads
@@ -95,7 +95,7 @@ def check_deposit(
     own = found.thick[inner & ~found.ended & ~found.covered]
     if not len(own):  # nowhere its full height: what there is of it, up to the opposite wall
         own = np.minimum(found.along, found.height)
-        first, _ = RayCaster(part).find_first(found.points + work.origin + away * found.normal, found.normal)
+        first, _ = prepare_rays(part).find_first(found.points + work.origin + away * found.normal, found.normal)
         own = np.minimum(own, first + away)
     return float(own.min()), float(own.mean()), float(own.max())
 

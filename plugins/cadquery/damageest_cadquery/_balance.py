@@ -12,7 +12,7 @@ from typing import Any
 
 from damageest.artefacts import Part, Solid
 from damageest.errors import InputError
-from damageest.geometry.solids import to_manifold
+from damageest.geometry.solids import to_manifold, unite
 from damageest_cadquery._check import is_plane, measure_inner_area
 from damageest_cadquery._solids import explore_faces
 from damageest_cadquery._split import Piece, is_near, measure_volume, triangulate
@@ -67,7 +67,4 @@ class Balance:
         return self._join([each.shape for each in self.solids if is_near(each.shape, self.damage)])
 
     def _join(self, shapes: Sequence[Any]) -> Any:
-        from manifold3d import Manifold, OpType
-
-        meshes = [to_manifold(triangulate(shape, FINE * self.tolerance), self.origin) for shape in shapes]
-        return Manifold.batch_boolean(meshes, OpType.Add)
+        return unite([triangulate(shape, FINE * self.tolerance) for shape in shapes], self.origin)

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from damageest.artefacts import Deposit, Floats, Ints, Mesh, Part, Solid
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, is_inside, signed_distance
 from damageest.geometry.skin import find_inner_faces
-from damageest.geometry.solids import to_arrays, to_manifold
+from damageest.geometry.solids import to_arrays, to_manifold, unite
 from damageest.geometry.vectors import normalise
 from damageest_cadquery._check import VOLUME, is_plane, measure_area
 from damageest_cadquery._cut import find_rim
@@ -49,12 +49,9 @@ def compare_stock(
 
     Raises StockError where it differs too much, also from what the stage builds on the exact damage volume's own skin.
     """
-    from manifold3d import Manifold, OpType
-
     parts = [lump.solid for lump in build_parts(bases)] if bases else []
     origin = deposit.bounds.mean(axis=0)
-    solids = [to_manifold(triangulate(solid, tolerance / 16), origin) for solid in parts]
-    stock = Manifold.batch_boolean(solids, OpType.Add) if solids else Manifold()
+    stock = unite([triangulate(solid, tolerance / 16) for solid in parts], origin)
     whole = to_manifold(part, origin)
     entered = (stock ^ whole).volume() > bound_entered(bases, part, deposit)
     stock = stock - whole if entered else stock

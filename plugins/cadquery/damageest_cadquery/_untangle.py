@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array
 
-from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.artefacts import Flags, Floats, Mesh
 from damageest.geometry.undoing import find_crossings
 
 ROUNDS = 40
@@ -19,13 +19,9 @@ def untangle(mesh: Mesh, farthest: float) -> Mesh:
     itself where it has none, where that does not help, or where a vertex would move by more than ``farthest``."""
     moved = mesh
     for number in range(ROUNDS):
-        vertices = _find_vertices(moved)
-        if not len(vertices):
+        near = _find_near(moved, number // WIDER)
+        if not near.any():
             break
-        near = np.zeros(len(mesh.vertices), bool)
-        near[vertices] = True
-        for _ in range(number // WIDER):
-            near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
         moved = Mesh(_smooth(moved, near), mesh.faces)
         if np.linalg.norm(moved.vertices - mesh.vertices, axis=1).max() > farthest:
             return mesh
@@ -37,20 +33,22 @@ def untangle(mesh: Mesh, farthest: float) -> Mesh:
 def keep_apart(mesh: Mesh, before: Floats) -> Mesh:
     """The mesh with its vertices round crossings back at the places ``before`` (V,3), from which they were moved."""
     for number in range(ROUNDS // WIDER):
-        vertices = _find_vertices(mesh)
-        if not len(vertices):
+        near = _find_near(mesh, number)
+        if not near.any():
             break
-        near = np.zeros(len(mesh.vertices), bool)
-        near[vertices] = True
-        for _ in range(number):
-            near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
         mesh = Mesh(np.where(near[:, None], before, mesh.vertices), mesh.faces)
     return mesh
 
 
-def _find_vertices(mesh: Mesh) -> Ints:
+def _find_near(mesh: Mesh, rings: int) -> Flags:
+    """(V,) the vertices of edges and faces that cross, and ``rings`` of neighbours round them."""
     edges, faces = find_crossings(mesh)
-    return np.unique(np.concatenate([edges.ravel(), mesh.faces[faces].ravel()]))
+    near = np.zeros(len(mesh.vertices), bool)
+    near[edges] = True
+    near[mesh.faces[faces]] = True
+    for _ in range(rings):
+        near[mesh.faces[near[mesh.faces].any(axis=1)]] = True
+    return near
 
 
 def _smooth(mesh: Mesh, near: Flags) -> Floats:
