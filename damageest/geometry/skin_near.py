@@ -15,10 +15,8 @@ from damageest.geometry.spreading import spread_on_faces, spread_points
 from damageest.geometry.vectors import measure_longest_edges
 from damageest.geometry.voxels import VoxelGrid, measure_bounds
 
-CUBE = 40.0
-"""Edge of a cube, in tolerances."""
 MOST_ALONG = 100
-"""Largest number of cubes along an axis: on a part of more tolerances they are larger."""
+"""Largest number of cubes along an axis: on a larger part they are larger."""
 POOR = 0.15
 """Share of the usual number of intact points for its skin below which a cube has few of them."""
 PLACES = 8
@@ -66,17 +64,17 @@ class NearCubes:
         return count > 0
 
 
-def find_cubes_near(part: Mesh, places: Floats, intact: Floats, tolerance: float) -> NearCubes:
+def find_cubes_near(part: Mesh, places: Floats, intact: Floats, edge: float) -> NearCubes:
     """The cubes of the part's skin near damage.
 
-    These are the cubes with one of the damaged ``places`` (N,3), cubes connected to them whose skin has few of the
-    ``intact`` points (M,3), and the cubes round both.
+    These are the cubes of ``edge``, or more where there were too many, with one of the damaged ``places`` (N,3), cubes
+    connected to them whose skin has few of the ``intact`` points (M,3), and the cubes round both.
     """
     from scipy.ndimage import binary_dilation, label
 
     every = [measure_bounds(points) for points in (part.vertices, places, intact) if len(points)]
     low, high = measure_bounds(np.concatenate(every))
-    size = max(CUBE * tolerance, float((high - low).max()) / MOST_ALONG)
+    size = max(edge, float((high - low).max()) / MOST_ALONG)
     low = low - 2 * size
     grid = VoxelGrid(low, size, np.ceil((high - low) / size).astype(np.int64) + 3)
     total = int(np.prod(grid.shape))

@@ -133,7 +133,7 @@ BY_SITE: Route = (
 )
 AT_ONCE: Route = (
     where_taken(  # nearby
-        sample_near_damage,  # part, aligned, deviation, sites, tolerance -> nearby
+        sample_near_damage,  # part, aligned, deviation, sites, tolerance, encloser_at_once -> nearby
         by=(EncloseAll,),
     ),
     EncloseAll,  # part, aligned, deviation, sites, samples, nearby, tolerance -> enclosures

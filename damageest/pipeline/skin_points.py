@@ -12,7 +12,12 @@ from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import Step, step
 from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.rules.notes import make_notes
+from damageest.stages.enclose import EncloseAll
 from damageest.stages.sample import Sample
+
+EDGE_SPACINGS, MOST_EDGE = 16.0, 40.0
+"""Edge of the cubes in which skin is near damage, in spacings of the scan and, at most, in tolerances: in cubes with
+fewer points it is a matter of chance whether the scan shows their skin."""
 
 
 def where_taken(item: Contract | Step[..., Any], by: Sequence[Contract]) -> Branch:
@@ -39,8 +44,12 @@ def note_unused(engine: Engine, samples: Samples | None) -> Reasons:
 
 
 @step(gives="nearby")
-def sample_near_damage(part: Part, aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float) -> Samples:
+def sample_near_damage(
+    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float, encloser_at_once: EncloseAll | None
+) -> Samples:
     """Points on the part's skin near the damaged points of the sites, a tolerance apart."""
     on_skin = (deviation.label == INTACT) | (deviation.label == ADDED)
     places, intact = aligned.points[sites.label > 0], aligned.points[on_skin]
-    return sample_near(part, find_cubes_near(part, places, intact, tolerance), tolerance)
+    reach = encloser_at_once.nearby_reach if encloser_at_once else MOST_EDGE
+    edge = max(reach * tolerance, min(EDGE_SPACINGS * aligned.spacing, MOST_EDGE * tolerance))
+    return sample_near(part, find_cubes_near(part, places, intact, edge), tolerance)

@@ -195,7 +195,8 @@ def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces
     state = state.with_value(JobState.sites, kept)
     if turned.samples is not None:
         state = state.with_value(JobState.samples, complement_samples(turned.samples))
-    nearby = sample_near_damage(part, turned.aligned, deviation, kept, turned.tolerance)
+    encloser = engine.job.stages.get(EncloseAll)
+    nearby = sample_near_damage(part, turned.aligned, deviation, kept, turned.tolerance, encloser)
     state = state.with_value(JobState.nearby, complement_samples(nearby))
     origin = part.bounds.mean(axis=0)
     whole = to_manifold(part, origin)

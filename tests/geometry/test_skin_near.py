@@ -13,7 +13,7 @@ from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin_near import find_cubes_near, sample_near
 from tests.geometry.shapes import box, torus
 
-TOLERANCE = 0.1
+TOLERANCE, EDGE = 0.1, 4.0
 
 
 def as_part(mesh: Mesh) -> Part:
@@ -28,12 +28,12 @@ def test_no_place_near_the_damage_is_far_from_a_point(mesh: Mesh) -> None:
     skin, _ = sample_by_area(part, 60_000, rng)
     centre = part.vertices[0]
     is_lost = np.linalg.norm(skin - centre, axis=1) < 2
-    near = find_cubes_near(part, skin[is_lost], skin[~is_lost], TOLERANCE)
+    near = find_cubes_near(part, skin[is_lost], skin[~is_lost], EDGE)
     found = sample_near(part, near, TOLERANCE)
     asked = near.holds(skin)
-    assert asked[np.linalg.norm(skin - centre, axis=1) < 40 * TOLERANCE].all()
+    assert asked[np.linalg.norm(skin - centre, axis=1) < EDGE].all()
     # at the border of the cubes the nearest point may lie beyond it
-    inner = asked & (np.linalg.norm(skin - centre, axis=1) < 39 * TOLERANCE)
+    inner = asked & (np.linalg.norm(skin - centre, axis=1) < EDGE - TOLERANCE)
     assert cKDTree(found.points).query(skin[inner])[0].max() <= found.spacing
     assert near.holds(found.points).all()
     assert distance_to_mesh(found.points, part).max() < 1e-9
@@ -47,7 +47,7 @@ def test_skin_that_the_scan_does_not_show_is_near_where_it_begins_at_the_damage(
     skin, _ = sample_by_area(part, 60_000, rng)
     is_lost = np.linalg.norm(skin - part.bounds[1], axis=1) < 2
     is_bare = (skin[:, 2] > 9.9) & (skin[:, 0] > -10)  # a strip of the top, from the damage on
-    near = find_cubes_near(part, skin[is_lost], skin[~is_lost & ~is_bare], TOLERANCE)
+    near = find_cubes_near(part, skin[is_lost], skin[~is_lost & ~is_bare], EDGE)
     assert near.holds(skin[is_bare]).all()
-    other = find_cubes_near(part, skin[is_lost], skin[~is_lost], TOLERANCE)
+    other = find_cubes_near(part, skin[is_lost], skin[~is_lost], EDGE)
     assert not other.holds(skin[is_bare]).all()

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.distance import SurfaceTree
-from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.stages.align._points import OrientedPoints
 
 Floats32 = NDArray[np.float32]
@@ -81,17 +80,19 @@ class PlaneGrid:
 
     @classmethod
     def build(cls, target: PartSurface, samples: OrientedPoints, margin: float = 0.12) -> PlaneGrid:
-        """The grid of a part. Cells farther than `NEAR` from all ``samples`` of its skin get the plane of the nearest
-        sample: exact searches from far away cost most, and there only which side a point lies on counts."""
+        """The grid of a part. Cells farther than `NEAR` from all ``samples`` of its skin get the plane of a sample in
+        the nearest cell that has one: searches from far away cost most, and there only which side a point lies on
+        counts."""
         low, high = target.mesh.bounds + np.array([[-margin], [margin]])
         cell = float(np.prod(high - low) / CELLS) ** (1 / 3)
         shape = np.ceil((high - low) / cell).astype(int)
         axes = [low[k] + (np.arange(shape[k]) + 0.5) * cell for k in range(3)]
         centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        away, index = find_neighbours(centres, 1, samples.points)
-        foot, normal = samples.points[index[:, 0]], samples.normals[index[:, 0]]
-        distance = np.copysign(away[:, 0], np.einsum("ij,ij->i", centres - foot, normal))
-        near = away[:, 0] < (NEAR if target.unseen is None else np.inf)  # samples lie on known skin alone
+        nearest = _find_sample_near(((samples.points - low) / cell).astype(np.int64), shape)
+        foot, normal = samples.points[nearest], samples.normals[nearest]
+        away = np.linalg.norm(centres - foot, axis=1)
+        distance = np.copysign(away, np.einsum("ij,ij->i", centres - foot, normal))
+        near = away < (NEAR if target.unseen is None else np.inf)  # samples lie on known skin alone
         distance[near], foot[near], face = target.closest(centres[near])
         normal[near] = target.normals[face]
         offset = -np.einsum("ij,ij->i", normal, foot)
@@ -105,3 +106,14 @@ class PlaneGrid:
         x, y, z = (np.clip(at[..., k], 0, self.shape[k] - 1).astype(np.int64) for k in range(3))
         cell: Ints = (x * self.shape[1] + y) * self.shape[2] + z
         return cell
+
+
+def _find_sample_near(at: Ints, shape: Ints) -> Ints:
+    """For each cell of a grid the number of one of the samples in the nearest cell that has some; ``at`` (N,3): the
+    samples' cells."""
+    from scipy.ndimage import distance_transform_edt
+
+    sample = np.full(shape, -1, np.int64)
+    sample[tuple(at.T)] = np.arange(len(at))
+    near = distance_transform_edt(sample < 0, return_distances=False, return_indices=True)
+    return np.asarray(sample[tuple(near)].ravel())

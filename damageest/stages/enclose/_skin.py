@@ -10,9 +10,11 @@ from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, P
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours, pick_one_per_cube
-from damageest.geometry.skin_near import CUBE, NearCubes
+from damageest.geometry.skin_near import NearCubes
 from damageest.geometry.voxels import measure_bounds, number_cubes
 
+CUBE = 20.0
+"""Edge, in tolerances, of the cubes round the skin samples outside of which no scan point counts."""
 NEARER = 0.4
 """Skin is held where an intact point is nearer than this share of the distance to the damaged points."""
 FAR = 8.0

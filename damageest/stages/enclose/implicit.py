@@ -83,6 +83,11 @@ class Implicit(EncloseAll):
             )
         return Enclosures(tuple(items))
 
+    @property
+    def nearby_reach(self) -> float:
+        """The samples have to hold the surface in all of the grid round a loss."""
+        return max(super().nearby_reach, self.margin)
+
     def _make_grid(self, points: Floats, tolerance: float) -> Grid:
         """A grid round the points (N,3) of a loss."""
         from damageest.geometry.poisson import make_grid
