@@ -13,6 +13,7 @@ from damageest.artefacts import Deviation, Floats, Mesh, Part, Samples, Scan, Si
 from damageest.geometry.solids import to_arrays
 from damageest.pipeline.skin_points import sample_near_damage
 from damageest.stages.cluster.dbscan import Dbscan
+from damageest.stages.enclose.implicit import Implicit
 from damageest.stages.segment.mesh_distance import MeshDistance
 
 NOISE = 0.02
@@ -37,7 +38,7 @@ class Scene:
     @cached_property
     def nearby(self) -> Samples:
         """Points on the skin near the damage."""
-        return sample_near_damage(**self.inputs())
+        return sample_near_damage(**self.inputs(), encloser_at_once=Implicit())
 
     def of_sites(self) -> Floats:
         return self.aligned.points[self.sites.label > 0]

@@ -18,7 +18,7 @@ SPREAD_BYTES, THIN_BYTES, TRIANGLE_BYTES = 170, 210, 260
 """Memory to spread a point, to choose from it, and for each triangle, measured."""
 MANY = 300_000
 """Points from which on fewer of them are compared in pairs at first; those that are then too far from all are next."""
-FINE = 0.4
+FINE = 0.5
 """Step of the first points on triangles that are too small for a grid of their own, in spacings."""
 
 
@@ -99,11 +99,15 @@ def thin(points: Floats, apart: float, reach: float) -> Ints:
     _require_memory(THIN_BYTES * len(points), len(points))
     # First keep few points per disc: on very fine meshes the pairs of points would not fit in memory.
     todo = _pick_one_per_cell(points, (0.4 if len(points) < MANY else 0.8) * apart)
-    kept = np.empty(0, np.int64)
+    kept, rest = np.empty(0, np.int64), np.ones(len(points), bool)
     while len(todo):
         kept = np.concatenate([kept, todo[_pick_apart(points[todo], apart)]])
-        far, _ = cKDTree(points[kept]).query(points, workers=count_threads())
-        todo = _pick_one_per_cell(points, 0.2 * apart, np.flatnonzero(far > reach))
+        rest[todo] = False  # each of them is within ``apart`` of one that was kept
+        asked = np.flatnonzero(rest)
+        if len(asked):
+            tree = cKDTree(points[kept])
+            rest[asked] = tree.query(points[asked], distance_upper_bound=reach, workers=count_threads())[0] > reach
+        todo = _pick_one_per_cell(points, 0.2 * apart, np.flatnonzero(rest))
     return np.sort(kept)
 
 

@@ -82,7 +82,7 @@ class PlaneGrid:
     def build(cls, target: PartSurface, samples: OrientedPoints, margin: float = 0.12) -> PlaneGrid:
         """The grid of a part. Cells farther than `NEAR` from all ``samples`` of its skin get the plane of a sample in
         the nearest cell that has one: searches from far away cost most, and there only which side a point lies on
-        counts."""
+        counts. All such cells that are connected lie on one side."""
         low, high = target.mesh.bounds + np.array([[-margin], [margin]])
         cell = float(np.prod(high - low) / CELLS) ** (1 / 3)
         shape = np.ceil((high - low) / cell).astype(int)
@@ -93,6 +93,7 @@ class PlaneGrid:
         away = np.linalg.norm(centres - foot, axis=1)
         distance = np.copysign(away, np.einsum("ij,ij->i", centres - foot, normal))
         near = away < (NEAR if target.unseen is None else np.inf)  # samples lie on known skin alone
+        distance[~near] = _choose_side(distance, ~near.reshape(shape))
         distance[near], foot[near], face = target.closest(centres[near])
         normal[near] = target.normals[face]
         offset = -np.einsum("ij,ij->i", normal, foot)
@@ -117,3 +118,14 @@ def _find_sample_near(at: Ints, shape: Ints) -> Ints:
     sample[tuple(at.T)] = np.arange(len(at))
     near = distance_transform_edt(sample < 0, return_distances=False, return_indices=True)
     return np.asarray(sample[tuple(near)].ravel())
+
+
+def _choose_side(distance: Floats, is_far: Flags) -> Floats:
+    """The signed distances of the far cells of a grid, ``is_far`` (X,Y,Z); each connected set of them has the sign that
+    most of its ``distance`` (X*Y*Z,) have."""
+    from scipy.ndimage import label
+
+    far = is_far.ravel()
+    number = label(is_far)[0].ravel()[far]
+    votes = np.bincount(number, np.sign(distance[far]))
+    return np.copysign(distance[far], votes[number])

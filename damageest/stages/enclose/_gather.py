@@ -18,7 +18,7 @@ from damageest.geometry.neighbourhoods import (
 from damageest.geometry.poisson import Grid, GridValues, refine_field
 from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.stages.enclose._loss_surface import build_surface
-from damageest.stages.enclose._skin import SkinSamples, find_held, look_at_skin, push_outward
+from damageest.stages.enclose._skin import BESIDE, SkinSamples, find_held, look_at_skin, push_outward
 
 OF_SITE = 0.05
 """Share of the points of a site from which a group holds the site; a few stray ones do not."""
@@ -99,11 +99,9 @@ def sort_losses(
     ``band``: width of skin round the damaged points that counts as neither lost nor intact, in tolerances.
     """
     points, label, grown, of_scan = _grow_to_rim(aligned, deviation, sites, tolerance)
-    skin = look_at_skin(part, aligned, deviation, grown, nearby, tolerance)
-    beside = np.maximum(band * tolerance, 1.6 * skin.usual)
-    away = find_neighbours(skin.points, 1, points, float(beside.max(initial=0.0)))[0][:, 0]
-    free = away < beside
-    asked = np.flatnonzero(free & (away >= band * tolerance))
+    skin = look_at_skin(part, aligned, deviation, points, grown, nearby, tolerance, band * tolerance)
+    free = skin.away < np.maximum(band * tolerance, BESIDE * skin.usual)
+    asked = np.flatnonzero(free & (skin.away >= band * tolerance))
     free[asked[find_held(part, aligned, deviation, of_scan, skin, asked, tolerance)]] = False
     above, depth = part.face_normals[deviation.face[of_scan]], -deviation.distance[of_scan]
     groups, lost_by = _group_losses(points, above, depth, label, skin, free, tolerance, aligned.spacing, aligned.noise)

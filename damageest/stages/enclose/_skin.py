@@ -9,12 +9,22 @@ import numpy as np
 from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Part, Samples, Scan
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.duplicates import group_integers
-from damageest.geometry.neighbourhoods import find_in_box, find_neighbours, pick_one_per_cube
+from damageest.geometry.neighbourhoods import (
+    find_in_box,
+    find_neighbours,
+    make_tree,
+    pick_one_per_cube,
+    query_neighbours,
+)
 from damageest.geometry.skin_near import NearCubes
 from damageest.geometry.voxels import measure_bounds, number_cubes
 
 CUBE = 20.0
 """Edge, in tolerances, of the cubes round the skin samples outside of which no scan point counts."""
+BESIDE = 1.6
+"""Distance from damaged points up to which skin is near them, in usual gaps of the scan."""
+SEEN = 2.0
+"""Distance to an intact point, in tolerances, up to which skin is seen however dense the scan is."""
 NEARER = 0.4
 """Skin is held where an intact point is nearer than this share of the distance to the damaged points."""
 FAR = 8.0
@@ -26,44 +36,72 @@ DEEP = 3.0
 @dataclass(frozen=True, eq=False)
 class SkinSamples:
     """``points`` (S,3) on the part's skin round the damage, and their outward ``normals`` (S,3). ``bare`` (S,): whether
-    no intact scan point is near and no added metal lies on it, though the scan is dense enough there. ``usual`` (S,):
-    the usual gap between the scan's points there."""
+    no intact scan point is near and no added metal lies on it, though the scan is dense enough there. ``away`` (S,):
+    the distance to the nearest damaged point, infinite where none is near. ``usual`` (S,): the usual gap between the
+    scan's points there; far from damaged points, where intact ones are near, that of all the skin."""
 
     points: Floats
     normals: Floats
     bare: Flags
+    away: Floats
     usual: Floats
 
 
 def look_at_skin(
-    part: Part, aligned: Scan, deviation: Deviation, grown: Flags, nearby: Samples, tolerance: float
+    part: Part,
+    aligned: Scan,
+    deviation: Deviation,
+    damaged: Floats,
+    grown: Flags,
+    nearby: Samples,
+    tolerance: float,
+    band: float,
 ) -> SkinSamples:
-    """The samples ``nearby``, with what the scan shows on each."""
+    """The samples ``nearby``, with what the scan shows on each. ``damaged`` (M,3): the damaged points; those ``grown``
+    (N,) of the scan are not intact. ``band``: width of skin round the damaged points that is near them."""
     intact = (deviation.label == INTACT) & ~grown
     added = deviation.label == ADDED
     points, normals = nearby.points, nearby.normals
     if not len(points):
-        return SkinSamples(points, normals, np.zeros(0, bool), np.zeros(0))
+        none = np.zeros(0)
+        return SkinSamples(points, normals, none > 0, none, none)
     hits = NearCubes.around(points, CUBE * tolerance).holds(aligned.points)
     keep = np.flatnonzero(hits & intact)
     hit = aligned.points[keep]
     if not len(hit):
-        return SkinSamples(points, normals, np.ones(len(points), bool), np.full(len(points), aligned.spacing))
+        usual = np.full(len(points), aligned.spacing)
+        away = _measure_away(points, damaged, max(band, BESIDE * aligned.spacing))
+        return SkinSamples(points, normals, np.ones(len(points), bool), away, usual)
     thin = pick_one_per_cube(hit, 0.35 * tolerance)
     hit, face = hit[thin], deviation.face[keep][thin]
-    usual = _measure_usual_gap(points, hit, tolerance)
+    gaps = _UsualGaps.measure(hit, tolerance)
+    away = _measure_away(points, damaged, max(band, BESIDE * gaps.most))
     # Skin under added metal has no scan points, but no metal is lost there: the places below the added points cover it.
     above = aligned.points[hits & added]
     if len(above):
         _, below, places = closest_on_mesh(above[pick_one_per_cube(above, 0.7 * tolerance)], part)
         hit, face = np.concatenate([hit, places]), np.concatenate([face, below])
-    outward = part.face_normals[face]
-    clear = np.maximum(1.5 * usual, 2 * tolerance)
     # The normal counts as fourth to sixth coordinate: points on the far side of a thin wall must not count here.
     weight = 1.5 * tolerance
-    among, asked = (np.concatenate([at, weight * way], axis=1) for at, way in ((hit, outward), (points, normals)))
-    gap = find_neighbours(asked, 1, among, float(clear.max()) * 1.001)[0][:, 0]
-    return SkinSamples(points, normals, gap > clear, usual)
+    among, asked = (
+        np.concatenate([at, weight * way], axis=1) for at, way in ((hit, part.face_normals[face]), (points, normals))
+    )
+    tree = make_tree(among)
+    gap = query_neighbours(tree, asked, 1, SEEN * tolerance)[0][:, 0]
+    is_open = ~np.isfinite(gap)
+    usual = np.full(len(points), gaps.typical)
+    told = np.flatnonzero(is_open | np.isfinite(away))
+    usual[told] = gaps.find_at(points[told])
+    clear = np.maximum(1.5 * usual[is_open], SEEN * tolerance)
+    bare = np.zeros(len(points), bool)
+    reach = float(clear.max(initial=0.0)) * 1.001
+    bare[is_open] = query_neighbours(tree, asked[is_open], 1, reach)[0][:, 0] > clear
+    return SkinSamples(points, normals, bare, away, usual)
+
+
+def _measure_away(points: Floats, damaged: Floats, reach: float) -> Floats:
+    """The distance (S,) to the nearest of the damaged points, infinite from ``reach`` on."""
+    return find_neighbours(points, 1, damaged, reach)[0][:, 0]
 
 
 def find_held(
@@ -103,18 +141,37 @@ def find_held(
     return np.asarray(held)
 
 
-def _measure_usual_gap(points: Floats, hit: Floats, tolerance: float) -> Floats:
-    """Radius (S,) that holds six intact points, measured at the intact points nearest to each skin sample. Far from all
-    of them, where a search takes longest, one sample stands for those of its cube."""
-    edge = 3 * tolerance
-    some = hit[pick_one_per_cube(hit, edge)]
-    radius = find_neighbours(some, 7, hit)[0][:, -1]
-    distance, index = find_neighbours(points, 6, some, FAR * edge)
-    far = np.flatnonzero(~np.isfinite(distance[:, -1]))
-    if len(far):
-        first, cube, _ = group_integers(number_cubes(points[far], edge)[1])
-        index[far] = find_neighbours(points[far[first]], index.shape[1], some)[1][cube]
-    return np.asarray(np.median(radius[index], axis=1))
+@dataclass(frozen=True, eq=False)
+class _UsualGaps:
+    """The radius (K,) that holds six intact points, at intact ``points`` (K,3), one in each cube of ``edge``."""
+
+    points: Floats
+    radius: Floats
+    edge: float
+
+    @classmethod
+    def measure(cls, hit: Floats, tolerance: float) -> _UsualGaps:
+        """From the intact points (N,3) near the samples."""
+        some = hit[pick_one_per_cube(hit, 3 * tolerance)]
+        return cls(some, find_neighbours(some, 7, hit)[0][:, -1], 3 * tolerance)
+
+    @property
+    def most(self) -> float:
+        return float(self.radius.max())
+
+    @property
+    def typical(self) -> float:
+        return float(np.median(self.radius))
+
+    def find_at(self, places: Floats) -> Floats:
+        """The median (S,) of the radii at the points nearest to each of the places (S,3). Far from all of them, where a
+        search takes longest, one place stands for those of its cube."""
+        distance, index = find_neighbours(places, 6, self.points, FAR * self.edge)
+        far = np.flatnonzero(~np.isfinite(distance[:, -1]))
+        if len(far):
+            first, cube, _ = group_integers(number_cubes(places[far], self.edge)[1])
+            index[far] = find_neighbours(places[far[first]], index.shape[1], self.points)[1][cube]
+        return np.asarray(np.median(self.radius[index], axis=1))
 
 
 def push_outward(part: Part, skin: Floats, outward: Floats, push: float) -> Floats:

@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from damageest.artefacts import Enclosures, Sites
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import iou, to_manifold, to_solid, unite
+from damageest.pipeline.skin_points import sample_near_damage
 from damageest.stages.enclose.implicit import Implicit
+from damageest.stages.sample.edge_aware import EdgeAware
 from tests.scenes import TOLERANCE, Scene, scene
 
 
@@ -122,3 +125,15 @@ def test_more_points_give_a_better_surface_where_it_is_curved() -> None:
         errors.append(sum(body.volume() for body in differs) / (case.truth.area / 2) / TOLERANCE)
     assert errors[0] < 0.08
     assert errors[0] < 0.5 * errors[1]
+
+
+def test_skin_samples_reach_as_far_as_the_grid_does() -> None:
+    case, wide = scene("edge"), Implicit(margin=60)
+    nearby = sample_near_damage(**case.inputs(), encloser_at_once=wide)
+    skin = EdgeAware().run(part=case.part, tolerance=10 * TOLERANCE).points
+    reached = KDTree(case.of_sites()).query(skin)[0] < 60 * TOLERANCE
+    assert KDTree(nearby.points).query(skin[reached])[0].max() < nearby.spacing
+    assert len(case.nearby.points) < 0.7 * len(nearby.points), "the default margin needs fewer"
+    (item,) = enclose_with(case, wide, nearby=nearby).items
+    (piece,) = intersect_pieces(case, Enclosures((item,)))
+    assert iou(piece, case.truth) > 0.97
