@@ -53,7 +53,8 @@ class LargeScan:
                     sound &= kept
                 scan = Scan(
                     points,
-                    unit=canonical_unit(self.unit),
+                    piece.normals,
+                    canonical_unit(self.unit),
                     viewpoints=None if viewpoints is None or view is None else viewpoints * factor,
                     view=None if viewpoints is None or view is None else view.astype(np.int32),
                     colours=piece.colours,
@@ -73,8 +74,8 @@ class LargeScan:
         found = joined.take()
         notes = (*units.notes(), *confidence.notes())
         scan = make_scan(
-            found.points, None, self.unit, paths=paths, notes=notes, viewpoints=found.viewpoints, view=found.view,
-            colours=found.colours, confidence=found.confidence,
+            found.points, found.normals, self.unit, paths=paths, notes=notes, viewpoints=found.viewpoints,
+            view=found.view, colours=found.colours, confidence=found.confidence,
         )  # fmt: skip
         return replace(scan, total=self.count, warnings=(*units.warnings(), *confidence.warnings()))
 
@@ -127,9 +128,11 @@ class JoinedViews:
         points = np.concatenate([piece.points for piece in pieces]) if pieces else np.empty((0, 3))
         view = np.concatenate(views) if pieces else np.empty(0, np.int32)
         known = bool((view >= 0).any())
+        normals = [piece.normals for piece in pieces if piece.normals is not None]
         colours, confidence = join_attributes(pieces)
         return Scan(
             points,
+            np.concatenate(normals) if normals and len(normals) == len(pieces) else None,
             viewpoints=np.array(self._places) if known else None,
             view=view if known else None,
             colours=colours,

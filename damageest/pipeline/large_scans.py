@@ -61,7 +61,7 @@ def add_points_near_damage(
     """Adds all points near damage to the scan. The spacing is then that near damage."""
     assert reader is not None  # as `where_thinned` asks
     place = _Place(part, pose.T_part_scan, tolerance)
-    most = max(len(scan.points), 1_000_000)
+    most = max(len(scan.points) // 2, 1_000_000)
 
     def read() -> Iterator[Scan]:
         pieces = _crop(_read(engine, reader, unit), reader.crop)
@@ -138,7 +138,7 @@ def _gather(read: Callable[[], Iterator[Scan]], place: _Place, most: int, scan: 
     for piece in read():
         chosen = place.is_in(piece.points, cubes)
         count += int(chosen.sum())
-        joined.add(piece, chosen, rng)
+        joined.add(replace(piece, normals=None), chosen, rng)  # only the alignment takes normals
         joined.halve_to(most)
     added = joined.take()
     points, view = added.points, added.view

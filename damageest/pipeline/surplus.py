@@ -195,7 +195,8 @@ def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces
     state = state.with_value(JobState.sites, kept)
     if turned.samples is not None:
         state = state.with_value(JobState.samples, complement_samples(turned.samples))
-    encloser = engine.job.stages.get(EncloseAll)
+    encloser = engine.job.stages[EncloseAll]
+    assert isinstance(encloser, EncloseAll)  # as it is called below
     nearby = sample_near_damage(part, turned.aligned, deviation, kept, turned.tolerance, encloser)
     state = state.with_value(JobState.nearby, complement_samples(nearby))
     origin = part.bounds.mean(axis=0)

@@ -1,6 +1,6 @@
 """Point files read in pieces, for scans that do not fit into memory: PLY, NPY, LAS, LAZ, E57.
 
-A piece is what `read_points` gives of the same points, without normals.
+A piece is what `read_points` gives of the same points.
 """
 
 from __future__ import annotations
@@ -74,7 +74,12 @@ def _open_npy(path: Path) -> PointStream | None:
         return None
     row = np.dtype((kind, (shape[1],)))
     _check_size(path, begin, shape[0], row.itemsize)
-    return PointStream(path, shape[0], lambda: (PointFile(_take(p[:, :3])) for p in _slice(path, begin, shape[0], row)))
+
+    def start() -> Iterator[PointFile]:
+        for piece in _slice(path, begin, shape[0], row):
+            yield PointFile(_take(piece[:, :3]), _take(piece[:, 3:]) if shape[1] == 6 else None)
+
+    return PointStream(path, shape[0], start)
 
 
 def _open_ply(path: Path) -> PointStream | None:
@@ -88,7 +93,7 @@ def _open_ply(path: Path) -> PointStream | None:
 
     def start() -> Iterator[PointFile]:
         for block in read_blocks(path, header, PIECE):
-            yield replace(make_points(block, header), normals=None, unit=unit, unit_said=said)
+            yield replace(make_points(block, header), unit=unit, unit_said=said)
 
     return PointStream(path, vertex.count, start)
 
@@ -140,9 +145,9 @@ def _read_e57(path: Path) -> Iterator[PointFile]:
             while got := reader.read():
                 raw = {name: values[:got] for name, values in data.items()}
                 known = known if known is not None else posed or "sphericalRange" in raw or is_range_image(raw)
-                points, _, colours = read_scan(header, raw, index)
+                points, normals, colours = read_scan(header, raw, index)
                 view = np.full(len(points), index if known else -1)
-                yield PointFile(points, unit="m", viewpoints=positions, view=view, colours=colours)
+                yield PointFile(points, normals, "m", viewpoints=positions, view=view, colours=colours)
             reader.close()
 
 

@@ -11,6 +11,7 @@ from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, field_s
 
 from damageest.artefacts import Reason, Scan
 from damageest.errors import InputError
+from damageest.geometry.crops import PieceCrop
 from damageest.geometry.units import UnitOption
 from damageest.io.large_scans import LargeScan, open_large_scan
 from damageest.io.points import READERS
@@ -21,6 +22,10 @@ from damageest.stages import JobPath
 from damageest.stages.scan import ReadScan
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+
+
+MOST_WHOLE = 10_000_000
+"""Points up to which a file is read whole where a crop needs all of them and the job does not say how many."""
 
 
 class ViewFile(Options):
@@ -79,7 +84,7 @@ class ScanFile(ReadScan):
         "scale of the file; default: none is",
     )
     most_points: int = Field(
-        10_000_000,
+        4_000_000,
         ge=0,
         description="of a larger file (PLY, NPY, LAS, LAZ, E57) about so many points are used, chosen evenly, and all "
         "near damage in addition; 0: all points, whatever memory they need",
@@ -140,11 +145,11 @@ class ScanFile(ReadScan):
     def _open_large(self, unit: str) -> LargeScan | None:
         if not self.most_points:
             return None
-        files = self._list_files()
+        files, most = self._list_files(), self.most_points
+        if "most_points" not in self.model_fields_set and any(isinstance(crop, PieceCrop) for crop in self.crop):
+            most = MOST_WHOLE
         places = [file.viewpoint for file in files]
-        return open_large_scan(
-            [file.path for file in files], unit, self.unit, places, self.most_points, self.min_confidence
-        )
+        return open_large_scan([file.path for file in files], unit, self.unit, places, most, self.min_confidence)
 
     def _list_files(self) -> list[ViewFile]:
         """The files, those of folders among them, with the positions of their scanners."""

@@ -71,6 +71,23 @@ def test_a_truncated_file_is_refused(suffix: str, cloud: np.ndarray, tmp_path: P
         ScanFile(path=path, most_points=1000).run("mm")
 
 
+@pytest.mark.parametrize("suffix", ["npy", "ply"])
+def test_a_thinned_scan_keeps_its_normals(suffix: str, cloud: np.ndarray, tmp_path: Path) -> None:
+    path = tmp_path / f"scan.{suffix}"
+    normals = cloud / np.linalg.norm(cloud, axis=1, keepdims=True)
+    if suffix == "npy":
+        np.save(path, np.column_stack([cloud, normals]))
+    else:
+        columns = ("x", "y", "z", "nx", "ny", "nz")
+        write_points(path, dict(zip(columns, (*cloud.T, *normals.T), strict=True)))
+    whole, few = (ScanFile(path=path, most_points=most).run("mm") for most in (0, 1000))
+    assert few.total == len(cloud)
+    assert whole.normals is not None
+    assert few.normals is not None
+    of = {tuple(point): normal for point, normal in zip(whole.points, whole.normals, strict=True)}
+    np.testing.assert_allclose(few.normals, [of[tuple(point)] for point in few.points], atol=1e-12)
+
+
 def write_job(folder: Path, most_points: int, **more: object) -> Path:
     damaged_box.write(folder)
     points = damaged_box.scan(POINTS).astype(np.float32)
@@ -102,6 +119,13 @@ def test_crops_hold_for_the_points_added(tmp_path: Path) -> None:
         write_job(tmp_path, POINTS // 4, crop=[{"keep": "box", "min": low, "max": [0, 30, 30]}]), settings=[]
     )
     assert few.scan.points[:, 0].max() <= 0
+
+
+def test_a_file_is_read_whole_for_a_crop_that_needs_all_points(tmp_path: Path) -> None:
+    count = ScanFile.model_fields["most_points"].default + 1000
+    np.save(tmp_path / "scan.npy", np.random.default_rng(0).random((count, 3), dtype=np.float32))
+    assert ScanFile(path=tmp_path / "scan.npy").run("mm").total == count
+    assert not ScanFile(path=tmp_path / "scan.npy", crop=[{"keep": "largest piece"}]).run("mm").total
 
 
 def test_a_crop_that_needs_all_points_is_refused(tmp_path: Path) -> None:
