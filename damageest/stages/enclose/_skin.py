@@ -10,14 +10,13 @@ from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, P
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import (
-    find_in_box,
     find_neighbours,
     make_tree,
     pick_one_per_cube,
     query_neighbours,
 )
 from damageest.geometry.skin_near import NearCubes
-from damageest.geometry.voxels import measure_bounds, number_cubes
+from damageest.geometry.voxels import number_cubes
 
 CUBE = 20.0
 """Edge, in tolerances, of the cubes round the skin samples outside of which no scan point counts."""
@@ -118,9 +117,7 @@ def find_held(
     width = float(np.median(skin.usual[asked]))
     on_skin = (deviation.label == INTACT) & (deviation.distance >= -max(2 * aligned.noise, 0.1 * tolerance))
     on_skin[damaged] = False
-    low, high = measure_bounds(skin.points[asked]) + 2 * width * np.array([[-1.0], [1.0]])
-    near = find_in_box(aligned.points, low, high)
-    intact = near[on_skin[near]]
+    intact = np.flatnonzero(on_skin & NearCubes.around(skin.points[asked], 2 * width).holds(aligned.points))
     is_deep = -deviation.distance[damaged] >= width
     feet = aligned.points[damaged] - deviation.distance[damaged, None] * part.face_normals[deviation.face[damaged]]
     if not len(intact) or is_deep.all():

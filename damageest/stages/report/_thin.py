@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.neighbourhoods import pick_one_per_cube
 from damageest.geometry.voxels import number_cubes
+
+ENOUGH = 8
+"""Points for each one that is shown, among which these are chosen."""
 
 
 def thin_points(points: Floats, most: int) -> Ints:
@@ -13,15 +17,18 @@ def thin_points(points: Floats, most: int) -> Ints:
     chosen = np.arange(len(points))
     if len(points) <= most:
         return chosen
-    edge = float(np.linalg.norm(np.ptp(points, axis=0))) / np.sqrt(most)
+    if len(points) > ENOUGH * most:  # cubes are filled by chance, as by all points
+        chosen = np.flatnonzero(np.random.default_rng(0).random(len(points)) < ENOUGH * most / len(points))
+    some = points[chosen]
+    edge = float(np.linalg.norm(np.ptp(some, axis=0))) / np.sqrt(most)
     for _ in range(12):
-        first = np.unique(number_cubes(points, edge)[1], return_index=True)[1]
+        first = pick_one_per_cube(some, edge)
         if len(first) > most:
-            return np.sort(first)[np.linspace(0, len(first) - 1, most).astype(np.int64)]
+            return chosen[first[np.linspace(0, len(first) - 1, most).astype(np.int64)]]
         if len(first) > 0.7 * most:
-            return np.sort(first)
+            break
         edge *= 0.8
-    return np.sort(first)
+    return chosen[first]
 
 
 def thin_mesh(mesh: Mesh, most: int) -> Mesh:
