@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Mesh, Part, Solid, Vector
 from damageest.errors import StageError
+from damageest.geometry.rays import RayCaster
 from damageest.geometry.refinement import halve_edges
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_manifold, to_solid
@@ -51,6 +53,42 @@ class Prepare(Options):
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Column:
+    """What lies above a ``floor`` (X,Y), heights at the nodes of a grid from ``corner`` (2,) on, ``cell`` apart, and
+    below the height ``top``."""
+
+    floor: Floats
+    corner: Floats
+    cell: float
+    top: float
+
+    @property
+    def places(self) -> Floats:
+        """The nodes (X,Y,2)."""
+        x, y = (self.corner[k] + self.cell * np.arange(self.floor.shape[k]) for k in range(2))
+        return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+
+    def raise_body(self) -> Any:
+        """The column as a Manifold."""
+        from manifold3d import Manifold, Mesh64
+
+        (nx, ny), count, places = self.floor.shape, self.floor.size, self.places.reshape(-1, 2)
+        # thin everywhere, so that the column is one closed body; its top lies above the damage
+        below = np.column_stack([places, np.minimum(self.floor.ravel(), self.top)])
+        above = np.column_stack([places, np.full(count, self.top + self.cell)])
+        number = np.arange(count).reshape(nx, ny)
+        a, b, c, d = (each.ravel() for each in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+        up = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+        ring = np.concatenate([number[:, 0], number[-1, 1:], number[-2::-1, -1], number[0, -2:0:-1]])
+        on = np.roll(ring, -1)
+        sides = [np.stack(one, axis=1) for one in ((ring, on, on + count), (ring, on + count, ring + count))]
+        faces = np.concatenate([up[:, ::-1], up + count, *sides])
+        body = Manifold(Mesh64(np.concatenate([below, above]), faces.astype(np.uint64)))
+        # what is only as high as the roof's plate is no opening
+        return body.trim_by_plane((0.0, 0.0, -1.0), -self.top)
+
+
 def open_cavity(
     damage: Solid, part: Part, others: Solid | None, prepare: Prepare, tolerance: float
 ) -> tuple[Solid, Solid | None]:
@@ -60,34 +98,15 @@ def open_cavity(
     Seen along the direction, the floor of the cavity is a height over a grid of the plane across it. It is lowered to
     the least cone round each of its places (an erosion by a cone, as of a grey image; Serra 1982), whose sides have the
     wall angle, and by a ball of the cutter's radius where it is narrower than the cutter. What lies above it, in the
-    part and not above the damage's highest place, is the cavity. ``others``: damage of other sites, which is left out.
+    part and not above the damage's highest place, is the cavity. Metal that stands over it and ends no higher above
+    that place than the damage is deep, as a shoulder, is removed too. ``others``: damage of other sites, left out.
 
     Raises StageError where the skin faces no direction, or nothing of the volume is left.
     """
-    from scipy import ndimage
-
     direction = _find_direction(damage, part, prepare)
     origin, turn = damage.bounds.mean(axis=0), turn_to_axis(direction).T
-    vertices = (damage.vertices - origin) @ turn.T
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    slope = 1 / np.tan(np.radians(prepare.wall_angle)) if prepare.wall_angle > 0 else np.inf
-    deep = float(high[2] - low[2]) + prepare.depth
-    out = deep / slope + 2 * prepare.min_radius if np.isfinite(slope) else 2 * prepare.min_radius
-    size = float((high - low)[:2].max()) + 2 * out
-    cell = max(min(tolerance, prepare.min_radius / FINE if prepare.min_radius else np.inf), size / NODES)
-    nx, ny = (np.ceil(((high - low)[:2] + 2 * out) / cell).astype(int) + 5).tolist()
-    corner = low[:2] - out - 2 * cell
-    floor = _lower_floor(Mesh(vertices, damage.faces), corner, (nx, ny), cell) - prepare.depth
-    top = float(high[2]) + tolerance / 4
-    floor = np.minimum(floor, top)
-    cone: Any = -_draw_cone(deep / slope, cell, slope) if np.isfinite(slope) else np.zeros((1, 1))
-    floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
-    if prepare.min_radius > 0:
-        # a ball leaves upright walls round its lower half, which then lean outward too
-        floor = _widen(floor, prepare.min_radius, cell, SHALLOW * cell)
-        floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
-    room = _raise_column(floor, corner, cell, top).simplify(tolerance / 8)
-    room = room.transform(np.column_stack([turn.T, np.zeros(3)]))
+    room = _raise_room(_turn(damage, origin, turn), _turn(part, origin, turn), prepare, tolerance)
+    room = room.simplify(tolerance / 8).transform(np.column_stack([turn.T, np.zeros(3)]))
     whole, lost = to_manifold(part, origin), to_manifold(damage, origin)
     # joined first: where faces coincide, as those of the damage with the skin, volumes may come out wrong
     opening = room + lost
@@ -100,6 +119,60 @@ def open_cavity(
     if cavity is None:
         raise StageError("the opened cavity is no solid", "use a slightly different prepare.wall_angle")
     return cavity, to_solid(opening, origin)
+
+
+def _turn(mesh: Mesh, origin: Floats, turn: Floats) -> Mesh:
+    return Mesh((mesh.vertices - origin) @ turn.T, mesh.faces)
+
+
+def _raise_room(damage: Mesh, part: Mesh, prepare: Prepare, tolerance: float) -> Any:
+    """The column over the floor of the opened cavity, a Manifold; damage and part with z along the direction."""
+    high, deep = float(damage.bounds[1, 2]), float(np.ptp(damage.bounds[:, 2])) + prepare.depth
+    top, limit = high + tolerance / 4, high + deep
+    column = _open_floor(damage, prepare, tolerance, deep, top)
+    rays = RayCaster(part)
+    if (_measure_metal(rays, part, column, top, limit) > 0).any():
+        # metal that is higher than the damage stands over it, and is removed where it is not a wall
+        higher = _open_floor(damage, prepare, tolerance, deep + limit - top, limit)
+        if np.isfinite(_measure_metal(rays, part, higher, top, limit)).all():
+            column = higher
+    return column.raise_body()
+
+
+def _open_floor(damage: Mesh, prepare: Prepare, tolerance: float, deep: float, top: float) -> _Column:
+    """The column over the floor of the opened cavity up to the height ``top``, from which it is ``deep``."""
+    from scipy import ndimage
+
+    low, high = damage.bounds[:, :2]
+    slope = 1 / np.tan(np.radians(prepare.wall_angle)) if prepare.wall_angle > 0 else np.inf
+    out = deep / slope + 2 * prepare.min_radius
+    size = float((high - low).max()) + 2 * out
+    cell = max(min(tolerance, prepare.min_radius / FINE if prepare.min_radius else np.inf), size / NODES)
+    nx, ny = (np.ceil((high - low + 2 * out) / cell).astype(int) + 5).tolist()
+    corner = low - out - 2 * cell
+    floor = np.minimum(_lower_floor(damage, corner, (nx, ny), cell) - prepare.depth, top)
+    cone: Any = -_draw_cone(deep / slope, cell, slope) if np.isfinite(slope) else np.zeros((1, 1))
+    floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
+    if prepare.min_radius > 0:
+        # a ball leaves upright walls round its lower half, which then lean outward too
+        floor = _widen(floor, prepare.min_radius, cell, SHALLOW * cell)
+        floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
+    return _Column(floor, corner, cell, top)
+
+
+def _measure_metal(rays: RayCaster, part: Mesh, column: _Column, start: float, end: float) -> Floats:
+    """How much higher than ``start`` (N,) metal reaches over the open nodes of a column: 0 where there is none, and
+    infinite where it goes on above ``end``. ``rays``: of the part."""
+    places = column.places[column.floor < column.top]
+    low, high = (np.column_stack([places, np.full(len(places), height)]) for height in (start, end))
+    face = rays.find_first(low, np.tile([0.0, 0.0, 1.0], (len(low), 1)))[1]
+    goes_on = (face >= 0) & (part.face_normals[face, 2] > 0)  # of those that cross nothing before the end
+    crossed, reach = rays.find_crossings(low, high), np.zeros(len(low))
+    last = np.flatnonzero(np.diff(crossed.ray, append=-1))
+    goes_on[crossed.ray[last]] = crossed.enters[last]
+    reach[crossed.ray[last]] = crossed.distance[last]
+    reach[goes_on] = np.inf
+    return reach
 
 
 def _find_direction(damage: Solid, part: Part, prepare: Prepare) -> Floats:
@@ -151,28 +224,3 @@ def _widen(floor: Floats, radius: float, cell: float, least: float) -> Floats:
     reached = [ndimage.grey_erosion(ndimage.grey_dilation(floor, **one), **one) for one in cutters]
     pressed = np.where(np.minimum(*reached) > floor + least, floor, floor.max())
     return np.asarray(np.minimum(floor, ndimage.grey_erosion(pressed, **shape(radius, True))))
-
-
-def _raise_column(floor: Floats, corner: Floats, cell: float, top: float) -> Any:
-    """What lies above a floor given at the nodes of a grid, up to a height; a Manifold."""
-    from manifold3d import Manifold, Mesh64
-
-    nx, ny = floor.shape
-    x, y = np.meshgrid(corner[0] + cell * np.arange(nx), corner[1] + cell * np.arange(ny), indexing="ij")
-    # thin everywhere, so that the column is one closed body; its top lies above the damage
-    roof = np.full(nx * ny, top + cell)
-    below = np.column_stack([x.ravel(), y.ravel(), np.minimum(floor.ravel(), top)])
-    above = np.column_stack([x.ravel(), y.ravel(), roof])
-    number = np.arange(nx * ny).reshape(nx, ny)
-    a, b, c, d = (each.ravel() for each in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
-    up = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    ring = np.concatenate([number[:, 0], number[-1, 1:], number[-2::-1, -1], number[0, -2:0:-1]])
-    on = np.roll(ring, -1)
-    count = nx * ny
-    sides = np.concatenate(
-        [np.stack([ring, on, on + count], axis=1), np.stack([ring, on + count, ring + count], axis=1)]
-    )
-    faces = np.concatenate([up[:, ::-1], up + count, sides])
-    body = Manifold(Mesh64(np.concatenate([below, above]), faces.astype(np.uint64)))
-    # what is only as high as the roof's plate is no opening
-    return body.trim_by_plane((0.0, 0.0, -1.0), -top)

@@ -23,9 +23,9 @@ def as_solid(body: Any) -> Solid:
     return found
 
 
-def prepare(tool: Any, **options: Any) -> tuple[Any, Any, Deposit]:
-    """The damage that a tool leaves in the block, the cavity that is made of it, and the deposit."""
-    block, damage = as_solid(BLOCK), as_solid(BLOCK ^ tool)
+def prepare(tool: Any, body: Any = BLOCK, **options: Any) -> tuple[Any, Any, Deposit]:
+    """The damage that a tool leaves in the body, the cavity that is made of it, and the deposit."""
+    block, damage = as_solid(body), as_solid(body ^ tool)
     part = Part(block.vertices, block.faces)
     made = Milling(prepare=options).run(damage=damage, part=part, tolerance=TOLERANCE, others=None)
     assert isinstance(made, Deposit)
@@ -69,6 +69,21 @@ def test_a_crack_becomes_as_wide_as_the_cutter() -> None:
 def test_depth_is_added_below() -> None:
     _, cavity, _ = prepare(Manifold.cube((16, 12, 12), True), wall_angle=0, depth=1.5)
     assert cavity.bounding_box()[2] == pytest.approx(-7.5, abs=0.01)
+
+
+@pytest.mark.parametrize(("height", "is_removed"), [(3.0, True), (30.0, False)])
+def test_a_shoulder_over_the_opening_is_removed_and_a_wall_stays(height: float, is_removed: bool) -> None:
+    raised = BLOCK + Manifold.cube((24, 40, height + 1)).translate((6, -20, -1))
+    lost, cavity, made = prepare(Manifold.cube((10, 12, 12), True), raised, wall_angle=30, direction=(0, 0, 1))
+    if is_removed:
+        over = [(cavity.translate((0, 0, up)) ^ (raised - cavity)).volume() for up in (0.5, 2.0, 4.0)]
+        assert max(over) < 1e-4 * lost.volume()
+        # the wall of the opening goes on at its angle up to the top of the shoulder
+        assert cavity.slice(2.9).bounds()[2] == pytest.approx(5 + 8.9 * np.tan(np.radians(30)), abs=0.4)
+    else:
+        assert cavity.bounding_box()[5] < 0.1
+    assert (lost - cavity).volume() < 1e-5 * lost.volume()
+    assert made.cut_back_volume == pytest.approx(cavity.volume() - lost.volume(), rel=1e-3)
 
 
 @pytest.mark.slow
