@@ -43,7 +43,9 @@ class Prepare(Options):
         20.0, ge=0, lt=80, description="least angle between a wall and the direction of the opening, in degrees"
     )
     undercut: Literal["remove"] = Field(
-        "remove", description="metal above the cavity, seen along the direction, is removed up to the damage's rim"
+        "remove",
+        description="metal above the cavity, seen along the direction, is removed up to the damage's rim, and above it "
+        "where it ends no higher than the damage is deep",
     )
     depth: float = Field(
         0.0, ge=0, allow_inf_nan=False, description="intact metal that is removed below the damage, in the job's unit"
