@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import find_duplicates, list_used
-from damageest.geometry.long_faces import build_tree
+from damageest.geometry.long_faces import Tree, build_tree
 from damageest.geometry.pseudonormals import keep_signed_mesh
 from damageest.geometry.vectors import measure_longest_edges, normalise
 from damageest.geometry.voxels import order_by_place
@@ -104,7 +104,8 @@ class SurfaceTree:
         self.mesh = mesh
 
     @cached_property
-    def _tree(self) -> tuple[Any, Floats, Ints, Ints]:
+    def tree(self) -> Tree:
+        """libigl's tree over short pieces of the triangles, and these."""
         return build_tree(self.mesh.vertices, self.mesh.faces)
 
     def closest(self, points: Floats) -> Closest:
@@ -116,7 +117,7 @@ class SurfaceTree:
             return _find_none()
         _require_some(self.mesh.faces, "triangle")
         order = order_by_place(points)
-        tree, vertices, faces, origin = self._tree
+        tree, vertices, faces, origin = self.tree
         query = np.ascontiguousarray(points[order], np.float64)
         squared, face, place = tree.squared_distance(vertices, faces, query)
         found = np.sqrt(np.ravel(squared)), origin[np.ravel(face)], np.reshape(place, (-1, 3))
@@ -191,7 +192,12 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     used = np.flatnonzero(~flat)
     _require_some(used, "triangle with an area")
     faces = mesh.faces[used]
-    signed, nearest, foot, pseudo = keep_signed_mesh(mesh, vertices, faces).measure(query)
+
+    def find_tree() -> Tree:
+        # that of plain distances is the same where no triangle is left out
+        return build_tree(vertices, faces) if flat.any() else keep_tree(mesh).tree
+
+    signed, nearest, foot, pseudo = keep_signed_mesh(mesh, vertices, faces, find_tree).measure(query)
     away = query - foot
     normal = normalise(mesh.cross[used[nearest]])
     beside = np.linalg.norm(np.cross(away, normal), axis=1) > 1e-7 * np.abs(signed)

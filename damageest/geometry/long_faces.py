@@ -14,6 +14,8 @@ import numpy as np
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.vectors import measure_longest_edges
 
+Tree = tuple[Any, Floats, Ints, Ints]
+"""libigl's tree of boxes, vertices (V,3) and the pieces (P,3) that it holds, and the triangle (P,) of each piece."""
 SHORT = 0.1
 """Longest edge of a piece, in diagonals of the mesh's bounds."""
 LOOSE = 3.0
@@ -50,7 +52,7 @@ def cut_long_faces(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, Ints]:
     return vertices, faces, numbers
 
 
-def build_tree(vertices: Floats, faces: Ints) -> tuple[Any, Floats, Ints, Ints]:
+def build_tree(vertices: Floats, faces: Ints) -> Tree:
     """libigl's tree of boxes over short pieces of triangles (F,3), and these as `cut_long_faces` gives them."""
     import igl
 

@@ -6,15 +6,15 @@ are. Where few points are asked of a mesh with many triangles, or triangles are 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
-from damageest.geometry.long_faces import build_tree
+from damageest.geometry.long_faces import Tree
 from damageest.geometry.threads import cut_evenly
 
 CHUNK = 10_000
@@ -29,14 +29,12 @@ _last: WeakKeyDictionary[Mesh, SignedMesh] = WeakKeyDictionary()
 
 @dataclass(frozen=True, eq=False)
 class SignedMesh:
-    """The ``vertices`` (V,3) and ``faces`` (F,3) of a watertight mesh, without flat ones, near the origin."""
+    """The ``vertices`` (V,3) and ``faces`` (F,3) of a watertight mesh, without flat ones, near the origin; ``tree``: as
+    `build_tree` gives it."""
 
     vertices: Floats
     faces: Ints
-
-    @cached_property
-    def _tree(self) -> tuple[Any, Floats, Ints, Ints]:
-        return build_tree(self.vertices, self.faces)
+    tree: Tree
 
     @cached_property
     def _normals(self) -> tuple[Floats, Floats, Floats, Ints]:
@@ -64,7 +62,7 @@ class SignedMesh:
             return np.empty(0), np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3))
         if not len(self.faces):  # libigl ends the process by a segmentation fault there
             raise ValueError("no distance: what it is measured to has no triangle; ask only where there is one")
-        tree, vertices, faces, origin = self._tree
+        tree, vertices, faces, origin = self.tree
         squared, found, place = tree.squared_distance(vertices, faces, points)
         face, place = origin[np.ravel(found)], np.reshape(place, (-1, 3))
         some = cut_evenly(len(points), CHUNK)
@@ -90,9 +88,10 @@ class SignedMesh:
         return np.asarray(found)
 
 
-def keep_signed_mesh(mesh: Mesh, vertices: Floats, faces: Ints) -> SignedMesh:
-    """The mesh as it was prepared by the last call, or now. ``vertices``, ``faces``: as of `SignedMesh`."""
+def keep_signed_mesh(mesh: Mesh, vertices: Floats, faces: Ints, find_tree: Callable[[], Tree]) -> SignedMesh:
+    """The mesh as it was prepared by the last call, or now. ``vertices``, ``faces``, what ``find_tree`` gives: as of
+    `SignedMesh`."""
     if (found := _last.get(mesh)) is None:
         _last.clear()
-        found = _last[mesh] = SignedMesh(vertices, faces)
+        found = _last[mesh] = SignedMesh(vertices, faces, find_tree())
     return found

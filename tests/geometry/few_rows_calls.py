@@ -170,7 +170,9 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "distance.signed_distance": call_signed,
     "distance.run_libigl_pass": call_both(distance.run_libigl_pass),
     "pseudonormals.SignedMesh": call_both(
-        lambda points, mesh: pseudonormals.SignedMesh(mesh.vertices, mesh.faces).measure(points)[0]
+        lambda points, mesh: pseudonormals.SignedMesh(
+            mesh.vertices, mesh.faces, long_faces.build_tree(mesh.vertices, mesh.faces)
+        ).measure(points)[0]
     ),
     "distance_by_cells.signed_distance_by_cells": call_by_cells,
     "duplicates.list_distinct": lambda r: expect(duplicates.list_distinct(r.numbers), (None,)),

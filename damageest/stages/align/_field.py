@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
-from damageest.geometry.distance import SurfaceTree
+from damageest.geometry.distance import SurfaceTree, keep_tree
 from damageest.stages.align._points import OrientedPoints
 
 Floats32 = NDArray[np.float32]
@@ -30,10 +30,13 @@ inside, which may be anything and speaks for no pose and against none."""
 @dataclass(frozen=True)
 class PartSurface:
     """The part, centred and scaled to a diagonal of 1, for exact closest-point queries. ``unseen`` (F,): triangles that
-    only close an earlier scan; None: of a part as designed."""
+    only close an earlier scan; None: of a part as designed. ``whole``: the part of diagonal ``size`` that it is made
+    of, whose tree is asked, since later stages ask it too; None: there is none but it."""
 
     mesh: Mesh
     unseen: Flags | None = None
+    whole: Mesh | None = None
+    size: float = 1.0
 
     @cached_property
     def known(self) -> Mesh:
@@ -42,7 +45,7 @@ class PartSurface:
 
     @cached_property
     def _tree(self) -> SurfaceTree:
-        return SurfaceTree(self.mesh)
+        return SurfaceTree(self.mesh) if self.whole is None else keep_tree(self.whole)
 
     @cached_property
     def normals(self) -> Floats:
@@ -55,7 +58,8 @@ class PartSurface:
 
         The sign is that of the nearest face. At a saddle-shaped corner it can be wrong; a robust fit tolerates that.
         """
-        distance, face, foot = self._tree.closest(points)
+        distance, face, foot = self._tree.closest(points * self.size)
+        distance, foot = distance / self.size, foot / self.size
         outward = np.einsum("ij,ij->i", points - foot, self.normals[face])
         signed = np.copysign(distance, outward)
         if self.unseen is not None:

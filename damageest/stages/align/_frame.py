@@ -60,7 +60,8 @@ class Frame:
             raise StageError(wrong, "set the unit of scan or part, or crop the scan to the part", topic="unit")
         size, centre = part.diagonal, part.bounds.mean(0)
         middle = np.median(scan.points[:: max(1, len(scan.points) // 100_000)], axis=0)
-        return cls(PartSurface(Mesh((part.vertices - centre) / size, part.faces), part.unseen), size, centre, middle)
+        scaled = Mesh((part.vertices - centre) / size, part.faces)
+        return cls(PartSurface(scaled, part.unseen, part, size), size, centre, middle)
 
     def scale_points(self, scan: Scan) -> Floats:
         """The scan's points (N,3), centred, in diagonals of the part."""
