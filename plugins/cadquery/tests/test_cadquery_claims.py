@@ -1,0 +1,79 @@
+"""CAD solids that claim larger tolerances for their edges than they need."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.needs import import_for, needs_plugin
+
+pytestmark = needs_plugin("cadquery")
+cq = import_for("cadquery", "cadquery")
+
+
+def make_claiming(claim: float) -> Any:
+    """A cylinder whose edges claim a tolerance that they do not need."""
+    from damageest_cadquery._read import explore
+    from OCP.BRep import BRep_Builder
+    from OCP.TopAbs import TopAbs_EDGE
+    from OCP.TopoDS import TopoDS
+
+    solid = cq.Workplane().cylinder(20, 10).val().wrapped
+    for edge in explore(solid, TopAbs_EDGE):
+        BRep_Builder().UpdateEdge(TopoDS.Edge_s(edge), claim)
+    return solid
+
+
+def split_at(solid: Any, z: float) -> list[float]:
+    """The volumes of what a plane divides a solid into."""
+    from damageest_cadquery._split import Tool, measure_volume, split
+
+    plane = cq.Face.makePlane(40, 40, (0, 0, z), (0, 0, 1)).wrapped
+    pieces = split(solid, 0, [(k, -1) for k in range(3)], Tool([plane], plane), 1e-6)
+    return sorted(measure_volume(piece.shape) for piece in pieces or ())
+
+
+def test_a_claim_that_is_not_needed_is_lowered() -> None:
+    from damageest_cadquery._claims import lower_claims
+
+    true = [np.pi * 100 * 0.5, np.pi * 100 * 19.5]
+    wrong = make_claiming(1.5)
+    assert split_at(wrong, 9.5) != pytest.approx(true, rel=1e-6), "OpenCASCADE takes the cut for the edge"
+    lowered = lower_claims(wrong, 0.002)
+    assert split_at(lowered, 9.5) == pytest.approx(true, rel=1e-6)
+    assert split_at(wrong, 9.5) != pytest.approx(true, rel=1e-6), "what was given is not changed"
+
+
+def test_other_claims_stay() -> None:
+    from damageest_cadquery._claims import lower_claims
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    small = make_claiming(0.001)
+    assert lower_claims(small, 0.002) is small
+    needed = make_gap(0.05)
+    assert BRepCheck_Analyzer(needed).IsValid()
+    assert lower_claims(needed, 0.002) is needed, "an edge that lies off its face needs what it claims"
+
+
+def make_gap(off: float) -> Any:
+    """A cylinder whose upper edge lies off its faces, and says so."""
+    from damageest_cadquery._read import explore
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+    from OCP.Geom import Geom_Circle
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_VERTEX
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    solid = BRepBuilderAPI_Copy(cq.Workplane().cylinder(20, 10).val().wrapped).Shape()
+    builder = BRep_Builder()
+    for edge in explore(solid, TopAbs_EDGE):
+        if cq.Edge(edge).geomType() == "CIRCLE" and cq.Edge(edge).Center().z > 9:
+            circle = Geom_Circle(gp_Ax2(gp_Pnt(0, 0, 10), gp_Dir(0, 0, 1)), 10 + off)
+            builder.UpdateEdge(TopoDS.Edge_s(edge), circle, TopLoc_Location(), 2 * off)
+    for corner in explore(solid, TopAbs_VERTEX):
+        builder.UpdateVertex(TopoDS.Vertex_s(corner), 2 * off)
+    return solid
