@@ -23,6 +23,7 @@ from damageest_cadquery._attempts import call, list_tools
 from damageest_cadquery._balance import Balance
 from damageest_cadquery._check import Measured, check_pieces, measure_inner_area
 from damageest_cadquery._cut import make_cut
+from damageest_cadquery._doubles import drop_doubles, find_doubles
 from damageest_cadquery._read import explore
 from damageest_cadquery._split import (
     Piece,
@@ -178,12 +179,13 @@ class _Work:
         found = _split_all(self.solids, tool, fuzzy, site.damage, self.tolerance)
         if found is None:
             return _Trial(Measured(0.0, "it does not separate the solid"))
-        pieces, rest = found
+        pieces, rest, doubles = found
         if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
             return _Trial(Measured(0.0, f"more than {MOST_FACES} faces"), is_final=True)
+        elsewhere = measure_inner_area(rest) - self.inner_before - measure_inner_area(doubles)
         measured = check_pieces(
-            kind, pieces, measure_inner_area(rest) - self.inner_before, self.bodies, site.damage, site.surface,
-            self.part, site.points, self.tolerance, self.faces, self.off,
+            kind, pieces, elsewhere, self.bodies, site.damage, site.surface, self.part, site.points, self.tolerance,
+            self.faces, self.off,
         )  # fmt: skip
         if not measured.reason and not is_sound([piece for piece in rest if piece not in self.solids]):
             measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)
@@ -208,7 +210,7 @@ def _count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> i
     alone = sum(body.volume > least for body in split_bodies(damage))
     if len({piece.owner for piece in solids}) < 2:
         return alone
-    lost, count = to_manifold(damage, origin), 0
+    lost, found = to_manifold(damage, origin), []
     for piece in solids:
         if not is_near(piece.shape, damage):
             continue
@@ -216,14 +218,15 @@ def _count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> i
             common = to_manifold(triangulate(piece.shape, tolerance / 16), origin) ^ lost
         except (InputError, ValueError):
             return alone
-        count += sum(body.volume() > least for body in common.decompose())
-    return count
+        found += [body for body in common.decompose() if body.volume() > least]
+    return len(found) - sum(find_doubles(found))
 
 
 def _split_all(
     solids: Sequence[Piece], tool: Tool, fuzzy: float, damage: Solid, tolerance: float
-) -> tuple[tuple[Piece, ...], tuple[Piece, ...]] | None:
-    """The pieces that are the damage volume, and all others; None where there are none of the first."""
+) -> tuple[tuple[Piece, ...], tuple[Piece, ...], tuple[Piece, ...]] | None:
+    """The pieces that are the damage volume, all others, and those that lie in other pieces of the damage volume; None
+    where there are none of the first."""
     taken: list[Piece] = []
     rest: list[Piece] = []
     try:
@@ -240,12 +243,13 @@ def _split_all(
                     taken.append(piece)
                 elif volume > SPECK * damage.volume:
                     rest.append(piece)
+        kept, doubles = drop_doubles(taken, damage.bounds.mean(axis=0), tolerance / 16)
     except Exception as error:
         # of the others, a piece that cannot be triangulated, or whose triangles do not close
         if not (is_opencascade_error(error) or isinstance(error, (InputError, ValueError))):
             raise
         return None
-    return (tuple(taken), tuple(rest)) if taken else None
+    return (kept, tuple(rest), doubles) if kept else None
 
 
 def _is_damage(piece: Piece, volume: float, damage: Solid, tolerance: float) -> bool:
