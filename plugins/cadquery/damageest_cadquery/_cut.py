@@ -77,7 +77,7 @@ def make_cut(damage: Solid, surface: Surface, part: Part, enclosures: Sequence[S
     chosen = _close_gaps(faces, chosen)
     rows, renumbered = np.unique(faces[chosen], return_inverse=True)
     mesh = Mesh(vertices[rows], renumbered.reshape(-1, 3))
-    cut = Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen])
+    cut = _drop_elsewhere(Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen]))
     cut = _smooth_outside(_drop_specks(_drop_horns(cut, surface, tolerance), tolerance), part, tolerance)
     for size in (tolerance, np.inf):
         mesh, origin = refine_crossings(cut.mesh, size)
@@ -85,6 +85,17 @@ def make_cut(damage: Solid, surface: Surface, part: Part, enclosures: Sequence[S
         if apart is not mesh:
             return Cut(apart, signed_distance(apart.vertices, part)[0], cut.core[origin])
     return cut
+
+
+def _drop_elsewhere(cut: Cut) -> Cut:
+    """The cut without what its continuation reaches of the part elsewhere, as where another site of the same enclosure
+    is near."""
+    own = np.zeros(len(cut.mesh.vertices), bool)
+    own[cut.mesh.faces[cut.core]] = True
+    dropped = ((cut.height < 0) & ~own)[cut.mesh.faces].any(axis=1)
+    if not dropped.any():
+        return cut
+    return _take_used(Cut(Mesh(cut.mesh.vertices, cut.mesh.faces[~dropped]), cut.height, cut.core[~dropped]))
 
 
 def _smooth_outside(cut: Cut, part: Part, tolerance: float) -> Cut:
