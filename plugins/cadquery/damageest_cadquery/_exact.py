@@ -7,6 +7,7 @@ few facets, more. Where planes explain most of it, they come before splines.
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -41,6 +42,9 @@ VOLUME = "its volume"
 """How the reason begins where the volume is refused."""
 WANTED = 0.003
 """Relative difference of the volumes, beside chords, from which later forms are tried too, and the nearest is taken."""
+NEARER, STALE = 0.75, 2
+"""A kind of form, but for facets, is given up where so many of it are off in volume by more than this share of the best
+one's: they follow the same planes."""
 SPECK = 1e-3
 """Share of the damage volume below which a body of it, or a piece that a split leaves over, is dropped."""
 
@@ -105,7 +109,7 @@ def find_exact(
         return None, ("no surface is known that cuts it out of the part",)
     bodies, refused = _count_bodies(site.damage, solids, tolerance), ""
     second: Exact | None = None
-    least = np.inf
+    least, stale, best = np.inf, Counter[str](), dict[str, float]()
     work = _Work(site, solids, faces, part, tolerance, off, bodies, measure_inner_area(solids))
     balance = Balance(solids, part, site.damage, tolerance)
     for form, make, fuzzies, shift in list_tools(cut, part, tolerance):
@@ -134,7 +138,9 @@ def find_exact(
                     # room for chords was larger than these: a later form may be nearer
                     tried.append(f"{form}: {VOLUME} differs by {off_by:+.2%} beside chords")
                     second = found if abs(off_by) < least else second
-                    least = min(least, abs(off_by))
+                    stale[kind] += kind != "facets" and abs(off_by) > NEARER * best.get(kind, np.inf)
+                    refused = kind if stale[kind] >= STALE else refused
+                    least, best[kind] = min(least, abs(off_by)), min(best.get(kind, np.inf), abs(off_by))
                     break
                 tried.append(f"{form}: {measured.reason}")
                 if trial.is_final:

@@ -77,3 +77,25 @@ def make_gap(off: float) -> Any:
     for corner in explore(solid, TopAbs_VERTEX):
         builder.UpdateVertex(TopoDS.Vertex_s(corner), 2 * off)
     return solid
+
+
+def test_a_corner_on_an_edge_of_the_part_is_not_off_the_part() -> None:
+    from damageest_cadquery._check import _measure_off
+    from damageest_cadquery._solids import explore_faces
+    from damageest_cadquery._split import Tool, find_corners, split
+
+    solid = make_gap(0.05)
+    faces, plane = explore_faces(solid), cq.Face.makePlane(40, 40, (3, 0, 0), (1, 0, 0)).wrapped
+    pieces = split(solid, 0, [(k, -1) for k in range(3)], Tool([plane], plane), 1e-6)
+    assert pieces is not None
+    assert len(pieces) == 2
+    count = 0
+    for piece in pieces:
+        for face, (number, _) in zip(explore_faces(piece.shape), piece.origins, strict=True):
+            corners = find_corners(face)
+            count += int((np.hypot(*corners.T[:2]) > 10.01).sum()) if number >= 0 else 0
+            if number >= 0:
+                assert _measure_off(face, faces[number], 1e-5) < 1e-6
+                moved = cq.Face(face).translate(cq.Vector(0.0, 0.03, 0.03)).wrapped
+                assert _measure_off(moved, faces[number], 1e-5) > 0.01, "other corners have to be on the face"
+    assert count > 4, "corners that lie off their face"
