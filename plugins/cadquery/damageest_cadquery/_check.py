@@ -14,6 +14,7 @@ from damageest_cadquery._read import explore
 from damageest_cadquery._shapes import subdivide
 from damageest_cadquery._split import Piece, find_corners, measure_volume
 
+INVALID = "not valid (BRepCheck)"
 VOLUME = 0.003
 """Largest relative difference of the volumes, beside what the triangles of the part cut off its curved faces."""
 LIMITS = {"shapes": (0.1, 2.0), "planes": (0.1, 2.0), "spline": (0.02, 1.5), "facets": (0.01, 1.0)}
@@ -70,7 +71,7 @@ def check_pieces(
         return Measured(volume, reason, *numbers)
 
     if not all(BRepCheck_Analyzer(piece.shape).IsValid() for piece in pieces):
-        return refuse("not valid (BRepCheck)")
+        return refuse(INVALID)
     shells = [shell for piece in pieces for shell in explore(piece.shape, TopAbs_SHELL)]
     if not all(BRep_Tool.IsClosed_s(TopoDS.Shell_s(shell)) for shell in shells):
         return refuse("not closed")

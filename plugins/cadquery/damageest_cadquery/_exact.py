@@ -17,25 +17,13 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Part, Solid, Surface
-from damageest.errors import InputError
-from damageest.geometry.bodies import split_bodies
-from damageest.geometry.solids import to_manifold
 from damageest_cadquery._attempts import call, list_tools
 from damageest_cadquery._balance import Balance
 from damageest_cadquery._check import Measured, check_pieces, measure_inner_area
 from damageest_cadquery._cut import make_cut
-from damageest_cadquery._doubles import drop_doubles, find_doubles
+from damageest_cadquery._pieces import count_bodies, take_pieces
 from damageest_cadquery._read import explore
-from damageest_cadquery._split import (
-    Piece,
-    Tool,
-    is_near,
-    is_opencascade_error,
-    is_sound,
-    measure_volume,
-    split,
-    triangulate,
-)
+from damageest_cadquery._split import Piece, Tool, is_sound
 
 MOST_FACES = 5000
 VOLUME = "its volume"
@@ -45,8 +33,6 @@ WANTED = 0.003
 NEARER, STALE = 0.75, 2
 """A kind of form, but for facets, is given up where so many of it are off in volume by more than this share of the best
 one's: they follow the same planes."""
-SPECK = 1e-3
-"""Share of the damage volume below which a body of it, or a piece that a split leaves over, is dropped."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +93,7 @@ def find_exact(
     cut = make_cut(site.damage, site.surface, part, site.enclosures, tolerance)
     if cut is None:
         return None, ("no surface is known that cuts it out of the part",)
-    bodies, refused = _count_bodies(site.damage, solids, tolerance), ""
+    bodies, refused = count_bodies(site.damage, solids, tolerance), ""
     second: Exact | None = None
     least, stale, best = np.inf, Counter[str](), dict[str, float]()
     work = _Work(site, solids, faces, part, tolerance, off, bodies, measure_inner_area(solids))
@@ -182,9 +168,9 @@ class _Work:
     def split(self, tool: Tool, kind: str, fuzzy: float) -> _Trial:
         """What a tool gives, checked."""
         site = self.site
-        found = _split_all(self.solids, tool, fuzzy, site.damage, self.tolerance)
-        if found is None:
-            return _Trial(Measured(0.0, "it does not separate the solid"))
+        found = take_pieces(self.solids, tool, fuzzy, site.damage, self.tolerance)
+        if isinstance(found, str):
+            return _Trial(Measured(0.0, found))
         pieces, rest, doubles = found
         if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
             return _Trial(Measured(0.0, f"more than {MOST_FACES} faces"), is_final=True)
@@ -208,75 +194,6 @@ def _move(
     tool = call(partial(shift, step)) if step else None
     moved = None if tool is None else work.split(tool, kind, fuzzy)
     return trial if moved is None or moved.measured.reason else moved
-
-
-def _count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> int:
-    """How many solids a damage volume is: in a part of several, which its mesh may have united, one or more in each."""
-    least, origin = SPECK * damage.volume, damage.bounds.mean(axis=0)
-    alone = sum(body.volume > least for body in split_bodies(damage))
-    if len({piece.owner for piece in solids}) < 2:
-        return alone
-    lost, found = to_manifold(damage, origin), []
-    for piece in solids:
-        if not is_near(piece.shape, damage):
-            continue
-        try:
-            common = to_manifold(triangulate(piece.shape, tolerance / 16), origin) ^ lost
-        except (InputError, ValueError):
-            return alone
-        found += [body for body in common.decompose() if body.volume() > least]
-    return len(found) - sum(find_doubles(found))
-
-
-def _split_all(
-    solids: Sequence[Piece], tool: Tool, fuzzy: float, damage: Solid, tolerance: float
-) -> tuple[tuple[Piece, ...], tuple[Piece, ...], tuple[Piece, ...]] | None:
-    """The pieces that are the damage volume, all others, and those that lie in other pieces of the damage volume; None
-    where there are none of the first."""
-    taken: list[Piece] = []
-    rest: list[Piece] = []
-    try:
-        for solid in solids:
-            if not _touch(solid.shape, tool.shape):
-                rest.append(solid)
-                continue
-            made = split(solid.shape, solid.owner, solid.origins, tool, fuzzy)
-            if made is None:
-                return None
-            for piece in made:
-                volume = measure_volume(piece.shape)
-                if _is_damage(piece, volume, damage, tolerance):
-                    taken.append(piece)
-                elif volume > SPECK * damage.volume:
-                    rest.append(piece)
-        kept, doubles = drop_doubles(taken, damage.bounds.mean(axis=0), tolerance / 16)
-    except Exception as error:
-        # of the others, a piece that cannot be triangulated, or whose triangles do not close
-        if not (is_opencascade_error(error) or isinstance(error, (InputError, ValueError))):
-            raise
-        return None
-    return (kept, tuple(rest), doubles) if kept else None
-
-
-def _is_damage(piece: Piece, volume: float, damage: Solid, tolerance: float) -> bool:
-    if not SPECK * damage.volume < volume < 1.5 * damage.volume:
-        return False
-    mesh = triangulate(piece.shape, tolerance / 16)
-    origin = damage.bounds.mean(axis=0)
-    common = to_manifold(mesh, origin) ^ to_manifold(damage, origin)
-    return bool(common.volume() > 0.5 * mesh.volume)
-
-
-def _touch(first: Any, second: Any) -> bool:
-    from OCP.Bnd import Bnd_Box
-    from OCP.BRepBndLib import BRepBndLib
-
-    boxes = []
-    for shape in (first, second):
-        box = Bnd_Box()
-        BRepBndLib.Add_s(shape, box, False)
-        boxes.append(box)
-    return not boxes[0].IsOut(boxes[1])
 
 
 def scale_shape(shape: Any, factor: float, T: Floats | None = None) -> Any:

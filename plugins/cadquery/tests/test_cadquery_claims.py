@@ -57,8 +57,8 @@ def test_other_claims_stay() -> None:
     assert lower_claims(needed, 0.002) is needed, "an edge that lies off its face needs what it claims"
 
 
-def make_gap(off: float) -> Any:
-    """A cylinder whose upper edge lies off its faces, and says so."""
+def make_gap(off: float, claim: float | None = None) -> Any:
+    """A cylinder whose upper edge lies off its faces, and says so unless it claims less."""
     from damageest_cadquery._read import explore
     from OCP.BRep import BRep_Builder
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
@@ -69,13 +69,13 @@ def make_gap(off: float) -> Any:
     from OCP.TopoDS import TopoDS
 
     solid = BRepBuilderAPI_Copy(cq.Workplane().cylinder(20, 10).val().wrapped).Shape()
-    builder = BRep_Builder()
+    builder, claim = BRep_Builder(), 2 * off if claim is None else claim
     for edge in explore(solid, TopAbs_EDGE):
         if cq.Edge(edge).geomType() == "CIRCLE" and cq.Edge(edge).Center().z > 9:
             circle = Geom_Circle(gp_Ax2(gp_Pnt(0, 0, 10), gp_Dir(0, 0, 1)), 10 + off)
-            builder.UpdateEdge(TopoDS.Edge_s(edge), circle, TopLoc_Location(), 2 * off)
+            builder.UpdateEdge(TopoDS.Edge_s(edge), circle, TopLoc_Location(), claim)
     for corner in explore(solid, TopAbs_VERTEX):
-        builder.UpdateVertex(TopoDS.Vertex_s(corner), 2 * off)
+        builder.UpdateVertex(TopoDS.Vertex_s(corner), claim)
     return solid
 
 
@@ -99,3 +99,32 @@ def test_a_corner_on_an_edge_of_the_part_is_not_off_the_part() -> None:
                 moved = cq.Face(face).translate(cq.Vector(0.0, 0.03, 0.03)).wrapped
                 assert _measure_off(moved, faces[number], 1e-5) > 0.01, "other corners have to be on the face"
     assert count > 4, "corners that lie off their face"
+
+
+def test_a_piece_that_is_not_valid_is_refused_before_it_is_triangulated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The triangles of such a piece can take minutes."""
+    from damageest_cadquery import _pieces
+    from damageest_cadquery._exact import start_solids
+    from damageest_cadquery._split import Tool
+    from test_cadquery_balance import cut_off, mesh_part
+
+    lost = cut_off(mesh_part(cq.Workplane().cylinder(20, 10), 0.01), -20.0)
+    plane = cq.Face.makePlane(40, 40, (7, 0, 0), (1, 0, 0)).wrapped
+    triangulated: list[Any] = []
+    triangulate = _pieces.triangulate
+
+    def note(shape: Any, chord: float) -> Any:
+        triangulated.append(shape)
+        return triangulate(shape, chord)
+
+    def take(solid: Any) -> Any:
+        triangulated.clear()
+        pieces, _ = start_solids([solid])
+        monkeypatch.setattr(_pieces, "split", lambda *_: list(pieces))
+        return _pieces.take_pieces(pieces, Tool([plane], plane), 1e-6, lost, 0.2)
+
+    monkeypatch.setattr(_pieces, "triangulate", note)
+    taken, rest, doubles = take(make_gap(0.0))
+    assert (len(taken), len(rest), len(doubles), len(triangulated)) == (1, 0, 0, 1)
+    assert take(make_gap(0.05, claim=1e-7)) == "not valid (BRepCheck)"
+    assert not triangulated
