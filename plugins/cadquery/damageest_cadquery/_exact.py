@@ -179,7 +179,7 @@ class _Work:
             kind, pieces, elsewhere, self.bodies, site.damage, site.surface, self.part, site.points, self.tolerance,
             self.faces, self.off,
         )  # fmt: skip
-        if not measured.reason and not is_sound([piece for piece in rest if piece not in self.solids]):
+        if not measured.reason and not is_sound([piece for piece in rest if piece not in self.solids], self.faces):
             measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)
         # where it is sound but not near enough, another fuzzy value does not change that
         final = np.isfinite(measured.farthest) or measured.reason.startswith(VOLUME)

@@ -128,3 +128,56 @@ def test_a_piece_that_is_not_valid_is_refused_before_it_is_triangulated(monkeypa
     assert (len(taken), len(rest), len(doubles), len(triangulated)) == (1, 0, 0, 1)
     assert take(make_gap(0.05, claim=1e-7)) == "not valid (BRepCheck)"
     assert not triangulated
+
+
+def make_bulge() -> Any:
+    """A cube of 20 whose edge at y = z = 10 bulges from its two faces, and claims that it does not."""
+    from damageest_cadquery._read import explore
+    from OCP.BRep import BRep_Builder, BRep_Tool
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+    from OCP.Geom import Geom_BSplineCurve
+    from OCP.gp import gp_Pnt
+    from OCP.TColgp import TColgp_Array1OfPnt
+    from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal
+    from OCP.TopAbs import TopAbs_EDGE
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    solid = BRepBuilderAPI_Copy(cq.Workplane().box(20, 20, 20).val().wrapped).Shape()
+    for edge in map(TopoDS.Edge_s, explore(solid, TopAbs_EDGE)):
+        middle = cq.Edge(edge).Center()
+        if middle.y > 9 and middle.z > 9:
+            line = BRep_Tool.Curve_s(edge, 0.0, 0.0)
+            poles, knots, many = TColgp_Array1OfPnt(1, 3), TColStd_Array1OfReal(1, 2), TColStd_Array1OfInteger(1, 2)
+            ends = [np.array(line.Value(at).Coord()) for at in (0.0, 20.0)]
+            for k, point in enumerate((ends[0], sum(ends) / 2 + [0, 0.1, 0.1], ends[1])):
+                poles.SetValue(k + 1, gp_Pnt(*map(float, point)))
+            for k, at in enumerate((0.0, 20.0)):
+                knots.SetValue(k + 1, at)
+                many.SetValue(k + 1, 3)
+            BRep_Builder().UpdateEdge(edge, Geom_BSplineCurve(poles, knots, many, 2), TopLoc_Location(), 1e-7)
+    return solid
+
+
+def test_faults_of_the_file_that_no_cut_touches_are_no_faults_of_the_cut() -> None:
+    from damageest_cadquery._solids import explore_faces
+    from damageest_cadquery._split import Tool, is_sound, measure_volume, split
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    solid = make_bulge()
+    faces = explore_faces(solid)
+    assert sum(not BRepCheck_Analyzer(face).IsValid() for face in faces) == 2
+
+    def cut(y: float, z: float) -> list[Any]:
+        """The pieces that a plane through (0, y, z) makes, parallel to x and across the way to the middle."""
+        plane = cq.Face.makePlane(60, 60, (0, y, z), (0, y, z)).wrapped
+        pieces = split(solid, 0, [(k, -1) for k in range(6)], Tool([plane], plane), 1e-6)
+        assert pieces is not None
+        return sorted(pieces, key=lambda piece: measure_volume(piece.shape))
+
+    small, large = cut(-9, -9)
+    assert measure_volume(small.shape) == pytest.approx(2 * 2 / 2 * 20, rel=1e-4)
+    assert is_sound([small])
+    assert is_sound([large], faces)
+    assert not is_sound([large]), "not without knowing the file"
+    assert not all(is_sound([piece], faces) for piece in cut(9, -9)), "the cut goes through one of these faces"
