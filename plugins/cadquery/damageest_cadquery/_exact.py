@@ -51,7 +51,8 @@ class SiteInput:
 @dataclass(frozen=True, eq=False)
 class Exact:
     """``pieces``: the damage volume; ``rest``: what is left of the solids; ``form``: shapes, spline, planes or facets;
-    ``seconds``: of the processor; ``tried``: what was refused before, and why."""
+    ``seconds``: of the processor; ``tried``: what was refused before, and why; ``doubles``: pieces that lie in those of
+    the damage volume, of solids that the file holds twice."""
 
     pieces: tuple[Piece, ...]
     rest: tuple[Piece, ...]
@@ -59,6 +60,7 @@ class Exact:
     measured: Measured
     seconds: float
     tried: tuple[str, ...] = ()
+    doubles: tuple[Piece, ...] = ()
 
 
 def start_solids(solids: Sequence[Any]) -> tuple[tuple[Piece, ...], tuple[Any, ...]]:
@@ -118,7 +120,7 @@ def find_exact(
                 measured = trial.measured
                 if not measured.reason:
                     spent, off_by = time.process_time() - start, balance.measure_off(trial.pieces)
-                    found = Exact(trial.pieces, trial.rest, kind, measured, spent, tuple(tried))
+                    found = Exact(trial.pieces, trial.rest, kind, measured, spent, tuple(tried), trial.doubles)
                     if abs(off_by) <= WANTED:
                         return found, tuple(tried)
                     # room for chords was larger than these: a later form may be nearer
@@ -145,6 +147,7 @@ class _Trial:
     pieces: tuple[Piece, ...] = ()
     rest: tuple[Piece, ...] = ()
     is_final: bool = False
+    doubles: tuple[Piece, ...] = ()
 
     @property
     def is_near(self) -> bool:
@@ -183,7 +186,7 @@ class _Work:
             measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)
         # where it is sound but not near enough, another fuzzy value does not change that
         final = np.isfinite(measured.farthest) or measured.reason.startswith(VOLUME)
-        return _Trial(measured, pieces, rest, bool(final))
+        return _Trial(measured, pieces, rest, bool(final), doubles)
 
 
 def _move(

@@ -17,7 +17,7 @@ from damageest.stages.export import DepositForm, ExactForm
 from damageest_cadquery._adapted import MovedSolids, move_solids
 from damageest_cadquery._claims import lower_claims
 from damageest_cadquery._colours import read_colours
-from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit
+from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit, refuse_doubles
 from damageest_cadquery._exact import Exact, SiteInput, find_exact, scale_shape, start_solids
 from damageest_cadquery._files import join_shapes
 from damageest_cadquery._moved import MoveError
@@ -90,6 +90,7 @@ def _make(request: Request) -> Made:
             forms[site.number] = DepositForm(reason=StockError(fault, _list_stock(site)).describe(facts.names))
             continue
         try:
+            refuse_doubles(site.deposit, exact.pieces, exact.doubles)
             with at_work(name_deposit(site.number), request.seconds):
                 made = find_deposit(site.deposit, site.damage, exact.pieces, exact.rest, faces, part, request.tolerance)
             deposits[site.number], forms[site.number] = made, _describe_deposit(made)

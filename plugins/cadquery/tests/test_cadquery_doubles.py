@@ -58,3 +58,26 @@ def test_solids_that_overlap_in_part_are_refused(monkeypatch: pytest.MonkeyPatch
     found, tried = find(halves, monkeypatch)
     assert found is None
     assert "its volume differs by +40" in tried[-1]
+
+
+def test_stock_on_a_face_of_the_other_solid_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from damageest_cadquery._deposit import refuse_doubles
+    from damageest_cadquery._solids import StockError
+    from test_cadquery_balance import cut_off, mesh_part
+
+    from damageest.artefacts import Deposit
+
+    whole = cq.Workplane().box(30, 20, 12)
+    lost = cut_off(mesh_part(whole, 0.1), 12.0)
+    found, tried = find([whole, whole], monkeypatch)
+    assert found is not None, tried
+    assert [piece.owner for piece in found.doubles] == [1]
+
+    def make(*numbers: int) -> Deposit:
+        return Deposit(lost.vertices, lost.faces, heights=tuple((number, 0.5) for number in numbers), stock_volume=1.0)
+
+    own = next(number for number, _ in found.pieces[0].origins if number >= 0)
+    refuse_doubles(make(own), found.pieces, found.doubles)
+    with pytest.raises(StockError, match="holds this metal twice"):
+        refuse_doubles(make(own, own + 6), found.pieces, found.doubles)
+    refuse_doubles(make(own, own + 6), found.pieces, ())
