@@ -12,8 +12,6 @@ from damageest.geometry.vectors import measure_longest_edges
 
 ROUNDS = 40
 """How often the places round crossings are looked for."""
-STEPS = 4
-"""How often they are smoothed each time."""
 WIDER = 4
 """Rounds after which a ring of vertices more is smoothed."""
 
@@ -31,15 +29,18 @@ def refine_crossings(mesh: Mesh, size: float) -> tuple[Mesh, Ints]:
     return mesh, origin
 
 
-def untangle(mesh: Mesh, farthest: float) -> Mesh:
+def untangle(mesh: Mesh, farthest: float, steps: int = 1) -> Mesh:
     """The mesh with the vertices round its crossings moved to the middle of their neighbours, until none is left;
-    itself where it has none, where that does not help, or where a vertex would move by more than ``farthest``."""
+    itself where it has none, where that does not help, or where a vertex would move by more than ``farthest``.
+
+    ``steps``: how often places are smoothed before they are looked for again; more reach farther, and move more.
+    """
     moved = mesh
     for number in range(ROUNDS):
         near = _find_near(moved, number // WIDER)
         if not near.any():
             break
-        moved = _smooth(moved, near)
+        moved = _smooth(moved, near, steps)
         if np.linalg.norm(moved.vertices - mesh.vertices, axis=1).max() > farthest:
             return mesh
     else:
@@ -68,15 +69,14 @@ def _find_near(mesh: Mesh, rings: int) -> Flags:
     return near
 
 
-def _smooth(mesh: Mesh, near: Flags) -> Mesh:
-    """The mesh with the vertices that are ``near`` moved half the way to the middle of their neighbours, `STEPS` times
-    over."""
+def _smooth(mesh: Mesh, near: Flags, steps: int) -> Mesh:
+    """The mesh with the vertices that are ``near`` moved half the way to the middle of their neighbours so often."""
     count = len(mesh.vertices)
     ends = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     ends = np.concatenate([ends, ends[:, ::-1]])
     graph = coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()[near]
     total = np.maximum(np.asarray(graph.sum(axis=1)).ravel(), 1)
     vertices = mesh.vertices.copy()
-    for _ in range(STEPS):
+    for _ in range(steps):
         vertices[near] += 0.5 * (np.asarray(graph @ vertices) / total[:, None] - vertices[near])
     return Mesh(vertices, mesh.faces)
