@@ -105,13 +105,12 @@ def test_a_piece_that_is_not_valid_is_refused_before_it_is_triangulated(monkeypa
     """The triangles of such a piece can take minutes."""
     from damageest_cadquery import _pieces
     from damageest_cadquery._exact import start_solids
-    from damageest_cadquery._split import Tool
+    from damageest_cadquery._split import Tool, triangulate
     from test_cadquery_balance import cut_off, mesh_part
 
     lost = cut_off(mesh_part(cq.Workplane().cylinder(20, 10), 0.01), -20.0)
     plane = cq.Face.makePlane(40, 40, (7, 0, 0), (1, 0, 0)).wrapped
     triangulated: list[Any] = []
-    triangulate = _pieces.triangulate
 
     def note(shape: Any, chord: float) -> Any:
         triangulated.append(shape)
@@ -150,8 +149,8 @@ def make_bulge() -> Any:
             line = BRep_Tool.Curve_s(edge, 0.0, 0.0)
             poles, knots, many = TColgp_Array1OfPnt(1, 3), TColStd_Array1OfReal(1, 2), TColStd_Array1OfInteger(1, 2)
             ends = [np.array(line.Value(at).Coord()) for at in (0.0, 20.0)]
-            for k, point in enumerate((ends[0], sum(ends) / 2 + [0, 0.1, 0.1], ends[1])):
-                poles.SetValue(k + 1, gp_Pnt(*map(float, point)))
+            for k, point in enumerate((ends[0], (ends[0] + ends[1]) / 2 + [0, 0.1, 0.1], ends[1])):
+                poles.SetValue(k + 1, gp_Pnt(*point.tolist()))
             for k, at in enumerate((0.0, 20.0)):
                 knots.SetValue(k + 1, at)
                 many.SetValue(k + 1, 3)
