@@ -14,6 +14,7 @@ from damageest_cadquery._read import explore
 from damageest_cadquery._shapes import subdivide
 from damageest_cadquery._split import Piece, find_corners, measure_volume
 
+INVALID = "not valid (BRepCheck)"
 VOLUME = 0.003
 """Largest relative difference of the volumes, beside what the triangles of the part cut off its curved faces."""
 LIMITS = {"shapes": (0.1, 2.0), "planes": (0.1, 2.0), "spline": (0.02, 1.5), "facets": (0.01, 1.0)}
@@ -70,7 +71,7 @@ def check_pieces(
         return Measured(volume, reason, *numbers)
 
     if not all(BRepCheck_Analyzer(piece.shape).IsValid() for piece in pieces):
-        return refuse("not valid (BRepCheck)")
+        return refuse(INVALID)
     shells = [shell for piece in pieces for shell in explore(piece.shape, TopAbs_SHELL)]
     if not all(BRep_Tool.IsClosed_s(TopoDS.Shell_s(shell)) for shell in shells):
         return refuse("not closed")
@@ -99,9 +100,10 @@ def check_pieces(
     beyond = max(float(weights[there > quarter].sum()), float(areas[back > quarter].sum()))
     distance = max(_find_quantile(there, weights), _find_quantile(back, areas))
     farthest = max(float(there.max()), float(back.max()))
-    off = max((_measure_off(face, cad_faces[number]) for face, (number, _) in faces if number >= 0), default=0.0)
+    near = ON_CAD * part.diagonal + off_faces
+    off = max((_measure_off(face, cad_faces[number], near) for face, (number, _) in faces if number >= 0), default=0.0)
     numbers = (distance, farthest, beyond, off)
-    if off > ON_CAD * part.diagonal + off_faces:
+    if off > near:
         return refuse(f"an outer corner lies {off:.2g} off the CAD's surface", *numbers)
     share, most = LIMITS[form]
     if farthest > most * tolerance or beyond > share:
@@ -175,16 +177,25 @@ def measure_area(face: Any) -> float:
     return float(sizes.Mass())
 
 
-def _measure_off(face: Any, original: Any) -> float:
-    """The largest distance of a face's corners from the surface of the face that it is a piece of."""
+def _measure_off(face: Any, original: Any, near: float) -> float:
+    """The largest distance of a face's corners from the face that it is a piece of. In files of little precision the
+    part's own edges lie farther off its surfaces than ``near``; so a corner that does, but lies on such an edge, counts
+    by its distance from that edge."""
     from OCP.BRep import BRep_Tool
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
+    from OCP.BRepExtrema import BRepExtrema_DistShapeShape
     from OCP.gp import gp_Pnt
     from OCP.ShapeAnalysis import ShapeAnalysis_Surface
+    from OCP.TopAbs import TopAbs_EDGE
     from OCP.TopoDS import TopoDS
 
     analysis = ShapeAnalysis_Surface(BRep_Tool.Surface_s(TopoDS.Face_s(original)))
-    off = 0.0
+    edges, off = explore(original, TopAbs_EDGE), 0.0
     for point in find_corners(face).tolist():
         analysis.ValueOfUV(gp_Pnt(*point), 1e-7)
-        off = max(off, analysis.Gap())
-    return float(off)
+        gap = float(analysis.Gap())
+        if gap > near:
+            corner = BRepBuilderAPI_MakeVertex(gp_Pnt(*point)).Vertex()
+            gap = min(gap, *(BRepExtrema_DistShapeShape(corner, edge).Value() for edge in edges))
+        off = max(off, gap)
+    return off

@@ -18,7 +18,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, signe
 from damageest.geometry.loops import trace_loops
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import concatenate_meshes
-from damageest_cadquery._untangle import untangle
+from damageest_cadquery._untangle import refine_crossings, untangle
 
 RINGS = 3
 """Rings of triangles by which it reaches beyond the skin."""
@@ -28,6 +28,8 @@ HORNS = 0.05
 """Largest share of triangles, of those that bound the damage volume, that are taken out as horns."""
 SPECK = 0.03
 """Pieces of it with a smaller share of triangles than the largest are left out where they are shallow."""
+APART = 4.0
+"""Farthest, in tolerances, that a vertex is moved to take a crossing out: most of that is outside the part."""
 ISLAND = 0.1
 """Triangles left out among those of the cut are taken in where they are fewer than this share of it."""
 
@@ -75,10 +77,25 @@ def make_cut(damage: Solid, surface: Surface, part: Part, enclosures: Sequence[S
     chosen = _close_gaps(faces, chosen)
     rows, renumbered = np.unique(faces[chosen], return_inverse=True)
     mesh = Mesh(vertices[rows], renumbered.reshape(-1, 3))
-    cut = Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen])
+    cut = _drop_elsewhere(Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen]))
     cut = _smooth_outside(_drop_specks(_drop_horns(cut, surface, tolerance), tolerance), part, tolerance)
-    apart = untangle(cut.mesh, 2 * tolerance)
-    return cut if apart is cut.mesh else Cut(apart, signed_distance(apart.vertices, part)[0], cut.core)
+    for size, steps in ((tolerance, 1), (tolerance, 4), (np.inf, 1)):  # the first moves least
+        mesh, origin = refine_crossings(cut.mesh, size)
+        apart = untangle(mesh, APART * tolerance, steps)
+        if apart is not mesh:
+            return Cut(apart, signed_distance(apart.vertices, part)[0], cut.core[origin])
+    return cut
+
+
+def _drop_elsewhere(cut: Cut) -> Cut:
+    """The cut without what its continuation reaches of the part elsewhere, as where another site of the same enclosure
+    is near."""
+    own = np.zeros(len(cut.mesh.vertices), bool)
+    own[cut.mesh.faces[cut.core]] = True
+    dropped = ((cut.height < 0) & ~own)[cut.mesh.faces].any(axis=1)
+    if not dropped.any():
+        return cut
+    return _take_used(Cut(Mesh(cut.mesh.vertices, cut.mesh.faces[~dropped]), cut.height, cut.core[~dropped]))
 
 
 def _smooth_outside(cut: Cut, part: Part, tolerance: float) -> Cut:

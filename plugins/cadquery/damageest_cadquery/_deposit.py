@@ -108,6 +108,17 @@ def find_deposit(
         return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
 
 
+def refuse_doubles(deposit: Solid | None, damage: Sequence[Piece], doubles: Sequence[Piece]) -> None:
+    """Raises StockError where stock lies on faces of solids that the damage volume lies in twice: the mesh has one of
+    two faces that coincide, which need not be that of the piece that was taken."""
+    if not isinstance(deposit, Deposit):
+        return
+    wanted = {number for number, height in deposit.heights if height > 0}
+    other = {number for piece in doubles for number, _ in piece.origins}
+    if lost := (wanted & other) - {number for piece in damage for number, _ in piece.origins}:
+        raise StockError("the CAD file holds this metal twice, in solids that overlap", lost)
+
+
 def _find_invalid(pieces: Sequence[Piece]) -> list[int]:
     """The CAD faces of which a face in a solid comes that is not valid by itself; none where each is."""
     from OCP.BRepCheck import BRepCheck_Analyzer

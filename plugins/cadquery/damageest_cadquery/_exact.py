@@ -7,6 +7,7 @@ few facets, more. Where planes explain most of it, they come before splines.
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -16,32 +17,22 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Part, Solid, Surface
-from damageest.errors import InputError
-from damageest.geometry.bodies import split_bodies
-from damageest.geometry.solids import to_manifold
 from damageest_cadquery._attempts import call, list_tools
 from damageest_cadquery._balance import Balance
 from damageest_cadquery._check import Measured, check_pieces, measure_inner_area
 from damageest_cadquery._cut import make_cut
+from damageest_cadquery._pieces import count_bodies, take_pieces
 from damageest_cadquery._read import explore
-from damageest_cadquery._split import (
-    Piece,
-    Tool,
-    is_near,
-    is_opencascade_error,
-    is_sound,
-    measure_volume,
-    split,
-    triangulate,
-)
+from damageest_cadquery._split import Piece, Tool, is_sound
 
 MOST_FACES = 5000
 VOLUME = "its volume"
 """How the reason begins where the volume is refused."""
 WANTED = 0.003
 """Relative difference of the volumes, beside chords, from which later forms are tried too, and the nearest is taken."""
-SPECK = 1e-3
-"""Share of the damage volume below which a body of it, or a piece that a split leaves over, is dropped."""
+NEARER, STALE = 0.75, 2
+"""A kind of form, but for facets, is given up where so many of it are off in volume by more than this share of the best
+one's: they follow the same planes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +51,8 @@ class SiteInput:
 @dataclass(frozen=True, eq=False)
 class Exact:
     """``pieces``: the damage volume; ``rest``: what is left of the solids; ``form``: shapes, spline, planes or facets;
-    ``seconds``: of the processor; ``tried``: what was refused before, and why."""
+    ``seconds``: of the processor; ``tried``: what was refused before, and why; ``doubles``: pieces that lie in those of
+    the damage volume, of solids that the file holds twice."""
 
     pieces: tuple[Piece, ...]
     rest: tuple[Piece, ...]
@@ -68,6 +60,7 @@ class Exact:
     measured: Measured
     seconds: float
     tried: tuple[str, ...] = ()
+    doubles: tuple[Piece, ...] = ()
 
 
 def start_solids(solids: Sequence[Any]) -> tuple[tuple[Piece, ...], tuple[Any, ...]]:
@@ -102,9 +95,9 @@ def find_exact(
     cut = make_cut(site.damage, site.surface, part, site.enclosures, tolerance)
     if cut is None:
         return None, ("no surface is known that cuts it out of the part",)
-    bodies, refused = _count_bodies(site.damage, solids, tolerance), ""
+    bodies, refused = count_bodies(site.damage, solids, tolerance), ""
     second: Exact | None = None
-    least = np.inf
+    least, stale, best = np.inf, Counter[str](), dict[str, float]()
     work = _Work(site, solids, faces, part, tolerance, off, bodies, measure_inner_area(solids))
     balance = Balance(solids, part, site.damage, tolerance)
     for form, make, fuzzies, shift in list_tools(cut, part, tolerance):
@@ -127,13 +120,15 @@ def find_exact(
                 measured = trial.measured
                 if not measured.reason:
                     spent, off_by = time.process_time() - start, balance.measure_off(trial.pieces)
-                    found = Exact(trial.pieces, trial.rest, kind, measured, spent, tuple(tried))
+                    found = Exact(trial.pieces, trial.rest, kind, measured, spent, tuple(tried), trial.doubles)
                     if abs(off_by) <= WANTED:
                         return found, tuple(tried)
                     # room for chords was larger than these: a later form may be nearer
                     tried.append(f"{form}: {VOLUME} differs by {off_by:+.2%} beside chords")
                     second = found if abs(off_by) < least else second
-                    least = min(least, abs(off_by))
+                    stale[kind] += kind != "facets" and abs(off_by) > NEARER * best.get(kind, np.inf)
+                    refused = kind if stale[kind] >= STALE else refused
+                    least, best[kind] = min(least, abs(off_by)), min(best.get(kind, np.inf), abs(off_by))
                     break
                 tried.append(f"{form}: {measured.reason}")
                 if trial.is_final:
@@ -152,6 +147,7 @@ class _Trial:
     pieces: tuple[Piece, ...] = ()
     rest: tuple[Piece, ...] = ()
     is_final: bool = False
+    doubles: tuple[Piece, ...] = ()
 
     @property
     def is_near(self) -> bool:
@@ -175,21 +171,22 @@ class _Work:
     def split(self, tool: Tool, kind: str, fuzzy: float) -> _Trial:
         """What a tool gives, checked."""
         site = self.site
-        found = _split_all(self.solids, tool, fuzzy, site.damage, self.tolerance)
-        if found is None:
-            return _Trial(Measured(0.0, "it does not separate the solid"))
-        pieces, rest = found
+        found = take_pieces(self.solids, tool, fuzzy, site.damage, self.tolerance)
+        if isinstance(found, str):
+            return _Trial(Measured(0.0, found))
+        pieces, rest, doubles = found
         if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
             return _Trial(Measured(0.0, f"more than {MOST_FACES} faces"), is_final=True)
+        elsewhere = measure_inner_area(rest) - self.inner_before - measure_inner_area(doubles)
         measured = check_pieces(
-            kind, pieces, measure_inner_area(rest) - self.inner_before, self.bodies, site.damage, site.surface,
-            self.part, site.points, self.tolerance, self.faces, self.off,
+            kind, pieces, elsewhere, self.bodies, site.damage, site.surface, self.part, site.points, self.tolerance,
+            self.faces, self.off,
         )  # fmt: skip
-        if not measured.reason and not is_sound([piece for piece in rest if piece not in self.solids]):
+        if not measured.reason and not is_sound([piece for piece in rest if piece not in self.solids], self.faces):
             measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)
         # where it is sound but not near enough, another fuzzy value does not change that
         final = np.isfinite(measured.farthest) or measured.reason.startswith(VOLUME)
-        return _Trial(measured, pieces, rest, bool(final))
+        return _Trial(measured, pieces, rest, bool(final), doubles)
 
 
 def _move(
@@ -200,73 +197,6 @@ def _move(
     tool = call(partial(shift, step)) if step else None
     moved = None if tool is None else work.split(tool, kind, fuzzy)
     return trial if moved is None or moved.measured.reason else moved
-
-
-def _count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> int:
-    """How many solids a damage volume is: in a part of several, which its mesh may have united, one or more in each."""
-    least, origin = SPECK * damage.volume, damage.bounds.mean(axis=0)
-    alone = sum(body.volume > least for body in split_bodies(damage))
-    if len({piece.owner for piece in solids}) < 2:
-        return alone
-    lost, count = to_manifold(damage, origin), 0
-    for piece in solids:
-        if not is_near(piece.shape, damage):
-            continue
-        try:
-            common = to_manifold(triangulate(piece.shape, tolerance / 16), origin) ^ lost
-        except (InputError, ValueError):
-            return alone
-        count += sum(body.volume() > least for body in common.decompose())
-    return count
-
-
-def _split_all(
-    solids: Sequence[Piece], tool: Tool, fuzzy: float, damage: Solid, tolerance: float
-) -> tuple[tuple[Piece, ...], tuple[Piece, ...]] | None:
-    """The pieces that are the damage volume, and all others; None where there are none of the first."""
-    taken: list[Piece] = []
-    rest: list[Piece] = []
-    try:
-        for solid in solids:
-            if not _touch(solid.shape, tool.shape):
-                rest.append(solid)
-                continue
-            made = split(solid.shape, solid.owner, solid.origins, tool, fuzzy)
-            if made is None:
-                return None
-            for piece in made:
-                volume = measure_volume(piece.shape)
-                if _is_damage(piece, volume, damage, tolerance):
-                    taken.append(piece)
-                elif volume > SPECK * damage.volume:
-                    rest.append(piece)
-    except Exception as error:
-        # of the others, a piece that cannot be triangulated, or whose triangles do not close
-        if not (is_opencascade_error(error) or isinstance(error, (InputError, ValueError))):
-            raise
-        return None
-    return (tuple(taken), tuple(rest)) if taken else None
-
-
-def _is_damage(piece: Piece, volume: float, damage: Solid, tolerance: float) -> bool:
-    if not SPECK * damage.volume < volume < 1.5 * damage.volume:
-        return False
-    mesh = triangulate(piece.shape, tolerance / 16)
-    origin = damage.bounds.mean(axis=0)
-    common = to_manifold(mesh, origin) ^ to_manifold(damage, origin)
-    return bool(common.volume() > 0.5 * mesh.volume)
-
-
-def _touch(first: Any, second: Any) -> bool:
-    from OCP.Bnd import Bnd_Box
-    from OCP.BRepBndLib import BRepBndLib
-
-    boxes = []
-    for shape in (first, second):
-        box = Bnd_Box()
-        BRepBndLib.Add_s(shape, box, False)
-        boxes.append(box)
-    return not boxes[0].IsOut(boxes[1])
 
 
 def scale_shape(shape: Any, factor: float, T: Floats | None = None) -> Any:

@@ -15,7 +15,7 @@ from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.geometry.vectors import normalise
 from damageest_cadquery._check import VOLUME
-from damageest_cadquery._exact import SPECK
+from damageest_cadquery._pieces import SPECK
 from damageest_cadquery._planar import build_solid
 from damageest_cadquery._read import explore
 from damageest_cadquery._split import Piece, is_near, triangulate

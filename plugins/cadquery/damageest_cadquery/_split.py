@@ -47,15 +47,46 @@ def build_flat(vertices: Floats, facets: Sequence[Facet]) -> Tool:
     return Tool(explore(shell, TopAbs_FACE), shell)
 
 
-def is_sound(pieces: Sequence[Piece]) -> bool:
-    """Whether OpenCASCADE finds all of them valid, and no face hangs in them."""
+def is_sound(pieces: Sequence[Piece], faces: Sequence[Any] = ()) -> bool:
+    """Whether OpenCASCADE finds all of them valid, but for ``faces`` of the CAD file, by number, that are not valid in
+    it and that no cut has changed; and whether no face hangs in them."""
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.TopAbs import TopAbs_FACE, TopAbs_INTERNAL
 
-    return all(
-        BRepCheck_Analyzer(piece.shape).IsValid()
-        and all(face.Orientation() != TopAbs_INTERNAL for face in explore(piece.shape, TopAbs_FACE))
-        for piece in pieces
+    for piece in pieces:
+        analyser = BRepCheck_Analyzer(piece.shape)
+        if not (analyser.IsValid() or _has_faults_of_file(analyser, piece, faces)):
+            return False
+        if any(face.Orientation() == TopAbs_INTERNAL for face in explore(piece.shape, TopAbs_FACE)):
+            return False
+    return True
+
+
+def _has_faults_of_file(analyser: Any, piece: Piece, faces: Sequence[Any]) -> bool:
+    """Whether all that is not valid in a piece are faces of the CAD file that were so before."""
+    from OCP.BRepCheck import BRepCheck_Analyzer, BRepCheck_NoError
+    from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID, TopAbs_VERTEX, TopAbs_WIRE
+
+    bad = [
+        (face, number)
+        for face, (number, _) in zip(explore(piece.shape, TopAbs_FACE), piece.origins, strict=True)
+        if not analyser.IsValid(face)
+    ]
+    return (
+        bool(bad)
+        and all(0 <= number < len(faces) and face.IsSame(faces[number]) for face, number in bad)
+        and not any(BRepCheck_Analyzer(face).IsValid() for face, _ in bad)
+        and all(
+            analyser.IsValid(each)
+            for kind in (TopAbs_VERTEX, TopAbs_EDGE, TopAbs_WIRE)
+            for each in explore(piece.shape, kind)
+        )
+        and all(
+            status == BRepCheck_NoError
+            for kind in (TopAbs_SHELL, TopAbs_SOLID)
+            for each in explore(piece.shape, kind)
+            for status in analyser.Result(each).Status()
+        )
     )
 
 

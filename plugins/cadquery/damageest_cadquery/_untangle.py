@@ -5,24 +5,42 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array
 
-from damageest.artefacts import Flags, Floats, Mesh
+from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.refinement import bisect_faces
 from damageest.geometry.undoing import find_crossings
+from damageest.geometry.vectors import measure_longest_edges
 
 ROUNDS = 40
-"""How often the places round crossings are smoothed."""
+"""How often the places round crossings are looked for."""
 WIDER = 4
 """Rounds after which a ring of vertices more is smoothed."""
 
 
-def untangle(mesh: Mesh, farthest: float) -> Mesh:
+def refine_crossings(mesh: Mesh, size: float) -> tuple[Mesh, Ints]:
+    """The mesh with no edge longer than ``size`` round its crossings, and the face (F,) that each face came from: with
+    large triangles, more of the surface would move than has to."""
+    origin = np.arange(len(mesh.faces))
+    for _ in range(ROUNDS):
+        long = _find_near(mesh, 1)[mesh.faces].any(axis=1) & (measure_longest_edges(mesh.triangles) > size)
+        if not long.any():
+            break
+        vertices, faces, parent = bisect_faces(mesh.vertices, mesh.faces, np.flatnonzero(long))
+        mesh, origin = Mesh(vertices, faces), origin[parent]
+    return mesh, origin
+
+
+def untangle(mesh: Mesh, farthest: float, steps: int = 1) -> Mesh:
     """The mesh with the vertices round its crossings moved to the middle of their neighbours, until none is left;
-    itself where it has none, where that does not help, or where a vertex would move by more than ``farthest``."""
+    itself where it has none, where that does not help, or where a vertex would move by more than ``farthest``.
+
+    ``steps``: how often places are smoothed before they are looked for again; more reach farther, and move more.
+    """
     moved = mesh
     for number in range(ROUNDS):
         near = _find_near(moved, number // WIDER)
         if not near.any():
             break
-        moved = Mesh(_smooth(moved, near), mesh.faces)
+        moved = _smooth(moved, near, steps)
         if np.linalg.norm(moved.vertices - mesh.vertices, axis=1).max() > farthest:
             return mesh
     else:
@@ -51,14 +69,14 @@ def _find_near(mesh: Mesh, rings: int) -> Flags:
     return near
 
 
-def _smooth(mesh: Mesh, near: Flags) -> Floats:
-    """(V,3) the vertices, those that are ``near`` moved half the way to the middle of their neighbours."""
+def _smooth(mesh: Mesh, near: Flags, steps: int) -> Mesh:
+    """The mesh with the vertices that are ``near`` moved half the way to the middle of their neighbours so often."""
     count = len(mesh.vertices)
     ends = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
     ends = np.concatenate([ends, ends[:, ::-1]])
-    graph = coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()
+    graph = coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()[near]
     total = np.maximum(np.asarray(graph.sum(axis=1)).ravel(), 1)
     vertices = mesh.vertices.copy()
-    around = np.asarray(graph @ vertices)
-    vertices[near] += 0.5 * (around[near] / total[near, None] - vertices[near])
-    return vertices
+    for _ in range(steps):
+        vertices[near] += 0.5 * (np.asarray(graph @ vertices) / total[:, None] - vertices[near])
+    return Mesh(vertices, mesh.faces)

@@ -15,8 +15,9 @@ from damageest.geometry.skin import find_inner_faces
 from damageest.isolation import at_work
 from damageest.stages.export import DepositForm, ExactForm
 from damageest_cadquery._adapted import MovedSolids, move_solids
+from damageest_cadquery._claims import lower_claims
 from damageest_cadquery._colours import read_colours
-from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit
+from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit, refuse_doubles
 from damageest_cadquery._exact import Exact, SiteInput, find_exact, scale_shape, start_solids
 from damageest_cadquery._files import join_shapes
 from damageest_cadquery._moved import MoveError
@@ -35,6 +36,9 @@ from damageest_cadquery._request import (
     name_site,
 )
 from damageest_cadquery._solids import StockError, list_faces
+
+CLAIMS = 0.01
+"""Largest tolerance of an edge, in tolerances of the job, that is taken as the CAD file claims it."""
 
 
 def make_exact(request: Request) -> Made:
@@ -86,6 +90,7 @@ def _make(request: Request) -> Made:
             forms[site.number] = DepositForm(reason=StockError(fault, _list_stock(site)).describe(facts.names))
             continue
         try:
+            refuse_doubles(site.deposit, exact.pieces, exact.doubles)
             with at_work(name_deposit(site.number), request.seconds):
                 made = find_deposit(site.deposit, site.damage, exact.pieces, exact.rest, faces, part, request.tolerance)
             deposits[site.number], forms[site.number] = made, _describe_deposit(made)
@@ -128,7 +133,7 @@ def take_solids(model: Model, request: Request) -> MovedSolids:
     scale = request.scale
     shapes = [scale_shape(solid, scale) if abs(scale - 1) > 1e-12 else solid for solid in model.solids]
     if request.field is None:
-        return MovedSolids(shapes, 0.0)
+        return MovedSolids([lower_claims(shape, CLAIMS * request.tolerance) for shape in shapes], 0.0)
     with at_work(ADAPTING, request.seconds):
         return move_solids(shapes, request.field, request.part, request.tolerance)
 

@@ -175,3 +175,24 @@ def test_a_surface_that_crosses_itself_is_untangled() -> None:
     assert untangle(apart, 3.0) is apart
     back = keep_apart(folded, apart.vertices)
     assert count_crossings(back) == 0
+
+
+def test_a_crossing_of_large_triangles_moves_a_small_part_of_the_surface() -> None:
+    from damageest_cadquery._untangle import refine_crossings, untangle
+
+    from damageest.geometry.distance import distance_to_mesh
+
+    folded = make_folded(0.3)
+    fine, origin = refine_crossings(folded, 0.5)
+    assert len(origin) == len(fine.faces) > len(folded.faces)
+    areas: Floats = np.linalg.norm(fine.cross, axis=1)
+    assert np.bincount(origin, weights=areas) == pytest.approx(np.linalg.norm(folded.cross, axis=1)), "the same surface"
+
+    def measure_moved(mesh: Mesh) -> float:
+        apart = untangle(mesh, 3.0)
+        assert count_crossings(apart) == 0
+        return float(np.linalg.norm(fine.vertex_cross, axis=1) @ (distance_to_mesh(fine.vertices, apart) > 0.1))
+
+    assert measure_moved(fine) < 0.8 * measure_moved(folded)
+    same, rows = refine_crossings(untangle(folded, 3.0), 0.5)
+    assert len(same.faces) == len(rows) == len(folded.faces), "none without crossings"

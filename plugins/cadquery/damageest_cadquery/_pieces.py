@@ -1,0 +1,90 @@
+"""Which pieces of the part's solids, split by a cut, are the damage volume."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from damageest.artefacts import Solid
+from damageest.errors import InputError
+from damageest.geometry.bodies import split_bodies
+from damageest.geometry.solids import to_manifold
+from damageest_cadquery._check import INVALID
+from damageest_cadquery._doubles import drop_doubles, find_doubles
+from damageest_cadquery._split import Piece, Tool, is_near, is_opencascade_error, measure_volume, split, triangulate
+
+SPECK = 1e-3
+"""Share of the damage volume below which a body of it, or a piece that a split leaves over, is dropped."""
+
+
+def count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> int:
+    """How many solids a damage volume is: in a part of several, which its mesh may have united, one or more in each."""
+    least, origin = SPECK * damage.volume, damage.bounds.mean(axis=0)
+    alone = sum(body.volume > least for body in split_bodies(damage))
+    if len({piece.owner for piece in solids}) < 2:
+        return alone
+    lost, found = to_manifold(damage, origin), []
+    for piece in solids:
+        if not is_near(piece.shape, damage):
+            continue
+        try:
+            common = to_manifold(triangulate(piece.shape, tolerance / 16), origin) ^ lost
+        except (InputError, ValueError):
+            return alone
+        found += [body for body in common.decompose() if body.volume() > least]
+    return len(found) - sum(find_doubles(found))
+
+
+def take_pieces(
+    solids: Sequence[Piece], tool: Tool, fuzzy: float, damage: Solid, tolerance: float
+) -> tuple[tuple[Piece, ...], tuple[Piece, ...], tuple[Piece, ...]] | str:
+    """The pieces that are the damage volume, all others, and those that lie in other pieces of the damage volume; or
+    why there are none of the first."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    why = "it does not separate the solid"
+    taken: list[Piece] = []
+    rest: list[Piece] = []
+    try:
+        for solid in solids:
+            if not _touch(solid.shape, tool.shape):
+                rest.append(solid)
+                continue
+            made = split(solid.shape, solid.owner, solid.origins, tool, fuzzy)
+            if made is None:
+                return why
+            for piece in made:
+                volume = measure_volume(piece.shape)
+                may_be = SPECK * damage.volume < volume < 1.5 * damage.volume
+                if may_be and not BRepCheck_Analyzer(piece.shape).IsValid():
+                    return INVALID  # to triangulate it can take minutes
+                if may_be and _is_damage(piece, damage, tolerance):
+                    taken.append(piece)
+                elif volume > SPECK * damage.volume:
+                    rest.append(piece)
+        kept, doubles = drop_doubles(taken, damage.bounds.mean(axis=0), tolerance / 16)
+    except Exception as error:
+        # of the others, a piece that cannot be triangulated, or whose triangles do not close
+        if not (is_opencascade_error(error) or isinstance(error, (InputError, ValueError))):
+            raise
+        return why
+    return (kept, tuple(rest), doubles) if kept else why
+
+
+def _is_damage(piece: Piece, damage: Solid, tolerance: float) -> bool:
+    mesh = triangulate(piece.shape, tolerance / 16)
+    origin = damage.bounds.mean(axis=0)
+    common = to_manifold(mesh, origin) ^ to_manifold(damage, origin)
+    return bool(common.volume() > 0.5 * mesh.volume)
+
+
+def _touch(first: Any, second: Any) -> bool:
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+
+    boxes = []
+    for shape in (first, second):
+        box = Bnd_Box()
+        BRepBndLib.Add_s(shape, box, False)
+        boxes.append(box)
+    return not boxes[0].IsOut(boxes[1])
