@@ -225,6 +225,7 @@ def test_a_form_that_stops_opencascade_costs_only_this_form(
     assert solid.Volume() == pytest.approx(one.sites[0].damage.volume, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_a_site_that_stops_opencascade_again_and_again_costs_no_other(
     done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
