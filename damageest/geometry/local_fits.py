@@ -24,7 +24,7 @@ SCALES = (32, 80, 200)
 """Numbers of neighbours among which the width of a fit is chosen."""
 KAPPA = 2.0
 """Standard deviations by which two fits of one point may differ because of noise."""
-BYTES_OF_NEIGHBOUR = 140
+BYTES_OF_NEIGHBOUR = 35
 """Memory of a fit for each of its neighbours, measured."""
 CHUNK = 500
 """Points fitted at a time, so that their neighbours fit in the processor's cache."""
@@ -46,8 +46,16 @@ def smooth_points(points: Floats, noise: float, count: int = 32) -> tuple[Floats
         return np.empty((0, 3)), np.empty((0, 3)), np.empty(0)
     _require_memory(points, count)
     distance, index = find_neighbours(points, count)
-    normals, weights = _fit_planes(points, index, distance, noise)
-    move, tilted, _ = _fit_quadric(normals, _look_around(points, index, points), weights, distance[:, -1])
+    normals, before = _fit_planes(points, index, distance, noise)
+    theirs = before.astype(np.float32)
+
+    def fit(own: slice) -> tuple[Floats, Floats]:
+        off = _look_around(points, index[own], points[own])
+        weights = _weigh_bilateral(before[own], off, theirs[index[own]], distance[own], noise)
+        return _fit_quadric(normals[own], off, weights, distance[own, -1])[:2]
+
+    found = map_in_threads(fit, cut_evenly(len(points), CHUNK))
+    move, tilted = (np.concatenate(column) for column in zip(*found, strict=True))
     return points + np.clip(move, -3 * noise, 3 * noise)[:, None] * normals, tilted, distance[:, -1]
 
 
@@ -114,15 +122,26 @@ def _look_around(points: Floats, index: Ints, at: Floats) -> Floats32:
     return np.asarray(points[index] - at[:, None], np.float32)
 
 
-def _fit_planes(points: Floats, index: Ints, distance: Floats, noise: float) -> tuple[Floats, Floats32]:
-    """Normals (N,3) of planes through the neighbours of agreeing direction, and the neighbours' weights (N,K)."""
-    off = _look_around(points, index, points)
-    weights = np.exp(-2.0 * (distance / np.maximum(distance[:, -1:], 1e-12)) ** 2).astype(np.float32)
-    normals = _find_least_spread(off, weights)
+def _fit_planes(points: Floats, index: Ints, distance: Floats, noise: float) -> tuple[Floats, Floats]:
+    """Normals (N,3) of planes through the neighbours of agreeing direction, and those of the round before, by which
+    directions agree."""
+
+    def start(own: slice) -> Floats:
+        weights = np.exp(-2.0 * (distance[own] / np.maximum(distance[own, -1:], 1e-12)) ** 2).astype(np.float32)
+        return _find_least_spread(_look_around(points, index[own], points[own]), weights)
+
+    pieces = cut_evenly(len(points), CHUNK)
+    normals = before = np.concatenate(map_in_threads(start, pieces))
     for _ in range(ROUNDS):
-        weights = _weigh_bilateral(normals, off, normals.astype(np.float32)[index], distance, noise)
-        normals = _find_least_spread(off, weights)
-    return normals, weights
+        before, theirs = normals, normals.astype(np.float32)
+
+        def fit(own: slice, own_normals: Floats = before, theirs: Floats32 = theirs) -> Floats:
+            off = _look_around(points, index[own], points[own])
+            weights = _weigh_bilateral(own_normals[own], off, theirs[index[own]], distance[own], noise)
+            return _find_least_spread(off, weights)
+
+        normals = np.concatenate(map_in_threads(fit, pieces))
+    return normals, before
 
 
 def _weigh_bilateral(

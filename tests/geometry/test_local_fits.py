@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from damageest.geometry import local_fits
 from damageest.geometry.local_fits import average_points, smooth_points
 
 SIGMA = 0.05
@@ -48,3 +49,16 @@ def test_a_sharp_edge_stays() -> None:
     height = (points[:, 2] + np.abs(points[:, 0])) / np.sqrt(2)
     near = np.abs(flat[:, 0]) < 0.5
     assert np.abs(height[near & middle(points)]).mean() < SIGMA
+
+
+def test_points_are_fitted_in_pieces_of_any_size_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = cloud(8.0, 1500)
+    chosen = np.arange(0, len(points), 3)
+
+    def fit() -> list[bytes]:
+        arrays = (*smooth_points(points, SIGMA), *average_points(points, np.ones(len(points), np.int64), SIGMA, chosen))
+        return [array.tobytes() for array in arrays]
+
+    before = fit()
+    monkeypatch.setattr(local_fits, "CHUNK", 37)
+    assert fit() == before
