@@ -23,8 +23,9 @@ CHORD = 1 / 32
 """Of the part's triangles, in tolerances: a fourth of the default, so that volumes differ by little because of it."""
 STOCK = 2.0
 """Height of the stock on the deposits, in tolerances."""
-LIMIT = 30.0
-"""Longest time for the exact form of a damage volume or of a deposit, in seconds of the processor."""
+LIMIT = 60.0
+"""Longest time for the exact form of a damage volume or of a deposit, in seconds of the processor: the default of
+`export.limit`."""
 SIZES = (100_000, 300_000)
 """Bytes from which a file comes after the smaller ones."""
 
