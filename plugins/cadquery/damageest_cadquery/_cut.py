@@ -18,6 +18,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, signe
 from damageest.geometry.loops import trace_loops
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import concatenate_meshes
+from damageest.geometry.undoing import find_crossings
 from damageest_cadquery._untangle import refine_crossings, untangle
 
 RINGS = 3
@@ -79,8 +80,10 @@ def make_cut(damage: Solid, surface: Surface, part: Part, enclosures: Sequence[S
     mesh = Mesh(vertices[rows], renumbered.reshape(-1, 3))
     cut = _drop_elsewhere(Cut(mesh, signed_distance(mesh.vertices, part)[0], core[chosen]))
     cut = _smooth_outside(_drop_specks(_drop_horns(cut, surface, tolerance), tolerance), part, tolerance)
-    for size, steps in ((tolerance, 1), (tolerance, 4), (np.inf, 1)):  # the first moves least
-        mesh, origin = refine_crossings(cut.mesh, size)
+    if not len(find_crossings(cut.mesh)[0]):
+        return cut
+    fine, as_it_is = refine_crossings(cut.mesh, tolerance), (cut.mesh, np.arange(len(cut.core)))
+    for (mesh, origin), steps in ((fine, 1), (fine, 4), (as_it_is, 1)):  # the first moves least
         apart = untangle(mesh, APART * tolerance, steps)
         if apart is not mesh:
             return Cut(apart, signed_distance(apart.vertices, part)[0], cut.core[origin])

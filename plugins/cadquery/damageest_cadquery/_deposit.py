@@ -15,7 +15,7 @@ from damageest.artefacts import Deposit, Part, Solid
 from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
-from damageest_cadquery._check import ON_CAD
+from damageest_cadquery._check import INVALID, ON_CAD
 from damageest_cadquery._compare_stock import bound_entered, compare_stock
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, combine, explore_faces, naming, sew, turn_offsets
@@ -104,7 +104,7 @@ def find_deposit(
         if len(pieces) != bodies:
             raise StockError(f"{len(pieces)} solids for {bodies} pieces")
         if not is_sound(pieces):
-            raise StockError("not valid (BRepCheck)", _find_invalid(pieces))
+            raise StockError(INVALID, _find_invalid(pieces))
         return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
 
 

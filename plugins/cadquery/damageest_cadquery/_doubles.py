@@ -6,8 +6,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from damageest.artefacts import Floats
 from damageest_cadquery._split import Piece, triangulate
 
@@ -37,6 +35,6 @@ def drop_doubles(pieces: Sequence[Piece], origin: Floats, chord: float) -> tuple
 
     if len({piece.owner for piece in pieces}) < 2:
         return tuple(pieces), ()
-    doubles = np.array(find_doubles([to_manifold(triangulate(piece.shape, chord), origin) for piece in pieces]))
+    doubles = find_doubles([to_manifold(triangulate(piece.shape, chord), origin) for piece in pieces])
     kept = tuple(piece for piece, double in zip(pieces, doubles, strict=True) if not double)
     return kept, tuple(piece for piece, double in zip(pieces, doubles, strict=True) if double)

@@ -97,7 +97,7 @@ def find_exact(
         return None, ("no surface is known that cuts it out of the part",)
     bodies, refused = count_bodies(site.damage, solids, tolerance), ""
     second: Exact | None = None
-    least, stale, best = np.inf, Counter[str](), dict[str, float]()
+    stale, best = Counter[str](), dict[str, float]()
     work = _Work(site, solids, faces, part, tolerance, off, bodies, measure_inner_area(solids))
     balance = Balance(solids, part, site.damage, tolerance)
     for form, make, fuzzies, shift in list_tools(cut, part, tolerance):
@@ -125,10 +125,10 @@ def find_exact(
                         return found, tuple(tried)
                     # room for chords was larger than these: a later form may be nearer
                     tried.append(f"{form}: {VOLUME} differs by {off_by:+.2%} beside chords")
-                    second = found if abs(off_by) < least else second
+                    second = found if abs(off_by) < min(best.values(), default=np.inf) else second
                     stale[kind] += kind != "facets" and abs(off_by) > NEARER * best.get(kind, np.inf)
                     refused = kind if stale[kind] >= STALE else refused
-                    least, best[kind] = min(least, abs(off_by)), min(best.get(kind, np.inf), abs(off_by))
+                    best[kind] = min(best.get(kind, np.inf), abs(off_by))
                     break
                 tried.append(f"{form}: {measured.reason}")
                 if trial.is_final:
