@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, PositiveFloat, Tag, model_validator
@@ -23,9 +23,11 @@ DEFAULT_GAP = 10.0
 
 
 class Crop(Options, ABC):
-    """Base of the crops: ``keep`` removes the points outside the shape, ``drop`` those inside."""
+    """Base of the crops: ``keep`` removes the points outside the shape, ``drop`` those inside. ``needs_all``: whether
+    it has to see all points of a scan at once."""
 
     model_config = ConfigDict(defer_build=True)
+    needs_all: ClassVar[bool] = False
     keep: str | None
 
     @abstractmethod
@@ -120,6 +122,8 @@ class AboveCrop(_ShapeCrop):
 
 class PieceCrop(Crop):
     """The connected piece with the most points. Points no farther apart than `gap` are connected."""
+
+    needs_all: ClassVar[bool] = True
 
     keep: Literal["largest piece"] = Field(description="keep the largest piece only")
     gap: PositiveFloat | None = Field(

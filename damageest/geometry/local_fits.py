@@ -5,6 +5,7 @@ Points and noise are in one unit, points in one frame.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -47,14 +48,10 @@ def smooth_points(points: Floats, noise: float, count: int = 32) -> tuple[Floats
     _require_memory(points, count)
     distance, index = find_neighbours(points, count)
     normals, before = _fit_planes(points, index, distance, noise)
-    theirs = before.astype(np.float32)
-
-    def fit(own: slice) -> tuple[Floats, Floats]:
-        off = _look_around(points, index[own], points[own])
-        weights = _weigh_bilateral(before[own], off, theirs[index[own]], distance[own], noise)
-        return _fit_quadric(normals[own], off, weights, distance[own, -1])[:2]
-
-    found = map_in_threads(fit, cut_evenly(len(points), CHUNK))
+    weigh = _weigh_by(before, points, index, distance, noise)
+    found = map_in_threads(
+        lambda own: _fit_quadric(normals[own], *weigh(own), distance[own, -1])[:2], cut_evenly(len(points), CHUNK)
+    )
     move, tilted = (np.concatenate(column) for column in zip(*found, strict=True))
     return points + np.clip(move, -3 * noise, 3 * noise)[:, None] * normals, tilted, distance[:, -1]
 
@@ -130,18 +127,29 @@ def _fit_planes(points: Floats, index: Ints, distance: Floats, noise: float) -> 
         weights = np.exp(-2.0 * (distance[own] / np.maximum(distance[own, -1:], 1e-12)) ** 2).astype(np.float32)
         return _find_least_spread(_look_around(points, index[own], points[own]), weights)
 
+    def fit_again(normals: Floats) -> Floats:
+        weigh = _weigh_by(normals, points, index, distance, noise)
+        return np.concatenate(map_in_threads(lambda own: _find_least_spread(*weigh(own)), pieces))
+
     pieces = cut_evenly(len(points), CHUNK)
     normals = before = np.concatenate(map_in_threads(start, pieces))
     for _ in range(ROUNDS):
-        before, theirs = normals, normals.astype(np.float32)
-
-        def fit(own: slice, own_normals: Floats = before, theirs: Floats32 = theirs) -> Floats:
-            off = _look_around(points, index[own], points[own])
-            weights = _weigh_bilateral(own_normals[own], off, theirs[index[own]], distance[own], noise)
-            return _find_least_spread(off, weights)
-
-        normals = np.concatenate(map_in_threads(fit, pieces))
+        before, normals = normals, fit_again(normals)
     return normals, before
+
+
+def _weigh_by(
+    normals: Floats, points: Floats, index: Ints, distance: Floats, noise: float
+) -> Callable[[slice], tuple[Floats32, Floats32]]:
+    """What gives, for some of the points, their neighbours as `_look_around` does, and the weights of these by all
+    points' ``normals`` (N,3)."""
+    theirs = normals.astype(np.float32)
+
+    def weigh(own: slice) -> tuple[Floats32, Floats32]:
+        off = _look_around(points, index[own], points[own])
+        return off, _weigh_bilateral(normals[own], off, theirs[index[own]], distance[own], noise)
+
+    return weigh
 
 
 def _weigh_bilateral(

@@ -13,7 +13,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part, Pose, Scan
 from damageest.errors import InputError
-from damageest.geometry.crops import Crop, PieceCrop
+from damageest.geometry.crops import Crop
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.distance_by_cells import signed_distance_by_cells
 from damageest.geometry.duplicates import list_distinct
@@ -37,7 +37,7 @@ MOST_CUBES = 1 << 20
 
 def check_crops(crops: Iterable[Crop]) -> None:
     """Raises InputError for a crop that needs all points at once."""
-    if any(isinstance(crop, PieceCrop) for crop in crops):
+    if any(crop.needs_all for crop in crops):
         raise InputError(
             "scan: crop  keep: largest piece  needs all points at once, but the scan is read in pieces; give  "
             "most_points: 0  where the memory suffices, or crop by a box, a cylinder or a plane"

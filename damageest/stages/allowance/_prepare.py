@@ -10,7 +10,7 @@ from pydantic import Field
 
 from damageest.artefacts import Floats, Mesh, Part, Solid, Vector
 from damageest.errors import StageError
-from damageest.geometry.rays import RayCaster
+from damageest.geometry.rays import prepare_rays
 from damageest.geometry.refinement import halve_edges
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_manifold, to_solid
@@ -71,6 +71,12 @@ class _Column:
         x, y = (self.corner[k] + self.cell * np.arange(self.floor.shape[k]) for k in range(2))
         return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
 
+    def place_between(self, low: float, high: float) -> tuple[Floats, Floats]:
+        """Places (N,3) at two heights over the nodes whose floor is below the top."""
+        places = self.places[self.floor < self.top]
+        first, last = (np.column_stack([places, np.full(len(places), height)]) for height in (low, high))
+        return first, last
+
     def raise_body(self) -> Any:
         """The column as a Manifold."""
         from manifold3d import Manifold, Mesh64
@@ -107,7 +113,8 @@ def open_cavity(
     """
     direction = _find_direction(damage, part, prepare)
     origin, turn = damage.bounds.mean(axis=0), turn_to_axis(direction).T
-    room = _raise_room(_turn(damage, origin, turn), _turn(part, origin, turn), prepare, tolerance)
+    turned = Mesh((damage.vertices - origin) @ turn.T, damage.faces)
+    room = _raise_room(turned, part, origin, turn, prepare, tolerance)
     room = room.simplify(tolerance / 8).transform(np.column_stack([turn.T, np.zeros(3)]))
     whole, lost = to_manifold(part, origin), to_manifold(damage, origin)
     # joined first: where faces coincide, as those of the damage with the skin, volumes may come out wrong
@@ -123,20 +130,21 @@ def open_cavity(
     return cavity, to_solid(opening, origin)
 
 
-def _turn(mesh: Mesh, origin: Floats, turn: Floats) -> Mesh:
-    return Mesh((mesh.vertices - origin) @ turn.T, mesh.faces)
-
-
-def _raise_room(damage: Mesh, part: Mesh, prepare: Prepare, tolerance: float) -> Any:
-    """The column over the floor of the opened cavity, a Manifold; damage and part with z along the direction."""
+def _raise_room(damage: Mesh, part: Part, origin: Floats, turn: Floats, prepare: Prepare, tolerance: float) -> Any:
+    """The column over the floor of the opened cavity, a Manifold, with z along the direction as the damage; ``origin``
+    (3,) and ``turn`` (3,3): where that frame lies in the part's."""
     high, deep = float(damage.bounds[1, 2]), float(np.ptp(damage.bounds[:, 2])) + prepare.depth
     top, limit = high + tolerance / 4, high + deep
     column = _open_floor(damage, prepare, tolerance, deep, top)
-    rays = RayCaster(part)
-    if (_measure_metal(rays, part, column, top, limit) > 0).any():
+
+    def measure(one: _Column) -> Floats:
+        low, high = (origin + places @ turn for places in one.place_between(top, limit))
+        return _measure_metal(part, low, high, turn[2])
+
+    if (measure(column) > 0).any():
         # metal that is higher than the damage stands over it, and is removed where it is not a wall
         higher = _open_floor(damage, prepare, tolerance, deep + limit - top, limit)
-        if np.isfinite(_measure_metal(rays, part, higher, top, limit)).all():
+        if np.isfinite(measure(higher)).all():
             column = higher
     return column.raise_body()
 
@@ -162,13 +170,12 @@ def _open_floor(damage: Mesh, prepare: Prepare, tolerance: float, deep: float, t
     return _Column(floor, corner, cell, top)
 
 
-def _measure_metal(rays: RayCaster, part: Mesh, column: _Column, start: float, end: float) -> Floats:
-    """How much higher than ``start`` (N,) metal reaches over the open nodes of a column: 0 where there is none, and
-    infinite where it goes on above ``end``. ``rays``: of the part."""
-    places = column.places[column.floor < column.top]
-    low, high = (np.column_stack([places, np.full(len(places), height)]) for height in (start, end))
-    face = rays.find_first(low, np.tile([0.0, 0.0, 1.0], (len(low), 1)))[1]
-    goes_on = (face >= 0) & (part.face_normals[face, 2] > 0)  # of those that cross nothing before the end
+def _measure_metal(part: Part, low: Floats, high: Floats, up: Floats) -> Floats:
+    """How far (N,) the part's metal reaches from places ``low`` (N,3) to ``high`` (N,3), which lie ``up`` (3,) from
+    them: 0 where there is none, and infinite where it goes on above."""
+    rays = prepare_rays(part)
+    face = rays.find_first(low, np.tile(up, (len(low), 1)))[1]
+    goes_on = (face >= 0) & (part.face_normals[face] @ up > 0)  # of those that cross nothing before the end
     crossed, reach = rays.find_crossings(low, high), np.zeros(len(low))
     last = np.flatnonzero(np.diff(crossed.ray, append=-1))
     goes_on[crossed.ray[last]] = crossed.enters[last]

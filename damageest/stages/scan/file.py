@@ -11,7 +11,6 @@ from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, field_s
 
 from damageest.artefacts import Reason, Scan
 from damageest.errors import InputError
-from damageest.geometry.crops import PieceCrop
 from damageest.geometry.units import UnitOption
 from damageest.io.large_scans import LargeScan, open_large_scan
 from damageest.io.points import READERS
@@ -146,7 +145,7 @@ class ScanFile(ReadScan):
         if not self.most_points:
             return None
         files, most = self._list_files(), self.most_points
-        if "most_points" not in self.model_fields_set and any(isinstance(crop, PieceCrop) for crop in self.crop):
+        if "most_points" not in self.model_fields_set and any(crop.needs_all for crop in self.crop):
             most = MOST_WHOLE
         places = [file.viewpoint for file in files]
         return open_large_scan([file.path for file in files], unit, self.unit, places, most, self.min_confidence)
