@@ -77,8 +77,11 @@ class SignedMesh:
         u, v, w = b - a, c - a, place - a
         uu, uv, vv, wu, wv = (np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (u, v), (v, v), (w, u), (w, v)))
         scale = uu * vv - uv * uv
+        sound = scale > 0  # slivers lose their area by cancellation: their own normal is taken
+        scale[~sound] = 1.0
         second, third = (vv * wu - uv * wv) / scale, (uu * wv - uv * wu) / scale
         share = np.stack([1 - second - third, second, third], axis=1)
+        share[~sound] = 1 / 3
         low = share <= ON_EDGE
         number = low.sum(axis=1)
         found = of_face[face]

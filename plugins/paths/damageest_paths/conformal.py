@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh
-from damageest.geometry.solids import to_arrays
+from damageest.geometry.solids import to_arrays, to_manifold
 from damageest_paths.fill import Line, list_lines
 from damageest_paths.floor import Floor, find_floor
 from damageest_paths.follow import follow_line, limit_tilt, make_pass
@@ -212,5 +212,11 @@ class _Work:
         if self.missing is not None:
             piece = piece - self.missing
         if piece.volume() > 0:
-            self.missing = piece if self.missing is None else self.missing + piece
             self.reasons[why] = self.reasons.get(why, 0.0) + piece.volume()
+            self.missing = _renew(piece if self.missing is None else self.missing + _renew(piece))
+
+
+def _renew(body: Any) -> Any:
+    """The same solid without what manifold3d knows of the ones that it was made of: unions of solids that nearly
+    coincide, made one after the other, take all memory with that (3.5.4)."""
+    return to_manifold(Mesh(*to_arrays(body)))

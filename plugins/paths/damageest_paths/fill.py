@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.regions import cover, find_main_angle, measure_length, shift_border, unite_regions
+from damageest_paths.regions import cover, find_main_angle, list_pieces, measure_length, shift_border, unite_regions
 from damageest_paths.stripes import Bead, fill_with_rows
 from damageest_paths.trim import cut_ring, follow_rim, join_lines, lengthen_line, trim_line
 
@@ -54,7 +54,7 @@ def list_lines(
     if region.is_empty():
         return []
     if pattern == "zigzag" and free is not None:
-        pieces = sorted(region.decompose(), key=lambda each: each.bounds())
+        pieces = sorted(list_pieces(region), key=lambda each: each.bounds())
         lines = [line for piece in pieces for line in _fill_piece(piece, bead, angle, free, shortest)]
     else:
         fill = {
@@ -151,8 +151,8 @@ def _finish(lines: Sequence[Line], region: Any, bead: Bead, free: Any, shortest:
 
 def _list_gaps(region: Any, lines: Sequence[Line], bead: Bead, least: float = SLIVER) -> list[Any]:
     """What the beads leave of a region, without what is smaller than ``least`` squares of the bead's width."""
-    gaps = (region - cover([line.points for line in lines], bead.width)).decompose()
-    large = [gap for gap in gaps if gap.area() > least * bead.width**2]
+    gaps = region - cover([line.points for line in lines], bead.width)
+    large = [gap for gap in list_pieces(gaps) if gap.area() > least * bead.width**2]
     return sorted(large, key=lambda gap: gap.bounds())
 
 

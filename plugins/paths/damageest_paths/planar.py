@@ -17,7 +17,15 @@ from damageest_paths.fill import Kind, Line, list_lines
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes
-from damageest_paths.regions import cover, make_region, measure_length, resample, shift_border, unite_regions
+from damageest_paths.regions import (
+    cover,
+    list_pieces,
+    make_region,
+    measure_length,
+    resample,
+    shift_border,
+    unite_regions,
+)
 
 UNSUPPORTED, COLLIDES, SHORT, SUNK, SHADED = (
     "stands on nothing within the permitted overhang",
@@ -104,7 +112,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
 def _share_out(gaps: Any, causes: Sequence[Any]) -> list[Any]:
     """The pieces of ``gaps``, a region, for each of the regions ``causes`` the ones that it is the first to meet."""
     found: list[list[Any]] = [[] for _ in causes]
-    for piece in gaps.decompose():
+    for piece in list_pieces(gaps):
         for own, cause in zip(found, causes, strict=True):
             if not (piece ^ cause).is_empty():
                 own.append(piece)

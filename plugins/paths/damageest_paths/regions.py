@@ -33,6 +33,12 @@ def unite_regions(regions: Sequence[Any]) -> Any:
     return CrossSection.batch_boolean(kept, OpType.Add) if kept else CrossSection()
 
 
+def list_pieces(region: Any) -> list[Any]:
+    """The connected pieces of a region. Clipper2 leaves some of them without area, whose bounds are those of nothing:
+    they are left out."""
+    return [piece for piece in region.decompose() if not piece.is_empty() and piece.area() > 0]
+
+
 def shift_border(region: Any, distance: float) -> Any:
     """The region grown by ``distance`` with round corners, or shrunk where that is negative."""
     from manifold3d import JoinType

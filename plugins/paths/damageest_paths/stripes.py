@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.regions import cover, turn_points
+from damageest_paths.regions import cover, list_pieces, turn_points
 from damageest_paths.trim import trim_line
 
 NEAR, FAR = 1.0, 6.0
@@ -58,7 +58,7 @@ def fill_with_rows(region: Any, bead: Bead, angle: float, linked: bool = True, f
     turned = region.rotate(float(-np.degrees(angle)))
     within = None if free is None else free.rotate(float(-np.degrees(angle)))
     lines: list[Floats] = []
-    for piece in sorted(turned.decompose(), key=lambda each: each.bounds()):
+    for piece in sorted(list_pieces(turned), key=lambda each: each.bounds()):
         rows = _find_rows(piece, bead)
         around = piece.offset(BESIDE * bead.width)
         if within is not None:
@@ -88,7 +88,7 @@ def _cut(piece: Any, number: int, height: float, edges: Floats, bead: Bead) -> l
     left, _, right, _ = piece.bounds()
     low, high = float(edges[number]), float(edges[number + 1])
     stripe = CrossSection.square((right - left + 2, high - low)).translate((left - 1, low))
-    spans = sorted(each.bounds() for each in (piece ^ stripe).decompose())
+    spans = sorted(each.bounds() for each in list_pieces(piece ^ stripe))
     merged: list[list[float]] = []
     outside = THIN * bead.width if number in (0, len(edges) - 2) else 0.0
     for start, bottom, stop, top in spans:

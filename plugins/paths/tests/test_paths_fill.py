@@ -8,8 +8,10 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from damageest_paths.fill import Pattern, fill_region
-from damageest_paths.regions import cover, make_region
+from damageest_paths.regions import cover, list_pieces, make_region
 from damageest_paths.stripes import Bead
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from manifold3d import CrossSection
 
 from damageest.artefacts import Floats
@@ -83,3 +85,17 @@ def test_rows_follow_the_angle() -> None:
 
 def test_nothing_for_nothing() -> None:
     assert fill_region(CrossSection(), "zigzag", BEAD, 0.0) == []
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-4, 4), st.floats(-4, 4)), min_size=3, max_size=6),
+    st.floats(1e-9, 1e-3),
+    st.floats(0, 3),
+)
+def test_rows_of_slivers_stay_near_them(corners: list[tuple[float, float]], flat: float, angle: float) -> None:
+    """Pieces that vanish where they are cut have no bounds; a row through them would be endless."""
+    region = make_region([np.array(corners) * [1.0, flat]]) + CrossSection.square((3, 3))
+    for line in fill_region(region, "zigzag", BEAD, angle):
+        assert np.abs(line).max() < 10
+    assert not list_pieces(CrossSection())
