@@ -60,7 +60,10 @@ class DepositPath(Checked):
     number: row, ring, spiral, rim, or gap (between others); empty where not known. ``setup`` (4,4): takes a point
     to the frame in which the part is set up, its z along the tool, for a path of three axes; None for other paths.
     ``channels``: names of what the process is given besides the speed, as power or powder, and ``values`` (N,C): of
-    each on the move that ends there, in the unit that the job has; None without channels.
+    each on the move that ends there, in the unit that the job has; None without channels. ``layer_form``: planar, or
+    conformal where the layers follow the floor of the cavity; empty where not known. ``around`` (4,): centre and radius
+    of a ball that holds all that the tool must not touch; ``free_ends`` (K,): whether the tool can leave it straight
+    along its axis from the end of each pass. Both None where not known.
     """
 
     points: Floats
@@ -89,10 +92,14 @@ class DepositPath(Checked):
     setup: Floats | None = None
     channels: tuple[str, ...] = ()
     values: Floats | None = None
+    layer_form: str = ""
+    around: Floats | None = None
+    free_ends: Flags | None = None
     _dtypes: ClassVar[dict[str, Any]] = {
         "points": np.float64, "axes": np.float64, "normals": np.float64, "feed": np.float64, "on": np.bool_,
         "layer": np.int64, "number": np.int64, "part": np.int64, "directions": np.float64, "heights": np.float64,
         "section": np.float64, "tightest": np.float64, "setup": np.float64, "values": np.float64,
+        "around": np.float64, "free_ends": np.bool_,
     }  # fmt: skip
     _ranges: ClassVar[dict[str, Range]] = {
         "width": (0.0, MOST), "standoff": (0.0, MOST), "deposit_volume": (0.0, MOST),
@@ -118,6 +125,9 @@ class DepositPath(Checked):
         if self.setup is not None:
             require_shape("setup", self.setup, 4, 4)
             require_finite("setup", self.setup)
+        if self.around is not None:
+            require_shape("around", self.around, 4)
+            require_finite("around", self.around)
         if (self.values is None) == bool(self.channels):
             raise ArtefactError("channels, values: one without the other")
         if self.values is not None:
@@ -133,6 +143,8 @@ class DepositPath(Checked):
             raise ArtefactError("layer, number, part: expected numbers from 1 up")
         if count and self.part.max() > len(self.directions):
             raise ArtefactError(f"part: number {self.part.max()} of the {len(self.directions)} parts")
+        if self.free_ends is not None:
+            require_shape("free_ends", self.free_ends, self.passes)
         if self.kinds and len(self.kinds) != self.passes:
             raise ArtefactError(f"kinds: {len(self.kinds)} for {self.passes} passes")
         if count and self.on[0]:

@@ -88,4 +88,5 @@ def _move_path(path: DepositPath, T: Floats | None) -> DepositPath:
     return replace(
         path, points=move_points(path.points, T), axes=axes, normals=path.normals @ turn,
         directions=path.directions @ turn, tightest=None, missing=None, setup=setup,
+        around=None if path.around is None else np.append(move_points(path.around[None, :3], T), path.around[3]),
     )  # fmt: skip

@@ -9,12 +9,14 @@ import numpy as np
 from damageest.artefacts import DepositPath, Floats, Ints
 from damageest.errors import StageError
 from damageest.stages.export import PathSettings
+from damageest_machines.angles import turn_axes
 from damageest_machines.definition import Machine
 from damageest_machines.moves import TO_MM, Moves, make_moves, split_moves
 from damageest_machines.positions import Positions, find_positions
 from damageest_machines.program import Program, find_exact
 from damageest_machines.rotary import turn_rotary
 from damageest_machines.timing import measure_minutes
+from damageest_machines.turning_back import find_refuge
 
 CHORD = 0.005
 """How far, in mm, a point may leave its line while a table without tool centre point turns between two points."""
@@ -23,16 +25,18 @@ CHORD = 0.005
 def build_program(path: DepositPath, settings: PathSettings, machine: Machine) -> Program:
     """Raises StageError for what the machine cannot do, or where the machine file has no command for a channel."""
     _check_channels(path, machine)
-    moves = make_moves(path, settings.unit, machine)
-    standoff = path.standoff * TO_MM[settings.unit]
-    at = find_positions(machine, moves, standoff)
+    factor = TO_MM[settings.unit]
+    refuge = find_refuge(path, factor, machine)
+    moves, rotary, notes = turn_axes(machine, make_moves(path, settings.unit, machine), refuge)
+    standoff = path.standoff * factor
+    at = find_positions(machine, moves, standoff, rotary)
     if machine.post.tcp == "table" and machine.rotary:
         moves, at = _follow_table(machine, moves, at, standoff)
     exact = find_exact(moves.on)
     minutes = measure_minutes(machine, moves, at, exact)
     title = settings.title.encode("ascii", "replace").decode().replace("\n", " ")
     name = machine.post.program.replace("{site}", str(settings.site))
-    return Program(machine, path, settings, moves, at, name, title, exact, minutes, at.notes)
+    return Program(machine, path, settings, moves, at, name, title, exact, minutes, (*notes, *at.notes))
 
 
 def _check_channels(path: DepositPath, machine: Machine) -> None:

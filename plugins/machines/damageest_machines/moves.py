@@ -14,6 +14,8 @@ from damageest_machines.frames import make_transform
 from damageest_machines.rotary import measure_angle, slerp
 
 TO_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
+TURNED_BACK = -2
+"""Source of a move at which a rotary axis is turned back."""
 REVERSED = 170.0
 """Degrees from which on the tool axis counts as reversed within one move: no shortest turn is known there."""
 
@@ -22,8 +24,8 @@ REVERSED = 170.0
 class Moves:
     """``points`` (M,3) in mm, ``axes`` and ``normals`` (M,3) in the frame of the work offset; ``feed`` (M,) in mm a
     minute; ``on`` (M,): whether the move that ends there deposits; ``source`` (M,): the move of the path that it is or
-    is a piece of, -1 for approach and retract; ``is_end`` (M,): whether it is that move's end. ``layer``, ``number``,
-    ``part`` (M,) and ``values`` (M,C) of channels as the path has them."""
+    is a piece of, -1 for approach and retract, `TURNED_BACK` for what turns an axis back; ``is_end`` (M,): whether it
+    is that move's end. ``layer``, ``number``, ``part`` (M,) and ``values`` (M,C) of channels as the path has them."""
 
     points: Floats
     axes: Floats
@@ -45,6 +47,8 @@ class Moves:
         """Where a move is, in words."""
         x, y, z = self.points[k]
         place = f"({x:.4g}, {y:.4g}, {z:.4g})"
+        if self.source[k] == TURNED_BACK:
+            return f"the way on which axes are turned back after pass {self.number[k]} of layer {self.layer[k]}"
         if self.source[k] < 0:
             return f"the {'approach' if k == 0 else 'retract'} to {place}"
         kind = "pass" if self.on[k] else "the way to pass"

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.errors import StageError
-from damageest_machines.definition import Machine, Rotary
+from damageest_machines.definition import Machine
 from damageest_machines.frames import OPPOSITE, make_tool_frame, make_transform, point_along, turn_between
 from damageest_machines.moves import Moves
-from damageest_machines.rotary import choose_angles, measure_turns, turn_rotary
+from damageest_machines.rotary import turn_rotary
 
-STRAIGHT = 1e-6
-"""How far the tool axis of a machine without rotary axes may be off its z."""
-LOOSE = 1.5
-"""Multiple of ``post.step`` by which the tool axis may leave its turn between two points."""
 WRIST = 40.0
 """Degrees by which a joint may turn between two points at most; more is a turn of the wrist from one form of the arm to
 another."""
@@ -43,15 +38,13 @@ class Positions:
     notes: tuple[str, ...]
 
 
-def find_positions(machine: Machine, moves: Moves, standoff: float, rotary: Floats | None = None) -> Positions:
-    """``standoff`` in mm. ``rotary`` (M,K): angles, where they are known. Raises StageError for what the machine cannot
-    do: an axis beyond its limits, a tool axis or a pose that it does not reach, an axis that would have to jump."""
+def find_positions(machine: Machine, moves: Moves, standoff: float, rotary: Floats) -> Positions:
+    """``standoff`` in mm; ``rotary`` (M,K): angles of the rotary axes. Raises StageError for what the machine cannot
+    do: an axis beyond its limits, a pose that it does not reach, a joint that would have to jump."""
     base = make_transform(machine.frames.work)
     tool = make_transform(machine.frames.tool)
     tool[:3, 3] += standoff * tool[:3, :3] @ point_along(machine.frames.tool.points)
     notes: list[str] = []
-    if rotary is None:
-        rotary = _find_rotary(machine, moves, base, notes)
     R, s = turn_rotary(machine.rotary, rotary, "part")
     world = np.einsum("nij,nj->ni", R, moves.points @ base[:3, :3].T + base[:3, 3]) + s
     turned = (world - base[:3, 3]) @ base[:3, :3]
@@ -63,61 +56,6 @@ def find_positions(machine: Machine, moves: Moves, standoff: float, rotary: Floa
     turns, joints = _place_robot(machine, moves, base, tool, rotary, R, world, notes)
     frames, still = np.swapaxes(R @ base[:3, :3], 1, 2) @ turns, base[:3, :3].T @ turns
     return Positions(rotary, world, frames, still, joints, tool, base, turned, tuple(notes))
-
-
-def _find_rotary(machine: Machine, moves: Moves, base: Floats, notes: list[str]) -> Floats:
-    directions = moves.axes @ base[:3, :3].T
-    home = np.array([machine.home.get(axis.name, 0.0) for axis in machine.rotary])
-    if not machine.follows:
-        if machine.robot is None:
-            tilts = np.linalg.norm(directions - [0, 0, 1], axis=1)
-            if tilts.max(initial=0.0) > STRAIGHT:
-                k = int(tilts.argmax())
-                raise StageError(
-                    f"{machine.name} has no rotary axes, but the tool is tilted by "
-                    f"{np.degrees(2 * np.arcsin(min(tilts[k] / 2, 1))):.1f} degrees: {moves.describe(k)}",
-                    "path.axes: 3, or a machine with rotary axes",
-                )
-        return np.tile(home, (len(directions), 1))
-    flat = np.array(machine.robot.flat if machine.robot else (0.0, 0.0, 1.0))
-    flat = flat / np.linalg.norm(flat)
-    found = choose_angles(machine.rotary, directions, flat, moves.on, home)
-    if len(found.unreached):
-        k = int(found.unreached[0])
-        x, y, z = directions[k]
-        raise StageError(
-            f"{len(found.unreached)} of {len(directions)} tool axes are not reached by {_name(machine.rotary)} within "
-            f"their limits, the first ({x:.3f}, {y:.3f}, {z:.3f}): {moves.describe(k)}",
-            "path.machine.tilt: a smaller tilt, another frames.work of the machine, or another path.direction",
-        )
-    _check_flips(machine, moves, found.angles, directions, flat, notes)
-    return found.angles
-
-
-def _check_flips(
-    machine: Machine, moves: Moves, angles: Floats, directions: Floats, flat: Floats, notes: list[str]
-) -> None:
-    off = measure_turns(machine.rotary, angles, directions, flat)
-    if off.max() > LOOSE * machine.post.step:
-        k = int(off.argmax())
-        was, now = ("/".join(f"{value:.1f}" for value in angles[j]) for j in (k - 1, k))
-        raise StageError(
-            f"{_name(machine.rotary)} would have to jump from {was} to {now} degrees, and the tool would "
-            f"leave its axis by {off[k]:.0f} degrees: {moves.describe(k)}",
-            "wider limits of the rotary axes, home nearer to the other end of them, or a part set up otherwise",
-        )
-    for number, axis in enumerate(machine.rotary):
-        turns = np.abs(np.diff(angles[:, number], prepend=angles[0, number]))
-        length = np.linalg.norm(np.diff(moves.points, axis=0, prepend=moves.points[:1]), axis=1)
-        planned = 60 * length / moves.feed
-        slow = moves.on & (turns / axis.speed > 1.5 * planned) & (turns > machine.post.step)
-        if slow.any():
-            k = int(np.where(slow, turns / axis.speed - planned, 0.0).argmax())
-            notes.append(
-                f"{slow.sum()} of {len(slow)} moves deposit slower than planned, because {axis.name} turns near the "
-                f"singular axis: by {turns[k]:.0f} degrees within {length[k]:.3g} mm, {turns[k] / axis.speed:.2g} s "
-                f"instead of {planned[k]:.2g} s: {moves.describe(k)}"
-            )
 
 
 def _check_linear(machine: Machine, moves: Moves, linear: Floats) -> None:
@@ -225,7 +163,3 @@ def _find_joints(machine: Machine, moves: Moves, poses: Floats, rotary: Floats) 
             "another frames.work, or another frames.tool.spin",
         )
     return joints
-
-
-def _name(axes: Sequence[Rotary]) -> str:
-    return " and ".join(axis.name for axis in axes)

@@ -14,7 +14,7 @@ from damageest.errors import StageError
 from damageest.stages.export import PathSettings, PathWriter, describe_setup
 from damageest_machines.build import build_program
 from damageest_machines.files import find_file, read_machine
-from damageest_machines.moves import TO_MM
+from damageest_machines.moves import TO_MM, TURNED_BACK
 from damageest_machines.program import Program
 from damageest_machines.rotary import find_ambiguous
 
@@ -115,6 +115,10 @@ class CncPost(Post):
         up = np.array([0.0, 0.0, 1.0])
         directions = self.moves.axes @ self.at.base[:3, :3].T
         found = find_ambiguous(self.machine.rotary, self.at.rotary, directions, up)
+        # a vector that stays does not turn an axis back
+        stays = np.linalg.norm(np.diff(directions, axis=0, prepend=directions[:1]), axis=1) < 1e-6
+        turns = np.abs(np.diff(self.at.rotary, axis=0, prepend=self.at.rotary[:1])).max(axis=1) > 0.01
+        found = np.union1d(found, np.flatnonzero(stays & turns & (self.moves.source == TURNED_BACK)))
         if len(found):
             raise StageError(
                 "from the tool axes alone the control would come to other rotary angles than those that were checked: "

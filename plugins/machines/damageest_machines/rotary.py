@@ -21,7 +21,12 @@ from damageest_machines.definition import Rotary
 SINGULAR = np.radians(2e-4)
 """Angle between the tool axis and the rotary axis next to the part below which that axis may stand anywhere: the tool
 is then off by twice the angle at most."""
-UNREACHED = np.inf
+TURN_BACK = 720.0**2
+"""Cost of a turn at a stop, where the tool may turn to all sides."""
+SAME = 1e-9
+"""Square of a turn in degrees that counts as none."""
+PAIRS = 200_000
+"""Pairs of candidates that are looked at for jumps at once."""
 TURNS = 12
 """Whole turns to each side of an axis that are looked at between its limits."""
 
@@ -59,9 +64,20 @@ def turn_rotary(axes: Sequence[Rotary], angles: Floats, carries: str) -> tuple[F
     return R, s
 
 
-def choose_angles(axes: Sequence[Rotary], directions: Floats, up: Floats, on: Flags, start: Floats) -> Choice:
+class Stops(NamedTuple):
+    """``is_stop`` (N,): moves at which the axes may turn by any angles at a price. At all others the tool axis may
+    leave its turn by ``loose`` degrees at most."""
+
+    is_stop: Flags
+    loose: float
+
+
+def choose_angles(
+    axes: Sequence[Rotary], directions: Floats, up: Floats, on: Flags, start: Floats, stops: Stops | None = None
+) -> Choice:
     """Angles for tool axes ``directions`` (N,3), in the machine's frame with all axes at 0, that add up to the least
-    turn, where turns while it deposits (``on``) count most; beginning near ``start`` (K,). ``up``: t."""
+    turn, where turns while it deposits (``on``) count most; beginning near ``start`` (K,). ``up``: t. Without ``stops``
+    axes may jump."""
     if len(axes) == 1:
         return _choose_one(axes[0], directions, up)
     chain = _make_chain(axes)
@@ -70,7 +86,9 @@ def choose_angles(axes: Sequence[Rotary], directions: Floats, up: Floats, on: Fl
     lost = np.flatnonzero(~possible.any(axis=1))
     if len(lost):
         return Choice(np.zeros((len(directions), 2)), singular, lost)
-    chosen = _choose_least(values, possible, on, start, [axis.limits is None for axis in axes])
+    endless = [axis.limits is None for axis in axes]
+    jumps = None if stops is None else _find_jumps(axes, values, directions, up, endless, stops.loose)
+    chosen = _choose_least(values, possible, on, start, endless, None if stops is None else stops.is_stop, jumps)
     for number, axis in enumerate(axes):
         if axis.limits is None:
             first = start[number] + _wrap(chosen[0, number] - start[number])
@@ -95,13 +113,17 @@ def measure_turns(axes: Sequence[Rotary], angles: Floats, directions: Floats, up
     """How far (N,) in degrees the tool axis leaves the shortest turn from the move before, if all axes turn evenly."""
     worst = np.zeros(len(angles))
     for share in (0.25, 0.5, 0.75):
-        between = angles[:-1] + share * np.diff(angles, axis=0)
-        part, _ = turn_rotary(axes, between, "part")
-        tool, _ = turn_rotary(axes, between, "tool")
-        found = np.einsum("nji,nj->ni", part, tool @ up)
-        planned = slerp(directions[:-1], directions[1:], np.full(len(between), share))
+        found = find_tool_axes(axes, angles[:-1] + share * np.diff(angles, axis=0), up)
+        planned = slerp(directions[:-1], directions[1:], np.full(len(found), share))
         worst[1:] = np.maximum(worst[1:], np.degrees(measure_angle(found, planned)))
     return worst
+
+
+def find_tool_axes(axes: Sequence[Rotary], angles: Floats, up: Floats) -> Floats:
+    """The tool axes (N,3) with the rotary axes at angles (N,K), in the machine's frame with the part's at 0."""
+    part, _ = turn_rotary(axes, angles, "part")
+    tool, _ = turn_rotary(axes, angles, "tool")
+    return np.asarray(np.einsum("nji,nj->ni", part, tool @ up))
 
 
 def measure_angle(first: Floats, second: Floats) -> Floats:
@@ -195,14 +217,45 @@ def _list_candidates(
     return values[:, keep], possible[:, keep]
 
 
-def _choose_least(values: Floats, possible: Flags, on: Flags, start: Floats, endless: Sequence[bool]) -> Floats:
-    """The candidate (N,2) of each move with the least sum of squared turns; ``endless``: axes without limits."""
+def _find_jumps(
+    axes: Sequence[Rotary], values: Floats, directions: Floats, up: Floats, endless: Sequence[bool], loose: float
+) -> Flags:
+    """Whether (N-1,M,M) the tool axis, from a candidate of a move to one of the next, leaves its turn by more than
+    ``loose`` degrees halfway."""
+    turns = values[1:, None] - values[:-1, :, None]
+    for number in np.flatnonzero(endless):
+        turns[..., number] = _wrap(turns[..., number])
+    rows, old, new = np.nonzero(np.abs(turns).max(axis=3) > loose)
+    found = np.zeros(turns.shape[:3], bool)
+    for start in range(0, len(rows), PAIRS):
+        row, a, b = (column[start : start + PAIRS] for column in (rows, old, new))
+        halfway = find_tool_axes(axes, values[row, a] + turns[row, a, b] / 2, up)
+        planned = slerp(directions[row], directions[row + 1], np.full(len(row), 0.5))
+        found[row, a, b] = np.degrees(measure_angle(halfway, planned)) > loose
+    return found
+
+
+def _choose_least(
+    values: Floats,
+    possible: Flags,
+    on: Flags,
+    start: Floats,
+    endless: Sequence[bool],
+    is_stop: Flags | None,
+    jumps: Flags | None,
+) -> Floats:
+    """The candidate (N,2) of each move with the least sum of squared turns; ``endless``: axes without limits. With
+    ``jumps`` (N-1,M,M) those turns are forbidden, but at the moves ``is_stop`` (N,)."""
     heavy = np.where(on, 1e3, 1.0)
     cost = _cost(values[0] - start, endless) * 1e-3
     cost = np.where(possible[0], cost, np.inf)
     came = np.zeros(values.shape[:2], np.int64)
     for k in range(1, len(values)):
-        step = heavy[k] * _cost(values[k][None] - values[k - 1][:, None], endless)
+        turns = _cost(values[k][None] - values[k - 1][:, None], endless)
+        if is_stop is not None and is_stop[k]:
+            step = np.where(turns < SAME, 0.0, TURN_BACK + turns)
+        else:
+            step = heavy[k] * turns if jumps is None else np.where(jumps[k - 1], np.inf, heavy[k] * turns)
         total = cost[:, None] + step
         came[k] = total.argmin(axis=0)
         cost = np.where(possible[k], total[came[k], np.arange(total.shape[1])], np.inf)
@@ -230,9 +283,7 @@ def _choose_one(axis: Rotary, directions: Floats, up: Floats) -> Choice:
     sign = -1.0 if axis.carries == "part" else 1.0
     angle = sign * np.degrees(_measure_about(np.tile(up, (len(directions), 1)), directions, u))
     found = np.degrees(np.unwrap(np.radians(angle)))
-    part, _ = turn_rotary([axis], found[:, None], "part")
-    tool, _ = turn_rotary([axis], found[:, None], "tool")
-    missed = measure_angle(np.einsum("nji,nj->ni", part, tool @ up), directions) > np.radians(0.001)
+    missed = measure_angle(find_tool_axes([axis], found[:, None], up), directions) > np.radians(0.001)
     if axis.limits is not None:
         found = found - 360 * np.round((found.mean() - sum(axis.limits) / 2) / 360)
         missed |= (found < axis.limits[0]) | (found > axis.limits[1])

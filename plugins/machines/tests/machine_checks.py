@@ -52,10 +52,13 @@ def load(machine: str | Path) -> dict[str, Any]:
 
 def compare(path: DepositPath, found: Read, factor: float = 1.0) -> Off:
     """Follows the path: each of its points comes, in its order, with its tool axis, and between two of them nothing but
-    places on the straight line, with the process as on the move of the path. Raises AssertionError where not."""
+    places on the straight line, with the process as on the move of the path; or, after a pass, a way straight along the
+    tool axis to where the tool may turn to all sides, and back. Raises AssertionError where not."""
     points = path.points * factor
     at, worst = 0, np.zeros(3)
     for k in range(len(points)):
+        if k and path.on[k - 1] and not path.on[k]:
+            at = _skip_way_out(path, found, k - 1, at, factor)
         start = at
         while True:
             assert at < len(found.points), f"move {k} of the path is missing"
@@ -86,6 +89,27 @@ def compare(path: DepositPath, found: Read, factor: float = 1.0) -> Off:
     if any(found.exact):
         assert all(found.exact[j] for j in switched)
     return Off(*worst.tolist())
+
+
+def _skip_way_out(path: DepositPath, found: Read, k: int, at: int, factor: float) -> int:
+    """The number of the first point behind a way from point ``k`` of the path, straight along the tool axis, to where
+    the tool may turn, and back; ``at``, where there is no such way."""
+    start, axis = path.points[k] * factor, path.axes[k]
+    out = np.asarray(found.points[at]) - start
+    far = float(np.linalg.norm(out))
+    if path.around is None or far < 1e-3 or float(np.linalg.norm(out / far - axis)) > 1e-5:
+        return at
+    tool = np.linalg.norm(path.nozzle.vertices + np.array([0.0, 0.0, path.standoff]), axis=1).max()
+    if np.linalg.norm(found.points[at] / factor - path.around[:3]) < path.around[3] + tool - 1e-3:
+        return at
+    place = found.points[at]
+    while np.linalg.norm(found.points[at] - place) < 1e-3:
+        assert not found.on[at]
+        at += 1
+    assert np.linalg.norm(found.points[at] - start) < 1e-3
+    assert np.linalg.norm(_unit(found.axes[at]) - axis) < 1e-4
+    assert not found.on[at]
+    return at + 1
 
 
 def _unit(vector: Any) -> Any:

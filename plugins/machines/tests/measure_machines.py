@@ -24,7 +24,7 @@ from damageest_machines.lazy import list_writers
 from machine_checks import PAIRS, STRAIGHT, compare, read, write
 from manifold3d import Manifold
 
-from damageest.artefacts import DepositPath, Floats
+from damageest.artefacts import DepositPath, Floats, Mesh
 from damageest.errors import StageError
 from damageest.stages.export import PathSettings
 from damageest.stages.export._paths import _move_path
@@ -67,9 +67,11 @@ def draw_path(seed: int) -> tuple[DepositPath, str]:
     path = _move_path(path, None)
     unit = str(rng.choice(list(UNITS)))
     factor = UNITS[unit]
+    assert path.around is not None
     return replace(
         path, points=path.points / factor, feed=path.feed / factor, standoff=path.standoff / factor,
         width=path.width / factor, heights=path.heights / factor,
+        nozzle=Mesh(path.nozzle.vertices / factor, path.nozzle.faces), around=path.around / factor,
     ), unit  # fmt: skip
 
 

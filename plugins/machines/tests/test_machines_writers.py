@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from machine_checks import PAIRS, STRAIGHT, compare, read, write
 
-from damageest.artefacts import DepositPath
+from damageest.artefacts import DepositPath, Mesh
 from tests.path_shapes import corner, dent, plan
 
 ROOT = Path(__file__).parents[3]
@@ -49,7 +49,11 @@ def test_the_control_would_follow_the_path(form: str, machine: str, kind: str, t
 @pytest.mark.parametrize(("unit", "factor"), [("in", 25.4), ("m", 1000.0), ("um", 1e-3)])
 def test_units_of_the_job(unit: str, factor: float, tmp_path: Path) -> None:
     path = make_path("straight")
-    here = replace(path, points=path.points / factor, feed=path.feed / factor, standoff=path.standoff / factor)
+    assert path.around is not None
+    here = replace(
+        path, points=path.points / factor, feed=path.feed / factor, standoff=path.standoff / factor,
+        nozzle=Mesh(path.nozzle.vertices / factor, path.nozzle.faces), around=path.around / factor,
+    )  # fmt: skip
     text, _ = write("krl", "kuka", here, tmp_path, unit)
     assert compare(here, read("krl", "kuka", text), factor).point < 1e-3
     assert text == write("krl", "kuka", path, tmp_path)[0]

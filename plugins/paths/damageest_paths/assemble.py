@@ -71,9 +71,8 @@ def plan_path(
     plans = plan_parts(body, origin, directions, around, process, planner)
     groups = [[_to_relative(one, plan) for one in plan.passes] for plan in plans]
     near = _gather_obstacles(groups, plans, around, task.body.bounds - origin, process)
-    moves = join_passes(
-        groups, clearance.during_travel().with_obstacles(near), _choose_travel(task, clearance, speeds, process, origin)
-    )
+    travel = _choose_travel(task, clearance, speeds, process, origin)
+    moves = join_passes(groups, clearance.during_travel().with_obstacles(near), travel)
     missing = gather_missing(plans)
     solid = None if missing is None else to_solid(missing, origin)
     fill = _simulate(task, moves, plans, solid, origin, process) if speeds.is_simulated and len(moves.points) else None
@@ -95,6 +94,8 @@ def plan_path(
         fill=fill,
         kinds=moves.kinds,
         setup=_choose_setup(plans[0].frame.direction) if process.axes == 3 else None,
+        around=np.append(origin + travel.centre, travel.safe),
+        free_ends=moves.free_ends,
     )  # fmt: skip
     return _add_notes(path, moves, process)
 

@@ -55,7 +55,8 @@ class Exit(NamedTuple):
 class Moves(NamedTuple):
     """Points (N,3), tool axes (N,3), normals (N,3), speed (N,), whether the move that ends there deposits (N,), layer
     (N,), pass (N,) and part (N,). ``gap``: least distance of the nozzle during travel; ``blocked``: travels for which
-    no clear way was found. ``kinds``: of the passes, in their order."""
+    no clear way was found. ``kinds``: of the passes, in their order; ``free_ends`` (K,): whether the tool can leave to
+    the safe distance straight along its axis from the end of each."""
 
     points: Floats
     axes: Floats
@@ -67,7 +68,8 @@ class Moves(NamedTuple):
     part: Ints
     gap: float
     blocked: int
-    kinds: tuple[str, ...] = ()
+    kinds: tuple[str, ...]
+    free_ends: Flags
 
 
 def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: Travel) -> Moves:
@@ -83,6 +85,7 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
     gap, number, blocked = np.inf, 0, 0
     before: Pass | None = None
     old, ranks, exits = 0, rank_layers(groups), _list_exits(groups)
+    free_ends = []
     network = Network(groups, travel.hop, travel.gap, clearance.reach)
     for part, passes in enumerate(groups, 1):
         for one in passes:
@@ -100,6 +103,7 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
             for k in range(1, len(one.points)):
                 values = (one.points[k], one.axes[k], one.normals[k], travel.feed, True)
                 rows.append((*values, one.layer + 1, number, part))
+            free_ends.append(_is_end_free(one, clearance.after(rank), travel))
             before = one
     if before is not None:
         standing = clearance.after(len(ranks))
@@ -113,7 +117,17 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
     points, axes, normals = (np.array(column, float).reshape(-1, 3) for column in columns[:3])
     layer, numbers, parts = (np.array(column, np.int64) for column in columns[5:])
     feed, on = np.array(columns[3], float), np.array(columns[4], bool)
-    return Moves(points, axes, normals, feed, on, layer, numbers, parts, max(gap, 0.0), blocked, kinds)
+    return Moves(
+        points, axes, normals, feed, on, layer, numbers, parts, max(gap, 0.0), blocked, kinds,
+        np.array(free_ends, bool),
+    )  # fmt: skip
+
+
+def _is_end_free(one: Pass, clearance: Clearance, travel: Travel) -> bool:
+    """Whether the tool can leave the end of a pass straight along its axis to the safe distance."""
+    point, axis = one.points[-1], one.axes[-1]
+    out = np.array([point, _lift_to_sphere(point, axis, travel, travel.safe)])
+    return measure_way(out, np.array([axis, axis]), clearance, travel.gap) >= travel.gap / 2
 
 
 def find_corners(points: Floats) -> Floats:
