@@ -37,6 +37,10 @@ class PathReport(JsonModel):
 
     passes: int
     layers: int
+    layer_form: str = Field(
+        description="planar: planes across the build direction; conformal: surfaces along the floor of the cavity; "
+        "empty: not known"
+    )
     directions: list[Vector] = Field(description="build direction of each part of the deposit")
     layer_heights: list[float] = Field(description="of each part of the deposit")
     length: float = Field(description="of all passes")

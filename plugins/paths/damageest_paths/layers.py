@@ -81,10 +81,11 @@ class Layers(Path):
     height: Length = Field(
         description="largest height of a layer; layers are made equal, so that the last ends at the top"
     )
-    layers: Literal["planar", "conformal"] = Field(
-        "planar",
+    layers: Literal["auto", "planar", "conformal"] = Field(
+        "auto",
         description="planar: planes across the build direction; conformal: surfaces at equal depth above the floor of "
-        "the cavity, that is what of the deposit lies on metal and is less than 75 degrees steep",
+        "the cavity, that is what of the deposit lies on metal and is less than 75 degrees steep; auto: planar, or "
+        "conformal where planes lose more than 7 % of the deposit and it loses less",
     )
     width: Length = Field(description="of a bead")
     feed: Length = Field(description="speed of deposition, in lengths a minute")
@@ -174,9 +175,8 @@ class Layers(Path):
     def run(self, body: Solid, left: Solid | None, built: Solid | None, tolerance: float) -> DepositPath | None:
         """The path. Raises StageError where the nozzle, the fixture or the direction cannot be used."""
         from damageest_paths.assemble import Speeds, Task, plan_path
-        from damageest_paths.conformal import plan_conformal
-        from damageest_paths.directions import find_open_normal
-        from damageest_paths.planar import plan_planar
+        from damageest_paths.directions import Planner, find_open_normal
+        from damageest_paths.form_choice import plan_in_form
         from damageest_paths.process import Process
         from damageest_paths.sight import Beam
         from damageest_paths.stripes import Bead
@@ -209,15 +209,13 @@ class Layers(Path):
         others: list[Mesh] = [built] if built is not None else []
         if self.fixture is not None:
             others.append(_read_mesh(self.fixture, "fixture", False))
-        path = plan_path(
-            Task(body, left, others, tolerance),
-            self._make_nozzle(),
-            self.standoff or self.width,
-            process,
-            Speeds(self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance, self.simulate),
-            direction,
-            plan_conformal if self.layers == "conformal" else plan_planar,
-        )
+        task, nozzle = Task(body, left, others, tolerance), self._make_nozzle()
+        speeds = Speeds(self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance, self.simulate)
+
+        def plan(planner: Planner, direction: Floats | None = direction) -> DepositPath:
+            return plan_path(task, nozzle, self.standoff or self.width, process, speeds, direction, planner)
+
+        path = plan_in_form(self.layers, plan)
         if self.layers == "conformal" and not len(path.points):
             why = "; ".join(item.why for item in path.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")

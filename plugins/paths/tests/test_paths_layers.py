@@ -23,7 +23,7 @@ UP = (0.0, 0.0, 1.0)
 
 @cache
 def plan_dent() -> DepositPath:
-    return plan(dent(), direction=UP)
+    return plan(dent(), direction=UP, layers="planar")
 
 
 def measure_others(path: DepositPath) -> float:
@@ -147,7 +147,8 @@ def test_short_passes_are_left_out_and_listed() -> None:
 
 
 def test_overlaps_at_start_and_stop() -> None:
-    plain, longer = (plan(dent(), direction=UP, **more) for more in ({}, {"start_overlap": 0.4, "stop_overlap": 0.6}))
+    overlaps = {"start_overlap": 0.4, "stop_overlap": 0.6}
+    plain, longer = (plan(dent(), direction=UP, layers="planar", **more) for more in ({}, overlaps))
     assert longer.passes == plain.passes
     assert longer.length == pytest.approx(plain.length + plain.passes * 1.0, rel=1e-3)
 

@@ -1,0 +1,59 @@
+"""Chooses whether the layers of a deposit are planes, or surfaces along the floor of the cavity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal, Protocol
+
+from damageest.artefacts import DepositPath, Floats
+from damageest_paths.conformal import plan_conformal
+from damageest_paths.directions import Planner
+from damageest_paths.planar import plan_planar
+
+Form = Literal["auto", "planar", "conformal"]
+PLANNERS: dict[str, Planner] = {"planar": plan_planar, "conformal": plan_conformal}
+POOR = 0.07
+"""Share of a deposit that planes lose from which surfaces along the floor are tried. Rough losses lose 2 to 7 % of
+themselves to the stair-step of planes beside leaning walls."""
+GAIN = 0.02
+"""Share of the deposit by which these have to lose less."""
+SUNK = 0.05
+"""Share of a deposit up to which beads in intact metal are no loss."""
+FARTHEST = 1.1
+"""Bead widths by which beads may reach out of the deposit, or as far as those of planes do."""
+
+
+class Plan(Protocol):
+    """Gives the path of a planner, along a build ``direction`` (3,) or the one that the job asks for."""
+
+    def __call__(self, planner: Planner, direction: Floats | None = ...) -> DepositPath: ...
+
+
+def plan_in_form(form: Form, plan: Plan) -> DepositPath:
+    """The path of a form. ``auto``: planes; where they lose much of the deposit, as the crescent of a worn bore,
+    surfaces along the floor, seen along the direction of the planes, if these lose less."""
+    if form != "auto":
+        return replace(plan(PLANNERS[form]), layer_form=form)
+    planar = replace(plan(PLANNERS["planar"]), layer_form="planar")
+    lost = measure_lost(planar)
+    if lost <= POOR:
+        return planar
+    conformal = replace(plan(PLANNERS["conformal"], planar.directions[0]), layer_form="conformal")
+    if not len(conformal.points) or measure_lost(conformal) > lost - GAIN:
+        return planar
+    spilt = max(FARTHEST * planar.width, _measure_spill(planar))
+    return conformal if _measure_spill(conformal) <= spilt else planar
+
+
+def measure_lost(path: DepositPath) -> float:
+    """What of the deposit is not filled, and what of the beads lies in intact metal beyond what is usual, as a share of
+    the deposit."""
+    lost = path.unreached_volume
+    if path.fill is not None:
+        lost += path.fill.gap + max(path.fill.sunk - SUNK * path.deposit_volume, 0.0)
+    return lost / path.deposit_volume
+
+
+def _measure_spill(path: DepositPath) -> float:
+    """How far beads reach out of the deposit; 0 where they were not simulated."""
+    return 0.0 if path.fill is None else path.fill.spill_distance
