@@ -17,7 +17,7 @@ import pytest
 
 import damageest
 from damageest.artefacts import Reason
-from damageest.cli.run import _print_table
+from damageest.cli._run_table import print_table
 from tests import damaged_box
 from tests.cli.test_watched_stages import FAULTY, environment, write_job
 from tests.needs import needs_plugin
@@ -213,7 +213,7 @@ def test_notes_and_failures_are_shown_as_they_are(ready: Path, capsys: pytest.Ca
     result = damageest.run(ready / "job.yaml", output=True)
     notes = (Reason("x", HARMFUL), Reason("y", "x" * 50_000_000))
     told = replace(result, warnings=notes, failures=(HARMFUL,))
-    _print_table(told, ready / "final [v2]")
+    print_table(told, ready / "final [v2]")
     said = capsys.readouterr().out
     assert f"note: {SHOWN}" in said
     assert f"failed: {SHOWN}" in said

@@ -9,7 +9,7 @@ import jsonschema
 import numpy as np
 import trimesh
 
-from damageest.cli.run import MOST_SURPLUS, _list_surplus
+from damageest.cli._run_table import MOST_SURPLUS, list_surplus
 from damageest.findings import Surplus
 from damageest.io.meshes import write_points
 from damageest.output.result_json import result_schema
@@ -47,12 +47,12 @@ def make_surplus(number: int, kind: str = "surplus") -> Surplus:
 
 def test_many_small_surpluses_are_one_line_for_a_kind_with_an_estimate_of_their_volume() -> None:
     items = [*map(make_surplus, range(1, 13)), make_surplus(13, "displaced piece"), make_surplus(14, "surroundings")]
-    lines = _list_surplus(items, "mm")
+    lines = list_surplus(items, "mm")
     assert len(lines) == MOST_SURPLUS + 3
     assert "9 smaller ones" in lines[-1]
     assert "1.2 mm high, 18 mm²" in lines[-1]
     assert "no closed volume, about 4.5 mm³ (an estimate" in lines[-1]
     assert [f"surplus {number} (" in line for number, line in zip((13, 14), lines[-3:-1], strict=True)] == [True, True]
-    assert len(_list_surplus(items[:3], "mm")) == 3
+    assert len(list_surplus(items[:3], "mm")) == 3
     pieces = [make_surplus(number, "displaced piece") for number in range(20, 60)]
-    assert len(_list_surplus([*items, *pieces], "mm")) == 2 * MOST_SURPLUS + 3
+    assert len(list_surplus([*items, *pieces], "mm")) == 2 * MOST_SURPLUS + 3
