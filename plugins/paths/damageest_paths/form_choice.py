@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal, Protocol
 
-from damageest.artefacts import DepositPath, Floats
+from damageest.artefacts import DepositPath
 from damageest_paths.conformal import plan_conformal
 from damageest_paths.directions import Planner
 from damageest_paths.planar import plan_planar
@@ -24,21 +24,22 @@ FARTHEST = 1.1
 
 
 class Plan(Protocol):
-    """Gives the path of a planner, along a build ``direction`` (3,) or the one that the job asks for."""
+    """Gives the path of a planner. ``is_trial``: where the job leaves the build direction to the planner, it is the
+    mean normal of the open side, and no other is tried."""
 
-    def __call__(self, planner: Planner, direction: Floats | None = ...) -> DepositPath: ...
+    def __call__(self, planner: Planner, is_trial: bool = False) -> DepositPath: ...
 
 
 def plan_in_form(form: Form, plan: Plan) -> DepositPath:
     """The path of a form. ``auto``: planes; where they lose much of the deposit, as the crescent of a worn bore,
-    surfaces along the floor, seen along the direction of the planes, if these lose less."""
+    surfaces along the floor if these lose less."""
     if form != "auto":
         return replace(plan(PLANNERS[form]), layer_form=form)
     planar = replace(plan(PLANNERS["planar"]), layer_form="planar")
     lost = measure_lost(planar)
     if lost <= POOR:
         return planar
-    conformal = replace(plan(PLANNERS["conformal"], planar.directions[0]), layer_form="conformal")
+    conformal = replace(plan(PLANNERS["conformal"], is_trial=True), layer_form="conformal")
     if not len(conformal.points) or measure_lost(conformal) > lost - GAIN:
         return planar
     spilt = max(FARTHEST * planar.width, _measure_spill(planar))
