@@ -24,10 +24,10 @@ FARTHEST = 1.1
 
 
 class Plan(Protocol):
-    """Gives the path of a planner. ``is_trial``: where the job leaves the build direction to the planner, it is the
+    """Gives the path of a planner. ``along_normal``: where the job leaves the build direction to the planner, it is the
     mean normal of the open side, and no other is tried."""
 
-    def __call__(self, planner: Planner, is_trial: bool = False) -> DepositPath: ...
+    def __call__(self, planner: Planner, along_normal: bool = False) -> DepositPath: ...
 
 
 def plan_in_form(form: Form, plan: Plan) -> DepositPath:
@@ -39,7 +39,7 @@ def plan_in_form(form: Form, plan: Plan) -> DepositPath:
     lost = measure_lost(planar)
     if lost <= POOR:
         return planar
-    conformal = replace(plan(PLANNERS["conformal"], is_trial=True), layer_form="conformal")
+    conformal = replace(plan(PLANNERS["conformal"], along_normal=True), layer_form="conformal")
     if not len(conformal.points) or measure_lost(conformal) > lost - GAIN:
         return planar
     spilt = max(FARTHEST * planar.width, _measure_spill(planar))

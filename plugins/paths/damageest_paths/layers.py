@@ -212,8 +212,8 @@ class Layers(Path):
         task, nozzle = Task(body, left, others, tolerance), self._make_nozzle()
         speeds = Speeds(self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance, self.simulate)
 
-        def plan(planner: Planner, is_trial: bool = False) -> DepositPath:
-            chosen = find_open_normal(body, left, tolerance) if is_trial and direction is None else direction
+        def plan(planner: Planner, along_normal: bool = False) -> DepositPath:
+            chosen = find_open_normal(body, left, tolerance) if along_normal and direction is None else direction
             return plan_path(task, nozzle, self.standoff or self.width, process, speeds, chosen, planner)
 
         path = plan_in_form(self.layers, plan)
