@@ -77,8 +77,9 @@ def list_path(site: Site, unit: str) -> list[tuple[str, str]]:
     if path is None:
         return []
     share = path.unreached_volume / path.deposit_volume
+    along = " along the floor" if path.layer_form == "conformal" else ""
     rows = [
-        ("passes", f"{path.passes} in {path.layers} layers, {format_number(path.length)} {unit}"),
+        ("passes", f"{path.passes} in {path.layers} layers{along}, {format_number(path.length)} {unit}"),
         ("time of the passes", f"{format_number(path.minutes, 3)} min, travel included"),
         ("not reached", f"{format_number(path.unreached_volume, 3)} {unit}³, {format_share(share)} of the deposit"),
     ]
