@@ -11,6 +11,7 @@ from damageest.isolation import at_work
 from damageest.stages.export import Body, DepositForm
 from damageest_cadquery._assembly import Colour, NamedShape
 from damageest_cadquery._deposit import STOCK, ExactDeposit
+from damageest_cadquery._doubles import SHARED
 from damageest_cadquery._exact import Exact, scale_shape
 from damageest_cadquery._files import join_shapes, write_shapes
 from damageest_cadquery._left import FACET, cut_facets
@@ -195,6 +196,10 @@ def _name(pieces: Sequence[Piece], name: str, colour: Colour, facts: CadFacts, i
             if tool == STOCK:
                 names.append(f"stock on {facts.names[number]}" if number >= 0 else "side of the stock")
                 colours.append(TOP if number >= 0 else SIDE)
+                continue
+            if tool == SHARED:
+                names.append(f"{inner} inner at {facts.names[number]}")
+                colours.append(INNER)
                 continue
             if tool == FACET:
                 names.append("facet")

@@ -17,6 +17,7 @@ from damageest.errors import InputError
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.solids import to_manifold
 from damageest.stages.allowance.plain_stock import build_plain_stock
+from damageest_cadquery._doubles import SHARED
 from damageest_cadquery._split import Piece
 from damageest_cadquery._tessellate import tessellate
 
@@ -33,7 +34,8 @@ def build_own_stock(damage: Sequence[Piece], deposit: Deposit, metal: Any, toler
         whole = to_manifold(Solid(found.vertices, found.faces), deposit.bounds.mean(axis=0))
     except (InputError, ValueError):
         return None
-    numbers = np.array([number for piece in damage for number, _ in piece.origins])[found.faces_brep]
+    numbers = np.array([-1 if kind == SHARED else number for piece in damage for number, kind in piece.origins])
+    numbers = numbers[found.faces_brep]
     skin = Mesh(found.vertices, found.faces[numbers >= 0])
     stock = _build(skin, dict(deposit.heights), numbers[numbers >= 0], deposit, tolerance) - whole
     return stock if metal is None else stock - metal

@@ -10,7 +10,7 @@ from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import INVALID
-from damageest_cadquery._doubles import drop_doubles, find_doubles
+from damageest_cadquery._doubles import drop_doubles, leave_once
 from damageest_cadquery._split import Piece, Tool, is_near, is_opencascade_error, measure_volume, split, triangulate
 
 SPECK = 1e-3
@@ -32,7 +32,8 @@ def count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> in
         except (InputError, ValueError):
             return alone
         found += [body for body in common.decompose() if body.volume() > least]
-    return len(found) - sum(find_doubles(found))
+    left = [each for each in leave_once(found) if each is not None]
+    return sum(body.volume() > least for each in left for body in each.decompose())
 
 
 def take_pieces(

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
 from damageest.artefacts import Floats
+from damageest_cadquery._doubles import SHARED
 from damageest_cadquery._edges import Edge, find_edges, measure_normals
 from damageest_cadquery._join_stock import Lump, fuse, sew_all
 from damageest_cadquery._mitre import build_mitre, find_heads
@@ -47,8 +48,8 @@ def take_bases(piece: Piece, heights: Mapping[int, float]) -> list[Base]:
     from OCP.TopoDS import TopoDS
 
     bases = []
-    for face, (number, _) in zip(explore(piece.shape, TopAbs_FACE), piece.origins, strict=True):
-        if number < 0:
+    for face, (number, kind) in zip(explore(piece.shape, TopAbs_FACE), piece.origins, strict=True):
+        if number < 0 or kind == SHARED:
             continue
         height = heights.get(number, 0.0)  # a sliver that the mesh does not have gets none
         if height < 0:
