@@ -109,7 +109,7 @@ def _compare_surfaces(
         return distance, farthest, None
     apart = [n[away & (each > tolerance / 4)] for n, away, each in zip(on, far, off, strict=True)]
     fault = StockError(
-        f"it is up to {farthest:.3g} from the mesh's, {beyond:.1%} more than a quarter tolerance",
+        f"it is up to {farthest / tolerance:.2g} tolerances from the mesh's, {beyond:.1%} more than a quarter",
         strayed | (set(np.concatenate(apart).tolist()) if beyond > BEYOND else set()),
     )
     return distance, farthest, fault

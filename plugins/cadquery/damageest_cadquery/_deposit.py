@@ -101,8 +101,9 @@ def find_deposit(
         if abs(wrong) > SAME:
             raise StockError(f"its volume differs by {wrong:+.2%} from damage and stock")
         bodies = sum(body.volume > SPECK * deposit.volume for body in split_bodies(deposit))
-        if len(pieces) != bodies:
-            raise StockError(f"{len(pieces)} solids for {bodies} pieces")
+        solids = sum(measure_volume(piece.shape) > SPECK * deposit.volume for piece in pieces)
+        if solids != bodies:
+            raise StockError(f"{solids} solids for {bodies} pieces")
         if not is_sound(pieces):
             raise StockError(INVALID, _find_invalid(pieces))
         return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
