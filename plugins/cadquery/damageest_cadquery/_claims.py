@@ -37,9 +37,9 @@ def lower_claims(solid: Any, most: float) -> Any:
 
 
 def find_coarse(solids: Sequence[Any], tolerance: float) -> tuple[float, ...]:
-    """The fuzzy value to try last, in millimetres, where edges need what they claim: there the sections of two faces end
-    apart. None where no edge claims as much, or a thousandth of the tolerance is less."""
+    """The fuzzy value to try last, in millimetres, where edges need what they claim: there the sections of two faces
+    end apart. None where no edge claims as much, or a thousandth of the tolerance is less."""
     from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
 
     claimed = max((ShapeAnalysis_ShapeTolerance().Tolerance(solid, 1) for solid in solids), default=0.0)
-    return (COARSE,) if COARSE <= min(claimed, tolerance / 1000) else ()
+    return (COARSE,) if min(claimed, tolerance / 1000) >= COARSE else ()

@@ -74,6 +74,11 @@ def name_deposit(number: int) -> str:
     return f"deposit of site {number}"
 
 
+def name_crossed(number: int) -> str:
+    """The look for the reason in the CAD file."""
+    return f"faces that cross at site {number}"
+
+
 def name_file(stem: str) -> str:
     return f"{stem}.step"
 

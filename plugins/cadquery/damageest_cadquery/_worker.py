@@ -17,6 +17,7 @@ from damageest.stages.export import DepositForm, ExactForm
 from damageest_cadquery._adapted import MovedSolids, move_solids
 from damageest_cadquery._claims import lower_claims
 from damageest_cadquery._colours import read_colours
+from damageest_cadquery._crossed import find_crossed
 from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit, refuse_doubles
 from damageest_cadquery._exact import Exact, SiteInput, find_exact, scale_shape, start_solids
 from damageest_cadquery._files import join_shapes
@@ -31,6 +32,7 @@ from damageest_cadquery._request import (
     Request,
     describe_missing,
     limit_form,
+    name_crossed,
     name_deposit,
     name_form,
     name_site,
@@ -80,7 +82,13 @@ def _make(request: Request) -> Made:
             )
         if exact is None:
             *before, last = reasons[site.number]
-            reasons[site.number] = (*before, f"{last}; it lies on {_tell_faces(site, part, facts.names)}")
+            with at_work(name_crossed(site.number), request.seconds):
+                skipped = name_crossed(site.number) in request.skipped
+                crossed = [] if skipped else find_crossed(solids, faces, site.damage, request.tolerance)
+            told = f"{last}; it lies on {_tell_faces(site, part, facts.names)}"
+            if crossed:
+                told += f"; in the CAD file these cross one another: {list_faces(crossed, facts.names)}"
+            reasons[site.number] = (*before, told)
             continue
         found[site.number] = exact
         rest = exact.rest if site.accepted else rest
