@@ -8,9 +8,10 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.geometry.vectors import normalise
-from damageest_cadquery._edges import Edge
+from damageest_cadquery._edges import SMOOTH, Edge
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, orient_solid
+from damageest_cadquery._split import is_opencascade_error
 
 MAX_MITRE = 100.0
 """Largest angle in degrees between normals at an edge with a pointed mitre; a sharper edge gets `ROUNDS` points."""
@@ -28,6 +29,10 @@ def find_heads(edge: Edge, at: int, tall: float, other: float) -> Floats:
     as that of the stage `allowance: milling`.
     """
     n, m, turn = edge.normals[at], edge.others[at], float(edge.turns[at])
+    if abs(turn) <= SMOOTH:  # an end of it, where the mitre has no width
+        if tall != other:
+            raise StockError("the heights differ at an edge that is smooth at one end")
+        return np.array([tall * n] * (3 if edge.turns[len(edge.turns) // 2] <= np.radians(MAX_MITRE) else 2 + ROUNDS))
     outward = np.cross(edge.tangents[at], n)
     aside = (other - tall * np.cos(turn)) / np.sin(turn)
     middle = edge.turns[len(edge.turns) // 2]
@@ -76,6 +81,19 @@ def _build_polygon(point: Floats, heads: Floats) -> Any:
     return BRepBuilderAPI_MakeFace(polygon.Wire(), True).Face()
 
 
+def _build_end(point: Floats, heads: Floats) -> list[Any]:
+    """The end of a mitre: a polygon, or triangles where it is not flat, as where an edge does not lie quite on its faces;
+    nothing where it has no width."""
+    if np.abs(heads - heads[0]).max() == 0:
+        return []
+    try:
+        return [_build_polygon(point, heads)]
+    except Exception as error:
+        if not is_opencascade_error(error):
+            raise
+        return [_build_polygon(point, heads[k : k + 2]) for k in range(len(heads) - 1)]
+
+
 def _find_turn(edge: Edge, heads: Floats, size: float) -> tuple[Any, float] | None:
     """The axis and angle by which the polygon turns along a circular edge; None where it does not."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
@@ -119,7 +137,8 @@ def _loft(points: Floats, heads: Floats) -> Any:
         sewing.Add(BRepBuilderAPI_MakeFace(GeomFill.Surface_s(one, two), 1e-7).Face())
     if np.linalg.norm(points[0] - points[-1]) > 1e-6:
         for end in (0, -1):
-            sewing.Add(_build_polygon(points[end], heads[end]))
+            for face in _build_end(points[end], heads[end]):
+                sewing.Add(face)
     sewing.Perform()
     shells = explore(sewing.SewedShape(), TopAbs_SHELL)
     if len(shells) != 1:

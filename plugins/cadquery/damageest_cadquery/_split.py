@@ -14,6 +14,7 @@ import numpy as np
 from damageest.artefacts import Floats, Solid
 from damageest.errors import InputError
 from damageest_cadquery._facets import Facet
+from damageest_cadquery._folds import drop_folds
 from damageest_cadquery._planar import build_shell
 from damageest_cadquery._read import explore
 
@@ -191,7 +192,7 @@ def _triangulate_once(shape: Any, chord: float, angle: float = 0.35) -> Solid:
     from damageest_cadquery._tessellate import tessellate
 
     mesh = tessellate([shape], chord, np.degrees(angle), lambda face: "")
-    return Solid(mesh.vertices, mesh.faces)
+    return Solid(mesh.vertices, drop_folds(mesh.faces, mesh.faces_brep))
 
 
 def is_near(shape: Any, mesh: Solid) -> bool:

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Ints
 from damageest_cadquery._doubles import SHARED
 from damageest_cadquery._edges import Edge, find_edges, measure_normals
 from damageest_cadquery._join_stock import Lump, fuse, sew_all
@@ -74,10 +72,7 @@ def build_parts(bases: Sequence[Base]) -> list[Lump]:
             "an edge between the faces is sharp in part only, or changes between convex and concave",
             (bases[k].number for edge in mixed for k in (edge.first, edge.second)),
         )
-    joined = [edge for edge in edges if edge.kind == "smooth" and heights[edge.first] == heights[edge.second]]
-    rows = ([edge.first for edge in joined], [edge.second for edge in joined])
-    graph = coo_array((np.ones(len(joined), bool), rows), shape=(len(bases),) * 2)
-    label = connected_components(graph, directed=False)[1]
+    label = _group(edges, heights)
     lumps = []
     for number in range(int(label.max()) + 1):
         mine = [bases[k] for k in np.flatnonzero(label == number).tolist()]
@@ -90,6 +85,20 @@ def build_parts(bases: Sequence[Base]) -> list[Lump]:
         with naming(numbers):
             lumps.append(Lump(build_mitre(edge, heights[edge.first], heights[edge.second]), numbers))
     return lumps + _build_corners(sharp, bases)
+
+
+def _group(edges: Sequence[Edge], heights: Sequence[float]) -> Ints:
+    """(B,) the group of each face: those of one height that are smooth together. Two faces with a sharp edge are never
+    in one, though they may be smooth with a third: what is offset in one piece must not have a sharp edge in it."""
+    label = np.arange(len(heights))
+    sharp = [(edge.first, edge.second) for edge in edges if edge.kind != "smooth"]
+    smooth = [edge for edge in edges if edge.kind == "smooth" and heights[edge.first] == heights[edge.second]]
+    for edge in sorted(smooth, key=lambda each: -each.length):
+        one, two = sorted((int(label[edge.first]), int(label[edge.second])))
+        after = np.where(label == two, one, label)
+        if one != two and all(after[first] != after[second] for first, second in sharp):
+            label = after
+    return np.unique(label, return_inverse=True)[1].reshape(-1)
 
 
 def join_stock(parts: Sequence[Lump], bases: Sequence[Base]) -> list[Any]:
