@@ -18,7 +18,7 @@ from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import INVALID, ON_CAD
 from damageest_cadquery._compare_stock import bound_entered, compare_stock, lower_stock
 from damageest_cadquery._read import explore
-from damageest_cadquery._solids import StockError, combine, explore_faces, naming, sew, turn_offsets
+from damageest_cadquery._solids import StockError, combine, explore_faces, naming, settle_edges, sew, turn_offsets
 from damageest_cadquery._split import (
     Origin,
     Piece,
@@ -103,7 +103,7 @@ def find_deposit(
         solids = sum(measure_volume(piece.shape) > SPECK * deposit.volume for piece in pieces)
         if solids != bodies:
             raise StockError(f"{solids} solids for {bodies} pieces")
-        if not is_sound(pieces):
+        if not all(settle_edges(piece.shape) for piece in pieces) or not is_sound(pieces):
             raise StockError(INVALID, _find_invalid(pieces))
         return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
 

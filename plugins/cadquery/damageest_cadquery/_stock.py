@@ -19,7 +19,7 @@ from damageest_cadquery._edges import Edge, find_edges, measure_normals
 from damageest_cadquery._join_stock import Lump, fuse, sew_all
 from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
-from damageest_cadquery._solids import StockError, close, explore_faces, naming, orient_solid
+from damageest_cadquery._solids import StockError, close, explore_faces, naming, orient_solid, settle_edges
 from damageest_cadquery._split import Piece, is_watertight, measure_volume
 from damageest_cadquery._walls import build_wall
 
@@ -267,5 +267,6 @@ def _merge(solids: Sequence[Any], bases: Sequence[Base]) -> list[Any]:
         (found,) = explore(unify.Shape(), TopAbs_SOLID) or (None,)
         sound = found is not None and BRepCheck_Analyzer(found).IsValid()
         same = sound and abs(measure_volume(found) / measure_volume(solid) - 1) < 1e-6
+        settle_edges(spare)
         merged.append(found if same and is_watertight(found, bases[0].height / CHORDS) else spare)
     return merged
