@@ -1,4 +1,4 @@
-"""Triangles that lie on others of their face the other way round: the mesher leaves some where an edge has no length."""
+"""Triangles that lie on others of their face, turned over: the mesher leaves some where an edge has no length."""
 
 from __future__ import annotations
 

@@ -82,8 +82,8 @@ def _build_polygon(point: Floats, heads: Floats) -> Any:
 
 
 def _build_end(point: Floats, heads: Floats) -> list[Any]:
-    """The end of a mitre: a polygon, or triangles where it is not flat, as where an edge does not lie quite on its faces;
-    nothing where it has no width."""
+    """The end of a mitre: a polygon, or triangles where it is not flat, as where an edge does not lie quite on its
+    faces; nothing where it has no width."""
     if np.abs(heads - heads[0]).max() == 0:
         return []
     try:

@@ -49,8 +49,8 @@ def is_plain(deposit: Deposit, lost: Solid, outside: Ints, part: Part, tolerance
 
 
 def build_plain(deposit: Deposit, lost: Solid, outside: Ints, part: Part, tolerance: float, less: float) -> Any:
-    """A Manifold about the middle of ``deposit``: stock of its heights by CAD face, each ``less`` by this, on the skin of
-    ``lost``, and nothing taken away but the part."""
+    """A Manifold about the middle of ``deposit``: stock of its heights by CAD face, each ``less`` by this, on the skin
+    of ``lost``, and nothing taken away but the part."""
     assert part.faces_brep is not None
     skin = Mesh(lost.vertices, lost.faces[outside])
     numbers = part.faces_brep[closest_on_mesh(skin.triangles.mean(axis=1), part)[1]]

@@ -75,9 +75,9 @@ def orient_solid(shape: Any) -> Any:
 
 
 def settle_edges(shape: Any) -> bool:
-    """Whether a shape is valid, if need be after its edges were made to follow their faces' curves at the same parameters,
-    and claim what they are off: sewing and joining can leave edges that claim less. No edge may claim more than `CLAIM`
-    of the diagonal."""
+    """Whether a shape is valid, if need be after its edges were made to follow their faces' curves at the same
+    parameters, and claim what they are off: sewing and joining can leave edges that claim less. No edge may claim more
+    than `CLAIM` of the diagonal."""
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
     from OCP.BRepCheck import BRepCheck_Analyzer
