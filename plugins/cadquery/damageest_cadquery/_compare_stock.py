@@ -51,8 +51,8 @@ def compare_stock(
     tolerance: float,
 ) -> tuple[float, float, float]:
     """Distance, largest distance and difference of volumes between stock, as high as the mesh's, on an exact
-    ``damage`` volume, and the mesh's. Its parts, ``lumps``, are joined as triangles, which takes a second where OpenCASCADE
-    takes a minute.
+    ``damage`` volume, and the mesh's. Its parts, ``lumps``, are joined as triangles, which takes a second where
+    OpenCASCADE takes a minute.
 
     Raises StockError where it differs too much, also from what the stage builds on the exact damage volume's own skin.
     """

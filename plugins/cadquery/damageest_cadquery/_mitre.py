@@ -11,13 +11,14 @@ from damageest.geometry.vectors import normalise
 from damageest_cadquery._edges import SMOOTH, Edge
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, orient_solid
-from damageest_cadquery._split import is_opencascade_error
 
 MAX_MITRE = 100.0
 """Largest angle in degrees between normals at an edge with a pointed mitre; a sharper edge gets `ROUNDS` points."""
 ROUNDS = 3
 LONG = 1.6
 """Largest length of a pointed mitre, in heights."""
+FLAT = 1e-6
+"""Distance in millimetres of a polygon's corners from a plane up to which it is flat."""
 EVEN = 1e-6
 """Largest change of the polygon's corners along a straight or circular edge, in heights."""
 
@@ -60,10 +61,11 @@ def build_mitre(edge: Edge, tall: float, other: float) -> Any:
     way = edge.points[-1] - edge.points[0]
     length = float(np.linalg.norm(way))
     straight = length > 0 and np.abs(np.cross(edge.points - edge.points[0], way / length)).max() < EVEN * size
-    if straight and np.abs(heads - heads[0]).max() < EVEN * size:
+    flat = _is_flat(heads[0])
+    if flat and straight and np.abs(heads - heads[0]).max() < EVEN * size:
         face = _build_polygon(edge.points[0], heads[0])
         return orient_solid(BRepPrimAPI_MakePrism(face, gp_Vec(*way.tolist())).Shape())
-    turned = _find_turn(edge, heads, size)
+    turned = _find_turn(edge, heads, size) if flat else None
     if turned is not None:
         axis, angle = turned
         return orient_solid(BRepPrimAPI_MakeRevol(_build_polygon(edge.points[0], heads[0]), axis, angle).Shape())
@@ -86,12 +88,14 @@ def _build_end(point: Floats, heads: Floats) -> list[Any]:
     faces; nothing where it has no width."""
     if np.abs(heads - heads[0]).max() == 0:
         return []
-    try:
+    if _is_flat(heads):
         return [_build_polygon(point, heads)]
-    except Exception as error:
-        if not is_opencascade_error(error):
-            raise
-        return [_build_polygon(point, heads[k : k + 2]) for k in range(len(heads) - 1)]
+    return [_build_polygon(point, heads[k : k + 2]) for k in range(len(heads) - 1)]
+
+
+def _is_flat(heads: Floats) -> bool:
+    corners = np.vstack([np.zeros(3), heads])
+    return bool(np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)[2] <= FLAT)
 
 
 def _find_turn(edge: Edge, heads: Floats, size: float) -> tuple[Any, float] | None:

@@ -113,3 +113,26 @@ def test_a_surface_of_which_a_vertex_joins_two_sheets_is_simplified() -> None:
     assert (apart.vertices[apart.faces] == both.vertices[both.faces]).all()
     flat = Flat(both, np.full(len(both.faces), -1), ())
     assert len(decimate(flat, 40).mesh.faces) < 80
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.3])
+def test_a_mitre_whose_ends_are_not_flat_is_closed(bend: float) -> None:
+    """As where an edge of a file does not lie quite on its faces, so that their normals lean along it."""
+    from dataclasses import replace
+
+    from damageest_cadquery._edges import find_edges
+    from damageest_cadquery._mitre import build_mitre
+    from damageest_cadquery._split import measure_volume
+
+    faces = [face.wrapped for face in cq.Workplane().box(10, 10, 10).val().Faces()]
+    edge = find_edges(faces)[0]
+    assert edge.kind == "convex"
+    along = np.linspace(0, 1, len(edge.points))[:, None]
+    leaning = replace(
+        edge, normals=edge.normals + 1e-4 * edge.tangents, others=edge.others - 2e-4 * edge.tangents,
+        points=edge.points + bend * (along - along**2) * edge.normals,
+    )  # fmt: skip
+    solid = build_mitre(leaning, HIGH, HIGH)
+    assert cq.Shape.cast(solid).isValid()
+    assert measure_volume(solid) == pytest.approx(10 * HIGH**2, rel=1e-3)
+    assert len(cq.Shape.cast(solid).Faces()) == 4 + 2 * 2, "each end is two triangles"
