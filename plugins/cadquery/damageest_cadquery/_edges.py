@@ -52,10 +52,10 @@ class Edge:
         over into one plane."""
         if (np.abs(self.turns) <= SMOOTH).all():
             return "smooth"
-        for kind, turns in (("convex", self.turns), ("concave", -self.turns)):
-            if (turns[1:-1] > SMOOTH).all() and (turns >= -SMOOTH).all():
-                return kind
-        return "mixed"
+        within = self.turns[1:-1]
+        if (within > SMOOTH).all() and (self.turns >= -SMOOTH).all():
+            return "convex"
+        return "concave" if (within < -SMOOTH).all() and (self.turns <= SMOOTH).all() else "mixed"
 
     def tapers(self, end: int) -> bool:
         """Whether a sharp edge is smooth at its start, 0, or at its end, -1."""
