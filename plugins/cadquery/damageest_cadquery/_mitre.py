@@ -99,7 +99,8 @@ def _is_flat(heads: Floats) -> bool:
 
 
 def _find_turn(edge: Edge, heads: Floats, size: float) -> tuple[Any, float] | None:
-    """The axis and angle by which the polygon turns along a circular edge; None where it does not."""
+    """The axis and angle by which the polygon turns along a circular edge; None where it does not. Raises StockError where
+    it would reach beyond the axis."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.GeomAbs import GeomAbs_Circle
     from OCP.gp import gp_Ax1
@@ -119,6 +120,8 @@ def _find_turn(edge: Edge, heads: Floats, size: float) -> tuple[Any, float] | No
     seen = np.einsum("sij,skj->ski", frames, heads)
     if np.abs(seen - seen[0]).max() > 10 * EVEN * size:
         return None
+    if (circle.Radius() + seen[0, :, 0]).min() <= 0:  # as inside a fillet, beyond whose axis it would lie
+        raise StockError("the offset of a face folds")
     line = gp_Ax1(circle.Location(), circle.Axis().Direction())
     if np.array(circle.Axis().Direction().Coord()) @ axis < 0:
         line.Reverse()

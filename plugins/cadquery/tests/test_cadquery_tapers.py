@@ -136,3 +136,18 @@ def test_a_mitre_whose_ends_are_not_flat_is_closed(bend: float) -> None:
     assert cq.Shape.cast(solid).isValid()
     assert measure_volume(solid) == pytest.approx(10 * HIGH**2, rel=1e-3)
     assert len(cq.Shape.cast(solid).Faces()) == 4 + 2 * 2, "each end is two triangles"
+
+
+def test_a_mitre_that_reaches_beyond_the_axis_of_its_edge_folds() -> None:
+    """Over the end of a concave fillet whose radius is less than the height of the stock."""
+    from damageest_cadquery._edges import find_edges
+    from damageest_cadquery._mitre import build_mitre
+    from damageest_cadquery._solids import StockError
+
+    step = cq.Workplane("XZ").polyline([(0, 0), (20, 0), (20, 5), (10, 5), (10, 15), (0, 15)]).close().extrude(10)
+    solid = step.edges(cq.selectors.BoxSelector((9, -20, 4), (11, 20, 6))).fillet(RADIUS)
+    edges = find_edges([face.wrapped for face in solid.val().Faces()])
+    (first, *_) = [edge for edge in edges if edge.kind == "convex" and cq.Edge(edge.shape).geomType() == "CIRCLE"]
+    assert cq.Shape.cast(build_mitre(first, RADIUS - 0.1, RADIUS - 0.1)).isValid()
+    with pytest.raises(StockError, match="folds"):
+        build_mitre(first, RADIUS + 0.1, RADIUS + 0.1)
