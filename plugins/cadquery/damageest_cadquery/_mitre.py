@@ -99,8 +99,8 @@ def _is_flat(heads: Floats) -> bool:
 
 
 def _find_turn(edge: Edge, heads: Floats, size: float) -> tuple[Any, float] | None:
-    """The axis and angle by which the polygon turns along a circular edge; None where it does not. Raises StockError where
-    it would reach beyond the axis."""
+    """The axis and angle by which the polygon turns along a circular edge; None where it does not. Raises StockError
+    where it would reach beyond the axis."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.GeomAbs import GeomAbs_Circle
     from OCP.gp import gp_Ax1
