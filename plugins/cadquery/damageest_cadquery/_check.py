@@ -104,10 +104,12 @@ def check_pieces(
     off = max((_measure_off(face, cad_faces[number], near) for face, (number, _) in faces if number >= 0), default=0.0)
     numbers = (distance, farthest, beyond, off)
     if off > near:
-        return refuse(f"an outer corner lies {off:.2g} off the CAD's surface", *numbers)
+        return refuse(f"an outer corner lies {off / tolerance:.2g} tolerances off the CAD's surface", *numbers)
     share, most = LIMITS[form]
     if farthest > most * tolerance or beyond > share:
-        return refuse(f"up to {farthest:.3g} from the mesh, on {beyond:.1%} more than a quarter tolerance", *numbers)
+        return refuse(
+            f"up to {farthest / tolerance:.2g} tolerances from the mesh, on {beyond:.1%} more than a quarter", *numbers
+        )
     if beyond > 0.01 and not _is_nearer(points, inner, surface, quarter):
         return refuse("the scan's points are nearer to the mesh", *numbers)
     return Measured(volume, "", *numbers)

@@ -6,8 +6,10 @@ nearer than the claim for the edge itself, so it finds no cut there, or a wrong 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+COARSE = 1e-3
 LEVELS = (1e-5, 1e-4, 1e-3)
 """Claims that are tried, in millimetres; those that are smaller stay."""
 
@@ -32,3 +34,12 @@ def lower_claims(solid: Any, most: float) -> Any:
         if BRepCheck_Analyzer(copy).IsValid():
             return copy
     return solid
+
+
+def find_coarse(solids: Sequence[Any], tolerance: float) -> tuple[float, ...]:
+    """The fuzzy value to try last, in millimetres, where edges need what they claim: there the sections of two faces
+    end apart. None where no edge claims as much, or a thousandth of the tolerance is less."""
+    from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
+
+    claimed = max((ShapeAnalysis_ShapeTolerance().Tolerance(solid, 1) for solid in solids), default=0.0)
+    return (COARSE,) if min(claimed, tolerance / 1000) >= COARSE else ()

@@ -15,11 +15,12 @@ from damageest.geometry.solids import to_arrays, to_manifold, unite
 from damageest.geometry.vectors import normalise
 from damageest_cadquery._check import VOLUME, is_plane, measure_area
 from damageest_cadquery._cut import find_rim
-from damageest_cadquery._own_skin import build_own_stock, is_plain
+from damageest_cadquery._join_stock import Lump
+from damageest_cadquery._own_skin import build_own_stock, build_plain, is_plain
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, explore_faces
 from damageest_cadquery._split import Piece, triangulate
-from damageest_cadquery._stock import Base, build_parts
+from damageest_cadquery._stock import Base
 
 BEYOND = 0.02
 """Largest share of the stock's surface that may be farther than a quarter tolerance from the mesh's."""
@@ -41,15 +42,21 @@ def bound_entered(bases: Sequence[Base], part: Part, deposit: Solid) -> float:
 
 
 def compare_stock(
-    damage: Sequence[Piece], bases: Sequence[Base], deposit: Deposit, lost: Solid, part: Part, tolerance: float
+    damage: Sequence[Piece],
+    bases: Sequence[Base],
+    lumps: Sequence[Lump],
+    deposit: Deposit,
+    lost: Solid,
+    part: Part,
+    tolerance: float,
 ) -> tuple[float, float, float]:
     """Distance, largest distance and difference of volumes between stock, as high as the mesh's, on an exact
-    ``damage`` volume, and the mesh's. Its parts are joined as triangles, which takes a second where OpenCASCADE takes a
-    minute.
+    ``damage`` volume, and the mesh's. Its parts, ``lumps``, are joined as triangles, which takes a second where
+    OpenCASCADE takes a minute.
 
     Raises StockError where it differs too much, also from what the stage builds on the exact damage volume's own skin.
     """
-    parts = [lump.solid for lump in build_parts(bases)] if bases else []
+    parts = [lump.solid for lump in lumps]
     origin = deposit.bounds.mean(axis=0)
     stock = unite([triangulate(solid, tolerance / 16) for solid in parts], origin)
     whole = to_manifold(part, origin)
@@ -78,6 +85,18 @@ def compare_stock(
         if own is None or not _is_same(stock, own, room, deposit, part, tolerance):
             raise fault
     return distance, farthest, difference
+
+
+def lower_stock(deposit: Deposit, lost: Solid, part: Part, tolerance: float) -> Deposit | None:
+    """The mesh's deposit with stock that is a quarter of the tolerance lower: of the height that the job asks for. None
+    where something took stock away, so that it cannot be built anew."""
+    outside = np.flatnonzero(~find_inner_faces(lost, part))
+    if not is_plain(deposit, lost, outside, part, tolerance, VOLUME * deposit.volume):
+        return None
+    origin = deposit.bounds.mean(axis=0)
+    stock = build_plain(deposit, lost, outside, part, tolerance, tolerance / 4)
+    vertices, triangles = to_arrays(stock + to_manifold(lost, origin))
+    return Deposit(vertices + origin, triangles, heights=deposit.heights, stock_volume=stock.volume())
 
 
 def _compare_surfaces(
@@ -109,7 +128,7 @@ def _compare_surfaces(
         return distance, farthest, None
     apart = [n[away & (each > tolerance / 4)] for n, away, each in zip(on, far, off, strict=True)]
     fault = StockError(
-        f"it is up to {farthest:.3g} from the mesh's, {beyond:.1%} more than a quarter tolerance",
+        f"it is up to {farthest / tolerance:.2g} tolerances from the mesh's, {beyond:.1%} more than a quarter",
         strayed | (set(np.concatenate(apart).tolist()) if beyond > BEYOND else set()),
     )
     return distance, farthest, fault

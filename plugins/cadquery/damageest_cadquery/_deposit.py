@@ -16,9 +16,9 @@ from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import INVALID, ON_CAD
-from damageest_cadquery._compare_stock import bound_entered, compare_stock
+from damageest_cadquery._compare_stock import bound_entered, compare_stock, lower_stock
 from damageest_cadquery._read import explore
-from damageest_cadquery._solids import StockError, combine, explore_faces, naming, sew, turn_offsets
+from damageest_cadquery._solids import StockError, combine, explore_faces, naming, settle_edges, sew, turn_offsets
 from damageest_cadquery._split import (
     Origin,
     Piece,
@@ -30,7 +30,7 @@ from damageest_cadquery._split import (
     note_images,
     triangulate,
 )
-from damageest_cadquery._stock import Base, build_stock, take_bases
+from damageest_cadquery._stock import Base, build_parts, build_stock, take_bases
 
 STOCK = -2
 """In origins: (number, STOCK) is the offset of a CAD face, (-1, STOCK) a side of the stock."""
@@ -83,8 +83,7 @@ def find_deposit(
     with naming(numbers):
         try:
             bases = [base for piece in damage for base in take_bases(piece, dict(deposit.heights))]
-            higher = [replace(base, height=base.height + tolerance / 4) for base in bases]
-            figures = compare_stock(damage, higher, deposit, lost, part, tolerance)
+            figures = _compare(damage, bases, deposit, lost, part, tolerance)
             stock = _build(bases, damage, rest, part, tolerance, deposit)
             pieces = _join(damage, stock, bases, faces, part, tolerance) if stock else tuple(damage)
             whole = sum(triangulate(piece.shape, tolerance / 16).volume for piece in pieces)
@@ -101,11 +100,28 @@ def find_deposit(
         if abs(wrong) > SAME:
             raise StockError(f"its volume differs by {wrong:+.2%} from damage and stock")
         bodies = sum(body.volume > SPECK * deposit.volume for body in split_bodies(deposit))
-        if len(pieces) != bodies:
-            raise StockError(f"{len(pieces)} solids for {bodies} pieces")
-        if not is_sound(pieces):
+        solids = sum(measure_volume(piece.shape) > SPECK * deposit.volume for piece in pieces)
+        if solids != bodies:
+            raise StockError(f"{solids} solids for {bodies} pieces")
+        if not all(settle_edges(piece.shape) for piece in pieces) or not is_sound(pieces):
             raise StockError(INVALID, _find_invalid(pieces))
         return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
+
+
+def _compare(
+    damage: Sequence[Piece], bases: Sequence[Base], deposit: Deposit, lost: Solid, part: Part, tolerance: float
+) -> tuple[float, float, float]:
+    """What `compare_stock` gives for stock as high as the mesh's. Where that cannot be built, as where only the quarter
+    of a tolerance more makes it fold in a fillet, the mesh's is lowered by it."""
+    higher = [replace(base, height=base.height + tolerance / 4) for base in bases]
+    try:
+        parts = build_parts(higher) if bases else []
+    except StockError:
+        parts, lower = build_parts(bases), lower_stock(deposit, lost, part, tolerance)
+        if lower is None:
+            raise
+        return compare_stock(damage, bases, parts, lower, lost, part, tolerance)
+    return compare_stock(damage, higher, parts, deposit, lost, part, tolerance)
 
 
 def refuse_doubles(deposit: Solid | None, damage: Sequence[Piece], doubles: Sequence[Piece]) -> None:

@@ -42,13 +42,24 @@ class Edge:
     vertices: tuple[Any, Any]
 
     @property
+    def length(self) -> float:
+        """Of its chords."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+    @property
     def kind(self) -> Literal["smooth", "convex", "concave", "mixed"]:
-        """How the faces meet, all along it."""
+        """How the faces meet, all along it. At its ends a sharp edge may be smooth, as where two fillets meet that go
+        over into one plane."""
         if (np.abs(self.turns) <= SMOOTH).all():
             return "smooth"
-        if (self.turns > SMOOTH).all():
+        within = self.turns[1:-1]
+        if (within > SMOOTH).all() and (self.turns >= -SMOOTH).all():
             return "convex"
-        return "concave" if (self.turns < -SMOOTH).all() else "mixed"
+        return "concave" if (within < -SMOOTH).all() and (self.turns <= SMOOTH).all() else "mixed"
+
+    def tapers(self, end: int) -> bool:
+        """Whether a sharp edge is smooth at its start, 0, or at its end, -1."""
+        return bool(abs(self.turns[end]) <= SMOOTH)
 
 
 def find_edges(faces: Sequence[Any]) -> list[Edge]:

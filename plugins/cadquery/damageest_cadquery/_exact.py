@@ -20,12 +20,15 @@ from damageest.artefacts import Floats, Part, Solid, Surface
 from damageest_cadquery._attempts import call, list_tools
 from damageest_cadquery._balance import Balance
 from damageest_cadquery._check import Measured, check_pieces, measure_inner_area
+from damageest_cadquery._claims import find_coarse
 from damageest_cadquery._cut import make_cut
-from damageest_cadquery._pieces import count_bodies, take_pieces
+from damageest_cadquery._pieces import Taken, count_bodies, take_pieces
 from damageest_cadquery._read import explore
 from damageest_cadquery._split import Piece, Tool, is_sound
 
 MOST_FACES = 5000
+FLAT = ("planes", "facets")
+"""Kinds of forms of flat faces alone."""
 VOLUME = "its volume"
 """How the reason begins where the volume is refused."""
 WANTED = 0.003
@@ -99,6 +102,7 @@ def find_exact(
     second: Exact | None = None
     stale, best = Counter[str](), dict[str, float]()
     work = _Work(site, solids, faces, part, tolerance, off, bodies, measure_inner_area(solids))
+    coarse = find_coarse([piece.shape for piece in solids], tolerance)
     balance = Balance(solids, part, site.damage, tolerance)
     for form, make, fuzzies, shift in list_tools(cut, part, tolerance):
         kind = form.split()[0]
@@ -112,7 +116,7 @@ def find_exact(
                 tried.append(f"{form}: {barred}")
                 continue
             tool = call(make)
-            for fuzzy in fuzzies if tool is not None else ():
+            for fuzzy in [*fuzzies, *(coarse if kind in FLAT else ())] if tool is not None else ():
                 assert tool is not None
                 trial = work.split(tool, kind, fuzzy)
                 if shift is not None and trial.is_near:
@@ -174,19 +178,29 @@ class _Work:
         found = take_pieces(self.solids, tool, fuzzy, site.damage, self.tolerance)
         if isinstance(found, str):
             return _Trial(Measured(0.0, found))
-        pieces, rest, doubles = found
+        pieces, rest = found.damage, found.rest
         if sum(len(piece.origins) for piece in pieces) > MOST_FACES:
             return _Trial(Measured(0.0, f"more than {MOST_FACES} faces"), is_final=True)
-        elsewhere = measure_inner_area(rest) - self.inner_before - measure_inner_area(doubles)
-        measured = check_pieces(
-            kind, pieces, elsewhere, self.bodies, site.damage, site.surface, self.part, site.points, self.tolerance,
-            self.faces, self.off,
-        )  # fmt: skip
+        measured = self._check(kind, found, pieces)
+        if measured.reason and np.isfinite(measured.farthest) and found.specks:
+            # the mesh's surface at a speck that is left out can be far from all others
+            pieces = (*pieces, *found.specks)
+            measured = self._check(kind, found, pieces)
         if not measured.reason and not is_sound([piece for piece in rest if piece not in self.solids], self.faces):
             measured = replace(measured, reason="what it leaves of the part is not valid", farthest=np.nan)
         # where it is sound but not near enough, another fuzzy value does not change that
         final = np.isfinite(measured.farthest) or measured.reason.startswith(VOLUME)
-        return _Trial(measured, pieces, rest, bool(final), doubles)
+        return _Trial(measured, pieces, rest, bool(final), found.doubles)
+
+    def _check(self, kind: str, found: Taken, pieces: Sequence[Piece]) -> Measured:
+        site = self.site
+        elsewhere = measure_inner_area(found.rest) - self.inner_before
+        elsewhere -= measure_inner_area([*found.doubles, *found.specks])
+        bodies = self.bodies + len(pieces) - len(found.damage)
+        return check_pieces(
+            kind, pieces, elsewhere, bodies, site.damage, site.surface, self.part, site.points, self.tolerance,
+            self.faces, self.off,
+        )  # fmt: skip
 
 
 def _move(

@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.geometry.vectors import normalise
-from damageest_cadquery._edges import Edge
+from damageest_cadquery._edges import SMOOTH, Edge
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, orient_solid
 
@@ -17,6 +17,8 @@ MAX_MITRE = 100.0
 ROUNDS = 3
 LONG = 1.6
 """Largest length of a pointed mitre, in heights."""
+FLAT = 1e-6
+"""Distance in millimetres of a polygon's corners from a plane up to which it is flat."""
 EVEN = 1e-6
 """Largest change of the polygon's corners along a straight or circular edge, in heights."""
 
@@ -28,6 +30,10 @@ def find_heads(edge: Edge, at: int, tall: float, other: float) -> Floats:
     as that of the stage `allowance: milling`.
     """
     n, m, turn = edge.normals[at], edge.others[at], float(edge.turns[at])
+    if abs(turn) <= SMOOTH:  # an end of it, where the mitre has no width
+        if tall != other:
+            raise StockError("the heights differ at an edge that is smooth at one end")
+        return np.array([tall * n] * (3 if edge.turns[len(edge.turns) // 2] <= np.radians(MAX_MITRE) else 2 + ROUNDS))
     outward = np.cross(edge.tangents[at], n)
     aside = (other - tall * np.cos(turn)) / np.sin(turn)
     middle = edge.turns[len(edge.turns) // 2]
@@ -55,10 +61,11 @@ def build_mitre(edge: Edge, tall: float, other: float) -> Any:
     way = edge.points[-1] - edge.points[0]
     length = float(np.linalg.norm(way))
     straight = length > 0 and np.abs(np.cross(edge.points - edge.points[0], way / length)).max() < EVEN * size
-    if straight and np.abs(heads - heads[0]).max() < EVEN * size:
+    flat = _is_flat(heads[0])
+    if flat and straight and np.abs(heads - heads[0]).max() < EVEN * size:
         face = _build_polygon(edge.points[0], heads[0])
         return orient_solid(BRepPrimAPI_MakePrism(face, gp_Vec(*way.tolist())).Shape())
-    turned = _find_turn(edge, heads, size)
+    turned = _find_turn(edge, heads, size) if flat else None
     if turned is not None:
         axis, angle = turned
         return orient_solid(BRepPrimAPI_MakeRevol(_build_polygon(edge.points[0], heads[0]), axis, angle).Shape())
@@ -76,8 +83,24 @@ def _build_polygon(point: Floats, heads: Floats) -> Any:
     return BRepBuilderAPI_MakeFace(polygon.Wire(), True).Face()
 
 
+def _build_end(point: Floats, heads: Floats) -> list[Any]:
+    """The end of a mitre: a polygon, or triangles where it is not flat, as where an edge does not lie quite on its
+    faces; nothing where it has no width."""
+    if np.abs(heads - heads[0]).max() == 0:
+        return []
+    if _is_flat(heads):
+        return [_build_polygon(point, heads)]
+    return [_build_polygon(point, heads[k : k + 2]) for k in range(len(heads) - 1)]
+
+
+def _is_flat(heads: Floats) -> bool:
+    corners = np.vstack([np.zeros(3), heads])
+    return bool(np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)[2] <= FLAT)
+
+
 def _find_turn(edge: Edge, heads: Floats, size: float) -> tuple[Any, float] | None:
-    """The axis and angle by which the polygon turns along a circular edge; None where it does not."""
+    """The axis and angle by which the polygon turns along a circular edge; None where it does not. Raises StockError
+    where it would reach beyond the axis."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.GeomAbs import GeomAbs_Circle
     from OCP.gp import gp_Ax1
@@ -97,6 +120,8 @@ def _find_turn(edge: Edge, heads: Floats, size: float) -> tuple[Any, float] | No
     seen = np.einsum("sij,skj->ski", frames, heads)
     if np.abs(seen - seen[0]).max() > 10 * EVEN * size:
         return None
+    if (circle.Radius() + seen[0, :, 0]).min() <= 0:  # as inside a fillet, beyond whose axis it would lie
+        raise StockError("the offset of a face folds")
     line = gp_Ax1(circle.Location(), circle.Axis().Direction())
     if np.array(circle.Axis().Direction().Coord()) @ axis < 0:
         line.Reverse()
@@ -119,7 +144,8 @@ def _loft(points: Floats, heads: Floats) -> Any:
         sewing.Add(BRepBuilderAPI_MakeFace(GeomFill.Surface_s(one, two), 1e-7).Face())
     if np.linalg.norm(points[0] - points[-1]) > 1e-6:
         for end in (0, -1):
-            sewing.Add(_build_polygon(points[end], heads[end]))
+            for face in _build_end(points[end], heads[end]):
+                sewing.Add(face)
     sewing.Perform()
     shells = explore(sewing.SewedShape(), TopAbs_SHELL)
     if len(shells) != 1:

@@ -11,6 +11,7 @@ from damageest.isolation import at_work
 from damageest.stages.export import Body, DepositForm
 from damageest_cadquery._assembly import Colour, NamedShape
 from damageest_cadquery._deposit import STOCK, ExactDeposit
+from damageest_cadquery._doubles import SHARED
 from damageest_cadquery._exact import Exact, scale_shape
 from damageest_cadquery._files import join_shapes, write_shapes
 from damageest_cadquery._left import FACET, cut_facets
@@ -48,7 +49,7 @@ class Writing:
         path = Path(request.folder) / file
         path.parent.mkdir(parents=True, exist_ok=True)
         with at_work(file, request.seconds):
-            scratch, chord = Path(request.scratch) / "a.step", request.tolerance / 16
+            scratch, chord = Path(request.scratch) / "a.step", request.tolerance / request.enlarged / 16
             done = write_shapes(scratch, path, name, shapes, request.unit, chord)
         if done.said:
             self.notes.append(f"{file} {done.said}")
@@ -74,23 +75,23 @@ def write_all(
     for number, deposit in deposits.items():
         stem, name = f"deposit/site-{number}", f"deposit site-{number}"
         stock[stem] = _name(deposit.pieces, name, request.bodies[stem].colour, facts, f"damage site-{number}")
-    left = _find_left(writing, found, rest)
+    left, size = _find_left(writing, found, rest), 1 / request.enlarged
     for place, T in request.places.items():
         here: dict[str, NamedShape] = {}
         for stem, shape in {**sites, **stock}.items():
-            made, fault = writing.save(f"{place}{stem}", shape.name, [_move(shape, T)])
+            made, fault = writing.save(f"{place}{stem}", shape.name, [_move(shape, T, size)])
             here.update((stem, each) for each in made)
             if fault:
                 _take_fault(writing, stem, fault, deposits)
         writing.exact = [number for number in found if number not in writing.reasons]
         union = (
-            [_move(shape, T) for shape in _gather_lost(request, sites)]
+            [_move(shape, T, size) for shape in _gather_lost(request, sites)]
             if any(s.accepted for s in request.sites)
             else []
         )
         if left and union:
-            here |= _save_whole(writing, place, [_move(shape, T) for shape in left], union)
-        everything = _collect(request.bodies, here, T) if request.assembly else []
+            here |= _save_whole(writing, place, [_move(shape, T, size) for shape in left], union)
+        everything = _collect(request.bodies, here, T, size) if request.assembly else []
         if everything:
             writing.save(f"{place}result", "result", everything)
 
@@ -166,10 +167,11 @@ def _save_whole(
     return {f"undamaged#{number}": each for number, each in enumerate(left)}
 
 
-def _collect(bodies: Mapping[str, Body], shapes: Mapping[str, NamedShape], T: Floats | None) -> list[NamedShape]:
+def _collect(
+    bodies: Mapping[str, Body], shapes: Mapping[str, NamedShape], T: Floats | None, size: float
+) -> list[NamedShape]:
     """What the assembly holds: what is left of the part, damage volumes and deposits, with facets where they have no
     exact form."""
-    from damageest.geometry.transforms import move_mesh
     from damageest_cadquery._step import MAX_FACES
 
     found = []
@@ -180,10 +182,9 @@ def _collect(bodies: Mapping[str, Body], shapes: Mapping[str, NamedShape], T: Fl
         if apart or stem in shapes:
             found += apart or [shapes[stem]]
             continue
-        solid = body.solid if T is None else move_mesh(body.solid, T)
-        shape, count = build_solid(solid)
+        shape, count = build_solid(body.solid)
         if count <= MAX_FACES:
-            found.append(NamedShape(body.name, shape, body.colour))
+            found.append(_move(NamedShape(body.name, shape, body.colour), T, size))
     return found
 
 
@@ -195,6 +196,10 @@ def _name(pieces: Sequence[Piece], name: str, colour: Colour, facts: CadFacts, i
             if tool == STOCK:
                 names.append(f"stock on {facts.names[number]}" if number >= 0 else "side of the stock")
                 colours.append(TOP if number >= 0 else SIDE)
+                continue
+            if tool == SHARED:
+                names.append(f"{inner} inner at {facts.names[number]}")
+                colours.append(INNER)
                 continue
             if tool == FACET:
                 names.append("facet")
@@ -230,5 +235,6 @@ def join_named(name: str, shapes: Sequence[NamedShape], colour: Colour) -> Named
     return NamedShape(name, join_shapes([each.shape for each in shapes]), colour, names, colours)
 
 
-def _move(shape: NamedShape, T: Floats | None) -> NamedShape:
-    return shape if T is None else replace(shape, shape=scale_shape(shape.shape, 1.0, T))
+def _move(shape: NamedShape, T: Floats | None, size: float) -> NamedShape:
+    """A shape in its own size, and in its place."""
+    return shape if T is None and size == 1 else replace(shape, shape=scale_shape(shape.shape, size, T))

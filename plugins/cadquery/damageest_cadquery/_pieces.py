@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from damageest.artefacts import Solid
@@ -10,11 +11,24 @@ from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import INVALID
-from damageest_cadquery._doubles import drop_doubles, find_doubles
-from damageest_cadquery._split import Piece, Tool, is_near, is_opencascade_error, measure_volume, split, triangulate
+from damageest_cadquery._doubles import drop_doubles, leave_once
+from damageest_cadquery._split import (
+    Piece,
+    Tool,
+    estimate_volume,
+    is_near,
+    is_opencascade_error,
+    measure_volume,
+    split,
+    triangulate,
+)
 
 SPECK = 1e-3
 """Share of the damage volume below which a body of it, or a piece that a split leaves over, is dropped."""
+DUST = 1e-5
+"""Share of it below which a piece is nothing at all."""
+MOST = 2.0
+"""Damage volumes that a piece may have, by an estimate, that is looked at: whether it is one, its triangles tell."""
 
 
 def count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> int:
@@ -32,19 +46,29 @@ def count_bodies(damage: Solid, solids: Sequence[Piece], tolerance: float) -> in
         except (InputError, ValueError):
             return alone
         found += [body for body in common.decompose() if body.volume() > least]
-    return len(found) - sum(find_doubles(found))
+    left = [each for each in leave_once(found) if each is not None]
+    return sum(body.volume() > least for each in left for body in each.decompose())
 
 
-def take_pieces(
-    solids: Sequence[Piece], tool: Tool, fuzzy: float, damage: Solid, tolerance: float
-) -> tuple[tuple[Piece, ...], tuple[Piece, ...], tuple[Piece, ...]] | str:
-    """The pieces that are the damage volume, all others, and those that lie in other pieces of the damage volume; or
-    why there are none of the first."""
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """``damage``: the pieces that are the damage volume; ``rest``: all others; ``doubles``: those that lie in other
+    pieces of the damage volume; ``specks``: small ones of it, which are not counted as its solids."""
+
+    damage: tuple[Piece, ...]
+    rest: tuple[Piece, ...]
+    doubles: tuple[Piece, ...]
+    specks: tuple[Piece, ...]
+
+
+def take_pieces(solids: Sequence[Piece], tool: Tool, fuzzy: float, damage: Solid, tolerance: float) -> Taken | str:
+    """What a tool makes of solids; or why it does not cut the damage volume out."""
     from OCP.BRepCheck import BRepCheck_Analyzer
 
     why = "it does not separate the solid"
     taken: list[Piece] = []
     rest: list[Piece] = []
+    specks: list[Piece] = []
     try:
         for solid in solids:
             if not _touch(solid.shape, tool.shape):
@@ -54,21 +78,35 @@ def take_pieces(
             if made is None:
                 return why
             for piece in made:
-                volume = measure_volume(piece.shape)
-                may_be = SPECK * damage.volume < volume < 1.5 * damage.volume
+                share = estimate_volume(piece.shape) / damage.volume
+                if share < 10 * SPECK:
+                    share = measure_volume(piece.shape) / damage.volume
+                may_be = SPECK < share < MOST
                 if may_be and not BRepCheck_Analyzer(piece.shape).IsValid():
                     return INVALID  # to triangulate it can take minutes
                 if may_be and _is_damage(piece, damage, tolerance):
                     taken.append(piece)
-                elif volume > SPECK * damage.volume:
+                elif share > SPECK:
                     rest.append(piece)
+                elif share > DUST and _is_speck(piece, damage, tolerance):
+                    specks.append(piece)
         kept, doubles = drop_doubles(taken, damage.bounds.mean(axis=0), tolerance / 16)
     except Exception as error:
         # of the others, a piece that cannot be triangulated, or whose triangles do not close
         if not (is_opencascade_error(error) or isinstance(error, (InputError, ValueError))):
             raise
         return why
-    return (kept, tuple(rest), doubles) if kept else why
+    return Taken(kept, tuple(rest), doubles, tuple(specks)) if kept else why
+
+
+def _is_speck(piece: Piece, damage: Solid, tolerance: float) -> bool:
+    """Whether a small piece belongs to the damage volume; not where that cannot be told."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    try:
+        return BRepCheck_Analyzer(piece.shape).IsValid() and _is_damage(piece, damage, tolerance)
+    except (InputError, ValueError):
+        return False
 
 
 def _is_damage(piece: Piece, damage: Solid, tolerance: float) -> bool:

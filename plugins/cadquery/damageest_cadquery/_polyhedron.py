@@ -24,7 +24,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest_cadquery._cut import Cut
 from damageest_cadquery._flat_faces import Flat, split_regions
 from damageest_cadquery._recognise import ALIKE, Shape, find_neighbours
-from damageest_cadquery._untangle import keep_apart
+from damageest_cadquery._untangle import keep_apart, split_sheets
 
 SMALL = 20
 """Triangles of a region of a plane below which it is not kept as a face of its own."""
@@ -85,7 +85,10 @@ def _collapse(flat: Flat, count: int, apart: bool) -> Flat:
         np.ascontiguousarray(flat.mesh.vertices), np.ascontiguousarray(flat.mesh.faces, np.int32), count, apart
     )
     if not len(F):  # it refuses surfaces of which a vertex joins two sheets
-        return flat
+        apart_there = split_sheets(flat.mesh)
+        if len(apart_there.vertices) == len(flat.mesh.vertices):
+            return flat
+        return _collapse(Flat(apart_there, flat.label, flat.planes), count, apart)
     return Flat(Mesh(np.asarray(V, np.float64), np.asarray(F, np.int64)), flat.label[np.asarray(birth)], flat.planes)
 
 

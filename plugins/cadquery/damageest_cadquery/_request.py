@@ -21,7 +21,7 @@ class Request:
     the stem of its file, for the assembly, which ``assembly`` asks for; ``field``: what moves the part as designed, as
     its CAD file has it, to ``part``, None for nothing; ``seconds``: processor time that each piece of work has;
     ``skipped``: those that stopped this process before, by `name_site`, `name_form`, `name_deposit` and `name_file`,
-    and why.
+    and why. ``enlarged``: all lengths, but those of ``places``, are millimetres times this.
     """
 
     part: Part
@@ -35,6 +35,7 @@ class Request:
     places: Mapping[str, Floats | None]
     seconds: float
     assembly: bool = True
+    enlarged: float = 1.0
     field: DisplacementField | None = None
     skipped: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
@@ -66,11 +67,16 @@ def name_form(number: int, form: str) -> str:
 
 def limit_form(seconds: float) -> float:
     """How long a form of a damage volume may take of the ``seconds`` of a site: others are to be tried after it."""
-    return seconds / 3
+    return seconds / 2
 
 
 def name_deposit(number: int) -> str:
     return f"deposit of site {number}"
+
+
+def name_crossed(number: int) -> str:
+    """The look for the reason in the CAD file."""
+    return f"faces that cross at site {number}"
 
 
 def name_file(stem: str) -> str:

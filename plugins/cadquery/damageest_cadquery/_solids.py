@@ -16,6 +16,8 @@ SEWN = 2e-5
 """Distance in millimetres within which edges of faces are one edge, where they do not claim to be less exact."""
 
 
+CLAIM = 1e-4
+"""Largest tolerance of an edge, in diagonals of its solid, that joining may need."""
 MOST_NAMED = 6
 """Faces that a reason names."""
 
@@ -58,7 +60,6 @@ def naming(faces: Iterable[int]) -> Iterator[None]:
 
 def orient_solid(shape: Any) -> Any:
     """The one solid of a shape with its faces outward. Raises StockError where it is not sound."""
-    from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.BRepLib import BRepLib
     from OCP.TopAbs import TopAbs_SOLID
     from OCP.TopoDS import TopoDS
@@ -68,9 +69,29 @@ def orient_solid(shape: Any) -> Any:
         raise StockError("the offset of a face is not one solid")
     solid = TopoDS.Solid_s(solids[0])
     BRepLib.OrientClosedSolid_s(solid)
-    if not BRepCheck_Analyzer(solid).IsValid() or measure_volume(solid) <= 0:
+    if not settle_edges(solid) or measure_volume(solid) <= 0:
         raise StockError("the offset of a face folds")
     return solid
+
+
+def settle_edges(shape: Any) -> bool:
+    """Whether a shape is valid, if need be after its edges were made to follow their faces' curves at the same
+    parameters, and claim what they are off: sewing and joining can leave edges that claim less. No edge may claim more
+    than `CLAIM` of the diagonal."""
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepLib import BRepLib
+    from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
+
+    if BRepCheck_Analyzer(shape).IsValid():
+        return True
+    BRepLib.SameParameter_s(shape, 1e-7, True)
+    BRepLib.UpdateTolerances_s(shape, True)
+    box = Bnd_Box()
+    BRepBndLib.Add_s(shape, box, False)
+    small = ShapeAnalysis_ShapeTolerance().Tolerance(shape, 1) <= CLAIM * np.sqrt(box.SquareExtent())
+    return bool(small and BRepCheck_Analyzer(shape).IsValid())
 
 
 def _place_faces(shape: Any) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 from damageest.artefacts import Floats, Solid
 from damageest.errors import InputError
 from damageest_cadquery._facets import Facet
+from damageest_cadquery._folds import drop_folds
 from damageest_cadquery._planar import build_shell
 from damageest_cadquery._read import explore
 
@@ -179,11 +180,19 @@ def note_images(known: ShapeMap, algorithm: Any, face: Any, origin: Origin) -> N
 
 
 def triangulate(shape: Any, chord: float, angle: float = 0.35) -> Solid:
-    """A closed mesh of a solid, within ``chord``. Raises InputError or ValueError where it cannot be closed."""
+    """A closed mesh of a solid, within ``chord``. Where the mesher leaves a gap, it is asked once more for triangles of
+    half the chord. Raises InputError or ValueError where these do not close either."""
+    try:
+        return _triangulate_once(shape, chord, angle)
+    except (InputError, ValueError):
+        return _triangulate_once(shape, chord / 2, angle)
+
+
+def _triangulate_once(shape: Any, chord: float, angle: float = 0.35) -> Solid:
     from damageest_cadquery._tessellate import tessellate
 
     mesh = tessellate([shape], chord, np.degrees(angle), lambda face: "")
-    return Solid(mesh.vertices, mesh.faces)
+    return Solid(mesh.vertices, drop_folds(mesh.faces, mesh.faces_brep))
 
 
 def is_near(shape: Any, mesh: Solid) -> bool:
@@ -202,7 +211,7 @@ def is_near(shape: Any, mesh: Solid) -> bool:
 def is_watertight(shape: Any, chord: float) -> bool:
     """Whether triangles of a solid close; those of some solids that BRepCheck finds valid do not."""
     try:
-        return triangulate(shape, chord).volume > 0
+        return _triangulate_once(shape, chord).volume > 0
     except (InputError, ValueError):
         return False
 
@@ -214,6 +223,16 @@ def measure_volume(shape: Any) -> float:
 
     sizes = GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, sizes, 1e-5, False, False)
+    return float(sizes.Mass())
+
+
+def estimate_volume(shape: Any) -> float:
+    """Within some percent, at once: the integral that holds its error can take a minute on a part with many splines."""
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    sizes = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, sizes)
     return float(sizes.Mass())
 
 

@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Ints
+from damageest_cadquery._doubles import SHARED
 from damageest_cadquery._edges import Edge, find_edges, measure_normals
 from damageest_cadquery._join_stock import Lump, fuse, sew_all
 from damageest_cadquery._mitre import build_mitre, find_heads
 from damageest_cadquery._read import explore
-from damageest_cadquery._solids import StockError, close, explore_faces, naming, orient_solid
+from damageest_cadquery._solids import StockError, close, explore_faces, naming, orient_solid, settle_edges
 from damageest_cadquery._split import Piece, is_watertight, measure_volume
 from damageest_cadquery._walls import build_wall
 
@@ -47,8 +46,8 @@ def take_bases(piece: Piece, heights: Mapping[int, float]) -> list[Base]:
     from OCP.TopoDS import TopoDS
 
     bases = []
-    for face, (number, _) in zip(explore(piece.shape, TopAbs_FACE), piece.origins, strict=True):
-        if number < 0:
+    for face, (number, kind) in zip(explore(piece.shape, TopAbs_FACE), piece.origins, strict=True):
+        if number < 0 or kind == SHARED:
             continue
         height = heights.get(number, 0.0)  # a sliver that the mesh does not have gets none
         if height < 0:
@@ -73,10 +72,7 @@ def build_parts(bases: Sequence[Base]) -> list[Lump]:
             "an edge between the faces is sharp in part only, or changes between convex and concave",
             (bases[k].number for edge in mixed for k in (edge.first, edge.second)),
         )
-    joined = [edge for edge in edges if edge.kind == "smooth" and heights[edge.first] == heights[edge.second]]
-    rows = ([edge.first for edge in joined], [edge.second for edge in joined])
-    graph = coo_array((np.ones(len(joined), bool), rows), shape=(len(bases),) * 2)
-    label = connected_components(graph, directed=False)[1]
+    label = _group(edges, heights)
     lumps = []
     for number in range(int(label.max()) + 1):
         mine = [bases[k] for k in np.flatnonzero(label == number).tolist()]
@@ -89,6 +85,20 @@ def build_parts(bases: Sequence[Base]) -> list[Lump]:
         with naming(numbers):
             lumps.append(Lump(build_mitre(edge, heights[edge.first], heights[edge.second]), numbers))
     return lumps + _build_corners(sharp, bases)
+
+
+def _group(edges: Sequence[Edge], heights: Sequence[float]) -> Ints:
+    """(B,) the group of each face: those of one height that are smooth together. Two faces with a sharp edge are never
+    in one, though they may be smooth with a third: what is offset in one piece must not have a sharp edge in it."""
+    label = np.arange(len(heights))
+    sharp = [(edge.first, edge.second) for edge in edges if edge.kind != "smooth"]
+    smooth = [edge for edge in edges if edge.kind == "smooth" and heights[edge.first] == heights[edge.second]]
+    for edge in sorted(smooth, key=lambda each: -each.length):
+        one, two = sorted((int(label[edge.first]), int(label[edge.second])))
+        after = np.where(label == two, one, label)
+        if one != two and all(after[first] != after[second] for first, second in sharp):
+            label = after
+    return np.unique(label, return_inverse=True)[1].reshape(-1)
 
 
 def join_stock(parts: Sequence[Lump], bases: Sequence[Base]) -> list[Any]:
@@ -257,5 +267,6 @@ def _merge(solids: Sequence[Any], bases: Sequence[Base]) -> list[Any]:
         (found,) = explore(unify.Shape(), TopAbs_SOLID) or (None,)
         sound = found is not None and BRepCheck_Analyzer(found).IsValid()
         same = sound and abs(measure_volume(found) / measure_volume(solid) - 1) < 1e-6
+        settle_edges(spare)
         merged.append(found if same and is_watertight(found, bases[0].height / CHORDS) else spare)
     return merged

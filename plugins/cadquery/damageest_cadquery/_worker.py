@@ -17,6 +17,7 @@ from damageest.stages.export import DepositForm, ExactForm
 from damageest_cadquery._adapted import MovedSolids, move_solids
 from damageest_cadquery._claims import lower_claims
 from damageest_cadquery._colours import read_colours
+from damageest_cadquery._crossed import find_crossed
 from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit, refuse_doubles
 from damageest_cadquery._exact import Exact, SiteInput, find_exact, scale_shape, start_solids
 from damageest_cadquery._files import join_shapes
@@ -31,6 +32,7 @@ from damageest_cadquery._request import (
     Request,
     describe_missing,
     limit_form,
+    name_crossed,
     name_deposit,
     name_form,
     name_site,
@@ -80,7 +82,13 @@ def _make(request: Request) -> Made:
             )
         if exact is None:
             *before, last = reasons[site.number]
-            reasons[site.number] = (*before, f"{last}; it lies on {_tell_faces(site, part, facts.names)}")
+            with at_work(name_crossed(site.number), request.seconds):
+                skipped = name_crossed(site.number) in request.skipped
+                crossed = [] if skipped else find_crossed(solids, faces, site.damage, request.tolerance)
+            told = f"{last}; it lies on {_tell_faces(site, part, facts.names)}"
+            if crossed:
+                told += f"; in the CAD file these cross one another: {list_faces(crossed, facts.names)}"
+            reasons[site.number] = (*before, told)
             continue
         found[site.number] = exact
         rest = exact.rest if site.accepted else rest
@@ -93,14 +101,14 @@ def _make(request: Request) -> Made:
             refuse_doubles(site.deposit, exact.pieces, exact.doubles)
             with at_work(name_deposit(site.number), request.seconds):
                 made = find_deposit(site.deposit, site.damage, exact.pieces, exact.rest, faces, part, request.tolerance)
-            deposits[site.number], forms[site.number] = made, _describe_deposit(made)
+            deposits[site.number], forms[site.number] = made, _describe_deposit(made, request.enlarged)
         except StockError as error:
             forms[site.number] = DepositForm(reason=error.describe(facts.names))
     missing = {number: tried for number, tried in reasons.items() if number not in found}
     writing = Writing(request, facts, missing, forms)
     write_all(writing, found, deposits, rest)
     said = {number: ExactForm("none", tried=tried) for number, tried in writing.reasons.items()}
-    said |= {number: _describe(found[number]) for number in writing.exact}
+    said |= {number: _describe(found[number], request.enlarged) for number in writing.exact}
     said = {number: replace(form, deposit=forms[number]) for number, form in said.items()}
     return Made(tuple(writing.files), tuple(writing.notes), said)
 
@@ -128,8 +136,8 @@ def _tell_faces(site: SiteInput, part: Part, names: Sequence[str]) -> str:
 
 
 def take_solids(model: Model, request: Request) -> MovedSolids:
-    """The solids of the part in millimetres: those of its CAD file, moved where the part was adapted. Raises MoveError
-    where they cannot be."""
+    """The solids of the part, enlarged as the request says: those of its CAD file, moved where the part was adapted.
+    Raises MoveError where they cannot be."""
     scale = request.scale
     shapes = [scale_shape(solid, scale) if abs(scale - 1) > 1e-12 else solid for solid in model.solids]
     if request.field is None:
@@ -148,7 +156,7 @@ def write_part(request: Request, file: str) -> str:
             cad = take_solids(read(path, path.suffix.lower()), request)
         except MoveError as error:
             return str(error)
-        BRepTools.Write_s(join_shapes(cad.solids), file)
+        BRepTools.Write_s(scale_shape(join_shapes(cad.solids), 1 / request.enlarged), file)
     return ""
 
 
@@ -158,18 +166,20 @@ def _explore_faces(solid: Any) -> list[Any]:
     return explore(solid, TopAbs_FACE)
 
 
-def _describe(exact: Exact) -> ExactForm:
+def _describe(exact: Exact, enlarged: float) -> ExactForm:
     origins = [origin for piece in exact.pieces for origin in piece.origins]
     measured = exact.measured
     return ExactForm(
-        exact.form, len(origins), sum(tool >= 0 for _, tool in origins), measured.volume, measured.distance,
-        measured.farthest, measured.beyond, round(exact.seconds, 3), exact.tried,
+        exact.form, len(origins), sum(tool >= 0 for _, tool in origins), measured.volume / enlarged**3,
+        measured.distance / enlarged, measured.farthest / enlarged, measured.beyond, round(exact.seconds, 3),
+        exact.tried,
     )  # fmt: skip
 
 
-def _describe_deposit(deposit: ExactDeposit) -> DepositForm:
+def _describe_deposit(deposit: ExactDeposit, enlarged: float) -> DepositForm:
     origins = [origin for piece in deposit.pieces for origin in piece.origins]
     offsets = sum(number >= 0 and kind == STOCK for number, kind in origins)
     return DepositForm(
-        len(origins), offsets, deposit.volume, deposit.distance, deposit.farthest, round(deposit.seconds, 3)
-    )
+        len(origins), offsets, deposit.volume / enlarged**3, deposit.distance / enlarged, deposit.farthest / enlarged,
+        round(deposit.seconds, 3),
+    )  # fmt: skip

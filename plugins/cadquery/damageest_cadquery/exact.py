@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -29,6 +30,8 @@ NO_FIELD = "the part was adapted to the scan by a stage that gives no field, so 
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
 WORKER = "damageest_cadquery exact"
+SIZES, USUAL = (0.5, 5_000.0), 100.0
+"""Diagonals in millimetres that a part has as a rule, and to which others are brought."""
 MOST_STARTS = 12
 """How often the process is started; each time without the form or the site that stopped it before."""
 MOST_FORMS = 3
@@ -88,12 +91,15 @@ def write_exact(
 def make_request(
     result: Result, folder: Path, bodies: Mapping[str, Body], places: Mapping[str, Floats | None], seconds: float
 ) -> Request:
-    """What the process gets: everything in millimetres."""
-    factor = MILLIMETRES[result.units]
+    """What the process gets: everything in millimetres, or these times a power of two where the part is very small or
+    large: OpenCASCADE takes all that is nearer than 1e-7 for one, whatever the size."""
+    unit = MILLIMETRES[result.units]
+    enlarged = find_enlargement(result.part.diagonal * unit)
+    factor = unit * enlarged
     part = replace(
         _scale(result.part, factor), tessellation_error=result.part.tessellation_error * factor, unit="mm", notes=()
     )
-    moved = {place: None if T is None else _scale_shift(T, factor) for place, T in places.items()}
+    moved = {place: None if T is None else _scale_shift(T, unit) for place, T in places.items()}
     return Request(
         part=part,
         scale=result.part.cad_scale * factor,
@@ -106,7 +112,16 @@ def make_request(
         places=moved,
         seconds=seconds,
         field=_scale_field(result, factor),
+        enlarged=enlarged,
     )
+
+
+def find_enlargement(diagonal: float) -> float:
+    """The power of two that brings the diagonal of a part, in millimetres, near to `USUAL`; 1 where it is within
+    `SIZES`. By a power of two no coordinate is rounded."""
+    if SIZES[0] <= diagonal <= SIZES[1]:
+        return 1.0
+    return float(2.0 ** round(math.log2(USUAL / diagonal)))
 
 
 def _take_site(result: Result, index: int, factor: float) -> SiteInput:

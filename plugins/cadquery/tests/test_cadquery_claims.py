@@ -123,8 +123,9 @@ def test_a_piece_that_is_not_valid_is_refused_before_it_is_triangulated(monkeypa
         return _pieces.take_pieces(pieces, Tool([plane], plane), 1e-6, lost, 0.2)
 
     monkeypatch.setattr(_pieces, "triangulate", note)
-    taken, rest, doubles = take(make_gap(0.0))
-    assert (len(taken), len(rest), len(doubles), len(triangulated)) == (1, 0, 0, 1)
+    taken = take(make_gap(0.0))
+    found = (taken.damage, taken.rest, taken.doubles, taken.specks)
+    assert [len(each) for each in (*found, triangulated)] == [1, 0, 0, 0, 1]
     assert take(make_gap(0.05, claim=1e-7)) == "not valid (BRepCheck)"
     assert not triangulated
 
@@ -180,3 +181,16 @@ def test_faults_of_the_file_that_no_cut_touches_are_no_faults_of_the_cut() -> No
     assert is_sound([large], faces)
     assert not is_sound([large]), "not without knowing the file"
     assert not all(is_sound([piece], faces) for piece in cut(9, -9)), "the cut goes through one of these faces"
+
+
+def test_a_coarser_fuzzy_value_is_tried_where_edges_claim_as_much() -> None:
+    from damageest_cadquery._claims import COARSE, find_coarse
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+    from OCP.ShapeFix import ShapeFix_ShapeTolerance
+
+    exact = cq.Workplane().box(200, 200, 200).val().wrapped
+    loose = BRepBuilderAPI_Copy(exact).Shape()
+    ShapeFix_ShapeTolerance().SetTolerance(loose, 4e-3)
+    assert find_coarse([exact], 5.0) == ()
+    assert find_coarse([exact, loose], 5.0) == (COARSE,)
+    assert find_coarse([loose], 0.5) == (), "for this tolerance it is not small"

@@ -15,8 +15,8 @@ from damageest_cadquery._exact import start_solids
 from damageest_cadquery._faces import list_faces
 from damageest_cadquery._read import read
 from damageest_cadquery._solids import StockError, explore_faces
-from damageest_cadquery._split import find_corners, measure_volume
-from damageest_cadquery._stock import Base, build_stock, take_bases
+from damageest_cadquery._split import Piece, find_corners, measure_volume
+from damageest_cadquery._stock import Base, build_parts, build_stock, take_bases
 
 import damageest
 from damageest.artefacts import Deposit
@@ -233,24 +233,27 @@ def test_stock_of_another_volume_is_refused(done: Run) -> None:
     assert caught.value.faces
 
 
+def take_pit(radius: float, top: int) -> Piece:
+    """An exact pit, whose flat face is the CAD face ``top``."""
+    lost = cq.Workplane().box(30, 20, 12).intersect(cq.Workplane().sphere(radius).translate((2, 3, 6)))
+    solid = lost.val().Solids()[0].wrapped
+    flat = [cq.Face(face).Center().z > 5.99 for face in explore_faces(solid)]
+    return Piece(solid, 0, tuple((top, -1) if each else (-1, 0) for each in flat))
+
+
 def test_stock_on_another_outline_is_compared_on_its_own_skin(done: Run) -> None:
     """The exact pit is wider by two tolerances, as where the mesh does not show how a loss fades out."""
     from damageest_cadquery._compare_stock import compare_stock
-    from damageest_cadquery._split import Piece
 
     site, part = done.result.sites[0], done.result.part
     deposit = site.deposit
     assert isinstance(deposit, Deposit)
     ((top, high),) = deposit.heights
-    lost = cq.Workplane().box(30, 20, 12).intersect(cq.Workplane().sphere(BALL["radius"] + 0.4).translate((2, 3, 6)))
-    solid = lost.val().Solids()[0].wrapped
-    faces = explore_faces(solid)
-    origins = tuple((top, -1) if cq.Face(face).Center().z > 5.99 else (-1, 0) for face in faces)
-    piece = Piece(solid, 0, origins)
+    piece = take_pit(BALL["radius"] + 0.4, top)
 
     def compare(height: float, to: Deposit = deposit) -> tuple[float, float, float]:
         bases = take_bases(piece, {top: height})
-        return compare_stock([piece], bases, to, site.damage, part, 0.2)
+        return compare_stock([piece], bases, build_parts(bases), to, site.damage, part, 0.2)
 
     _, farthest, difference = compare(high + 0.05)
     assert farthest > 0.3, "the mesh ends elsewhere"
@@ -260,3 +263,32 @@ def test_stock_on_another_outline_is_compared_on_its_own_skin(done: Run) -> None
     # something took a part of the mesh's stock away: on the exact one it would be there
     with pytest.raises(StockError, match=r"mesh's|differs"):
         compare(high + 0.05, replace(deposit, stock_volume=0.98 * deposit.stock_volume))
+
+
+def test_where_only_the_height_of_the_mesh_folds_the_mesh_is_lowered(
+    done: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a fillet whose radius lies between both heights."""
+    from damageest_cadquery import _deposit
+
+    site = done.result.sites[0]
+    deposit = site.deposit
+    assert isinstance(deposit, Deposit)
+    ((top, high),) = deposit.heights
+    pieces = (take_pit(BALL["radius"], top),)
+    tried: list[float] = []
+
+    def fold(bases: list[Base]) -> Any:
+        tried.append(bases[0].height)
+        if bases[0].height > high + 1e-9:
+            raise StockError("the offset of a face folds")
+        return build_parts(bases)
+
+    monkeypatch.setattr(_deposit, "build_parts", fold)
+    bases = [base for piece in pieces for base in take_bases(piece, dict(deposit.heights))]
+    _, _, difference = _deposit._compare(pieces, bases, deposit, site.damage, done.result.part, 0.2)
+    assert tried == [high + 0.05, high]
+    assert abs(difference) < 0.02
+    less = replace(deposit, stock_volume=0.9 * deposit.stock_volume)
+    with pytest.raises(StockError, match="folds"):  # what took stock away is not known
+        _deposit._compare(pieces, bases, less, site.damage, done.result.part, 0.2)
