@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -28,6 +29,9 @@ NEARER = 0.85
 BESIDE, WITHIN = 0.9, 0.02
 """Share of half a bead's width within which a line that follows the border of the free region lies beside a gap, and
 bead widths that it lies within that border."""
+DOUBLED, SHARP = 0.75, np.radians(60.0)
+"""Share of its length times the bead's width that a line covers at most where it comes back beside itself, and the turn
+at a corner at which it is cut there."""
 ROUNDS = 2
 """How often gaps between passes are looked for and filled."""
 
@@ -76,11 +80,16 @@ def _fill_beside(region: Any, lines: Sequence[Line], bead: Bead, free: Any, shor
     """Pieces of the border of the free region that cover gaps in which no row may lie: tips of the region beside metal.
     Of pieces that cover the same the one that covers most is taken."""
     gaps = _list_gaps(region, lines, bead)
-    rings = _read_rings(shift_border(region ^ free, -WITHIN * bead.width), bead) if gaps else []
+    rings = _read_rings(shift_border(free, -WITHIN * bead.width), bead) if gaps else []
     found: list[Line] = []
     for gap in gaps:
         near, rest = shift_border(gap, bead.width / 2 * BESIDE), gap
-        pieces = [Line(piece, "gap") for ring in rings for piece in cut_ring(ring, near, bead.width)]
+        pieces = [
+            Line(part, "gap")
+            for ring in rings
+            for piece in cut_ring(ring, near, bead.width)
+            for part in _split_doubled(piece, bead)
+        ]
         left = _finish(pieces, region, bead, free, shortest)
         while left:
             gains = [float((rest ^ cover([line.points], bead.width)).area()) for line in left]
@@ -90,6 +99,18 @@ def _fill_beside(region: Any, lines: Sequence[Line], bead: Bead, free: Any, shor
             found.append(left.pop(best))
             rest -= cover([found[-1].points], bead.width)
     return found
+
+
+def _split_doubled(line: Floats, bead: Bead) -> list[Floats]:
+    """The line, or its pieces between sharp corners where it comes back beside itself: the border of a narrow region
+    runs along both of its sides, and a bead on one of them is enough."""
+    if float(cover([line], bead.width).area()) > DOUBLED * measure_length(line) * bead.width:
+        return [line]
+    sides = np.diff(line, axis=0)
+    angle = np.arctan2(sides[:, 1], sides[:, 0])
+    turns = np.abs((np.diff(angle) + np.pi) % (2 * np.pi) - np.pi)
+    ends = [0, *(np.flatnonzero(turns > SHARP) + 1).tolist(), len(line) - 1]
+    return [line[start : stop + 1] for start, stop in pairwise(ends)]
 
 
 def _fill_piece(region: Any, bead: Bead, angle: float, free: Any, shortest: float) -> list[Line]:

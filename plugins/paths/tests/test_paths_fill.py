@@ -7,8 +7,8 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from damageest_paths.fill import Pattern, fill_region
-from damageest_paths.regions import cover, list_pieces, make_region
+from damageest_paths.fill import Pattern, fill_region, list_lines
+from damageest_paths.regions import cover, list_pieces, make_region, measure_length
 from damageest_paths.stripes import Bead
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -99,3 +99,15 @@ def test_rows_of_slivers_stay_near_them(corners: list[tuple[float, float]], flat
     for line in fill_region(region, "zigzag", BEAD, angle):
         assert np.abs(line).max() < 10
     assert not list_pieces(CrossSection())
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi / 2])
+def test_a_strip_narrower_than_half_a_bead_beside_a_wall_is_covered(angle: float) -> None:
+    """The middle of a bead may lie a little beside the strip, but not nearer to the wall than half a bead."""
+    region = CrossSection.square((6, 0.46))
+    free = CrossSection.square((5.0, 0.1)).translate((0.5, 0.48))
+    lines = [line.points for line in list_lines(region, "zigzag", BEAD, angle, free)]
+    assert (region - cover(lines, BEAD.width)).area() < 0.05 * region.area()
+    assert sum(measure_length(line) for line in lines) < 6  # not there and back
+    for line in lines:
+        assert (cover([line], 1e-3) - free).area() < 1e-3
