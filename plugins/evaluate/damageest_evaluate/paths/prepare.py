@@ -93,7 +93,7 @@ def evaluate_damage(name: str, part: Part, seed: int, milling: type[Any]) -> Pre
     width = float(str(options["width"]))
     tolerance = 0.05 * width
     direction = tuple(find_open_normal(damage, left, tolerance).tolist())
-    options |= {"axes": 3, "direction": direction, "simulate": False}
+    options |= {"axes": 3, "direction": direction, "simulate": False, "layers": "planar"}
     stage = milling.model_validate({"prepare": {"min_radius": width, "wall_angle": WALL, "direction": direction}})
     deposit = stage.run(damage=damage, part=part, tolerance=tolerance, others=None)
     convex = (_open_convex(lost, direction) ^ body).volume() - lost.volume()
