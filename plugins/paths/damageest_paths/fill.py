@@ -49,11 +49,18 @@ def fill_region(region: Any, pattern: Pattern, bead: Bead, angle: float) -> list
 
 
 def list_lines(
-    region: Any, pattern: Pattern, bead: Bead, angle: float, free: Any = None, shortest: float = 0.0
+    region: Any,
+    pattern: Pattern,
+    bead: Bead,
+    angle: float,
+    free: Any = None,
+    shortest: float = 0.0,
+    firm: Any = None,
 ) -> list[Line]:
     """Lines whose beads cover a region, as far as their middles may lie in the region ``free``, None for everywhere.
 
-    ``shortest``: lines that are shorter are lengthened where there is room; the others are given as they are.
+    ``shortest``: lines that are shorter are lengthened where there is room; the others are given as they are. ``firm``:
+    where lines that follow the border of the free region may lie beside the region too; None: nowhere.
     """
     if region.is_empty():
         return []
@@ -73,14 +80,15 @@ def list_lines(
         if not rows:
             break
         lines += _finish([Line(row, "gap") for row in rows], region, bead, free, shortest)
-    return lines if free is None else [*lines, *_fill_beside(region, lines, bead, free, shortest)]
+    return lines if free is None else [*lines, *_fill_beside(region, lines, bead, free, shortest, firm)]
 
 
-def _fill_beside(region: Any, lines: Sequence[Line], bead: Bead, free: Any, shortest: float) -> list[Line]:
+def _fill_beside(region: Any, lines: Sequence[Line], bead: Bead, free: Any, shortest: float, firm: Any) -> list[Line]:
     """Pieces of the border of the free region that cover gaps in which no row may lie: tips of the region beside metal.
     Of pieces that cover the same the one that covers most is taken."""
     gaps = _list_gaps(region, lines, bead)
-    rings = _read_rings(shift_border(free, -WITHIN * bead.width), bead) if gaps else []
+    within = free ^ (region if firm is None else unite_regions([region, firm]))
+    rings = _read_rings(shift_border(within, -WITHIN * bead.width), bead) if gaps else []
     found: list[Line] = []
     for gap in gaps:
         near, rest = shift_border(gap, bead.width / 2 * BESIDE), gap

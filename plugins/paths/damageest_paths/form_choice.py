@@ -15,8 +15,8 @@ PLANNERS: dict[str, Planner] = {"planar": plan_planar, "conformal": plan_conform
 POOR = 0.07
 """Share of a deposit that planes lose from which surfaces along the floor are tried. Rough losses lose 2 to 7 % of
 themselves to the stair-step of planes beside leaning walls."""
-GAIN = 0.02
-"""Share of the deposit by which these have to lose less."""
+GAIN = 0.5
+"""Share of what planes lose that these may lose."""
 SUNK = 0.05
 """Share of a deposit up to which beads in intact metal are no loss."""
 FARTHEST = 1.1
@@ -32,7 +32,7 @@ class Plan(Protocol):
 
 def plan_in_form(form: Form, plan: Plan) -> DepositPath:
     """The path of a form. ``auto``: planes; where they lose much of the deposit, as the crescent of a worn bore,
-    surfaces along the floor if these lose less."""
+    surfaces along the floor if these lose half as much or less."""
     if form != "auto":
         return replace(plan(PLANNERS[form]), layer_form=form)
     planar = replace(plan(PLANNERS["planar"]), layer_form="planar")
@@ -40,7 +40,7 @@ def plan_in_form(form: Form, plan: Plan) -> DepositPath:
     if lost <= POOR:
         return planar
     conformal = replace(plan(PLANNERS["conformal"], along_normal=True), layer_form="conformal")
-    if not len(conformal.points) or measure_lost(conformal) > lost - GAIN:
+    if not len(conformal.points) or measure_lost(conformal) > GAIN * lost:
         return planar
     spilt = max(FARTHEST * planar.width, _measure_spill(planar))
     return conformal if _measure_spill(conformal) <= spilt else planar

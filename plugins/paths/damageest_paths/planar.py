@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
-from damageest_paths.aims import find_aims, find_sink
+from damageest_paths.aims import Aims, find_aims, find_sink
 from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
 from damageest_paths.fill import Kind, Line, list_lines
@@ -78,22 +78,24 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         # below, where the layer before was too thin over metal for a bead, metal is that much lower
         under = max(height / 4, height - find_sink(height, process))
         ground = _cast_shadow(_cut_slab(near, floor - under, top), process)
-        held = wanted ^ shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
+        firm = shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
+        held = wanted ^ firm
         aims = find_aims(metal, wanted, (floor, top), around.clearance.standoff, process)
         free = None if aims.free is None else aims.free ^ shift_border(held, OFF * width)
         angle = process.angle + number * process.turn
-        lines = list_lines(held ^ aims.drawn, process.pattern, process.bead, angle, free, process.shortest)
+        lines = list_lines(held ^ aims.drawn, process.pattern, process.bead, angle, free, process.shortest, firm)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
         short = cover([line.points for line in lines if measure_length(line.points) < process.shortest], width)
         made, dropped, shaded = choice.place(long, top, number)
         made = order_passes(made, passes[-1] if passes else None, clearance.reach)
         done = cover([one.points[:, :2] for one in made], width)
         causes = [cover(dropped, width), cover(shaded, width), short if made else wanted]
-        lost = _share_out((held ^ aims.reached) - done, causes)
+        hanging = _find_hanging(held, wanted, aims, process)
+        lost = _share_out((held ^ aims.reached) - done - hanging, causes)
         left = {
-            UNSUPPORTED: wanted - held,
-            SUNK: held - aims.flush,
-            SHADED: unite_regions([held ^ (aims.flush - aims.reached), lost[1]]),
+            UNSUPPORTED: unite_regions([wanted - held, hanging]),
+            SUNK: held - aims.flush - hanging,
+            SHADED: unite_regions([held ^ (aims.flush - aims.reached), lost[1]]) - hanging,
             COLLIDES: lost[0],
             SHORT: lost[2],
         }
@@ -107,6 +109,15 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
                 reasons[why] = reasons.get(why, 0.0) + piece.volume()
         passes += made
     return Plan(frame, height, tuple(passes), _gather(missing), reasons)
+
+
+def _find_hanging(held: Any, wanted: Any, aims: Aims, process: Process) -> Any:
+    """What of the ``held`` region a bead could cover if all that is ``wanted`` were held, but for which its middle
+    would have to stand on nothing: strips beside metal, narrower than half a bead."""
+    if aims.free is None:
+        return make_region([])
+    reach = process.bead.width / 2
+    return held ^ (shift_border(aims.free ^ wanted, reach) - shift_border(aims.free ^ held, reach))
 
 
 def _share_out(gaps: Any, causes: Sequence[Any]) -> list[Any]:
