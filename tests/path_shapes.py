@@ -11,7 +11,9 @@ from damageest.artefacts import DepositPath, Solid
 from damageest.geometry.solids import to_solid
 
 NOZZLE = {"tip_radius": 1.0, "cone_angle": 25.0, "length": 60.0, "body_radius": 12.0}
-OPTIONS: dict[str, Any] = {"height": 1.0, "width": 2.0, "feed": 600.0, "standoff": 3.0, "nozzle": NOZZLE}
+OPTIONS: dict[str, Any] = {
+    "height": 1.0, "width": 2.0, "feed": 600.0, "standoff": 3.0, "nozzle": NOZZLE, "layers": "planar"
+}  # fmt: skip
 TOLERANCE = 0.05
 
 

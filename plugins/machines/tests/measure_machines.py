@@ -60,7 +60,8 @@ def draw_path(seed: int) -> tuple[DepositPath, str]:
     axes: Any = (3, "3+2", 5, 5)[int(rng.integers(4))]
     direction = np.array([*rng.uniform(-0.6, 0.6, 2), 1.0])
     path = plan(
-        loss, simulate=False, axes=axes, width=float(rng.uniform(3, 4.5)), height=float(rng.uniform(1.4, 2.2)),
+        loss, simulate=False, layers="auto", axes=axes,
+        width=float(rng.uniform(3, 4.5)), height=float(rng.uniform(1.4, 2.2)),
         direction=tuple(direction if axes != 3 else [0.0, 0.0, 1.0]), overlap=float(rng.uniform(0.2, 0.4)),
         pattern=str(rng.choice(["zigzag", "contour", "spiral", "offset-zigzag"])), process=PROCESS,
     )  # fmt: skip

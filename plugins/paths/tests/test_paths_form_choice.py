@@ -35,7 +35,7 @@ def test_on_a_flat_floor_layers_are_planes() -> None:
 def test_where_the_floor_cannot_be_followed_layers_are_planes() -> None:
     """A step in the floor, and a nozzle for which the lower half is out of reach."""
     fat = {"tip_radius": 5.0, "cone_angle": 25.0, "length": 60.0, "body_radius": 12.0}
-    path = plan(stair(), direction=UP, nozzle=fat)
+    path = plan(stair(), direction=UP, layers="auto", nozzle=fat)
     assert measure_lost(path) > POOR
     assert path.layer_form == "planar"
     assert len(path.points)

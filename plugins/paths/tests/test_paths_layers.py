@@ -23,7 +23,7 @@ UP = (0.0, 0.0, 1.0)
 
 @cache
 def plan_dent() -> DepositPath:
-    return plan(dent(), direction=UP, layers="planar")
+    return plan(dent(), direction=UP)
 
 
 def measure_others(path: DepositPath) -> float:
@@ -148,7 +148,7 @@ def test_short_passes_are_left_out_and_listed() -> None:
 
 def test_overlaps_at_start_and_stop() -> None:
     overlaps = {"start_overlap": 0.4, "stop_overlap": 0.6}
-    plain, longer = (plan(dent(), direction=UP, layers="planar", **more) for more in ({}, overlaps))
+    plain, longer = (plan(dent(), direction=UP, **more) for more in ({}, overlaps))
     assert longer.passes == plain.passes
     assert longer.length == pytest.approx(plain.length + plain.passes * 1.0, rel=1e-3)
 

@@ -103,7 +103,7 @@ def test_beads_are_drawn_as_they_lie() -> None:
 
 
 def test_the_check_sees_a_nozzle_in_beads() -> None:
-    path = plan(dent(), direction=UP, layers="planar", simulate=False)
+    path = plan(dent(), direction=UP, simulate=False)
     assert measure_built(path, 4.0) >= 0.25
     lower = replace(path, standoff=0.001, axes=path.axes * [1, 1, -1])
     assert measure_built(lower, 0.5) == 0

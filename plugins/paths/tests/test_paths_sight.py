@@ -15,10 +15,10 @@ from tests.path_shapes import BLOCK, OPTIONS, Loss, corner, cut, dent, plan
 
 UP = (0.0, 0.0, 1.0)
 CASES: dict[str, dict[str, Any]] = {
-    "dent": {"direction": UP, "layers": "planar"},
+    "dent": {"direction": UP},
     "corner": {},
     "tilted": {"axes": 5, "direction": UP},
-    "contour": {"direction": UP, "layers": "planar", "pattern": "contour"},
+    "contour": {"direction": UP, "pattern": "contour"},
 }
 
 
