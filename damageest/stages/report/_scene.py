@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import base64
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import DAMAGE, INTACT, Floats, Mesh
-from damageest.geometry.tools import place_tool
+from damageest.artefacts import DAMAGE, INTACT, Mesh
 from damageest.io import colours
 from damageest.io.section_files import round_nice
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
 from damageest.stages.report._least_depth import map_least_depth
+from damageest.stages.report._scene_path import add_path
+from damageest.stages.report._scene_stage import Stage
 from damageest.stages.report._thin import find_sharp_edges, thin_mesh, thin_points
 from damageest.stages.report._values import choose_least_ends
 
@@ -65,55 +66,13 @@ class Scene:
     exaggerate: int = 0
 
 
-@dataclass
-class _Stage:
-    """Objects for k3d, in coordinates from ``origin`` that are rounded to ``step``, to be compressed well."""
-
-    origin: Floats
-    step: float
-    made: list[Any] = field(default_factory=list)
-    objects: list[dict[str, Any]] = field(default_factory=list)
-
-    def place(self, points: Floats) -> Any:
-        return (np.round((points - self.origin) / self.step) * self.step).astype(np.float32)
-
-    def add(self, item: Any, layer: str, site: int = 0, height: int = 0, alone: bool = False) -> None:
-        item.id = len(self.made) + 1  # k3d's own numbers are addresses in memory, and differ from run to run
-        self.made.append(item)
-        self.objects.append({"id": item.id, "layer": layer, "site": site, "height": height, "alone": alone})
-
-    def add_mesh(
-        self, mesh: Mesh, layer: str, colour: str, site: int = 0, opacity: float = 1.0, height: int = 0
-    ) -> None:
-        import k3d
-
-        if not len(mesh.faces):
-            return
-        item = k3d.mesh(
-            self.place(mesh.vertices),
-            mesh.faces.astype(np.uint32),
-            color=style.to_number(colour),
-            opacity=opacity,
-            side="double",
-            flat_shading=True,
-            name=layer,
-        )
-        self.add(item, layer, site, height, height > 0)
-
-    def add_points(self, points: Floats, layer: str, site: int, size: float, **look: Any) -> None:
-        import k3d
-
-        if len(points):
-            self.add(k3d.points(self.place(points), point_size=size, shader="flat", name=layer, **look), layer, site)
-
-
 def build_scene(result: Result, most_points: int, most_triangles: int) -> Scene:
     """The 3D view of a result with at most ``most_points`` scan points and about ``most_triangles`` triangles."""
     import k3d
 
     part = result.part
     step = 2.0 ** np.floor(np.log2(part.diagonal / 2**17))
-    stage = _Stage(np.round(part.bounds.mean(axis=0) / step) * step, step)
+    stage = Stage(np.round(part.bounds.mean(axis=0) / step) * step, step)
     share = _share_triangles(result, most_triangles)
     shown = thin_mesh(part, share)
     stage.add_mesh(shown, "part", colours.PART, opacity=0.18)
@@ -168,7 +127,7 @@ def _share_triangles(result: Result, most: int) -> int:
     return most
 
 
-def _add_edges(stage: _Stage, result: Result) -> None:
+def _add_edges(stage: Stage, result: Result) -> None:
     import k3d
 
     edges = find_sharp_edges(result.part)
@@ -182,7 +141,7 @@ def _add_edges(stage: _Stage, result: Result) -> None:
     stage.add(lines, "part")
 
 
-def _add_scan(stage: _Stage, result: Result, most: int, limit: float) -> int:
+def _add_scan(stage: Stage, result: Result, most: int, limit: float) -> int:
     """Adds the scan, coloured; gives how many points it has there."""
     import k3d
 
@@ -205,7 +164,7 @@ def _choose_point_size(result: Result, count: int) -> float:
     return float(1.6 * np.sqrt(result.part.area / max(count, 1)))
 
 
-def _add_site(stage: _Stage, result: Result, site: Site, share: int, most_points: int) -> None:
+def _add_site(stage: Stage, result: Result, site: Site, share: int, most_points: int) -> None:
     colour = colours.colour_site(site.id)
     points = result.aligned.points[site.points]
     places = points[thin_points(points, max(most_points // len(result.sites), 500))]
@@ -216,51 +175,10 @@ def _add_site(stage: _Stage, result: Result, site: Site, share: int, most_points
     stage.add_mesh(thin_mesh(site.surface, share), "surface", colour, site.id)
     if site.deposit is not None:
         stage.add_mesh(thin_mesh(site.deposit, share), "deposit", colours.DEPOSIT, site.id, opacity=0.75)
-    _add_path(stage, site)
+    add_path(stage, site)
 
 
-def _add_path(stage: _Stage, site: Site) -> None:
-    """Adds the passes of a site, each layer of the deposit an object, the nozzle and its beam at the end of each layer
-    and where it is tightest, and what no pass reaches."""
-    import k3d
-
-    path = site.path
-    if path is None:
-        return
-    if path.missing is not None:
-        stage.add_mesh(path.missing, "unreached", colours.UNREACHED, site.id)
-    if not path.on.any():
-        return
-    ends = np.flatnonzero(path.on)
-    kinds, number = np.unique(np.stack([path.part[ends], path.layer[ends]]), axis=1, return_inverse=True)
-    count = kinds.shape[1]
-    minutes = np.cumsum(path.moves / path.feed)
-    for k in range(count):
-        own = ends[number.ravel() == k]
-        points = np.concatenate([path.points[own - 1], path.points[own]])
-        pairs = np.stack([np.arange(len(own)), np.arange(len(own)) + len(own)], axis=1).astype(np.uint32)
-        colour = colours.pick_colour(colours.VIRIDIS, k / max(count - 1, 1))
-        lines = k3d.lines(
-            stage.place(points), pairs, indices_type="segment", shader="simple", color=style.to_number(colour),
-            width=0.02, name="path",
-        )  # fmt: skip
-        stage.add(lines, "path", site.id, k + 1)
-        stage.objects[-1]["minutes"] = float(f"{minutes[own[-1]]:.3g}")
-        _add_tool(stage, site, path.points[own[-1]], path.axes[own[-1]], k + 1)
-    if path.tightest is not None:
-        _add_tool(stage, site, *path.tightest)
-
-
-def _add_tool(stage: _Stage, site: Site, point: Floats, axis: Floats, height: int = 0) -> None:
-    """Adds nozzle and beam at a point (3,) with a tool axis (3,); with a ``height``, for that layer alone."""
-    assert site.path is not None
-    nozzle, beam = place_tool(site.path, point, axis)
-    layer = "tool" if height else "nozzle"
-    stage.add_mesh(nozzle, layer, colours.NOZZLE, site.id, 0.5, height)
-    stage.add_mesh(beam, layer, colours.BEAM, site.id, 0.7, height)
-
-
-def _add_form(stage: _Stage, result: Result, share: int) -> int:
+def _add_form(stage: Stage, result: Result, share: int) -> int:
     """Adds the part as designed, with its displacement at each end of the page's slider, coloured by its length; gives
     how many times the displacement is exaggerated at first, 0 where there is none."""
     import k3d
@@ -284,7 +202,7 @@ def _add_form(stage: _Stage, result: Result, share: int) -> int:
     return int(np.clip(VISIBLE * result.part.diagonal / adapted.amount, 1, EXAGGERATED))
 
 
-def _add_unseen(stage: _Stage, result: Result, share: int) -> None:
+def _add_unseen(stage: Stage, result: Result, share: int) -> None:
     coverage = result.coverage
     if coverage is None or not (coverage.region >= 0).any():
         return
@@ -294,7 +212,7 @@ def _add_unseen(stage: _Stage, result: Result, share: int) -> None:
     stage.add_mesh(thin_mesh(skin, share), "unseen", colours.UNSEEN, opacity=0.45)
 
 
-def _add_least_depth(stage: _Stage, result: Result, most: int) -> None:
+def _add_least_depth(stage: Stage, result: Result, most: int) -> None:
     """Adds points of the skin, coloured by the least depth of a loss that the scan can show there."""
     import k3d
 
