@@ -8,16 +8,16 @@ from typing import Literal, Protocol
 from damageest.artefacts import DepositPath
 from damageest_paths.conformal import plan_conformal
 from damageest_paths.directions import Planner
-from damageest_paths.planar import plan_planar
+from damageest_paths.planar import SHORT, SUNK, plan_planar
 
 Form = Literal["auto", "planar", "conformal"]
 PLANNERS: dict[str, Planner] = {"planar": plan_planar, "conformal": plan_conformal}
 POOR = 0.07
-"""Share of a deposit that planes lose from which surfaces along the floor are tried. Rough losses lose 2 to 7 % of
-themselves to the stair-step of planes beside leaning walls."""
+"""Share of a deposit that planes lose as planes from which surfaces along the floor are tried. Rough losses lose 2 to
+7 % of themselves to the stair-step of planes beside leaning walls."""
 GAIN = 0.5
 """Share of what planes lose that these may lose."""
-SUNK = 0.05
+USUAL = 0.05
 """Share of a deposit up to which beads in intact metal are no loss."""
 FARTHEST = 1.1
 """Bead widths by which beads may reach out of the deposit, or as far as those of planes do."""
@@ -31,14 +31,14 @@ class Plan(Protocol):
 
 
 def plan_in_form(form: Form, plan: Plan) -> DepositPath:
-    """The path of a form. ``auto``: planes; where they lose much of the deposit, as the crescent of a worn bore,
-    surfaces along the floor if these lose half as much or less."""
+    """The path of a form. ``auto``: planes; where they lose much of the deposit because they are planes, as of the
+    crescent of a worn bore, surfaces along the floor if these lose half of all that planes lose, or less."""
     if form != "auto":
         return replace(plan(PLANNERS[form]), layer_form=form)
     planar = replace(plan(PLANNERS["planar"]), layer_form="planar")
-    lost = measure_lost(planar)
-    if lost <= POOR:
+    if _measure_steps(planar) <= POOR:
         return planar
+    lost = measure_lost(planar)
     conformal = replace(plan(PLANNERS["conformal"], along_normal=True), layer_form="conformal")
     if not len(conformal.points) or measure_lost(conformal) > GAIN * lost:
         return planar
@@ -49,10 +49,20 @@ def plan_in_form(form: Form, plan: Plan) -> DepositPath:
 def measure_lost(path: DepositPath) -> float:
     """What of the deposit is not filled, and what of the beads lies in intact metal beyond what is usual, as a share of
     the deposit."""
-    lost = path.unreached_volume
-    if path.fill is not None:
-        lost += path.fill.gap + max(path.fill.sunk - SUNK * path.deposit_volume, 0.0)
-    return lost / path.deposit_volume
+    return path.unreached_volume / path.deposit_volume + _measure_badly_filled(path)
+
+
+def _measure_steps(path: DepositPath) -> float:
+    """As `measure_lost`, without what collides, is out of sight or stands on nothing: layers of another form would not
+    reach that either, and to try them takes long."""
+    thin = sum(item.volume for item in path.unreached if item.why in (SUNK, SHORT))
+    return thin / path.deposit_volume + _measure_badly_filled(path)
+
+
+def _measure_badly_filled(path: DepositPath) -> float:
+    if path.fill is None:
+        return 0.0
+    return path.fill.gap / path.deposit_volume + max(path.fill.sunk / path.deposit_volume - USUAL, 0.0)
 
 
 def _measure_spill(path: DepositPath) -> float:

@@ -85,7 +85,7 @@ class Layers(Path):
         "auto",
         description="planar: planes across the build direction; conformal: surfaces at equal depth above the floor of "
         "the cavity, that is what of the deposit lies on metal and is less than 75 degrees steep; auto: planar, or "
-        "conformal where planes lose more than 7 % of the deposit and it at most half of that",
+        "conformal where planes lose more than 7 % of the deposit as planes, and it half or less of what they lose",
     )
     width: Length = Field(description="of a bead")
     feed: Length = Field(description="speed of deposition, in lengths a minute")

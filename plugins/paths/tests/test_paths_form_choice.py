@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from damageest_evaluate.paths.check import measure_nozzle
-from damageest_paths.form_choice import POOR, measure_lost
+from damageest_paths.form_choice import PLANNERS, POOR, measure_lost
 from path_cavities import pocket, stair
 
 from damageest.artefacts import DepositPath
@@ -32,8 +33,9 @@ def test_on_a_flat_floor_layers_are_planes() -> None:
     assert np.array_equal(paths["auto"].points, paths["planar"].points)
 
 
-def test_where_the_floor_cannot_be_followed_layers_are_planes() -> None:
-    """A step in the floor, and a nozzle for which the lower half is out of reach."""
+def test_what_no_layer_would_reach_asks_for_no_other_layers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A nozzle for which the lower half is out of reach: the trial, which would take long, is not made."""
+    monkeypatch.setitem(PLANNERS, "conformal", None)  # type: ignore[arg-type]
     fat = {"tip_radius": 5.0, "cone_angle": 25.0, "length": 60.0, "body_radius": 12.0}
     path = plan(stair(), direction=UP, layers="auto", nozzle=fat)
     assert measure_lost(path) > POOR
