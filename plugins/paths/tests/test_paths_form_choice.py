@@ -35,7 +35,7 @@ def test_on_a_flat_floor_layers_are_planes() -> None:
 
 def test_what_no_layer_would_reach_asks_for_no_other_layers(monkeypatch: pytest.MonkeyPatch) -> None:
     """A nozzle for which the lower half is out of reach: the trial, which would take long, is not made."""
-    monkeypatch.setitem(PLANNERS, "conformal", None)  # type: ignore[arg-type]
+    monkeypatch.setitem(PLANNERS, "conformal", None)
     fat = {"tip_radius": 5.0, "cone_angle": 25.0, "length": 60.0, "body_radius": 12.0}
     path = plan(stair(), direction=UP, layers="auto", nozzle=fat)
     assert measure_lost(path) > POOR
