@@ -63,7 +63,8 @@ class DepositPath(Checked):
     each on the move that ends there, in the unit that the job has; None without channels. ``layer_form``: planar, or
     conformal where the layers follow the floor of the cavity; empty where not known. ``around`` (4,): centre and radius
     of a ball that holds all that the tool must not touch; ``free_ends`` (K,): whether the tool can leave it straight
-    along its axis from the end of each pass. Both None where not known.
+    along its axis from the end of each pass. Both None where not known,
+    the second also where the tool axis is the same everywhere.
     """
 
     points: Floats
@@ -155,6 +156,12 @@ class DepositPath(Checked):
         """(N,) length of the move that ends at each point; 0 for the first."""
         steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
         return np.concatenate([[0.0], steps]) if len(self.points) else np.empty(0)
+
+    @property
+    def reach(self) -> float:
+        """How far the farthest point of the nozzle is from the point that it works on."""
+        tool = self.nozzle.vertices + np.array([0.0, 0.0, self.standoff])
+        return float(np.linalg.norm(tool, axis=1).max(initial=self.standoff))
 
     @property
     def length(self) -> float:

@@ -12,6 +12,15 @@ def normalise(vectors: Floats, least: float = 1e-300) -> Floats:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), least))
 
 
+def measure_to_sphere(points: Floats, directions: Floats, centre: Floats, radius: float) -> Floats:
+    """How far (N,) the sphere is from points (N,3) along unit ``directions`` (N,3), where it is left; negative where it
+    lies behind, and the place nearest to ``centre`` (3,) where it is missed."""
+    away = points - centre
+    along = np.einsum("ni,ni->n", away, directions)
+    root = np.sqrt(np.maximum(along**2 - np.einsum("ni,ni->n", away, away) + radius**2, 0.0))
+    return np.asarray(root - along)
+
+
 def measure_longest_edges(triangles: Floats) -> Floats:
     """(F,) the length of the longest edge of each of the triangles (F,3,3), in their unit."""
     squares = []

@@ -292,6 +292,9 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "vectors.measure_longest_edges": lambda r: expect(
         vectors.measure_longest_edges(r.mesh.triangles), (len(r.mesh.faces),)
     ),
+    "vectors.measure_to_sphere": lambda r: expect(
+        vectors.measure_to_sphere(r.points, vectors.normalise(r.points + 1.0), np.zeros(3), 100.0), (r.count,)
+    ),
     "vectors.normalise": lambda r: expect(vectors.normalise(r.points), (r.count, 3)),
     "views.choose_view": lambda r: expect(
         views.choose_view(rays.RayCaster(CUBE), r.mesh, CUBE.bounds, 10.0).direction, (3,)

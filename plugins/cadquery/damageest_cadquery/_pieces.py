@@ -12,6 +12,7 @@ from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import INVALID
 from damageest_cadquery._doubles import drop_doubles, leave_once
+from damageest_cadquery._read import find_box
 from damageest_cadquery._split import (
     Piece,
     Tool,
@@ -117,12 +118,4 @@ def _is_damage(piece: Piece, damage: Solid, tolerance: float) -> bool:
 
 
 def _touch(first: Any, second: Any) -> bool:
-    from OCP.Bnd import Bnd_Box
-    from OCP.BRepBndLib import BRepBndLib
-
-    boxes = []
-    for shape in (first, second):
-        box = Bnd_Box()
-        BRepBndLib.Add_s(shape, box, False)
-        boxes.append(box)
-    return not boxes[0].IsOut(boxes[1])
+    return not find_box([first]).IsOut(find_box([second]))

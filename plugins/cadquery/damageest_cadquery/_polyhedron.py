@@ -24,7 +24,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest_cadquery._cut import Cut
 from damageest_cadquery._flat_faces import Flat, split_regions
 from damageest_cadquery._recognise import ALIKE, Shape, find_neighbours
-from damageest_cadquery._untangle import keep_apart, split_sheets
+from damageest_cadquery._untangle import keep_apart
 
 SMALL = 20
 """Triangles of a region of a plane below which it is not kept as a face of its own."""
@@ -90,6 +90,15 @@ def _collapse(flat: Flat, count: int, apart: bool) -> Flat:
             return flat
         return _collapse(Flat(apart_there, flat.label, flat.planes), count, apart)
     return Flat(Mesh(np.asarray(V, np.float64), np.asarray(F, np.int64)), flat.label[np.asarray(birth)], flat.planes)
+
+
+def split_sheets(mesh: Mesh) -> Mesh:
+    """The mesh with a vertex of its own for each sheet where several meet in one: sheets are triangles round a vertex
+    that follow each other by edges."""
+    import igl
+
+    vertices, faces, _ = igl.split_nonmanifold(mesh.vertices, mesh.faces)
+    return Mesh(vertices, faces)
 
 
 def fit(flat: Flat, cut: Cut, tolerance: float) -> Flat:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -174,6 +174,17 @@ def _sewn(shape: Any) -> list[Any]:
             "export the part as a solid"
         )
     return [ShapeFix_Solid().SolidFromShell(shell) for shell in shells]
+
+
+def find_box(shapes: Iterable[Any]) -> Any:
+    """OpenCASCADE's box round shapes; void where they have no faces."""
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+
+    box = Bnd_Box()
+    for shape in shapes:
+        BRepBndLib.Add_s(shape, box, False)
+    return box
 
 
 def explore(shape: Any, kind: Any) -> list[Any]:

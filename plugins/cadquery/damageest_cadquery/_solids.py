@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest_cadquery._read import explore
 from damageest_cadquery._split import ShapeMap, is_opencascade_error, measure_volume
+from damageest_cadquery._tessellate import measure_diagonal
 
 SEWN = 2e-5
 """Distance in millimetres within which edges of faces are one edge, where they do not claim to be less exact."""
@@ -78,8 +79,6 @@ def settle_edges(shape: Any) -> bool:
     """Whether a shape is valid, if need be after its edges were made to follow their faces' curves at the same
     parameters, and claim what they are off: sewing and joining can leave edges that claim less. No edge may claim more
     than `CLAIM` of the diagonal."""
-    from OCP.Bnd import Bnd_Box
-    from OCP.BRepBndLib import BRepBndLib
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.BRepLib import BRepLib
     from OCP.ShapeAnalysis import ShapeAnalysis_ShapeTolerance
@@ -88,9 +87,7 @@ def settle_edges(shape: Any) -> bool:
         return True
     BRepLib.SameParameter_s(shape, 1e-7, True)
     BRepLib.UpdateTolerances_s(shape, True)
-    box = Bnd_Box()
-    BRepBndLib.Add_s(shape, box, False)
-    small = ShapeAnalysis_ShapeTolerance().Tolerance(shape, 1) <= CLAIM * np.sqrt(box.SquareExtent())
+    small = ShapeAnalysis_ShapeTolerance().Tolerance(shape, 1) <= CLAIM * measure_diagonal([shape])
     return bool(small and BRepCheck_Analyzer(shape).IsValid())
 
 

@@ -16,7 +16,7 @@ from damageest.errors import InputError
 from damageest_cadquery._facets import Facet
 from damageest_cadquery._folds import drop_folds
 from damageest_cadquery._planar import build_shell
-from damageest_cadquery._read import explore
+from damageest_cadquery._read import explore, find_box
 
 Origin = tuple[int, int]
 """Where a face comes from: (number of the part's CAD face, -1), or (-1, number of the tool's face)."""
@@ -197,11 +197,7 @@ def _triangulate_once(shape: Any, chord: float, angle: float = 0.35) -> Solid:
 
 def is_near(shape: Any, mesh: Solid) -> bool:
     """Whether the boxes of a shape and of a mesh meet."""
-    from OCP.Bnd import Bnd_Box
-    from OCP.BRepBndLib import BRepBndLib
-
-    box = Bnd_Box()
-    BRepBndLib.Add_s(shape, box, False)
+    box = find_box([shape])
     if box.IsVoid():  # a solid without faces
         return False
     bounds = np.array(box.Get()).reshape(2, 3)

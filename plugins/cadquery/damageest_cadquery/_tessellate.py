@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
 from damageest.errors import InputError
-from damageest_cadquery._read import explore
+from damageest_cadquery._read import explore, find_box
 
 _CHECKED = 2000
 _WITHIN = 1.06
@@ -35,13 +35,7 @@ class Tessellation:
 
 def measure_diagonal(solids: list[Any]) -> float:
     """The diagonal of the box around all solids."""
-    from OCP.Bnd import Bnd_Box
-    from OCP.BRepBndLib import BRepBndLib
-
-    box = Bnd_Box()
-    for solid in solids:
-        BRepBndLib.Add_s(solid, box, False)
-    return float(np.sqrt(box.SquareExtent()))
+    return float(np.sqrt(find_box(solids).SquareExtent()))
 
 
 def tessellate(solids: list[Any], chord: float, angle: float, name_of: Callable[[Any], str]) -> Tessellation:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.refinement import bisect_faces
@@ -81,22 +80,3 @@ def _smooth(mesh: Mesh, near: Flags, steps: int) -> Mesh:
     for _ in range(steps):
         vertices[near] += 0.5 * (np.asarray(graph @ vertices) / total[:, None] - vertices[near])
     return Mesh(vertices, mesh.faces)
-
-
-def split_sheets(mesh: Mesh) -> Mesh:
-    """The mesh with a vertex of its own for each sheet where several meet in one: sheets are triangles round a vertex
-    that follow each other by edges."""
-    faces, count = mesh.faces, len(mesh.faces)
-    corners = np.arange(3 * count).reshape(-1, 3)
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    places = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
-    turned = ends[:, 0] > ends[:, 1]
-    ends[turned], places[turned] = ends[turned][:, ::-1], places[turned][:, ::-1]
-    order = np.lexsort(ends.T[::-1])
-    same = np.flatnonzero((ends[order][1:] == ends[order][:-1]).all(axis=1))
-    one, two = places[order[same]], places[order[same + 1]]
-    pairs = np.concatenate([np.column_stack([one[:, k], two[:, k]]) for k in range(2)])
-    graph = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(3 * count,) * 2)
-    label = np.asarray(connected_components(graph, directed=False)[1], np.int64)
-    _, first = np.unique(label, return_index=True)
-    return Mesh(mesh.vertices[faces.ravel()[first]], label.reshape(-1, 3))

@@ -93,8 +93,7 @@ def test_triangles_that_lie_on_each_other_are_dropped() -> None:
 
 def test_a_surface_of_which_a_vertex_joins_two_sheets_is_simplified() -> None:
     from damageest_cadquery._flat_faces import Flat
-    from damageest_cadquery._polyhedron import decimate
-    from damageest_cadquery._untangle import split_sheets
+    from damageest_cadquery._polyhedron import decimate, split_sheets
 
     count = 12
     x, y = np.meshgrid(np.arange(count, dtype=float), np.arange(count, dtype=float))

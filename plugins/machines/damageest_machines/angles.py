@@ -55,7 +55,9 @@ def turn_axes(machine: Machine, moves: Moves, refuge: Refuge | None) -> Rotated:
     off = measure_turns(machine.rotary, found.angles, directions, flat)
     rotated = Rotated(moves, found.angles, ())
     if off.max() > LOOSE * machine.post.step:
-        other = None if refuge is None or len(machine.rotary) < 2 else _turn_back(machine, moves, refuge, home, flat)
+        other = None
+        if refuge is not None and len(machine.rotary) == 2:
+            other = _turn_back(machine, moves, refuge, home, flat, base)
         if other is None:
             raise _describe_jump(machine, moves, found.angles, off)
         rotated = other
@@ -73,9 +75,11 @@ def _require_upright(machine: Machine, moves: Moves, directions: Floats) -> None
         )
 
 
-def _turn_back(machine: Machine, moves: Moves, refuge: Refuge, home: Floats, flat: Floats) -> Rotated | None:
-    """The moves with ways away from the part, on which axes are turned back; None where that does not help."""
-    base = make_transform(machine.frames.work)[:3, :3]
+def _turn_back(
+    machine: Machine, moves: Moves, refuge: Refuge, home: Floats, flat: Floats, base: Floats
+) -> Rotated | None:
+    """The moves with ways away from the part, on which axes are turned back; None where that does not help. ``base``
+    (3,3): turns from the work offset to the machine."""
     loose = LOOSE * machine.post.step
     stopping, is_stop = add_stops(moves, refuge)
     found = choose_angles(machine.rotary, stopping.axes @ base.T, flat, stopping.on, home, Stops(is_stop, loose))

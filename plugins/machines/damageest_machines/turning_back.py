@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import DepositPath, Flags, Floats, Ints
+from damageest.geometry.vectors import measure_to_sphere
 from damageest_machines.definition import Machine
 from damageest_machines.frames import make_transform
 from damageest_machines.moves import TURNED_BACK, Moves
@@ -31,10 +32,8 @@ def find_refuge(path: DepositPath, factor: float, machine: Machine) -> Refuge | 
     if path.around is None or path.free_ends is None:
         return None
     T = make_transform(machine.frames.part)
-    tool = path.nozzle.vertices + np.array([0.0, 0.0, path.standoff])
-    reach = float(np.linalg.norm(tool, axis=1).max(initial=path.standoff))
     centre = T[:3, :3] @ path.around[:3] * factor + T[:3, 3]
-    return Refuge(centre, (float(path.around[3]) + reach) * factor, path.free_ends)
+    return Refuge(centre, (float(path.around[3]) + path.reach) * factor, path.free_ends)
 
 
 def add_stops(moves: Moves, refuge: Refuge) -> tuple[Moves, Flags]:
@@ -66,14 +65,7 @@ def lead_away(moves: Moves, angles: Floats, is_stop: Flags, refuge: Refuge, step
     turned = angles[before] + share * (angles[row] - angles[before])
     found = moves.take(row)
     points = found.points.copy()
-    points[out] = _leave(found.points[out], found.axes[out], refuge)
+    far = measure_to_sphere(points[out], found.axes[out], refuge.centre, refuge.radius)
+    points[out] += np.maximum(far, 0.0)[:, None] * found.axes[out]
     ends = np.flatnonzero(out & (place == pieces[row]))
     return replace(found, points=points, is_end=found.is_end & ~led), turned, ends
-
-
-def _leave(points: Floats, axes: Floats, refuge: Refuge) -> Floats:
-    """The points (N,3) at the refuge's radius, straight along the tool axes (N,3)."""
-    away = points - refuge.centre
-    along = np.einsum("ni,ni->n", away, axes)
-    root = np.sqrt(np.maximum(along**2 - np.einsum("ni,ni->n", away, away) + refuge.radius**2, 0.0))
-    return np.asarray(points + np.maximum(root - along, 0.0)[:, None] * axes)

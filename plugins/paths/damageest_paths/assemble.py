@@ -23,6 +23,8 @@ from damageest_paths.process import Pass, Plan, Process
 from damageest_paths.turning import divide_turns
 
 MUCH_TRAVEL, MUCH_SURPLUS, MUCH_SUNK = 0.2, 0.1, 0.05
+"""Shares from which a note says how much it is: travel, of the whole way; what is added beyond the deposit, and what
+lies in intact metal, of the deposit."""
 DETAIL = 0.01
 """Share of the bead's height or width by which the body that is sliced may differ from the deposit."""
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Literal, Protocol
 
 from damageest.artefacts import DepositPath
+from damageest_paths.assemble import MUCH_SUNK
 from damageest_paths.conformal import plan_conformal
 from damageest_paths.directions import Planner
 from damageest_paths.planar import SHORT, SUNK, plan_planar
@@ -17,8 +18,6 @@ POOR = 0.07
 7 % of themselves to the stair-step of planes beside leaning walls."""
 GAIN = 0.5
 """Share of what planes lose that these may lose."""
-USUAL = 0.05
-"""Share of a deposit up to which beads in intact metal are no loss."""
 FARTHEST = 1.1
 """Bead widths by which beads may reach out of the deposit, or as far as those of planes do."""
 
@@ -62,7 +61,7 @@ def _measure_steps(path: DepositPath) -> float:
 def _measure_badly_filled(path: DepositPath) -> float:
     if path.fill is None:
         return 0.0
-    return path.fill.gap / path.deposit_volume + max(path.fill.sunk / path.deposit_volume - USUAL, 0.0)
+    return path.fill.gap / path.deposit_volume + max(path.fill.sunk / path.deposit_volume - MUCH_SUNK, 0.0)
 
 
 def _measure_spill(path: DepositPath) -> float:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest.geometry.vectors import normalise
+from damageest.geometry.vectors import measure_to_sphere, normalise
 from damageest_paths.clearance import Clearance
 from damageest_paths.network import Network, measure_way
 from damageest_paths.process import Pass
@@ -56,7 +56,7 @@ class Moves(NamedTuple):
     """Points (N,3), tool axes (N,3), normals (N,3), speed (N,), whether the move that ends there deposits (N,), layer
     (N,), pass (N,) and part (N,). ``gap``: least distance of the nozzle during travel; ``blocked``: travels for which
     no clear way was found. ``kinds``: of the passes, in their order; ``free_ends`` (K,): whether the tool can leave to
-    the safe distance straight along its axis from the end of each."""
+    the safe distance straight along its axis from the end of each; None where the axis is the same everywhere."""
 
     points: Floats
     axes: Floats
@@ -69,7 +69,7 @@ class Moves(NamedTuple):
     gap: float
     blocked: int
     kinds: tuple[str, ...]
-    free_ends: Flags
+    free_ends: Flags | None
 
 
 def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: Travel) -> Moves:
@@ -85,7 +85,7 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
     gap, number, blocked = np.inf, 0, 0
     before: Pass | None = None
     old, ranks, exits = 0, rank_layers(groups), _list_exits(groups)
-    free_ends = []
+    free_ends: list[bool] | None = [] if _is_turning(groups) else None
     network = Network(groups, travel.hop, travel.gap, clearance.reach)
     for part, passes in enumerate(groups, 1):
         for one in passes:
@@ -103,7 +103,8 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
             for k in range(1, len(one.points)):
                 values = (one.points[k], one.axes[k], one.normals[k], travel.feed, True)
                 rows.append((*values, one.layer + 1, number, part))
-            free_ends.append(_is_end_free(one, clearance.after(rank), travel))
+            if free_ends is not None:
+                free_ends.append(_is_end_free(one, clearance.after(rank), travel))
             before = one
     if before is not None:
         standing = clearance.after(len(ranks))
@@ -119,8 +120,14 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
     feed, on = np.array(columns[3], float), np.array(columns[4], bool)
     return Moves(
         points, axes, normals, feed, on, layer, numbers, parts, max(gap, 0.0), blocked, kinds,
-        np.array(free_ends, bool),
+        None if free_ends is None else np.array(free_ends, bool),
     )  # fmt: skip
+
+
+def _is_turning(groups: Sequence[Sequence[Pass]]) -> bool:
+    """Whether the tool axis is not the same everywhere."""
+    axes = np.concatenate([np.empty((0, 3)), *(one.axes for passes in groups for one in passes)])
+    return bool((np.abs(axes - axes[:1]) > SAME).any())
 
 
 def _is_end_free(one: Pass, clearance: Clearance, travel: Travel) -> bool:
@@ -155,10 +162,8 @@ def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
 
 def _lift_to_sphere(point: Floats, axis: Floats, travel: Travel, radius: float) -> Floats:
     """The point (3,) at a distance from the centre, straight up the axis."""
-    away = point - travel.centre
-    along = float(away @ axis)
-    root = np.sqrt(max(along**2 - float(away @ away) + radius**2, 0.0))
-    return np.asarray(point + max(root - along, travel.hop) * axis)
+    far = float(measure_to_sphere(point[None], axis[None], travel.centre, radius)[0])
+    return np.asarray(point + max(far, travel.hop) * axis)
 
 
 def _list_exits(groups: Sequence[Sequence[Pass]]) -> list[Exit]:

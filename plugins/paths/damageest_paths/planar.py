@@ -90,12 +90,12 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         made = order_passes(made, passes[-1] if passes else None, clearance.reach)
         done = cover([one.points[:, :2] for one in made], width)
         causes = [cover(dropped, width), cover(shaded, width), short if made else wanted]
-        hanging = _find_hanging(held, wanted, aims, process)
-        lost = _share_out((held ^ aims.reached) - done - hanging, causes)
+        held -= _find_hanging(held, wanted, aims, process)
+        lost = _share_out((held ^ aims.reached) - done, causes)
         left = {
-            UNSUPPORTED: unite_regions([wanted - held, hanging]),
-            SUNK: held - aims.flush - hanging,
-            SHADED: unite_regions([held ^ (aims.flush - aims.reached), lost[1]]) - hanging,
+            UNSUPPORTED: wanted - held,
+            SUNK: held - aims.flush,
+            SHADED: unite_regions([held ^ (aims.flush - aims.reached), lost[1]]),
             COLLIDES: lost[0],
             SHORT: lost[2],
         }

@@ -34,9 +34,8 @@ def unite_regions(regions: Sequence[Any]) -> Any:
 
 
 def list_pieces(region: Any) -> list[Any]:
-    """The connected pieces of a region. Clipper2 leaves some of them without area, whose bounds are those of nothing:
-    they are left out."""
-    return [piece for piece in region.decompose() if not piece.is_empty() and piece.area() > 0]
+    """The connected pieces of a region; none of an empty one, which `decompose` gives back with endless bounds."""
+    return [piece for piece in region.decompose() if piece.area() > 0]
 
 
 def shift_border(region: Any, distance: float) -> Any:

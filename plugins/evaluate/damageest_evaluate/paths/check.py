@@ -149,11 +149,10 @@ def _measure(path: DepositPath, moves: Ints, body: Manifold, origin: Floats, ste
 def _list_poses(path: DepositPath, run: Ints, step: float) -> tuple[Floats, Floats, Floats]:
     """For moves in a row: tips (N,3) of all poses, the last one included, axes (N,3), and how far (N,) any point of the
     nozzle has moved at most."""
-    reach = float(np.linalg.norm(path.nozzle.vertices + np.array([0.0, 0.0, path.standoff]), axis=1).max())
     own = np.append(run, run[-1] + 1)
     ends, turned = path.points[own], path.axes[own]
     chord = np.linalg.norm(np.diff(turned, axis=0), axis=1)
-    moves = np.linalg.norm(np.diff(ends, axis=0), axis=1) + 2 * np.arcsin(np.clip(chord / 2, 0, 1)) * reach
+    moves = np.linalg.norm(np.diff(ends, axis=0), axis=1) + 2 * np.arcsin(np.clip(chord / 2, 0, 1)) * path.reach
     counts = np.maximum(np.ceil(moves / step).astype(int), 1)
     share = np.concatenate([*(np.arange(count) / count for count in counts), [1.0]])[:, None]
     number = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
