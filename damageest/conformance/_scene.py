@@ -163,7 +163,7 @@ def sample_points(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Flo
 def make_scene() -> SimpleNamespace:
     """The part, its scan and the artefacts of all stages, in the part's frame."""
     from damageest.geometry.distance import signed_distance
-    from damageest.geometry.skin_near import find_cubes_near, sample_near
+    from damageest.geometry.skin_near import NearCubes, find_cubes_near, sample_near
     from damageest.stages.sample.edge_aware import EdgeAware
 
     rng = np.random.default_rng(7)
@@ -194,7 +194,7 @@ def make_scene() -> SimpleNamespace:
         scan=Scan(points, normals, noise=NOISE, spacing=SPACING),
         aligned=Scan(points, normals, noise=NOISE, spacing=SPACING),
         samples=EdgeAware().run(part=part, tolerance=TOLERANCE),
-        nearby=sample_near(part, near, TOLERANCE),
+        nearby=sample_near(part, near, NearCubes.around(points[damage], 6 * TOLERANCE), TOLERANCE),
         deviation=Deviation(distance, face, np.where(damage, DAMAGE, INTACT).astype(np.uint8)),
         sites=Sites(site, len(DENTS)),
         intact=points[~damage],

@@ -24,6 +24,8 @@ PLACES = 8
 SMALL = 0.5
 """Largest edge of a triangle that is sampled as a whole, in cubes: a larger one is halved, and only its halves near the
 places are."""
+COARSER = 2.0
+"""Spacing of the points away from the damage, in spacings of those near it."""
 MOST_POINTS = 400_000
 """Points from which on the spacing grows."""
 
@@ -39,7 +41,7 @@ class NearCubes:
     def around(cls, points: Floats, size: float) -> NearCubes:
         """The cubes of edge ``size``, or more where there were too many, with one of the points (N,3), and those that
         touch them."""
-        low, high = measure_bounds(points)
+        low, high = measure_bounds(points) if len(points) else np.zeros((2, 3))
         size = max(size, float((high - low).max()) / MOST_ALONG)
         low, high = low - 2 * size, high + 2 * size
         grid = VoxelGrid(low, size, np.ceil((high - low) / size).astype(np.int64) + 1)
@@ -102,19 +104,25 @@ def _spread_area(part: Mesh, step: float) -> tuple[Floats, Floats]:
     return np.concatenate([points, triangles[~is_large].mean(axis=1)]), np.concatenate([share[face], area[~is_large]])
 
 
-def sample_near(part: Part, near: NearCubes, spacing: float) -> Samples:
-    """Points on the faces of the part's skin in some cubes, none on edges.
+def sample_near(part: Part, near: NearCubes, fine: NearCubes, spacing: float) -> Samples:
+    """Points on the faces of the part's skin in the cubes ``near``, none on edges.
 
-    Every place of this skin is within the samples' spacing of a point: ``spacing``, or more where that would need more
-    than `MOST_POINTS`. The same part and cubes give the same points.
+    In the cubes ``fine``, too, every place of this skin is within ``spacing`` of a point, elsewhere within `COARSER`
+    times that, the spacing of the samples; both are more where that would need more than `MOST_POINTS`. The same part
+    and cubes give the same points.
     """
     vertices, faces, origin = _cut_near(part, near)
-    piece = Mesh(vertices, faces)
-    spacing = max(spacing, float(np.sqrt(1.25 * piece.area / MOST_POINTS))) if len(faces) else spacing
-    points, face = spread_on_faces(piece, spacing)
-    inside = near.holds(points)
-    face = origin[face[inside]]
-    return Samples(points[inside], part.face_normals[face], face, np.zeros(len(face), np.uint8), spacing)
+    of_fine = np.flatnonzero(fine.touches(vertices[faces]))
+    every, inmost = Mesh(vertices, faces), Mesh(vertices, faces[of_fine])
+    needed = 1.25 * (inmost.area + (every.area - inmost.area) / COARSER**2)
+    spacing = max(spacing, float(np.sqrt(needed / MOST_POINTS)))
+    wide, face = spread_on_faces(every, COARSER * spacing)
+    close, face_of_close = spread_on_faces(inmost, spacing)
+    outer = ~fine.holds(wide) & near.holds(wide)
+    inner = fine.holds(close) & near.holds(close)
+    points = np.concatenate([wide[outer], close[inner]])
+    face = origin[np.concatenate([face[outer], of_fine[face_of_close[inner]]])]
+    return Samples(points, part.face_normals[face], face, np.zeros(len(face), np.uint8), COARSER * spacing)
 
 
 def _cut_near(part: Part, near: NearCubes) -> tuple[Floats, Ints, Ints]:

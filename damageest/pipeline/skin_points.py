@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from damageest.artefacts import ADDED, INTACT, Deviation, Part, Samples, Scan, Sites
-from damageest.geometry.skin_near import find_cubes_near, sample_near
+from damageest.geometry.skin_near import NearCubes, find_cubes_near, sample_near
 from damageest.pipeline.engine import Branch, Engine, follow
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import Step, step
@@ -18,6 +18,9 @@ from damageest.stages.sample import Sample
 EDGE_SPACINGS, MOST_EDGE = 16.0, 40.0
 """Edge of the cubes in which skin is near damage, in spacings of the scan and, at most, in tolerances: in cubes with
 fewer points it is a matter of chance whether the scan shows their skin."""
+FINE, FINE_SPACINGS = 6.0, 3.0
+"""Distance from damaged points up to which the points on the skin are a tolerance apart, in tolerances, and in spacings
+of the scan: there lies the rim. It reaches at most twice as far."""
 
 
 def where_taken(item: Contract | Step[..., Any], by: Sequence[Contract]) -> Branch:
@@ -47,9 +50,10 @@ def note_unused(engine: Engine, samples: Samples | None) -> Reasons:
 def sample_near_damage(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float, encloser_at_once: EncloseAll | None
 ) -> Samples:
-    """Points on the part's skin near the damaged points of the sites, a tolerance apart."""
+    """Points on the part's skin near the damage: a tolerance apart about the rim, two elsewhere."""
     on_skin = (deviation.label == INTACT) | (deviation.label == ADDED)
     places, intact = aligned.points[sites.label > 0], aligned.points[on_skin]
     reach = encloser_at_once.nearby_reach if encloser_at_once else MOST_EDGE
     edge = max(reach * tolerance, min(EDGE_SPACINGS * aligned.spacing, MOST_EDGE * tolerance))
-    return sample_near(part, find_cubes_near(part, places, intact, edge), tolerance)
+    fine = NearCubes.around(places, max(FINE * tolerance, FINE_SPACINGS * aligned.spacing))
+    return sample_near(part, find_cubes_near(part, places, intact, edge), fine, tolerance)

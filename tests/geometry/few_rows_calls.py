@@ -146,7 +146,13 @@ CALLS: dict[str, Callable[[Rows], None]] = {
         skin_near.find_cubes_near(CUBE, r.points, r.points, 1.0).holds(r.points), (r.count,)
     ),
     "skin_near.sample_near": lambda r: expect(
-        skin_near.sample_near(PART, skin_near.find_cubes_near(PART, r.points, r.points, 1.0), 5.0).points, (None, 3)
+        skin_near.sample_near(
+            PART,
+            skin_near.find_cubes_near(PART, r.points, r.points, 1.0),
+            skin_near.NearCubes.around(r.points, 1.0),
+            5.0,
+        ).points,
+        (None, 3),
     ),
     "spreading.spread_on_faces": lambda r: expect(spreading.spread_on_faces(r.mesh, 0.5), (None, 3), (None,)),
     "spreading.spread_points": lambda r: expect(

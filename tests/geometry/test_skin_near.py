@@ -10,10 +10,10 @@ from damageest.artefacts import Mesh, Part
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.refinement import halve_edges
 from damageest.geometry.sampling import sample_by_area
-from damageest.geometry.skin_near import find_cubes_near, sample_near
+from damageest.geometry.skin_near import COARSER, NearCubes, find_cubes_near, sample_near
 from tests.geometry.shapes import box, torus
 
-TOLERANCE, EDGE = 0.1, 4.0
+TOLERANCE, RIM, EDGE = 0.1, 0.5, 4.0
 
 
 def as_part(mesh: Mesh) -> Part:
@@ -29,17 +29,22 @@ def test_no_place_near_the_damage_is_far_from_a_point(mesh: Mesh) -> None:
     centre = part.vertices[0]
     is_lost = np.linalg.norm(skin - centre, axis=1) < 2
     near = find_cubes_near(part, skin[is_lost], skin[~is_lost], EDGE)
-    found = sample_near(part, near, TOLERANCE)
+    fine = NearCubes.around(skin[is_lost], RIM)
+    found = sample_near(part, near, fine, TOLERANCE)
     asked = near.holds(skin)
     assert asked[np.linalg.norm(skin - centre, axis=1) < EDGE].all()
     # at the border of the cubes the nearest point may lie beyond it
     inner = asked & (np.linalg.norm(skin - centre, axis=1) < EDGE - TOLERANCE)
-    assert cKDTree(found.points).query(skin[inner])[0].max() <= found.spacing
+    gap = cKDTree(found.points).query(skin[inner])[0]
+    assert gap.max() <= found.spacing == COARSER * TOLERANCE
+    close = np.linalg.norm(skin[inner] - centre, axis=1) < 2 + RIM - found.spacing
+    assert gap[close].max() <= TOLERANCE, "about the damage the points are closer"
     assert near.holds(found.points).all()
     assert distance_to_mesh(found.points, part).max() < 1e-9
     assert found.face.max() < len(part.faces)
     np.testing.assert_allclose(found.normals, part.face_normals[found.face])
-    assert len(found.points) < 4 * asked.mean() * part.area / TOLERANCE**2, "little more than that skin needs"
+    needed = (fine.holds(skin) + ~fine.holds(skin) / COARSER**2)[asked].sum() / len(skin) * part.area / TOLERANCE**2
+    assert len(found.points) < 4 * needed, "little more than that skin needs"
 
 
 def test_skin_that_the_scan_does_not_show_is_near_where_it_begins_at_the_damage() -> None:
