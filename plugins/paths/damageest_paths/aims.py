@@ -11,8 +11,6 @@ from damageest_paths.regions import make_region, shift_border
 
 FLUSH = 0.02
 """Share of its radius by which a bead or beam may touch a wall beside it."""
-SINK = 0.45
-"""Share of a layer's height to which a bead may lie in intact metal where the job does not say how deep."""
 SLICES = 4
 """Heights between bead and tip at which a widening beam is compared with the metal."""
 
@@ -33,7 +31,7 @@ class Aims(NamedTuple):
 
 def find_sink(height: float, process: Process) -> float:
     """How deep a bead may lie in intact metal, in a layer of a height."""
-    return min(SINK * height if process.sink is None else process.sink, (1 - FLUSH) * height)
+    return min(process.sink_share * height if process.sink is None else process.sink, (1 - FLUSH) * height)
 
 
 def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: float, process: Process) -> Aims:

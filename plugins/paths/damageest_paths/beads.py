@@ -6,6 +6,7 @@ heats up, warps or shrinks is not simulated.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,11 +59,11 @@ def simulate_beads(
         sunk = spilled & _fill_solid(Mesh(frame.to_local(metal.vertices), metal.faces), low, size, edge)
         spilled &= ~sunk
     cell = edge**3
-    pieces, count = ndimage.label(gaps)
-    largest = int(np.bincount(pieces.ravel())[1:].max()) if count else 0
-    depth = float(ndimage.distance_transform_edt(gaps, sampling=edge).max()) if count else 0.0
+    pieces, _ = ndimage.label(gaps)
+    largest = int(np.bincount(pieces.ravel())[1:].max(initial=0))
+    depth = edge * _measure_depth(gaps, ndimage.find_objects(pieces))
     # the border of the deposit goes through voxels, so that its outermost ones may be beads though just outside
-    rim = spilled & ~ndimage.binary_dilation(wanted, np.ones((3, 3, 3), bool))
+    rim = spilled & ~_widen(wanted)
     places = low + (np.argwhere(rim) + 0.5) * edge
     far = float(distance_to_mesh(places, local).max()) if len(places) else 0.0
     return BeadFill(
@@ -76,6 +77,30 @@ def simulate_beads(
         float(sunk.sum() * cell),
         float((done & wanted).sum() / max(int(wanted.sum()), 1)),
     )
+
+
+def _measure_depth(gaps: Flags, boxes: Sequence[tuple[slice, ...]]) -> float:
+    """The largest distance, in voxels, of a voxel in a gap from one outside, found box by box: mostly the gaps are a
+    small part of the grid. Where gaps touch at edges it may be a little too large."""
+    from scipy import ndimage
+
+    found = 0.0
+    for box in boxes:
+        if (min(own.stop - own.start for own in box) + 1) / 2 > found:
+            wider = tuple(slice(max(own.start - 1, 0), own.stop + 1) for own in box)
+            found = max(found, float(ndimage.distance_transform_edt(gaps[wider]).max()))
+    return found
+
+
+def _widen(solid: Flags) -> Flags:
+    """The voxels of a solid and the 26 round each of them."""
+    for axis in range(3):
+        along = np.moveaxis(solid, axis, 0)
+        wider = along.copy()
+        wider[1:] |= along[:-1]
+        wider[:-1] |= along[1:]
+        solid = np.moveaxis(wider, 0, axis)
+    return solid
 
 
 def _choose_grid(local: Mesh, beads: Beads, frame: Frame, edge: float) -> tuple[Floats, tuple[int, int, int], float]:
@@ -124,14 +149,15 @@ def stamp_beads(beads: Beads, frame: Frame, low: Floats, size: tuple[int, int, i
     start, stop = frame.to_local(beads.start), frame.to_local(beads.stop)
     normal = beads.normal @ frame.turn.T
     length = np.linalg.norm(stop - start, axis=1)
-    counts = np.maximum(np.ceil(length / (beads.width / 6)).astype(int), 1) + 1
+    counts = np.maximum(np.ceil(length / (beads.width / 2)).astype(int), 1)
     owner = np.repeat(np.arange(len(start)), counts)
-    share = np.concatenate([np.linspace(0, 1, count) for count in counts])
+    share = np.concatenate([(np.arange(count) + 0.5) / count for count in counts])
     points = start[owner] + share[:, None] * (stop - start)[owner]
-    reach = int(np.ceil(np.hypot(beads.width.max() / 2, beads.height.max()) / edge)) + 1
-    ball = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     middle = points - (beads.height[owner] / 2)[:, None] * normal[owner]
-    half = np.hypot(beads.width.max() / 2, beads.height.max() / 2) + np.sqrt(3) * edge
+    reach = np.hypot(beads.width.max() / 2, beads.height.max() / 2)
+    half = np.hypot(reach, float((length / counts).max()) / 2) + np.sqrt(3) * edge
+    span = int(np.ceil(half / edge))
+    ball = np.stack(np.meshgrid(*[np.arange(-span, span + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     ball = ball[np.linalg.norm(ball, axis=1) * edge <= half]
     for first in range(0, len(points), max(CHUNK // len(ball), 1)):
         own = slice(first, first + max(CHUNK // len(ball), 1))
@@ -150,10 +176,11 @@ def _stamp(
     farther than half its width from the line that goes on ``ahead`` (N,3) and ``behind`` (N,3)."""
     cell = np.floor((middle - low) / edge).astype(np.int64)[:, None] + ball
     away = low + (cell + 0.5) * edge - points[:, None]
-    up = np.einsum("nmi,ni->nm", away, normal)
     front, back = np.linalg.norm(ahead, axis=1), np.linalg.norm(behind, axis=1)
-    along = np.einsum("nmi,ni->nm", away, (ahead + behind) / np.maximum(front + back, 1e-300)[:, None])
+    line = (ahead + behind) / np.maximum(front + back, 1e-300)[:, None]
+    along = np.einsum("nmi,ni->nm", away, line)
     beside = np.clip(along, -back[:, None], front[:, None])
+    up = np.einsum("nmi,ni->nm", away, normal) - beside * np.einsum("ni,ni->n", line, normal)[:, None]
     across = np.einsum("nmi,nmi->nm", away, away) - up**2 - beside * (2 * along - beside)
     tiny = 1e-9 * edge
     inside = (up <= tiny) & (up >= -height[:, None] - tiny) & (across <= (width[:, None] / 2) ** 2 + tiny)

@@ -1,8 +1,7 @@
 """How far the nozzle stays from what it must not touch.
 
-Two measures. Bounds come from points that are spread over the obstacles: each stands for the surface within a known
-distance of it, and its distance to a nozzle that is a solid of revolution follows from a formula, for many poses at
-once. Where the bounds do not decide, the FCL library gives the exact distance between the triangles of both.
+Two measures. Bounds are found for many poses at once, for a nozzle that is a solid of revolution. Where they do not
+decide, the FCL library gives the exact distance between the triangles of both.
 """
 
 from __future__ import annotations
@@ -15,19 +14,16 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.duplicates import list_distinct
 from damageest.geometry.transforms import turn_to_axis
+from damageest_paths.descent import ENOUGH, Descent
 from damageest_paths.nozzle import Nozzle
-from damageest_paths.obstacles import MEMBERS, Obstacles
+from damageest_paths.obstacles import Obstacles
 from damageest_paths.sight import Beam
 
 CHUNK = 1024
 """Poses that are bounded at once, so that intermediate arrays fit in the processor's cache."""
 STRIDES = (16, 4, 1)
 """Of the poses of a pass, each sixteenth is measured first, then those in between for which it does not decide."""
-BEAM = 12
-"""Balls of each level that are followed straight down the tree."""
 MOST_RANKS = 1 << 30
-ENOUGH = 1.5
-"""Multiple of the needed distance from which a distance need not be known well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,75 +132,13 @@ class Clearance:
         if self.nozzle.profile is None:
             return np.zeros(len(points)), high
         tips = points + self.standoff * axes
+        descent = Descent(self.obstacles, self.nozzle.profile, self.endless, self.floor, self.until)
         for start in range(0, len(points), CHUNK):
             own = slice(start, start + CHUNK)
-            low[own], high[own], pairs = self._bound_some(tips[own], axes[own], needed + self.detail)
+            low[own], high[own], pairs = descent.bound(tips[own], axes[own], needed + self.detail)
             if near is not None:
                 near.append(pairs + np.array([start, 0], np.int64))
         return np.maximum(low - self.detail, 0.0), np.maximum(high - self.detail, 0.0)
-
-    def _bound_some(self, tips: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats, Ints]:
-        """As `bound`, from tips (N,3), with the poses and ranks (K,2). Most poses
-        that are not free are found straight down the tree; the others go down it wherever a ball is near."""
-        assert self.obstacles is not None
-        levels = self.obstacles.levels
-        low, high = np.full(len(tips), np.inf), np.full(len(tips), np.inf)
-        ball = np.flatnonzero((levels[0].top > self.floor) & (levels[0].rank <= self.until))
-        pairs = np.empty((0, 2), np.int64)
-        if not len(ball):
-            return low, high, pairs
-        self._dive(ball, tips, axes, needed, high)
-        pose = np.repeat(np.flatnonzero(high >= needed), len(ball))
-        ball = np.tile(ball, len(tips))[: len(pose)]
-        for number, level in enumerate(levels):
-            going = high.take(pose) >= needed
-            pose, ball = pose[going], ball[going]
-            if not len(ball):
-                break
-            own = self._measure_from(level.middle.take(ball, 0), pose, tips, axes)
-            radius = level.radius.take(ball)
-            if number == len(levels) - 1:
-                _take_least(high, pose, np.maximum(own, 0.0))
-                _take_least(low, pose, own - radius)
-                close = own - radius < ENOUGH * needed
-                pairs = np.stack([pose[close], level.rank.take(ball[close])], axis=1)
-                break
-            _take_least(high, pose, np.maximum(own + radius, 0.0))
-            lower = own - radius
-            near = lower < ENOUGH * needed
-            _take_least(low, pose[~near], lower[~near])
-            pose, ball = np.repeat(pose[near], MEMBERS), _list_members(ball[near]).ravel()
-            following = levels[number + 1]
-            kept = np.flatnonzero((following.top.take(ball) > self.floor) & (following.rank.take(ball) <= self.until))
-            pose, ball = pose[kept], ball[kept]
-        low[high < needed] = 0.0
-        return low, high, pairs
-
-    def _measure_from(self, points: Floats, pose: Ints, tips: Floats, axes: Floats) -> Floats:
-        """Distances (M,) of points (M,3) from the nozzle at a ``pose`` (M,) each; negative inside."""
-        assert self.nozzle.profile is not None
-        return measure_points(points, tips.take(pose, 0), axes.take(pose, 0), self.nozzle.profile, self.endless)
-
-    def _dive(self, roots: Ints, tips: Floats, axes: Floats, needed: float, high: Floats) -> None:
-        """Lowers ``high`` (N,) straight down the tree: from the nearest of the balls ``roots`` (K,) to the nearest that
-        they hold, and so on, by a point on the surface in each."""
-        assert self.obstacles is not None
-        pose = np.arange(len(tips))
-        ball = np.tile(roots, (len(tips), 1))
-        for number, level in enumerate(self.obstacles.levels):
-            flat, count = ball.ravel(), ball.shape[1]
-            own = self._measure_from(level.one.take(flat, 0), np.repeat(pose, count), tips, axes)
-            own[(level.top.take(flat) <= self.floor) | (level.rank.take(flat) > self.until)] = np.inf
-            found = own.reshape(-1, count)
-            most = min(BEAM, count - 1)
-            nearest = np.argpartition(found, most, axis=1)[:, : most + 1]
-            value = found.min(axis=1)
-            high[pose] = np.minimum(high[pose], np.maximum(value, 0.0))
-            going = value >= needed
-            pose, ball = pose[going], np.take_along_axis(ball, nearest, axis=1)[going]
-            if not len(pose) or number == len(self.obstacles.levels) - 1:
-                break
-            ball = _list_members(ball.ravel()).reshape(len(pose), -1)
 
     def measure_poses(self, points: Floats, axes: Floats, needed: float) -> Floats:
         """For each pose (N,) a distance that the nozzle keeps at least; below ``needed`` only where it really is.
@@ -267,53 +201,9 @@ class Clearance:
         return np.asarray(2 * np.arcsin(np.clip(chord / 2, 0, 1)) * self.reach)
 
 
-def _list_members(ball: Ints) -> Ints:
-    """The balls (K,MEMBERS) of the next level that balls (K,) hold."""
-    return np.asarray(MEMBERS * ball[:, None] + np.arange(MEMBERS))
-
-
-def _take_least(least: Floats, pose: Ints, found: Floats) -> None:
-    """Lowers each of ``least`` (N,) to the values ``found`` (M,) of its ``pose`` (M,), which is sorted."""
-    if len(pose):
-        starts = np.flatnonzero(np.concatenate([[True], pose[1:] != pose[:-1]]))
-        own = pose[starts]
-        least[own] = np.minimum(least[own], np.minimum.reduceat(found, starts))
-
-
-def measure_points(points: Floats, tips: Floats, axes: Floats, profile: Floats, endless: bool) -> Floats:
-    """Distances (N,) of points (N,3) to the nozzle with its tip at ``tips`` (N,3) and its axis along ``axes`` (N,3);
-    negative inside. ``endless``: its body goes on above its end."""
-    away = points - tips
-    height = np.einsum("ij,ij->i", away, axes)
-    radius = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - height**2, 0.0))
-    return _measure_to_profile(height, radius, profile, endless)
-
-
 def _carry_over(found: Floats, far: Floats, known: Ints, needed: float) -> Floats:
     """Distances (N,) of poses that follow from those at the ``known`` ones and the way ``far`` (N,) between them."""
     number = np.searchsorted(known, np.arange(len(found)), side="right")
     before, after = known[np.maximum(number - 1, 0)], known[np.minimum(number, len(known) - 1)]
     implied = np.maximum(found[before] - np.abs(far - far[before]), found[after] - np.abs(far - far[after]))
     return np.where((found == -np.inf) & (implied >= needed), implied, found)
-
-
-def _measure_to_profile(height: Floats, radius: Floats, profile: Floats, endless: bool) -> Floats:
-    """Distances of points to the surface of a solid of revolution whose ``profile`` (K,2) has height and radius;
-    negative inside.
-
-    The profile is that of `Cone`: from the tip upward, never narrower.
-    """
-    tip, last = profile[0, 1], profile[-1, 1]
-    rise, end = profile[1, 0], np.inf if endless else profile[-1, 0]
-    side = np.array([rise - profile[0, 0], profile[1, 1] - tip])
-    out = radius - tip
-    along = np.clip((height * side[0] + out * side[1]) / (side @ side), 0, 1)
-    found = (height - along * side[0]) ** 2 + (out - along * side[1]) ** 2
-    np.minimum(found, height**2 + np.maximum(out, 0) ** 2, out=found)
-    beside = np.maximum(rise - height, 0) + np.maximum(height - end, 0)
-    np.minimum(found, beside**2 + (radius - last) ** 2, out=found)
-    if not endless:
-        np.minimum(found, (height - end) ** 2 + np.maximum(radius - last, 0) ** 2, out=found)
-    np.sqrt(found, out=found)
-    inside: Flags = (height > 0) & (height < end) & (radius < last) & (out * side[0] < height * side[1])
-    return np.asarray(np.where(inside, -found, found))

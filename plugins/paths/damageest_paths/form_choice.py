@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from damageest.artefacts import DepositPath
 from damageest_paths.assemble import MUCH_SUNK
 from damageest_paths.conformal import plan_conformal
 from damageest_paths.directions import Planner
-from damageest_paths.planar import SHORT, SUNK, plan_planar
+from damageest_paths.frames import Frame
+from damageest_paths.planar import SHORT, SUNK, Surroundings, plan_planar
+from damageest_paths.process import Plan as LayerPlan
+from damageest_paths.process import Process
 
 Form = Literal["auto", "planar", "conformal"]
 PLANNERS: dict[str, Planner] = {"planar": plan_planar, "conformal": plan_conformal}
@@ -20,6 +23,10 @@ GAIN = 0.5
 """Share of what planes lose that these may lose."""
 FARTHEST = 1.1
 """Bead widths by which beads may reach out of the deposit, or as far as those of planes do."""
+SPARING = (0.4, 0.3)
+"""Shares of a layer's height to which beads may lie in intact metal, in turn, where else too much of them does."""
+MOST_LEFT = 0.03
+"""Share of the deposit that may be left unfilled for that."""
 
 
 class Plan(Protocol):
@@ -29,20 +36,46 @@ class Plan(Protocol):
     def __call__(self, planner: Planner, along_normal: bool = False) -> DepositPath: ...
 
 
-def plan_in_form(form: Form, plan: Plan) -> DepositPath:
+def plan_in_form(form: Form, plan: Plan, is_sink_given: bool = False) -> DepositPath:
     """The path of a form. ``auto``: planes; where they lose much of the deposit because they are planes, as of the
-    crescent of a worn bore, surfaces along the floor if these lose half of all that planes lose, or less."""
-    if form != "auto":
+    crescent of a worn bore, surfaces along the floor if these lose half of all that planes lose, or less.
+
+    ``is_sink_given``: whether the job says how deep beads may lie in intact metal.
+    """
+    if form == "conformal":
         return replace(plan(PLANNERS[form]), layer_form=form)
-    planar = replace(plan(PLANNERS["planar"]), layer_form="planar")
-    if _measure_steps(planar) <= POOR:
-        return planar
-    lost = measure_lost(planar)
-    conformal = replace(plan(PLANNERS["conformal"], along_normal=True), layer_form="conformal")
-    if not len(conformal.points) or measure_lost(conformal) > GAIN * lost:
-        return planar
-    spilt = max(FARTHEST * planar.width, _measure_spill(planar))
-    return conformal if _measure_spill(conformal) <= spilt else planar
+    planar = plan(PLANNERS["planar"])
+    if form == "auto" and _measure_steps(planar) > POOR:
+        conformal = replace(plan(PLANNERS["conformal"], along_normal=True), layer_form="conformal")
+        spilt = max(FARTHEST * planar.width, _measure_spill(planar))
+        is_better = len(conformal.points) and measure_lost(conformal) <= GAIN * measure_lost(planar)
+        if is_better and _measure_spill(conformal) <= spilt:
+            return conformal
+    return replace(planar if is_sink_given else _spare_metal(planar, plan), layer_form="planar")
+
+
+def _spare_metal(planar: DepositPath, plan: Plan) -> DepositPath:
+    """The path in planes; where much of its beads lies in intact metal, one of which less does, if that leaves little
+    of the deposit unfilled."""
+    for share in SPARING:
+        if _measure_sunk(planar) <= MUCH_SUNK:
+            break
+        sparing = plan(_make_sparing(share))
+        left = (sparing.unreached_volume - planar.unreached_volume) / planar.deposit_volume
+        if not len(sparing.points) or left > MOST_LEFT:
+            break
+        if _measure_sunk(sparing) <= MUCH_SUNK:
+            return sparing
+    return planar
+
+
+def _make_sparing(share: float) -> Planner:
+    """The planner of planes with beads that lie no deeper in intact metal than a share of the layer's height."""
+
+    def plan(body: Any, frame: Frame, around: Surroundings, process: Process) -> LayerPlan:
+        return plan_planar(body, frame, around, replace(process, sink_share=share))
+
+    return plan
 
 
 def measure_lost(path: DepositPath) -> float:
@@ -61,7 +94,12 @@ def _measure_steps(path: DepositPath) -> float:
 def _measure_badly_filled(path: DepositPath) -> float:
     if path.fill is None:
         return 0.0
-    return path.fill.gap / path.deposit_volume + max(path.fill.sunk / path.deposit_volume - MUCH_SUNK, 0.0)
+    return path.fill.gap / path.deposit_volume + max(_measure_sunk(path) - MUCH_SUNK, 0.0)
+
+
+def _measure_sunk(path: DepositPath) -> float:
+    """The volume of beads in intact metal, as a share of the deposit; 0 where they were not simulated."""
+    return 0.0 if path.fill is None else path.fill.sunk / path.deposit_volume
 
 
 def _measure_spill(path: DepositPath) -> float:

@@ -127,7 +127,8 @@ class Layers(Path):
         None,
         ge=0,
         allow_inf_nan=False,
-        description="depth to which a bead may lie in intact metal, which melts; default: 0.45 of a layer's height",
+        description="depth to which a bead may lie in intact metal, which melts; default: 0.45 of a layer's height, or "
+        "0.4 or 0.3 where more than 5 % of the deposit would lie in it",
     )
     standoff: Length | None = Field(
         None, description="distance from the nozzle's tip to the top of the bead; default: the bead's width"
@@ -216,7 +217,7 @@ class Layers(Path):
             chosen = find_open_normal(body, left, tolerance) if along_normal and direction is None else direction
             return plan_path(task, nozzle, self.standoff or self.width, process, speeds, chosen, planner)
 
-        path = plan_in_form(self.layers, plan)
+        path = plan_in_form(self.layers, plan, self.penetration is not None)
         if self.layers == "conformal" and not len(path.points):
             why = "; ".join(item.why for item in path.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
+from damageest_paths.trees import make_tree
 
 SIDES = 32
 """Corners of the mesh's outline. They lie outside the circle, so that the mesh holds the nozzle."""
@@ -48,11 +49,7 @@ class Nozzle:
         """The mesh as FCL's object, which is moved from pose to pose."""
         import fcl
 
-        tree = fcl.BVHModel()
-        tree.beginModel(len(self.mesh.vertices), len(self.mesh.faces))
-        tree.addSubModel(np.ascontiguousarray(self.mesh.vertices), np.ascontiguousarray(self.mesh.faces))
-        tree.endModel()
-        return fcl.CollisionObject(tree, fcl.Transform())
+        return fcl.CollisionObject(make_tree(self.mesh), fcl.Transform())
 
 
 def make_nozzle(cone: Cone) -> Nozzle:

@@ -14,8 +14,9 @@ from damageest.geometry.duplicates import order_integers
 from damageest.geometry.morton import encode_cells
 from damageest_paths.frames import find_across
 from damageest_paths.process import Pass
+from damageest_paths.trees import make_tree
 
-FINE, GROWTH = 0.4, 0.4
+FINE, GROWTH = 0.8, 0.4
 """Longest edge of the obstacles' triangles, whose middles are the points: in bead widths near the deposit, and as a
 share of the distance from it."""
 MEMBERS = 8
@@ -54,24 +55,34 @@ class Obstacles:
         """``low``, ``high`` (3,): the box round the deposit, near which the points are dense; ``width`` of a bead;
         ``ranks``: for each mesh, ascending, the order in which it is built up; by default all are there from the
         beginning."""
-        self.trees: list[Any] = [make_tree(mesh) for mesh in meshes]
+        self._trees = [_Tree(mesh) for mesh in meshes]
         self.ranks: list[int] = [0] * len(meshes) if ranks is None else list(ranks)
         parts = [_cut_triangles(mesh.triangles, low, high, width) for mesh in meshes]
         triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
         rank = np.repeat(np.array(self.ranks, np.int64), [len(part) for part in parts])
-        self.levels: list[Level] = _make_levels(triangles, rank) if len(triangles) else []
+        self.levels: list[Level] = []
+        if len(triangles):
+            order = _fill_balls(triangles)
+            triangles = triangles[order]
+            self.levels = _make_levels(triangles, rank[order])
+        self._corners = triangles.astype(np.float32)
         self._turn = np.eye(3)
+
+    def find_triangles(self, ball: Ints) -> Floats:
+        """The triangles (K,3,3) of the balls (K,) of the last level."""
+        return self._corners[ball] @ self._turn.T
 
     @cached_property
     def objects(self) -> list[Any]:
         import fcl
 
-        return [fcl.CollisionObject(tree, fcl.Transform(self._turn, np.zeros(3))) for tree in self.trees]
+        return [fcl.CollisionObject(one.tree, fcl.Transform(self._turn, np.zeros(3))) for one in self._trees]
 
     def turn(self, turn: Floats) -> Obstacles:
         """The same in other coordinates, whose axes are the rows of ``turn`` (3,3)."""
         found = Obstacles((), np.zeros(3), np.zeros(3), 1.0)
-        found.trees, found.ranks, found._turn = self.trees, self.ranks, turn @ self._turn
+        found._trees, found.ranks, found._turn = self._trees, self.ranks, turn @ self._turn
+        found._corners = self._corners
         for level in self.levels:
             middle = level.middle @ turn.T
             found.levels.append(
@@ -117,29 +128,37 @@ def draw_passes(passes: Sequence[Pass], width: float, height: float) -> Mesh:
     return draw_beads(start, stop, np.concatenate([one.normals[1:] for one in passes]), width, height)
 
 
-def make_tree(mesh: Mesh) -> Any:
-    """FCL's tree of boxes over the triangles of a mesh."""
-    import fcl
+@dataclass(frozen=True, eq=False)
+class _Tree:
+    """FCL's ``tree`` of a mesh, made where it is asked for: mostly the bounds decide."""
 
-    tree = fcl.BVHModel()
-    tree.beginModel(len(mesh.vertices), len(mesh.faces))
-    tree.addSubModel(np.ascontiguousarray(mesh.vertices), np.ascontiguousarray(mesh.faces))
-    tree.endModel()
-    return tree
+    mesh: Mesh
+
+    @cached_property
+    def tree(self) -> Any:
+        return make_tree(self.mesh)
+
+
+def _find_depth(count: int) -> int:
+    """The number of levels above the last, of ``count`` balls."""
+    depth = 0
+    while count > ROOTS * MEMBERS**depth:
+        depth += 1
+    return depth
+
+
+def _fill_balls(triangles: Floats) -> Ints:
+    """An order (K,) of triangles (F,3,3) by place, the last of them again until each ball is full."""
+    order = _order_by_place(triangles.mean(axis=1))
+    return np.append(order, np.repeat(order[-1:], -len(order) % MEMBERS ** _find_depth(len(order))))
 
 
 def _make_levels(triangles: Floats, rank: Ints) -> list[Level]:
+    """The tree over triangles (F,3,3) in the order of `_fill_balls`, and their ranks (F,)."""
     points = triangles.mean(axis=1)
-    order = _order_by_place(points)
-    depth = 0
-    while len(points) > ROOTS * MEMBERS**depth:
-        depth += 1
-    # the last point again, until each ball is full
-    order = np.append(order, np.repeat(order[-1:], -len(order) % MEMBERS**depth))
-    points = points[order]
-    radius = np.sqrt(((triangles[order] - points[:, None]) ** 2).sum(axis=2).max(axis=1))
-    levels = [Level(points, radius, triangles[order, :, 2].max(axis=1), rank[order], points)]
-    for _ in range(depth):
+    radius = np.sqrt(((triangles - points[:, None]) ** 2).sum(axis=2).max(axis=1))
+    levels = [Level(points, radius, triangles[:, :, 2].max(axis=1), rank, points)]
+    for _ in range(_find_depth(len(points))):
         own, reach = levels[0].middle.reshape(-1, MEMBERS, 3), levels[0].radius.reshape(-1, MEMBERS)
         middle = (own.min(axis=1) + own.max(axis=1)) / 2
         away = np.sqrt(((own - middle[:, None]) ** 2).sum(axis=2)) + reach

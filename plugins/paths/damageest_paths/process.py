@@ -30,7 +30,7 @@ class Process:
     to keep. ``tilt``: largest of the tool axis against the build direction. ``extend``: how far a pass begins before
     its start and goes on beyond its end. ``turn_rate``: largest turn of the tool axis per length along a pass.
     ``is_trial``: few axes are tried. ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact metal; None:
-    a share of the height of a layer.
+    the share ``sink_share`` of the height of a layer.
     """
 
     height: float
@@ -48,6 +48,7 @@ class Process:
     is_trial: bool = False
     beam: Beam | None = None
     sink: float | None = None
+    sink_share: float = 0.45
 
     @property
     def step(self) -> float:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.clearance import Clearance, measure_points
-from damageest_paths.obstacles import MEMBERS
+from damageest_paths.clearance import Clearance
+from damageest_paths.descent import list_members, measure_points
 from damageest_paths.process import measure_along
 
 STRIDES = (64, 16, 4)
@@ -110,8 +110,8 @@ def bound_sweeps(
             hit[pose[kept][surface - shift[pose[kept]] < wanted]] = True
             found[hit] = -np.inf
             pose, ball = pose[kept][~hit[pose[kept]]], ball[kept][~hit[pose[kept]]]
-            pose = np.repeat(pose, MEMBERS)
-            ball = (MEMBERS * ball[:, None] + np.arange(MEMBERS)).ravel()
+            ball = list_members(ball)
+            pose, ball = np.repeat(pose, ball.shape[1]), ball.ravel()
             high = near.levels[number + 1].top[ball] > clearance.floor
             pose, ball = pose[high], ball[high]
     return np.asarray(found - clearance.detail)

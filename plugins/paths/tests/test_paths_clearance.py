@@ -53,3 +53,20 @@ def test_what_lies_below_the_floor_does_not_count() -> None:
     low, high = clearance.above(100.0).bound(points, axes, 0.8)
     assert np.isinf(low).all()
     assert np.isinf(high).all()
+
+
+def test_the_bounds_decide_close_to_the_true_distance() -> None:
+    """Without the exact distance, however near the needed one it is: surfaces are cut until they are small enough."""
+    obstacles, (points, axes) = make_obstacles(), make_poses(200)
+    clearance = Clearance(make_nozzle(Cone(1.0, 4.0, 30.0, np.radians(20))), 3.0, obstacles).during_travel()
+    checked = 0
+    for point, axis in zip(points, axes, strict=True):
+        exact = clearance.measure(point, axis)
+        if 0.1 < exact < 4:
+            # the nozzle's mesh is within the solid of revolution by 0.5 % of its radius
+            (low,), _ = clearance.bound(point[None], axis[None], exact - 0.025)
+            _, (high,) = clearance.bound(point[None], axis[None], exact + 0.005)
+            assert low >= exact - 0.025
+            assert high < exact + 0.005
+            checked += 1
+    assert checked > 40

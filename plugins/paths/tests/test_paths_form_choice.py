@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from damageest_evaluate.paths.check import measure_nozzle
-from damageest_paths.form_choice import PLANNERS, POOR, measure_lost
+from damageest_paths import form_choice
+from damageest_paths.assemble import MUCH_SUNK
+from damageest_paths.form_choice import MOST_LEFT, PLANNERS, POOR, measure_lost
+from manifold3d import CrossSection
 from path_cavities import pocket, stair
 
 from damageest.artefacts import DepositPath
-from tests.path_shapes import Loss, dent, plan
+from tests.path_shapes import BLOCK, Loss, cut, dent, plan
 
 UP = (0.0, 0.0, 1.0)
 
@@ -46,3 +49,28 @@ def test_what_no_layer_would_reach_asks_for_no_other_layers(monkeypatch: pytest.
 def test_the_form_is_that_which_is_asked_for() -> None:
     assert plan(dent(), direction=UP, layers="planar").layer_form == "planar"
     assert plan(pocket(), direction=UP, layers="conformal", simulate=False).layer_form == "conformal"
+
+
+def notch(half: float, deep: float) -> Loss:
+    """A groove with leaning walls and a sharp bottom: beads in planes lie partly in its walls."""
+    tool = CrossSection([[(-1.4 * half, 0.4 * deep), (0.0, -deep), (1.4 * half, 0.4 * deep)]]).extrude(12)
+    return cut(BLOCK, tool.translate((0, 0, -6)).rotate((90, 0, 0)))
+
+
+def sunk(path: DepositPath) -> float:
+    assert path.fill is not None
+    return path.fill.sunk / path.deposit_volume
+
+
+def test_where_many_beads_lie_in_metal_they_lie_less_deep() -> None:
+    usual, given = (plan(notch(3.0, 3.0), direction=UP, axes=5, **more) for more in ({}, {"penetration": 0.45}))
+    assert sunk(given) > MUCH_SUNK, "what the job says is done"
+    assert sunk(usual) <= MUCH_SUNK
+    assert 0 < (usual.unreached_volume - given.unreached_volume) / given.deposit_volume < MOST_LEFT
+
+
+def test_metal_is_not_spared_where_much_would_be_left_unfilled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(form_choice, "MOST_LEFT", 0.0)
+    path = plan(notch(3.0, 3.0), direction=UP, axes=5)
+    assert sunk(path) > MUCH_SUNK
+    assert any("of intact metal" in note for note in path.notes), "it is said"

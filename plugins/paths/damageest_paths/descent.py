@@ -1,0 +1,188 @@
+"""Bounds on the distance of a nozzle that is a solid of revolution, for many poses at once.
+
+A point's distance to such a nozzle follows from a formula. The points are spread over the obstacles: each stands for
+the surface within a known distance of it. Where that does not decide, the surface is cut into smaller pieces there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from damageest.artefacts import Flags, Floats, Ints
+from damageest_paths.obstacles import MEMBERS, Level, Obstacles
+
+BEAM = 12
+"""Balls of each level that are followed straight down the tree."""
+ENOUGH = 1.5
+"""Multiple of the needed distance from which a distance need not be known well."""
+CUTS = 9
+"""How often a triangle is cut in four at most. An edge is 500 times shorter then."""
+MOST_PIECES = 200_000
+"""Pieces of triangles that are looked at together: where more are open, the exact distance costs less."""
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """A nozzle with this ``profile`` (K,2) among obstacles. ``floor``: a height below which they do not count;
+    ``until``: the last rank of those that stand; ``endless``: the nozzle's body goes on above its end."""
+
+    obstacles: Obstacles
+    profile: Floats
+    endless: bool
+    floor: float
+    until: int
+
+    def bound(self, tips: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats, Ints]:
+        """Two distances (N,) for poses with ``tips`` and ``axes`` (N,3): the true one lies between them. They are only
+        as near to each other as it takes to see whether ``needed`` is kept; the lower one is 0 where it is not. And the
+        poses and ranks (K,2) of what may be nearer than `ENOUGH` times that.
+
+        Most poses that are not free are found straight down the tree; the others go down it wherever a ball is near.
+        """
+        levels = self.obstacles.levels
+        low, high = np.full(len(tips), np.inf), np.full(len(tips), np.inf)
+        ball = np.flatnonzero(self._counts(levels[0]))
+        pairs = np.empty((0, 2), np.int64)
+        if not len(ball):
+            return low, high, pairs
+        self._dive(ball, tips, axes, needed, high)
+        pose = np.repeat(np.flatnonzero(high >= needed), len(ball))
+        ball = np.tile(ball, len(tips))[: len(pose)]
+        for number, level in enumerate(levels):
+            going = high.take(pose) >= needed
+            pose, ball = pose[going], ball[going]
+            if not len(ball):
+                break
+            own = self._measure_from(level.middle.take(ball, 0), pose, tips, axes)
+            radius = level.radius.take(ball)
+            lower = own - radius
+            if number == len(levels) - 1:
+                _take_least(high, pose, np.maximum(own, 0.0))
+                close = lower < ENOUGH * needed
+                pairs = np.stack([pose[close], level.rank.take(ball[close])], axis=1)
+                open_ = (lower < needed) & (high.take(pose) >= needed)
+                _take_least(low, pose[~open_], lower[~open_])
+                self._cut(pose[open_], ball[open_], own[open_], tips, axes, needed, low, high)
+                break
+            _take_least(high, pose, np.maximum(own + radius, 0.0))
+            near = lower < ENOUGH * needed
+            _take_least(low, pose[~near], lower[~near])
+            pose, ball = np.repeat(pose[near], MEMBERS), list_members(ball[near]).ravel()
+            kept = np.flatnonzero(self._counts(levels[number + 1], ball))
+            pose, ball = pose[kept], ball[kept]
+        low[high < needed] = 0.0
+        return low, high, pairs
+
+    def _counts(self, level: Level, ball: Ints | None = None) -> Flags:
+        """Whether the balls (K,) of a level, by default all, hold something that counts."""
+        top, rank = (level.top, level.rank) if ball is None else (level.top.take(ball), level.rank.take(ball))
+        return np.asarray((top > self.floor) & (rank <= self.until))
+
+    def _cut(
+        self, pose: Ints, ball: Ints, own: Floats, tips: Floats, axes: Floats, needed: float, low: Floats, high: Floats
+    ) -> None:
+        """Lowers ``low`` and ``high`` (N,) by what the triangles of balls (K,), whose middles are ``own`` (K,) away,
+        are away from the poses (K,), which are sorted. A triangle that may be too near is cut in four until each piece
+        decides."""
+        radius = self.obstacles.levels[-1].radius.take(ball)
+        corners = self.obstacles.find_triangles(ball)
+        for _ in range(CUTS):
+            if not 0 < len(pose) <= MOST_PIECES:
+                break
+            # the piece in the middle has the middle of the whole; the others lie at its corners
+            outer = ((corners + _sum_corners(corners) / 3) / 2).reshape(-1, 3)
+            pieces, radius = np.empty((len(pose), 4)), radius / 2
+            pieces[:, :3] = self._measure_from(outer, np.repeat(pose, 3), tips, axes).reshape(-1, 3)
+            pieces[:, 3] = own
+            _take_least(high, np.repeat(pose, 4), np.maximum(pieces.ravel(), 0.0))
+            lower = pieces - radius[:, None]
+            is_open = (lower < needed) & (high.take(pose) >= needed)[:, None]
+            _take_least(low, np.repeat(pose, 4), np.where(is_open, np.inf, lower).ravel())
+            which, kind = np.nonzero(is_open)
+            pose, radius, own = pose[which], radius[which], pieces[which, kind]
+            corners = _cut_corners(corners[which], kind)
+        _take_least(low, pose, own - radius)
+
+    def _measure_from(self, points: Floats, pose: Ints, tips: Floats, axes: Floats) -> Floats:
+        """Distances (M,) of points (M,3) from the nozzle at a ``pose`` (M,) each; negative inside."""
+        return measure_points(points, tips.take(pose, 0), axes.take(pose, 0), self.profile, self.endless)
+
+    def _dive(self, roots: Ints, tips: Floats, axes: Floats, needed: float, high: Floats) -> None:
+        """Lowers ``high`` (N,) straight down the tree: from the nearest of the balls ``roots`` (K,) to the nearest that
+        they hold, and so on, by a point on the surface in each."""
+        pose = np.arange(len(tips))
+        ball = np.tile(roots, (len(tips), 1))
+        for number, level in enumerate(self.obstacles.levels):
+            flat, count = ball.ravel(), ball.shape[1]
+            own = self._measure_from(level.one.take(flat, 0), np.repeat(pose, count), tips, axes)
+            own[~self._counts(level, flat)] = np.inf
+            found = own.reshape(-1, count)
+            most = min(BEAM, count - 1)
+            nearest = np.argpartition(found, most, axis=1)[:, : most + 1]
+            value = found.min(axis=1)
+            high[pose] = np.minimum(high[pose], np.maximum(value, 0.0))
+            going = value >= needed
+            pose, ball = pose[going], np.take_along_axis(ball, nearest, axis=1)[going]
+            if not len(pose) or number == len(self.obstacles.levels) - 1:
+                break
+            ball = list_members(ball.ravel()).reshape(len(pose), -1)
+
+
+def _cut_corners(corners: Floats, kind: Ints) -> Floats:
+    """Of triangles (K,3,3) that are cut in four at the middles of their edges the piece at corner 0, 1 or 2, or for the
+    ``kind`` (K,) 3 the piece in the middle."""
+    opposite = (_sum_corners(corners) - corners) / 2
+    outer = np.flatnonzero(kind < 3)
+    opposite[outer, kind[outer]] = corners[outer, kind[outer]]
+    return opposite
+
+
+def _sum_corners(corners: Floats) -> Floats:
+    """The sums (K,1,3) of the corners of triangles (K,3,3); numpy's own take five times as long over three."""
+    return corners[:, :1] + corners[:, 1:2] + corners[:, 2:]
+
+
+def list_members(ball: Ints) -> Ints:
+    """The balls (K,MEMBERS) of the next level that balls (K,) hold."""
+    return np.asarray(MEMBERS * ball[:, None] + np.arange(MEMBERS))
+
+
+def _take_least(least: Floats, pose: Ints, found: Floats) -> None:
+    """Lowers each of ``least`` (N,) to the values ``found`` (M,) of its ``pose`` (M,), which is sorted."""
+    if len(pose):
+        starts = np.flatnonzero(np.concatenate([[True], pose[1:] != pose[:-1]]))
+        own = pose[starts]
+        least[own] = np.minimum(least[own], np.minimum.reduceat(found, starts))
+
+
+def measure_points(points: Floats, tips: Floats, axes: Floats, profile: Floats, endless: bool) -> Floats:
+    """Distances (N,) of points (N,3) to the nozzle with its tip at ``tips`` (N,3) and its axis along ``axes`` (N,3);
+    negative inside. ``endless``: its body goes on above its end."""
+    away = points - tips
+    height = np.einsum("ij,ij->i", away, axes)
+    radius = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - height**2, 0.0))
+    return _measure_to_profile(height, radius, profile, endless)
+
+
+def _measure_to_profile(height: Floats, radius: Floats, profile: Floats, endless: bool) -> Floats:
+    """Distances of points to the surface of a solid of revolution whose ``profile`` (K,2) has height and radius;
+    negative inside.
+
+    The profile is that of `Cone`: from the tip upward, never narrower.
+    """
+    tip, last = profile[0, 1], profile[-1, 1]
+    rise, end = profile[1, 0], np.inf if endless else profile[-1, 0]
+    side = np.array([rise - profile[0, 0], profile[1, 1] - tip])
+    out = radius - tip
+    along = np.clip((height * side[0] + out * side[1]) / (side @ side), 0, 1)
+    found = (height - along * side[0]) ** 2 + (out - along * side[1]) ** 2
+    np.minimum(found, height**2 + np.maximum(out, 0) ** 2, out=found)
+    beside = np.maximum(rise - height, 0) + np.maximum(height - end, 0)
+    np.minimum(found, beside**2 + (radius - last) ** 2, out=found)
+    if not endless:
+        np.minimum(found, (height - end) ** 2 + np.maximum(radius - last, 0) ** 2, out=found)
+    np.sqrt(found, out=found)
+    inside: Flags = (height > 0) & (height < end) & (radius < last) & (out * side[0] < height * side[1])
+    return np.asarray(np.where(inside, -found, found))
