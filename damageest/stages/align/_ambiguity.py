@@ -17,6 +17,9 @@ from damageest.stages.align._symmetries import measure_apart
 SAME = 0.002
 """Distance, in diagonals, up to which places of two surfaces are the same for a symmetry, where the scan is coarser."""
 
+FEW = 4000
+"""Points, spread over the scan, that are asked first whether a pose fits worse."""
+
 REMEDY = "where the pose is known, give it to align: icp or align: none"
 
 
@@ -36,15 +39,23 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
     for twist in motions.T[stiffness < 0.01]:
         for D in make_motions(np.stack([twist, -twist]) * 6 * band):
             differs = float((np.abs(target.closest(move_points(surface, D))[0]) > band).mean())
-            if differs > 0.002 and not is_worse(
-                robust_cost(target.closest(move_points(points, D @ pose))[0], band), here
-            ):
+            if differs > 0.002 and not _is_much_worse(target, points, D @ pose, band, here):
                 text = (
                     "the scan does not fix the pose: the part can be moved or turned a little and fits as well, "
                     "because the surface that would prevent it is missing or was not seen"
                 )
                 return (Reason("pose_free", text, "contradicts", remedy=REMEDY),)
     return ()
+
+
+def _is_much_worse(target: PartSurface, points: Floats, pose: Floats, band: float, here: Floats) -> bool:
+    """Whether the points (N,3) fit significantly worse in ``pose`` (4,4) than where they cost ``here`` (N,): mostly a
+    few of them show it."""
+    for step in (max(1, len(points) // FEW), 1):
+        cost = robust_cost(target.closest(move_points(points[::step], pose))[0], band)
+        if is_worse(cost, here[::step]):
+            return True
+    return False
 
 
 def describe_choice(choice: Choice) -> tuple[str, ...]:
