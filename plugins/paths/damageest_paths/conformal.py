@@ -102,13 +102,10 @@ class _Work:
 
     def build(self, count: int, corners: Floats) -> None:
         grid = make_grid(self.floor, corners[0, :2], corners[1, :2], self.process)
-        solid = Mesh(*to_arrays(self.body))
-        heights = guess_heights(self.floor, grid)
         width = self.process.bead.width
-        for number in range(count):
-            sheet = lay_sheet(self.floor, grid, heights, (number + 1) * self.height, self.process, self.height)
-            heights = sheet.points[:, 2]
-            reach = measure_reach(sheet, solid, self.height, 3 * FINE * width) + THIN * self.height
+        # all layers are laid out before the first is filled: what cannot be followed is refused without that
+        layers = self._lay_out(count, grid)
+        for number, (sheet, reach, patches) in enumerate(layers):
             lines = [one.points for one in self.layer]
             lean = self.height * np.tan(self.process.overhang)
             some = np.flatnonzero(reach < width)
@@ -119,12 +116,26 @@ class _Work:
             above = Obstacles(meshes, corners[0], corners[1], width)
             around = [self.standing, Sweeps(self.standing.clearance.with_obstacles(above))]
             self.layer = []
-            for patch in list_patches(sheet, grid, reach, self.floor, self.process):
+            for patch in patches:
                 self._fill_patch(patch, number, reach, held - lean, around)
             self.passes += order_passes(
                 self.layer, self.passes[-1] if self.passes else None, self.standing.clearance.reach
             )
         self._add_rest()
+
+    def _lay_out(self, count: int, grid: Grid) -> list[tuple[Sheet, Floats, list[Patch]]]:
+        """The tops of the layers, how far the deposit is from each place of them, and the patches that are unrolled.
+        Raises NotFollowedError."""
+        solid = Mesh(*to_arrays(self.body))
+        heights = guess_heights(self.floor, grid)
+        spacing = 3 * FINE * self.process.bead.width
+        found = []
+        for number in range(count):
+            sheet = lay_sheet(self.floor, grid, heights, (number + 1) * self.height, self.process, self.height)
+            heights = sheet.points[:, 2]
+            reach = measure_reach(sheet, solid, self.height, spacing) + THIN * self.height
+            found.append((sheet, reach, list_patches(sheet, grid, reach, self.floor, self.process)))
+        return found
 
     def _add_rest(self) -> None:
         """What no layer covers is missing too, as below the planes in which the floor goes on."""

@@ -59,7 +59,7 @@ class Descent:
             radius = level.radius.take(ball)
             lower = own - radius
             if number == len(levels) - 1:
-                _take_least(high, pose, np.maximum(own, 0.0))
+                _take_least(high, pose, self._measure_high(own, level.middle.take(ball, 0)))
                 close = lower < ENOUGH * needed
                 pairs = np.stack([pose[close], level.rank.take(ball[close])], axis=1)
                 open_ = (lower < needed) & (high.take(pose) >= needed)
@@ -96,14 +96,25 @@ class Descent:
             pieces, radius = np.empty((len(pose), 4)), radius / 2
             pieces[:, :3] = self._measure_from(outer, np.repeat(pose, 3), tips, axes).reshape(-1, 3)
             pieces[:, 3] = own
-            _take_least(high, np.repeat(pose, 4), np.maximum(pieces.ravel(), 0.0))
+            _take_least(high, np.repeat(pose, 3), self._measure_high(pieces[:, :3].ravel(), outer))
             lower = pieces - radius[:, None]
             is_open = (lower < needed) & (high.take(pose) >= needed)[:, None]
             _take_least(low, np.repeat(pose, 4), np.where(is_open, np.inf, lower).ravel())
             which, kind = np.nonzero(is_open)
-            pose, radius, own = pose[which], radius[which], pieces[which, kind]
             corners = _cut_corners(corners[which], kind)
+            kept = corners[:, :, 2].max(axis=1) > self.floor
+            pose, radius, own, corners = (
+                pose[which[kept]],
+                radius[which[kept]],
+                pieces[which, kind][kept],
+                corners[kept],
+            )
         _take_least(low, pose, own - radius)
+
+    def _measure_high(self, own: Floats, points: Floats) -> Floats:
+        """The distances (K,) of points (K,3) on obstacles, whose signed ones are ``own``; infinite where a point does
+        not count, as what it stands for may lie higher than it does."""
+        return np.where(points[:, 2] > self.floor, np.maximum(own, 0.0), np.inf)
 
     def _measure_from(self, points: Floats, pose: Ints, tips: Floats, axes: Floats) -> Floats:
         """Distances (M,) of points (M,3) from the nozzle at a ``pose`` (M,) each; negative inside."""
@@ -121,8 +132,8 @@ class Descent:
             found = own.reshape(-1, count)
             most = min(BEAM, count - 1)
             nearest = np.argpartition(found, most, axis=1)[:, : most + 1]
-            value = found.min(axis=1)
-            high[pose] = np.minimum(high[pose], np.maximum(value, 0.0))
+            value = self._measure_high(own, level.one.take(flat, 0)).reshape(-1, count).min(axis=1)
+            high[pose] = np.minimum(high[pose], value)
             going = value >= needed
             pose, ball = pose[going], np.take_along_axis(ball, nearest, axis=1)[going]
             if not len(pose) or number == len(self.obstacles.levels) - 1:

@@ -70,3 +70,18 @@ def test_the_bounds_decide_close_to_the_true_distance() -> None:
             assert high < exact + 0.005
             checked += 1
     assert checked > 40
+
+
+def test_of_a_large_triangle_only_what_lies_above_the_floor_counts() -> None:
+    """The nozzle touches a ramp below the floor; above the floor the ramp, in a few large triangles, is 3 away."""
+    x, z = np.array([-25.0, 35.0]), np.array([-11.0, 13.0])
+    corners = np.array([[x[k], y, z[k]] for k in range(2) for y in (-40.0, 40.0)])
+    ramp = Mesh(corners, np.array([[0, 2, 1], [1, 2, 3]]))
+    far = np.full(3, -100.0)
+    clearance = Clearance(make_nozzle(Cone(1.0, 4.0, 30.0, np.radians(20))), 3.0, Obstacles([ramp], far, far + 1, 2.0))
+    pose = np.array([[5.0, 0.0, -2.0]]), np.array([[0.0, 0.0, 1.0]])
+    assert clearance.bound(*pose, 0.8)[1] < 0.8
+    low, high = clearance.above(3.0).bound(*pose, 0.8)
+    assert low >= 0.8
+    assert high > 2.5
+    assert clearance.above(3.0).measure_poses(*pose, 0.8) >= 0.8
