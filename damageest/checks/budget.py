@@ -14,7 +14,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.checks.scanner import ScannerErrors
-from damageest.checks.uncertainty import WIDTH, SiteError
+from damageest.checks.site_error import WIDTH, SiteError
 from damageest.findings import Budget, BudgetBound, BudgetRow
 
 Distribution = Literal["normal", "rectangular"]

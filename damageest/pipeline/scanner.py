@@ -10,7 +10,7 @@ from damageest.artefacts import Part, Reason, Scan
 from damageest.checks.model_fit import FittedModel
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scanner import FORM_RANGE, REFERENCE, ScannerErrors, Term, leave_form, spread_of
-from damageest.checks.uncertainty import WIDTH
+from damageest.checks.site_error import WIDTH
 from damageest.job.scanner import Certificate, ScannerInfo, Temperature
 from damageest.pipeline.form import divide_scan
 from damageest.pipeline.state import Reasons

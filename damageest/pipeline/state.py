@@ -40,8 +40,8 @@ from damageest.checks.free_pose import Dependence
 from damageest.checks.model_fit import AskedFit, FittedModel
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scanner import ScannerErrors
+from damageest.checks.site_error import SiteError
 from damageest.checks.two_sheets import Sheets
-from damageest.checks.uncertainty import SiteError
 from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
 from damageest.findings import Budget, Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict

@@ -17,16 +17,8 @@ from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scan_quality import describe_few
 from damageest.checks.scanner import ScannerErrors
-from damageest.checks.uncertainty import (
-    WIDTH,
-    SiteError,
-    combine_site,
-    combine_total,
-    limit_beside,
-    measure_shifts,
-    measure_site_error,
-    sum_free,
-)
+from damageest.checks.site_error import WIDTH, SiteError, combine_site, combine_total, sum_free
+from damageest.checks.uncertainty import limit_beside, measure_shifts, measure_site_error
 from damageest.checks.view_fit import ViewFits
 from damageest.checks.view_overlap import compare_at_site
 from damageest.findings import Budget, Fading, Interval, Uncertainty

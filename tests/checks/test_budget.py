@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from damageest.checks.budget import SOURCES, make_depth_budget, make_volume_budget
 from damageest.checks.scanner import ScannerErrors, Term, leave_form, spread_of
-from damageest.checks.uncertainty import WIDTH, SiteError, combine_total
+from damageest.checks.site_error import WIDTH, SiteError, combine_total
 from damageest.findings import Budget
 
 SIZES = st.floats(0.0, 10.0)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from damageest.checks.uncertainty import WIDTH, SiteError, combine_site, combine_total
+from damageest.checks.site_error import WIDTH, SiteError, combine_site, combine_total
 
 SIZES = st.floats(0.0, 10.0)
 ERRORS = st.builds(
