@@ -10,7 +10,8 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_cubes
-from damageest.stages.adapt._field import Body, Field, Freedom, fit, match
+from damageest.stages.adapt._field import Body, Field, Freedom, match
+from damageest.stages.adapt._fit import fit
 
 PATCHES = 10.0
 """Patches along the part's diagonal."""

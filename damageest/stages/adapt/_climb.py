@@ -9,7 +9,8 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.stages.adapt._choose import Score, Trial, cross_validate, cut_patches, explains_more, is_better
-from damageest.stages.adapt._field import STIFF, Body, Field, Freedom, fit, match
+from damageest.stages.adapt._field import STIFF, Body, Field, Freedom, match
+from damageest.stages.adapt._fit import fit
 
 ROUNDS, LAST, HELD = 8, 10, 6
 """Rounds from the widest robust scale to the narrowest, more at the narrowest at most, and those of a fit to half of

@@ -11,16 +11,8 @@ from damageest.artefacts import Floats, Mesh
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_cubes
 from damageest.stages.adapt._choose import Trial, cut_patches
-from damageest.stages.adapt._field import (
-    Body,
-    Equations,
-    Match,
-    match,
-    weigh,
-    weigh_points,
-    weigh_roughness,
-    weigh_strain,
-)
+from damageest.stages.adapt._field import Body, Match, match, weigh
+from damageest.stages.adapt._fit import Equations, weigh_points, weigh_roughness, weigh_strain
 
 MODES = 24
 """Independent errors that are kept."""

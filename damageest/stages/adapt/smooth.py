@@ -18,7 +18,8 @@ from damageest.stages.adapt import Adapt
 from damageest.stages.adapt._body import prepare, thin
 from damageest.stages.adapt._choose import SHARE, Score, Trial
 from damageest.stages.adapt._climb import BENT, RIGID, WIDEST, choose_scales, climb, score
-from damageest.stages.adapt._field import Body, Field, fit, match, weigh
+from damageest.stages.adapt._field import Body, Field, match, weigh
+from damageest.stages.adapt._fit import fit
 from damageest.stages.adapt._mesh import deform_part, refine, require_injective
 from damageest.stages.adapt._other import (
     describe_hidden,
