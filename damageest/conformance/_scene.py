@@ -185,7 +185,8 @@ def make_scene() -> SimpleNamespace:
     distance, face = signed_distance(points, part)
     damage = distance < -TOLERANCE
     site = np.where(damage, site, 0).astype(np.int32)
-    near = find_cubes_near(part, points[damage], points[~damage], 20 * TOLERANCE)
+    feet = points[damage] - distance[damage, None] * part.face_normals[face[damage]]
+    near, _ = find_cubes_near(part, points[damage], feet, points[~damage], 20 * TOLERANCE)
     surface = make_bowl()
     low, high = part.bounds
     clear = 2 * TOLERANCE

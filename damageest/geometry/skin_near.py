@@ -66,11 +66,12 @@ class NearCubes:
         return count > 0
 
 
-def find_cubes_near(part: Mesh, places: Floats, intact: Floats, edge: float) -> NearCubes:
-    """The cubes of the part's skin near damage.
+def find_cubes_near(part: Mesh, places: Floats, feet: Floats, intact: Floats, edge: float) -> tuple[NearCubes, Floats]:
+    """The cubes of the part's skin near damage, and places (K,3) on the skin in them that the scan does not show.
 
     These are the cubes of ``edge``, or more where there were too many, with one of the damaged ``places`` (N,3), cubes
-    connected to them whose skin has few of the ``intact`` points (M,3), and the cubes round both.
+    connected to them whose skin has few of the ``intact`` points (M,3), and the cubes round both. Skin with few points
+    is lost where ``feet`` (N,3) lie on it, the places' nearest points of the skin; else it is not shown.
     """
     from scipy.ndimage import binary_dilation, label
 
@@ -90,7 +91,9 @@ def find_cubes_near(part: Mesh, places: Floats, intact: Floats, edge: float) -> 
     around = np.ones((3, 3, 3), bool)
     joined, _ = label((has_damage | poor).reshape(grid.shape), around)
     core = np.isin(joined, np.unique(joined.ravel()[has_damage]))
-    return NearCubes(grid, binary_dilation(core, around).ravel())
+    has_foot = np.bincount(grid.number_cells(feet), minlength=total) > 0
+    unseen = on_skin[(core.ravel() & poor & ~has_foot)[grid.number_cells(on_skin)]]
+    return NearCubes(grid, binary_dilation(core, around).ravel()), unseen
 
 
 def _spread_area(part: Mesh, step: float) -> tuple[Floats, Floats]:

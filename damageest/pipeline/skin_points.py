@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from damageest.artefacts import ADDED, INTACT, Deviation, Part, Samples, Scan, Sites
 from damageest.geometry.skin_near import NearCubes, find_cubes_near, sample_near
 from damageest.pipeline.engine import Branch, Engine, follow
@@ -50,10 +52,15 @@ def note_unused(engine: Engine, samples: Samples | None) -> Reasons:
 def sample_near_damage(
     part: Part, aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float, encloser_at_once: EncloseAll | None
 ) -> Samples:
-    """Points on the part's skin near the damage: a tolerance apart about the rim, two elsewhere."""
+    """Points on the part's skin near the damage: a tolerance apart about the rim and where the scan shows no skin, two
+    elsewhere."""
     on_skin = (deviation.label == INTACT) | (deviation.label == ADDED)
-    places, intact = aligned.points[sites.label > 0], aligned.points[on_skin]
+    damaged = np.flatnonzero(sites.label > 0)
+    places, intact = aligned.points[damaged], aligned.points[on_skin]
+    feet = places - deviation.distance[damaged, None] * part.face_normals[deviation.face[damaged]]
     reach = encloser_at_once.nearby_reach if encloser_at_once else MOST_EDGE
     edge = max(reach * tolerance, min(EDGE_SPACINGS * aligned.spacing, MOST_EDGE * tolerance))
-    fine = NearCubes.around(places, max(FINE * tolerance, FINE_SPACINGS * aligned.spacing))
-    return sample_near(part, find_cubes_near(part, places, intact, edge), fine, tolerance)
+    near, unseen = find_cubes_near(part, places, feet, intact, edge)
+    # where the scan ends beside damage, the surface ends somewhere beyond its points: wide samples would let it go on
+    fine = NearCubes.around(np.concatenate([places, unseen]), max(FINE * tolerance, FINE_SPACINGS * aligned.spacing))
+    return sample_near(part, near, fine, tolerance)

@@ -140,15 +140,16 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     ),
     "shapes.recognise_shape": lambda r: expect(np.asarray(shapes.recognise_shape(r.mesh.triangles) is None), ()),
     "skin_near.NearCubes": lambda r: expect(
-        skin_near.find_cubes_near(CUBE, CUBE.vertices, r.points, 1.0).touches(r.mesh.triangles), (len(r.mesh.faces),)
+        skin_near.find_cubes_near(CUBE, CUBE.vertices, CUBE.vertices, r.points, 1.0)[0].touches(r.mesh.triangles),
+        (len(r.mesh.faces),),
     ),
     "skin_near.find_cubes_near": lambda r: expect(
-        skin_near.find_cubes_near(CUBE, r.points, r.points, 1.0).holds(r.points), (r.count,)
+        skin_near.find_cubes_near(CUBE, r.points, r.points, r.points, 1.0)[0].holds(r.points), (r.count,)
     ),
     "skin_near.sample_near": lambda r: expect(
         skin_near.sample_near(
             PART,
-            skin_near.find_cubes_near(PART, r.points, r.points, 1.0),
+            skin_near.find_cubes_near(PART, r.points, r.points, r.points, 1.0)[0],
             skin_near.NearCubes.around(r.points, 1.0),
             5.0,
         ).points,

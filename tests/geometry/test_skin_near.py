@@ -28,7 +28,8 @@ def test_no_place_near_the_damage_is_far_from_a_point(mesh: Mesh) -> None:
     skin, _ = sample_by_area(part, 60_000, rng)
     centre = part.vertices[0]
     is_lost = np.linalg.norm(skin - centre, axis=1) < 2
-    near = find_cubes_near(part, skin[is_lost], skin[~is_lost], EDGE)
+    near, unseen = find_cubes_near(part, skin[is_lost], skin[is_lost], skin[~is_lost], EDGE)
+    assert not len(unseen), "what is not seen is lost"
     fine = NearCubes.around(skin[is_lost], RIM)
     found = sample_near(part, near, fine, TOLERANCE)
     asked = near.holds(skin)
@@ -52,7 +53,9 @@ def test_skin_that_the_scan_does_not_show_is_near_where_it_begins_at_the_damage(
     skin, _ = sample_by_area(part, 60_000, rng)
     is_lost = np.linalg.norm(skin - part.bounds[1], axis=1) < 2
     is_bare = (skin[:, 2] > 9.9) & (skin[:, 0] > -10)  # a strip of the top, from the damage on
-    near = find_cubes_near(part, skin[is_lost], skin[~is_lost & ~is_bare], EDGE)
+    near, unseen = find_cubes_near(part, skin[is_lost], skin[is_lost], skin[~is_lost & ~is_bare], EDGE)
     assert near.holds(skin[is_bare]).all()
-    other = find_cubes_near(part, skin[is_lost], skin[~is_lost], EDGE)
+    assert cKDTree(unseen).query(skin[is_bare])[0].max() < EDGE
+    assert (cKDTree(skin[is_bare]).query(unseen)[0] < EDGE).all()
+    other, _ = find_cubes_near(part, skin[is_lost], skin[is_lost], skin[~is_lost], EDGE)
     assert not other.holds(skin[is_bare]).all()

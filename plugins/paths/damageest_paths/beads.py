@@ -155,7 +155,7 @@ def stamp_beads(beads: Beads, frame: Frame, low: Floats, size: tuple[int, int, i
     points = start[owner] + share[:, None] * (stop - start)[owner]
     middle = points - (beads.height[owner] / 2)[:, None] * normal[owner]
     reach = np.hypot(beads.width.max() / 2, beads.height.max() / 2)
-    half = np.hypot(reach, float((length / counts).max()) / 2) + np.sqrt(3) * edge
+    half = reach + float((length / counts).max()) / 2 + np.sqrt(3) * edge
     span = int(np.ceil(half / edge))
     ball = np.stack(np.meshgrid(*[np.arange(-span, span + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     ball = ball[np.linalg.norm(ball, axis=1) * edge <= half]

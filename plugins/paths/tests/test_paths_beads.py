@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from damageest_paths.beads import Beads, simulate_beads, stamp_beads
 from damageest_paths.frames import make_frame
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from damageest.artefacts import Flags, Floats, Solid
@@ -43,6 +43,7 @@ def mark_one_by_one(beads: Beads, low: Floats, size: tuple[int, int, int]) -> Fl
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(1, 6), st.floats(0.05, 4.0), st.integers(0, 2**32 - 1))
+@example(2, 2.71875, 28)
 def test_a_voxel_is_marked_where_its_middle_lies_in_a_bead(count: int, longest: float, seed: int) -> None:
     beads = draw_beads(count, longest, np.random.default_rng(seed))
     ends = FRAME.to_local(np.concatenate([beads.start, beads.stop]))
