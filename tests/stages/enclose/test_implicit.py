@@ -133,7 +133,7 @@ def test_skin_samples_reach_as_far_as_the_grid_does() -> None:
     skin = EdgeAware().run(part=case.part, tolerance=10 * TOLERANCE).points
     reached = KDTree(case.of_sites()).query(skin)[0] < 60 * TOLERANCE
     assert KDTree(nearby.points).query(skin[reached])[0].max() < nearby.spacing
-    assert len(case.nearby.points) < 0.8 * len(nearby.points), "the default margin needs fewer"
+    assert len(case.nearby.points) < 0.9 * len(nearby.points), "the default margin needs fewer"
     (item,) = enclose_with(case, wide, nearby=nearby).items
     (piece,) = intersect_pieces(case, Enclosures((item,)))
     assert iou(piece, case.truth) > 0.97
