@@ -161,15 +161,14 @@ def _fill_in(costs: Floats, count: int) -> Floats:
 
 
 def _bound_all(points: Floats, axes: Floats, clearance: Clearance, limits: Limits) -> tuple[Floats, Floats]:
-    """Bounds (N,M) of the distance at points (N,3) with each of the axes (M,3): near enough to each other to see
-    whether there is room to spare, and where there is not, whether the distance is kept."""
+    """Bounds (N,M) of the distance at points (N,3) with each of the axes (M,3).
+
+    Rough ones: where they do not decide, a pose costs more than one with room to spare. With exact ones, the tool takes
+    tight poses, and has to leave and come back between passes: up to three times the travel was measured.
+    """
     count = len(axes)
     at, along = np.repeat(points, count, axis=0), np.tile(axes, (len(points), 1))
-    low, high = clearance.bound(at, along, ROOM * limits.needed)
-    near = np.flatnonzero((high < ROOM * limits.needed) & (high >= limits.needed))
-    if len(near):
-        least, most = clearance.bound(at[near], along[near], limits.needed)
-        low[near], high[near] = np.maximum(low[near], least), np.minimum(high[near], most)
+    low, high = clearance.bound(at, along, ROOM * limits.needed, is_rough=True)
     return low.reshape(-1, count), high.reshape(-1, count)
 
 

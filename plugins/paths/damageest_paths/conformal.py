@@ -35,6 +35,8 @@ NO_FLOOR, BESIDE = (
     "no side of it that lies on metal faces the build direction",
     "lies beside or below the floor that the layers follow",
 )
+COARSER = 2.0
+"""How much farther apart the points are by which the nozzle is bounded, than for planes: each pose is decided here."""
 SPARE = 0.02
 """Share of a layer's height that is not worth another layer: the facets of a round floor are off by as much."""
 SLIVER = 0.05
@@ -61,7 +63,7 @@ def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Proce
     corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
     meshes = [Mesh(*to_arrays(metal))]
     meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
-    near = Obstacles(meshes, corners[0], corners[1], process.bead.width)
+    near = Obstacles(meshes, corners[0], corners[1], process.bead.width, coarser=COARSER)
     standing = Sweeps(around.clearance.with_obstacles(near))
     thickest = float(floor.measure(to_arrays(local.refine_to_length(process.bead.width))[0]).distance.max())
     count = max(1, int(np.ceil(thickest / process.height - SPARE)))
@@ -113,7 +115,7 @@ class _Work:
             self.stack.append((sheet, reach))
             top = self._gather_top(grid)
             meshes = [top] if len(top.faces) else []
-            above = Obstacles(meshes, corners[0], corners[1], width)
+            above = Obstacles(meshes, corners[0], corners[1], width, coarser=COARSER)
             around = [self.standing, Sweeps(self.standing.clearance.with_obstacles(above))]
             self.layer = []
             for patch in patches:

@@ -16,7 +16,7 @@ from damageest_paths.frames import find_across
 from damageest_paths.process import Pass
 from damageest_paths.trees import make_tree
 
-FINE, GROWTH = 0.8, 0.4
+FINE, GROWTH = 0.4, 0.4
 """Longest edge of the obstacles' triangles, whose middles are the points: in bead widths near the deposit, and as a
 share of the distance from it."""
 MEMBERS = 8
@@ -50,14 +50,15 @@ class Obstacles:
     """
 
     def __init__(
-        self, meshes: Sequence[Mesh], low: Floats, high: Floats, width: float, ranks: Sequence[int] | None = None
-    ) -> None:
+        self, meshes: Sequence[Mesh], low: Floats, high: Floats, width: float, ranks: Sequence[int] | None = None,
+        coarser: float = 1.0,
+    ) -> None:  # fmt: skip
         """``low``, ``high`` (3,): the box round the deposit, near which the points are dense; ``width`` of a bead;
         ``ranks``: for each mesh, ascending, the order in which it is built up; by default all are there from the
-        beginning."""
+        beginning. ``coarser``: factor of the points' distance."""
         self._trees = [_Tree(mesh) for mesh in meshes]
         self.ranks: list[int] = [0] * len(meshes) if ranks is None else list(ranks)
-        parts = [_cut_triangles(mesh.triangles, low, high, width) for mesh in meshes]
+        parts = [_cut_triangles(mesh.triangles, low, high, coarser * width) for mesh in meshes]
         triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
         rank = np.repeat(np.array(self.ranks, np.int64), [len(part) for part in parts])
         self.levels: list[Level] = []
