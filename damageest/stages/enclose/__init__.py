@@ -96,9 +96,9 @@ class EncloseAll(Stage, ABC):
         sites: for each scan point the number of its site, from 1; 0 for a point of no site.
         samples: points on all of the part's skin, with normals; made only for an implementation that takes them.
         nearby: points on the faces of the skin round the damage, with normals, about a tolerance apart near damaged
-            points and two elsewhere: in cubes with damaged points, those connected to them with few points of the scan,
-            and those round both. The cubes have an edge of `nearby_reach` tolerances, up to 40 in a sparse scan.
-            Cheaper than ``samples`` on a part of many triangles.
+            points and where the scan shows no skin, two elsewhere: in cubes with damaged points, those connected to
+            them with few points of the scan, and those round both. The cubes have an edge of `nearby_reach` tolerances,
+            up to 40 in a sparse scan. Cheaper than ``samples`` on a part of many triangles.
         tolerance: depth from which a point counts as damage.
 
     Returns:
