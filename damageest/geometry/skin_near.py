@@ -82,7 +82,8 @@ def find_cubes_near(part: Mesh, places: Floats, feet: Floats, intact: Floats, ed
     grid = VoxelGrid(low, size, np.ceil((high - low) / size).astype(np.int64) + 3)
     total = int(np.prod(grid.shape))
     on_skin, area = _spread_area(part, size / PLACES)
-    expected = np.bincount(grid.number_cells(on_skin), weights=area, minlength=total)
+    cell = grid.number_cells(on_skin)
+    expected = np.bincount(cell, weights=area, minlength=total)
     seen = np.bincount(grid.number_cells(intact), minlength=total)
     has_skin = expected > 0
     usual = np.median(seen[has_skin] / expected[has_skin])
@@ -92,7 +93,7 @@ def find_cubes_near(part: Mesh, places: Floats, feet: Floats, intact: Floats, ed
     joined, _ = label((has_damage | poor).reshape(grid.shape), around)
     core = np.isin(joined, np.unique(joined.ravel()[has_damage]))
     has_foot = np.bincount(grid.number_cells(feet), minlength=total) > 0
-    unseen = on_skin[(core.ravel() & poor & ~has_foot)[grid.number_cells(on_skin)]]
+    unseen = on_skin[(core.ravel() & poor & ~has_foot)[cell]]
     return NearCubes(grid, binary_dilation(core, around).ravel()), unseen
 
 

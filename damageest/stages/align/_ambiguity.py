@@ -51,7 +51,7 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
 def _is_much_worse(target: PartSurface, points: Floats, pose: Floats, band: float, here: Floats) -> bool:
     """Whether the points (N,3) fit significantly worse in ``pose`` (4,4) than where they cost ``here`` (N,): mostly a
     few of them show it."""
-    for step in (max(1, len(points) // FEW), 1):
+    for step in sorted({max(1, len(points) // FEW), 1}, reverse=True):
         cost = robust_cost(target.closest(move_points(points[::step], pose))[0], band)
         if is_worse(cost, here[::step]):
             return True
