@@ -57,9 +57,9 @@ def plan_in_form(form: Form, plan: Plan, is_sink_given: bool = False) -> Deposit
 def _spare_metal(planar: DepositPath, plan: Plan) -> DepositPath:
     """The path in planes; where much of its beads lies in intact metal, one of which less does, if that leaves little
     of the deposit unfilled."""
+    if _measure_sunk(planar) <= MUCH_SUNK:
+        return planar
     for share in SPARING:
-        if _measure_sunk(planar) <= MUCH_SUNK:
-            break
         sparing = plan(_make_sparing(share))
         left = (sparing.unreached_volume - planar.unreached_volume) / planar.deposit_volume
         if not len(sparing.points) or left > MOST_LEFT:
