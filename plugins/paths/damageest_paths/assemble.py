@@ -15,7 +15,8 @@ from damageest.geometry.transforms import turn_to_axis
 from damageest_paths.beads import SHARE, Beads, simulate_beads
 from damageest_paths.clearance import Clearance
 from damageest_paths.directions import Planner, gather_missing, list_directions, plan_parts
-from damageest_paths.moves import Moves, Travel, find_corners, join_passes, rank_layers
+from damageest_paths.exits import Travel
+from damageest_paths.moves import Moves, find_corners, join_passes, rank_layers
 from damageest_paths.nozzle import Nozzle
 from damageest_paths.obstacles import Obstacles, draw_passes
 from damageest_paths.planar import Surroundings

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest.geometry.vectors import measure_to_sphere, normalise
+from damageest.geometry.vectors import normalise
 from damageest_paths.clearance import Clearance
-from damageest_paths.network import Network, measure_way
+from damageest_paths.exits import Exit, Travel, find_exit, leave, lift_to_sphere, list_exits
+from damageest_paths.network import Network, measure_blocked_way, measure_way
 from damageest_paths.process import Pass
 
 LIFTS = (1, 2, 4, 8)
@@ -22,34 +22,6 @@ SAME = 1e-6
 """Difference of two unit axes up to which they are the same."""
 FLAT = 0.01
 """Share of the gap up to which two heights are the same."""
-MOST_EXITS = 12
-"""Passes whose axes, and places, are tried where the tool cannot leave along its own axis, as in a bore."""
-
-
-@dataclass(frozen=True)
-class Travel:
-    """``hop``: how far the tool is lifted along its axis between passes; ``stays``: whether it is not where the way is
-    free without. ``safe``: a distance from ``centre`` (3,) at which the nozzle is clear of everything. ``corners``
-    (N,3): of the hull of everything, and ``above``: how far beyond it along the tool axis the nozzle is clear, measured
-    to the point that it works on. ``gap``: distance to keep. ``feed``, ``fast``: speeds of deposition and of travel, in
-    lengths a minute."""
-
-    hop: float
-    safe: float
-    centre: Floats
-    gap: float
-    feed: float
-    fast: float
-    corners: Floats
-    above: float
-    stays: bool = True
-
-
-class Exit(NamedTuple):
-    """A ``place`` (3,) from which the tool may be clear when it leaves along an ``axis`` (3,)."""
-
-    place: Floats
-    axis: Floats
 
 
 class Moves(NamedTuple):
@@ -84,7 +56,7 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
     rows: list[tuple[Floats, Floats, Floats, float, bool, int, int, int]] = []
     gap, number, blocked = np.inf, 0, 0
     before: Pass | None = None
-    old, ranks, exits = 0, rank_layers(groups), _list_exits(groups)
+    old, ranks, exits = 0, rank_layers(groups), list_exits(groups)
     free_ends: list[bool] | None = [] if _is_turning(groups) else None
     network = Network(groups, travel.hop, travel.gap, clearance.reach)
     for part, passes in enumerate(groups, 1):
@@ -94,7 +66,9 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
             standing = clearance.after(rank if rank == old else rank - 1)
             way, way_axes, found = _find_way(before, one, exits, network, standing, travel)
             old = rank
-            blocked += found < travel.gap / 2
+            if found < travel.gap / 2:
+                blocked += 1
+                found = _measure_blocked(before, way, way_axes, one, standing, travel)
             gap = min(gap, found)
             for point, axis in zip(way, way_axes, strict=True):
                 rows.append((point, axis, one.normals[0], travel.fast, False, one.layer + 1, number, part))
@@ -108,8 +82,10 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
             before = one
     if before is not None:
         standing = clearance.after(len(ranks))
-        way, way_axes, found = _leave(before.points[-1], before.axes[-1], exits, network, standing, travel)
-        blocked += found < travel.gap / 2
+        way, way_axes, found = leave(before.points[-1], before.axes[-1], exits, network, standing, travel)
+        if found < travel.gap / 2:
+            blocked += 1
+            found = _measure_blocked(before, way, way_axes, None, standing, travel)
         gap = min(gap, found)
         for point, axis in zip(way, way_axes, strict=True):
             rows.append((point, axis, before.normals[-1], travel.fast, False, rows[-1][5], number, rows[-1][7]))
@@ -124,6 +100,19 @@ def join_passes(groups: Sequence[Sequence[Pass]], clearance: Clearance, travel: 
     )  # fmt: skip
 
 
+def _measure_blocked(
+    before: Pass | None, way: Floats, axes: Floats, after: Pass | None, clearance: Clearance, travel: Travel
+) -> float:
+    """The least distance on a ``way`` (K,3) with tool ``axes`` (K,3) from the end of a pass to the start of another."""
+    poses = [(way, axes)]
+    if before is not None:
+        poses.insert(0, (before.points[-1:], before.axes[-1:]))
+    if after is not None:
+        poses.append((after.points[:1], after.axes[:1]))
+    points, turned = (np.concatenate(each) for each in zip(*poses, strict=True))
+    return measure_blocked_way(points, turned, clearance, travel.gap)
+
+
 def _is_turning(groups: Sequence[Sequence[Pass]]) -> bool:
     """Whether the tool axis is not the same everywhere."""
     axes = np.concatenate([np.empty((0, 3)), *(one.axes for passes in groups for one in passes)])
@@ -133,7 +122,7 @@ def _is_turning(groups: Sequence[Sequence[Pass]]) -> bool:
 def _is_end_free(one: Pass, clearance: Clearance, travel: Travel) -> bool:
     """Whether the tool can leave the end of a pass straight along its axis to the safe distance."""
     point, axis = one.points[-1], one.axes[-1]
-    out = np.array([point, _lift_to_sphere(point, axis, travel, travel.safe)])
+    out = np.array([point, lift_to_sphere(point, axis, travel, travel.safe)])
     return measure_way(out, np.array([axis, axis]), clearance, travel.gap) >= travel.gap / 2
 
 
@@ -153,84 +142,13 @@ def rank_layers(groups: Sequence[Sequence[Pass]]) -> dict[tuple[int, int], int]:
     return {each: rank for rank, each in enumerate(layers, 1)}
 
 
-def _lift(point: Floats, axis: Floats, travel: Travel) -> Floats:
-    """The point (3,) straight up the axis from which on all the nozzle is above everything, or at the safe distance."""
-    top = float((travel.corners @ axis).max()) + travel.above
-    sphere = float(_lift_to_sphere(point, axis, travel, travel.safe) @ axis)
-    return np.asarray(point + max(min(top, sphere) - float(point @ axis), travel.hop) * axis)
-
-
-def _lift_to_sphere(point: Floats, axis: Floats, travel: Travel, radius: float) -> Floats:
-    """The point (3,) at a distance from the centre, straight up the axis."""
-    far = float(measure_to_sphere(point[None], axis[None], travel.centre, radius)[0])
-    return np.asarray(point + max(far, travel.hop) * axis)
-
-
-def _list_exits(groups: Sequence[Sequence[Pass]]) -> list[Exit]:
-    """The tool axes of the passes, each once, in their order, with the start of the first pass that has it."""
-    found: dict[tuple[float, ...], Exit] = {}
-    for passes in groups:
-        for one in passes:
-            key = tuple(np.round(one.axes[0], 6).tolist())
-            found.setdefault(key, Exit(one.points[0], one.axes[0]))
-    return list(found.values())[:MOST_EXITS]
-
-
-def _list_ways_out(
-    point: Floats, axis: Floats, exits: Sequence[Exit], travel: Travel, lift: Callable[[Floats, Floats], Floats]
-) -> Iterator[tuple[Floats, Floats]]:
-    """Ways from a place (3,) to where ``lift`` takes it: points (K,3) and axes (K,3). Straight up the tool's ``axis``
-    (3,); after a hop along that of an exit; from above the exit."""
-    yield lift(point, axis)[None], axis[None]
-    turned = [(point, gate.axis) for gate in exits if not np.allclose(gate.axis, axis)]
-    for place, along in [*turned, *exits]:
-        way = [point + travel.hop * axis, place + travel.hop * along, lift(place, along)]
-        yield np.array(way), np.array([axis, along, along])
-
-
-def _find_exit(
-    point: Floats, axis: Floats, exits: Sequence[Exit], clearance: Clearance, travel: Travel, radius: float = 0.0
-) -> tuple[Floats, Floats, float]:
-    """Points (K,3) and axes (K,3) from a place (3,) on a pass to where the nozzle is above everything, or at a distance
-    ``radius`` from the centre, and the least distance: the first way that is clear, else the clearest."""
-
-    def lift(place: Floats, along: Floats) -> Floats:
-        return _lift_to_sphere(place, along, travel, radius) if radius else _lift(place, along, travel)
-
-    best = np.empty((0, 3)), np.empty((0, 3)), -np.inf
-    for way, axes in _list_ways_out(point, axis, exits, travel, lift):
-        points, turned = np.concatenate([point[None], way]), np.concatenate([axis[None], axes])
-        gap = measure_way(points, turned, clearance, travel.gap)
-        if gap > best[2]:
-            best = way, axes, gap
-        if gap >= travel.gap / 2:
-            break
-    return best
-
-
-def _leave(
-    point: Floats, axis: Floats, exits: Sequence[Exit], network: Network, clearance: Clearance, travel: Travel
-) -> tuple[Floats, Floats, float]:
-    """As `_find_exit`, to above everything; where no such way is clear, over poses from which one is."""
-    way, axes, gap = _find_exit(point, axis, exits, clearance, travel)
-    if gap >= travel.gap / 2:
-        return way, axes, gap
-    for found in network.find_exits((point, axis), clearance):
-        place, along = found.points[-1], found.axes[-1]
-        out = _lift(place, along, travel)
-        last = measure_way(np.array([place, out]), np.array([along, along]), clearance, travel.gap)
-        if last >= travel.gap / 2:
-            return np.vstack([found.points, out]), np.vstack([found.axes, along]), min(last, found.gap)
-    return way, axes, gap
-
-
 def _find_way(
     before: Pass | None, one: Pass, exits: Sequence[Exit], network: Network, clearance: Clearance, travel: Travel
 ) -> tuple[Floats, Floats, float]:
     """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
     stop, axis = one.points[0], one.axes[0]
     if before is None:
-        way, axes, gap = _leave(stop, axis, exits, network, clearance, travel)
+        way, axes, gap = leave(stop, axis, exits, network, clearance, travel)
         return way[::-1], axes[::-1], gap
     start, old = before.points[-1], before.axes[-1]
     if np.linalg.norm(stop - start) < 1e-9 and np.allclose(axis, old):
@@ -263,8 +181,8 @@ def _go_round(
     far = max(float(np.linalg.norm(point - travel.centre)) for point in (start, stop))
     radii = [share * travel.safe for share in RADII if share == 1 or share * travel.safe > far + 2 * travel.hop]
     for radius in [0.0, *radii] if np.abs(axis - old).max() < SAME else radii:
-        out, out_axes, first = _find_exit(start, old, exits, clearance, travel, radius)
-        back, back_axes, last = _find_exit(stop, axis, exits, clearance, travel, radius)
+        out, out_axes, first = find_exit(start, old, exits, clearance, travel, radius)
+        back, back_axes, last = find_exit(stop, axis, exits, clearance, travel, radius)
         ends, turned = np.array([out[-1], back[-1]]), np.array([out_axes[-1], back_axes[-1]])
         if not radius and np.abs(turned[0] - turned[1]).max() > SAME:
             continue

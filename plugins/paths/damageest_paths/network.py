@@ -36,7 +36,13 @@ MOST_CHECKS = 100
 """Legs that are checked for one way at most."""
 MOST_EXITS = 40
 """Poses from which a straight way out is tried, the nearest first."""
-MOST_POSES = 2000
+STEP = 0.5
+"""Distance of the poses at which a way is checked, in gaps."""
+KEPT = (1 + STEP) / 2
+"""Share of the gap that the nozzle keeps at such poses: then it keeps half the gap between them."""
+BLOCKED = 0.49
+"""Share of the gap that a way has at most where a pose of it keeps less than that."""
+MOST_POSES = 4000
 """Poses at which one leg of a way is checked at most."""
 
 
@@ -212,18 +218,36 @@ class _Graph:
 
 def measure_way(points: Floats, axes: Floats, clearance: Clearance, gap: float) -> float:
     """The least distance of the nozzle along a way (K,3) with tool ``axes`` (K,3), as a lower bound between the poses
-    that are measured, ``gap`` apart."""
-    far = np.linalg.norm(np.diff(points, axis=0), axis=1) + clearance.bound_turns(axes)
-    counts = np.clip(np.ceil(far / gap - 1e-9).astype(int), 1, MOST_POSES)
+    that are measured. Below half the ``gap`` only where some pose does not keep `KEPT` of it; then it is no bound."""
+    dense, turned = _list_poses_along(points, axes, clearance, gap)
+    moves = np.linalg.norm(np.diff(dense, axis=0), axis=1) + clearance.bound_turns(turned)
+    found = clearance.measure_poses(dense, turned, KEPT * gap)
+    least = float(min(found.min(), np.min((found[1:] + found[:-1] - moves) / 2, initial=np.inf)))
+    return least if found.min() >= KEPT * gap else min(least, BLOCKED * gap)
+
+
+def measure_blocked_way(points: Floats, axes: Floats, clearance: Clearance, gap: float) -> float:
+    """The least distance of the nozzle at poses along a way that is not clear, each measured exactly."""
+    least = np.inf
+    for point, axis in zip(*_list_poses_along(points, axes, clearance, gap), strict=True):
+        least = min(least, clearance.measure(point, axis))
+        if least <= 0:
+            break
+    return least
+
+
+def _list_poses_along(points: Floats, axes: Floats, clearance: Clearance, gap: float) -> tuple[Floats, Floats]:
+    """Points (N,3) and axes (N,3) along a way, at most `STEP` of the ``gap`` apart: axes that are mixed evenly turn
+    fastest half way."""
+    half = np.minimum(clearance.bound_turns(axes) / (2 * clearance.reach), np.radians(85))
+    far = np.linalg.norm(np.diff(points, axis=0), axis=1) + 2 * np.tan(half) * clearance.reach
+    counts = np.clip(np.ceil(1.001 * far / (STEP * gap)).astype(int), 1, MOST_POSES)
     share = np.concatenate([*(np.arange(count) / count for count in counts), [0.0]])
     place = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
     share[-1] = 1.0
     dense = points[place] + share[:, None] * (points[place + 1] - points[place])
     turned = (1 - share)[:, None] * axes[place] + share[:, None] * axes[place + 1]
-    turned = normalise(turned)
-    moves = np.linalg.norm(np.diff(dense, axis=0), axis=1) + clearance.bound_turns(turned)
-    found = clearance.measure_poses(dense, turned, gap)
-    return float(min(found.min(), np.min((found[1:] + found[:-1] - moves) / 2, initial=np.inf)))
+    return dense, normalise(turned)
 
 
 def _list_poses(groups: Sequence[Sequence[Pass]], hop: float) -> tuple[Floats, Floats, Ints]:

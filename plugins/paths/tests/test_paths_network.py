@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from damageest_paths.clearance import Clearance
-from damageest_paths.moves import Travel, join_passes
+from damageest_paths.exits import Travel
+from damageest_paths.moves import join_passes
+from damageest_paths.network import measure_way
 from damageest_paths.nozzle import Cone, make_nozzle
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.process import Pass
@@ -54,3 +56,20 @@ def test_the_tool_goes_round_a_post_near_the_passes() -> None:
 def test_without_a_post_the_way_is_straight() -> None:
     points, _, _ = join(0.1)
     assert float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < 14
+
+
+def test_a_tool_that_turns_far_is_clear_where_it_keeps_its_gap() -> None:
+    """Between two walls, upright to 60 degrees over; it turns fastest half way."""
+    walls = Manifold.cube((40, 40, 40)).translate((1.6, -20, -20)) + Manifold.cube((40, 40, 40)).translate(
+        (-41.6, -20, -20)
+    )
+    obstacles = Obstacles([Mesh(*to_arrays(walls))], np.array([-2.0, -20, 0]), np.array([2.0, 20, 30]), 1.0)
+    nozzle = make_nozzle(Cone(1.0, 1.0, 25.0, 0.4))
+    clearance = Clearance(nozzle, 3.0, obstacles).during_travel()
+    axes = normalise(np.array([[0.0, 0.0, 1.0], [0.0, 3.0, 1.0]]))
+    least = min(
+        clearance.measure(np.zeros(3), normalise((1 - s) * axes[0] + s * axes[1])) for s in np.linspace(0, 1, 200)
+    )
+    for gap in (0.5 * least, 0.9 * least):
+        assert gap / 2 <= measure_way(np.zeros((2, 3)), axes, clearance, gap) <= least + 1e-9
+    assert measure_way(np.zeros((2, 3)), axes, clearance, 2.1 * least) < 1.05 * least

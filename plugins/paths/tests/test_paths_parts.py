@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from damageest_evaluate.paths.check import measure_built, measure_nozzle
 from damageest_paths.clearance import Clearance
-from damageest_paths.moves import Moves, Travel, join_passes
+from damageest_paths.exits import Travel
+from damageest_paths.moves import Moves, join_passes
 from damageest_paths.nozzle import Cone, Nozzle, make_nozzle, make_nozzle_mesh
 from damageest_paths.obstacles import Obstacles, draw_passes
 from damageest_paths.process import Pass
