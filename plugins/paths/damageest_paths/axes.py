@@ -161,14 +161,10 @@ def _fill_in(costs: Floats, count: int) -> Floats:
 
 
 def _bound_all(points: Floats, axes: Floats, clearance: Clearance, limits: Limits) -> tuple[Floats, Floats]:
-    """Bounds (N,M) of the distance at points (N,3) with each of the axes (M,3).
-
-    Rough ones: where they do not decide, a pose costs more than one with room to spare. With exact ones, the tool takes
-    tight poses, and has to leave and come back between passes: up to three times the travel was measured.
-    """
+    """Bounds (N,M) of the distance at points (N,3) with each of the axes (M,3)."""
     count = len(axes)
     at, along = np.repeat(points, count, axis=0), np.tile(axes, (len(points), 1))
-    low, high = clearance.bound(at, along, ROOM * limits.needed, is_rough=True)
+    low, high = clearance.bound(at, along, ROOM * limits.needed)
     return low.reshape(-1, count), high.reshape(-1, count)
 
 

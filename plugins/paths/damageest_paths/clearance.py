@@ -105,23 +105,22 @@ class Clearance:
                 found = min(found, fcl.distance(each, moving, fcl.DistanceRequest(), fcl.DistanceResult()))
         return max(float(found) - self.detail, 0.0)
 
-    def bound(self, points: Floats, axes: Floats, needed: float, is_rough: bool = False) -> tuple[Floats, Floats]:
+    def bound(self, points: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats]:
         """Two distances (N,) for the poses at ``points`` (N,3) with ``axes`` (N,3): the true one lies between them.
 
         They are only as near to each other as it takes to see whether the nozzle keeps the distance ``needed``. Both
-        are 0 where something stands in the beam. ``is_rough``: they may not decide where that is close, which takes
-        less time; then the lower one is 0 where something may stand in the beam.
+        are 0 where something stands in the beam.
         """
-        low, high = self._bound_body(points, axes, needed, None, is_rough)
+        low, high = self._bound_body(points, axes, needed)
         for each in self.beams:
             assert self.beam is not None
-            least, most = each.bound(points, axes, self.beam.needed, is_rough)
+            least, most = each.bound(points, axes, self.beam.needed)
             low[least < self.beam.needed] = 0.0
             high[most < self.beam.needed] = 0.0
         return low, high
 
     def _bound_body(
-        self, points: Floats, axes: Floats, needed: float, near: list[Ints] | None = None, is_rough: bool = False
+        self, points: Floats, axes: Floats, needed: float, near: list[Ints] | None = None
     ) -> tuple[Floats, Floats]:
         """As `bound`, without the beam. ``near`` takes the poses and the ranks (K,2) of what may be nearer than
         `ENOUGH` times the distance needed."""
@@ -134,7 +133,7 @@ class Clearance:
         descent = Descent(self.obstacles, self.nozzle.profile, self.endless, self.floor, self.until)
         for start in range(0, len(points), CHUNK):
             own = slice(start, start + CHUNK)
-            low[own], high[own], pairs = descent.bound(tips[own], axes[own], needed + self.detail, is_rough)
+            low[own], high[own], pairs = descent.bound(tips[own], axes[own], needed + self.detail)
             if near is not None:
                 near.append(pairs + np.array([start, 0], np.int64))
         return np.maximum(low - self.detail, 0.0), np.maximum(high - self.detail, 0.0)

@@ -34,11 +34,10 @@ class Descent:
     floor: float
     until: int
 
-    def bound(self, tips: Floats, axes: Floats, needed: float, is_rough: bool = False) -> tuple[Floats, Floats, Ints]:
+    def bound(self, tips: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats, Ints]:
         """Two distances (N,) for poses with ``tips`` and ``axes`` (N,3): the true one lies between them. They are only
         as near to each other as it takes to see whether ``needed`` is kept; the lower one is 0 where it is not. And the
-        poses and ranks (K,2) of what may be nearer than `ENOUGH` times that. ``is_rough``: by the points alone; then
-        they may not decide.
+        poses and ranks (K,2) of what may be nearer than `ENOUGH` times that.
 
         Most poses that are not free are found straight down the tree; the others go down it wherever a ball is near.
         """
@@ -63,7 +62,7 @@ class Descent:
                 _take_least(high, pose, self._measure_high(own, level.middle.take(ball, 0)))
                 close = lower < ENOUGH * needed
                 pairs = np.stack([pose[close], level.rank.take(ball[close])], axis=1)
-                open_ = (lower < needed) & (high.take(pose) >= needed) & (not is_rough)
+                open_ = (lower < needed) & (high.take(pose) >= needed)
                 _take_least(low, pose[~open_], lower[~open_])
                 self._cut(pose[open_], ball[open_], own[open_], tips, axes, needed, low, high)
                 break

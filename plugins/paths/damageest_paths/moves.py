@@ -11,13 +11,15 @@ from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.vectors import normalise
 from damageest_paths.clearance import Clearance
 from damageest_paths.exits import Exit, Travel, find_exit, leave, lift_to_sphere, list_exits
-from damageest_paths.network import Network, measure_blocked_way, measure_way
+from damageest_paths.network import Network, Way, measure_blocked_way, measure_way
 from damageest_paths.process import Pass
 
 LIFTS = (1, 2, 4, 8)
 """Multiples of the hop that are tried."""
 RADII = (0.25, 0.5, 1.0)
 """Shares of the safe distance at which the tool goes round the part."""
+SHORT = 4.0
+"""Lengths of the hop by which a lifted way may be longer than the straight one before others are looked for."""
 SAME = 1e-6
 """Difference of two unit axes up to which they are the same."""
 FLAT = 0.01
@@ -144,15 +146,29 @@ def rank_layers(groups: Sequence[Sequence[Pass]]) -> dict[tuple[int, int], int]:
 
 def _find_way(
     before: Pass | None, one: Pass, exits: Sequence[Exit], network: Network, clearance: Clearance, travel: Travel
-) -> tuple[Floats, Floats, float]:
+) -> Way:
     """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
     stop, axis = one.points[0], one.axes[0]
     if before is None:
         way, axes, gap = leave(stop, axis, exits, network, clearance, travel)
-        return way[::-1], axes[::-1], gap
+        return Way(way[::-1], axes[::-1], gap)
     start, old = before.points[-1], before.axes[-1]
     if np.linalg.norm(stop - start) < 1e-9 and np.allclose(axis, old):
-        return np.empty((0, 3)), np.empty((0, 3)), np.inf
+        return Way(np.empty((0, 3)), np.empty((0, 3)), np.inf)
+    lifted = _lift_over(start, old, one, clearance, travel)
+    if lifted is not None and _measure_length(start, lifted, stop) <= np.linalg.norm(stop - start) + SHORT * travel.hop:
+        return lifted
+    found = network.find_way((start, old), (stop, axis), clearance)
+    ways = [way for way in (lifted, found) if way is not None]
+    if ways:
+        return min(ways, key=lambda way: _measure_length(start, way, stop))
+    return _go_round(start, old, one, exits, clearance, travel)
+
+
+def _lift_over(start: Floats, old: Floats, one: Pass, clearance: Clearance, travel: Travel) -> Way | None:
+    """As `_find_way` from a place (3,) with an axis (3,): straight, lifted as little as is clear; None where nothing
+    is."""
+    stop, axis = one.points[0], one.axes[0]
     rise = float((stop - start) @ one.normals[0])
     for factor in [0, *LIFTS] if travel.stays else LIFTS:
         lift = factor * travel.hop
@@ -165,19 +181,21 @@ def _find_way(
         points = np.concatenate([start[None], way[kept], stop[None]])
         gap = measure_way(points, np.concatenate([old[None], axes[kept], axis[None]]), clearance, travel.gap)
         if gap >= travel.gap / 2:
-            return way[kept], axes[kept], gap
-    found = network.find_way((start, old), (stop, axis), clearance)
-    if found is not None:
-        return found.points, found.axes, found.gap
-    return _go_round(start, old, one, exits, clearance, travel)
+            return Way(way[kept], axes[kept], gap)
+    return None
+
+
+def _measure_length(start: Floats, way: Way, stop: Floats) -> float:
+    """The length of a way from one place (3,) to another."""
+    return float(np.linalg.norm(np.diff(np.vstack([start, way.points, stop]), axis=0), axis=1).sum())
 
 
 def _go_round(
     start: Floats, old: Floats, one: Pass, exits: Sequence[Exit], clearance: Clearance, travel: Travel
-) -> tuple[Floats, Floats, float]:
+) -> Way:
     """As `_find_way` from a place (3,) with an axis (3,), over the part or round it: the nearest way that is clear."""
     stop, axis = one.points[0], one.axes[0]
-    best = np.empty((0, 3)), np.empty((0, 3)), -np.inf
+    best = Way(np.empty((0, 3)), np.empty((0, 3)), -np.inf)
     far = max(float(np.linalg.norm(point - travel.centre)) for point in (start, stop))
     radii = [share * travel.safe for share in RADII if share == 1 or share * travel.safe > far + 2 * travel.hop]
     for radius in [0.0, *radii] if np.abs(axis - old).max() < SAME else radii:
@@ -190,7 +208,7 @@ def _go_round(
         gap = min(first, last, measure_way(way, axes, clearance, travel.gap))
         if gap > best[2]:
             points = np.concatenate([out[:-1], way, back[-2::-1]])
-            best = points, np.concatenate([out_axes[:-1], axes, back_axes[-2::-1]]), gap
+            best = Way(points, np.concatenate([out_axes[:-1], axes, back_axes[-2::-1]]), gap)
         if gap >= travel.gap / 2:
             break
     return best
