@@ -13,10 +13,11 @@ from damageest_paths.clearance import Clearance
 from damageest_paths.exits import Exit, Travel, find_exit, leave, lift_to_sphere, list_exits
 from damageest_paths.network import Network, Way, measure_blocked_way, measure_way
 from damageest_paths.process import Pass
+from damageest_paths.shortcuts import cut_corners
 
 LIFTS = (1, 2, 4, 8)
 """Multiples of the hop that are tried."""
-RADII = (0.25, 0.5, 1.0)
+RADII = (0.25, 0.35, 0.5, 0.6, 0.7, 0.85, 1.0)
 """Shares of the safe distance at which the tool goes round the part."""
 SHORT = 4.0
 """Lengths of the hop by which a lifted way may be longer than the straight one before others are looked for."""
@@ -150,8 +151,8 @@ def _find_way(
     """Points (K,3) and axes (K,3) from the end of a pass to above the start of the next, and the least distance."""
     stop, axis = one.points[0], one.axes[0]
     if before is None:
-        way, axes, gap = leave(stop, axis, exits, network, clearance, travel)
-        return Way(way[::-1], axes[::-1], gap)
+        points, axes, gap = leave(stop, axis, exits, network, clearance, travel)
+        return Way(points[::-1], axes[::-1], gap)
     start, old = before.points[-1], before.axes[-1]
     if np.linalg.norm(stop - start) < 1e-9 and np.allclose(axis, old):
         return Way(np.empty((0, 3)), np.empty((0, 3)), np.inf)
@@ -159,10 +160,14 @@ def _find_way(
     if lifted is not None and _measure_length(start, lifted, stop) <= np.linalg.norm(stop - start) + SHORT * travel.hop:
         return lifted
     found = network.find_way((start, old), (stop, axis), clearance)
-    ways = [way for way in (lifted, found) if way is not None]
-    if ways:
-        return min(ways, key=lambda way: _measure_length(start, way, stop))
-    return _go_round(start, old, one, exits, clearance, travel)
+    ways = [each for each in (lifted, found) if each is not None]
+    ways = ways or [_go_round(start, old, one, exits, clearance, travel)]
+    way = min(ways, key=lambda each: _measure_length(start, each, stop))
+    if way.gap < travel.gap / 2:
+        return way
+    whole = Way(np.vstack([start, way.points, stop]), np.vstack([old, way.axes, axis]), way.gap)
+    short = cut_corners(whole, clearance, travel.gap)
+    return Way(short.points[1:-1], short.axes[1:-1], short.gap)
 
 
 def _lift_over(start: Floats, old: Floats, one: Pass, clearance: Clearance, travel: Travel) -> Way | None:
