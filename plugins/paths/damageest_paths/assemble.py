@@ -140,7 +140,7 @@ def _gather_obstacles(
         own = [one for one in groups[group] if one.layer == layer]
         meshes.append(draw_passes(own, process.bead.width, plans[group].height))
         ranks.append(rank)
-    return Obstacles(meshes, bounds[0], bounds[1], process.bead.width, ranks)
+    return Obstacles(meshes, bounds[0], bounds[1], process.bead.width, ranks, coarser=2.0)
 
 
 def _find_tightest(one: Pass | None, origin: Floats) -> Floats | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
+from damageest_paths.conformal import BESIDE
 from damageest_paths.frames import Frame, make_frame, make_unit
 from damageest_paths.obstacles import draw_passes
 from damageest_paths.planar import SUNK, Surroundings
@@ -17,8 +18,9 @@ from damageest_paths.process import Plan, Process
 
 ENOUGH = 1e-3
 """Share of a body's volume below which what is missing is not worth another direction."""
-THIN = 0.1
-"""Share of a body's volume up to which what is too thin over metal for a bead does not ask for other directions."""
+NO_REASON = {SUNK: 0.1, BESIDE: 0.01}
+"""Shares of a body's volume up to which what is missing for a reason asks for no other direction: what is too thin
+over metal for a bead is so with all of them, and layers along the floor follow it with each."""
 MOST_PARTS, MOST_DIRECTIONS = 4, 6
 COARSE = 2.0
 """Factor of layer height and bead width for the trials of directions."""
@@ -67,7 +69,7 @@ def choose_direction(
     larger beads. At least one direction is needed."""
     first = planner(body, make_frame(directions[0], origin), around, process)
     volume = float(body.volume())
-    if len(directions) == 1 or first.missing_volume - _measure_thin(first, volume) <= ENOUGH * volume:
+    if len(directions) == 1 or _measure_worth(first, volume) <= ENOUGH * volume:
         return first
     coarse = process.coarsen(COARSE)
     rough = body.simplify(ROUGH * process.height)
@@ -79,9 +81,10 @@ def choose_direction(
     return best if best.missing_volume < first.missing_volume else first
 
 
-def _measure_thin(plan: Plan, volume: float) -> float:
-    """What is missing of a body since it is thin over metal: it is with other directions too."""
-    return min(plan.reasons.get(SUNK, 0.0), THIN * volume)
+def _measure_worth(plan: Plan, volume: float) -> float:
+    """What is missing of a body and may not be with another direction."""
+    usual = sum(min(plan.reasons.get(why, 0.0), share * volume) for why, share in NO_REASON.items())
+    return plan.missing_volume - usual
 
 
 def plan_parts(
@@ -97,7 +100,7 @@ def plan_parts(
     within = [one for one in directions if one @ plans[0].frame.direction >= np.cos(process.tilt) - 1e-9]
     volume, smallest = float(body.volume()), process.bead.width**2 * process.height
     while len(plans) < MOST_PARTS:
-        if plans[-1].missing_volume - _measure_thin(plans[-1], volume) <= max(ENOUGH * volume, smallest):
+        if _measure_worth(plans[-1], volume) <= max(ENOUGH * volume, smallest):
             break
         left = plans[-1].missing
         left_local = left.transform(np.hstack([plans[-1].frame.turn.T, np.zeros((3, 1))]))
