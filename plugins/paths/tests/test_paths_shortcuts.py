@@ -51,6 +51,24 @@ def test_a_way_gets_shorter_and_stays_clear(seed: int, post: float) -> None:
         assert min(clearance.measure(*pose) for pose in zip(places, turned, strict=True)) >= GAP / 2 - 1e-9
 
 
+def test_a_turn_on_the_spot_stays_where_only_there_is_room() -> None:
+    """Between two walls: the tool comes in lying along them, and turns upright above them."""
+    walls = Manifold.cube((10, 30, 20)).translate((1.8, -15, 0)) + Manifold.cube((10, 30, 20)).translate(
+        (-11.8, -15, 0)
+    )
+    obstacles = Obstacles([Mesh(*to_arrays(walls))], np.array([-2.0, -15, 0]), np.array([2.0, 15, 20]), 1.0)
+    clearance = Clearance(make_nozzle(Cone(1.0, 1.0, 25.0, 0.4)), 3.0, obstacles).during_travel()
+    points = np.array([[0.0, -8, 5], [0, -8, 40], [0, -8, 40], [0, 8, 40], [0, 8, 40], [0, 8, 5]])
+    lying, upright = normalise(np.array([[0.0, -0.6, 1.0], [0.4, 0.6, 1.0]]))
+    axes = np.array([lying, lying, upright, upright, lying, lying])
+    way = Way(points, axes, measure_way(points, axes, clearance, GAP))
+    assert way.gap >= GAP / 2
+    short = cut_corners(way, clearance, GAP)
+    assert measure_way(short.points, short.axes, clearance, GAP) >= GAP / 2
+    assert measure_along(short.points)[-1] < 0.5 * measure_along(points)[-1]
+    assert np.allclose(short.axes[[0, -1]], axes[[0, -1]])
+
+
 def test_a_straight_way_stays_as_it_is() -> None:
     clearance = make_clearance(30.0)
     points = np.array([[-12.0, -10, 1], [12.0, -10, 1]])
