@@ -15,9 +15,10 @@ from damageest_paths.floor import Floor, find_floor
 from damageest_paths.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
+from damageest_paths.order import order_passes
 from damageest_paths.patches import NotFollowedError, Patch, list_patches
 from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings
-from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes
+from damageest_paths.process import Pass, Plan, Process, extend_line
 from damageest_paths.regions import cover, measure_length, resample, shift_border
 from damageest_paths.sheets import (
     FINE,
@@ -120,9 +121,8 @@ class _Work:
             self.layer = []
             for patch in patches:
                 self._fill_patch(patch, number, reach, held - lean, around)
-            self.passes += order_passes(
-                self.layer, self.passes[-1] if self.passes else None, self.standing.clearance.reach
-            )
+            before = self.passes[-1] if self.passes else None
+            self.passes += order_passes(self.layer, before, self.standing.clearance, self.process.gap)
         self._add_rest()
 
     def _lay_out(self, count: int, grid: Grid) -> list[tuple[Sheet, Floats, list[Patch]]]:

@@ -16,7 +16,8 @@ from damageest_paths.clearance import Clearance
 from damageest_paths.fill import Kind, Line, list_lines
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
-from damageest_paths.process import Pass, Plan, Process, extend_line, order_passes
+from damageest_paths.order import order_passes
+from damageest_paths.process import Pass, Plan, Process, extend_line
 from damageest_paths.regions import (
     cover,
     list_pieces,
@@ -87,7 +88,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
         short = cover([line.points for line in lines if measure_length(line.points) < process.shortest], width)
         made, dropped, shaded = choice.place(long, top, number)
-        made = order_passes(made, passes[-1] if passes else None, clearance.reach)
+        made = order_passes(made, passes[-1] if passes else None, clearance, process.gap)
         done = cover([one.points[:, :2] for one in made], width)
         causes = [cover(dropped, width), cover(shaded, width), short if made else wanted]
         held -= _find_hanging(held, wanted, aims, process)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -15,10 +14,6 @@ from damageest_paths.sight import Beam
 from damageest_paths.stripes import Bead
 
 Axes = Literal[3, "3+2", 5]
-LESS = 1e-6
-"""Share of the extent of a pass by which the ways have to become shorter where passes are put in another order."""
-TURN = 0.05
-"""Share of the nozzle's reach that a turn of the tool by one radian counts as, where passes are put in order."""
 
 
 @dataclass(frozen=True)
@@ -120,54 +115,3 @@ def extend_line(line: Floats, before: float, after: float) -> Floats:
     start = line[0] + before * first / max(float(np.linalg.norm(first)), 1e-300)
     end = line[-1] + after * last / max(float(np.linalg.norm(last)), 1e-300)
     return np.concatenate([start[None], line[1:-1], end[None]])
-
-
-def order_passes(passes: Sequence[Pass], last: Pass | None, reach: float) -> list[Pass]:
-    """The passes of one layer, some of them the other way round, so that the ways between them are short.
-
-    Each is the nearest to the end of the one before, the ``last`` of the layers below for the first; then stretches of
-    the sequence are run the other way round as long as that makes the ways shorter (2-opt, Croes 1958). A turn of the
-    tool counts as a way too, by the ``reach`` of the nozzle.
-    """
-
-    def place(one: Pass, end: int) -> Floats:
-        return np.concatenate([one.points[end], TURN * reach * one.axes[end]])
-
-    left, ordered = list(passes), []
-    start = None if last is None else place(last, -1)
-    at = start
-    while left:
-        ends = np.array([[place(one, 0), place(one, -1)] for one in left])
-        gaps = np.linalg.norm(ends - (ends[0, 0] if at is None else at), axis=2)
-        number, end = np.unravel_index(int(np.argmin(np.round(gaps, 9))), gaps.shape)
-        one = left.pop(int(number))
-        ordered.append(one.reverse() if end else one)
-        at = place(ordered[-1], -1)
-    for _ in range(len(ordered) ** 2):
-        firsts, lasts = ([place(one, end) for one in ordered] for end in (0, -1))
-        low, high, gain = _find_turn(np.array(firsts), np.array(lasts), start)
-        if gain <= LESS * ordered[0].points.std():
-            break
-        ordered[low : high + 1] = [one.reverse() for one in ordered[low : high + 1][::-1]]
-    return ordered
-
-
-def _find_turn(first: Floats, last: Floats, start: Floats | None) -> tuple[int, int, float]:
-    """The first and last pass of the stretch that is best run the other way round, and by how much that is shorter.
-
-    ``first``, ``last`` (N,K): where the passes begin and end; ``start`` (K,): where the way to the first one begins.
-    """
-    if len(first) < 2:
-        return 0, 0, 0.0
-    before = np.concatenate([first[:1] if start is None else start[None], last[:-1]])
-    # before a stretch, its first pass is now reached at its last point, and what follows from its first
-    into = np.linalg.norm(before[:, None] - last[None], axis=2)
-    out = np.zeros((len(first), len(first)))
-    out[:, :-1] = np.linalg.norm(first[:, None] - first[None, 1:], axis=2)
-    was_in = np.linalg.norm(before - first, axis=1)
-    was_out = np.append(np.linalg.norm(last[:-1] - first[1:], axis=1), 0.0)
-    if start is None:
-        into[0], was_in[0] = 0.0, 0.0
-    gain = np.triu(was_in[:, None] + was_out[None] - into - out)
-    low, high = np.unravel_index(int(np.argmax(np.round(gain, 9))), gain.shape)
-    return int(low), int(high), float(gain[low, high])
