@@ -40,6 +40,8 @@ STEP = 0.5
 """Distance of the poses at which a way is checked, in gaps."""
 KEPT = (1 + STEP) / 2
 """Share of the gap that the nozzle keeps at such poses: then it keeps half the gap between them."""
+FIRST = 24
+"""Poses at which a way is looked at before all others are."""
 BLOCKED = 0.49
 """Share of the gap that a way has at most where a pose of it keeps less than that."""
 MOST_POSES = 4000
@@ -220,6 +222,10 @@ def measure_way(points: Floats, axes: Floats, clearance: Clearance, gap: float) 
     """The least distance of the nozzle along a way (K,3) with tool ``axes`` (K,3), as a lower bound between the poses
     that are measured. Below half the ``gap`` only where some pose does not keep `KEPT` of it; then it is no bound."""
     dense, turned = _list_poses_along(points, axes, clearance, gap)
+    some = np.linspace(0, len(dense) - 1, min(len(dense), FIRST)).astype(int)
+    _, most = clearance.bound(dense[some], turned[some], gap / 2)
+    if most.min() < gap / 2:
+        return float(most.min())
     moves = np.linalg.norm(np.diff(dense, axis=0), axis=1) + clearance.bound_turns(turned)
     found = clearance.measure_poses(dense, turned, KEPT * gap)
     least = float(min(found.min(), np.min((found[1:] + found[:-1] - moves) / 2, initial=np.inf)))
