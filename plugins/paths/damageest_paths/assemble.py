@@ -18,7 +18,7 @@ from damageest_paths.directions import Planner, gather_missing, list_directions,
 from damageest_paths.exits import Travel
 from damageest_paths.moves import Moves, find_corners, join_passes, rank_layers
 from damageest_paths.nozzle import Nozzle
-from damageest_paths.obstacles import Obstacles, draw_passes
+from damageest_paths.obstacles import COARSER, Obstacles, draw_passes
 from damageest_paths.planar import Surroundings
 from damageest_paths.process import Pass, Plan, Process
 from damageest_paths.turning import divide_turns
@@ -140,7 +140,7 @@ def _gather_obstacles(
         own = [one for one in groups[group] if one.layer == layer]
         meshes.append(draw_passes(own, process.bead.width, plans[group].height))
         ranks.append(rank)
-    return Obstacles(meshes, bounds[0], bounds[1], process.bead.width, ranks, coarser=2.0)
+    return Obstacles(meshes, bounds[0], bounds[1], process.bead.width, ranks, coarser=COARSER)
 
 
 def _find_tightest(one: Pass | None, origin: Floats) -> Floats | None:

@@ -14,7 +14,7 @@ from damageest_paths.fill import Line, list_lines
 from damageest_paths.floor import Floor, find_floor
 from damageest_paths.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.frames import Frame
-from damageest_paths.obstacles import Obstacles
+from damageest_paths.obstacles import COARSER, Obstacles
 from damageest_paths.order import order_passes
 from damageest_paths.patches import NotFollowedError, Patch, list_patches
 from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings
@@ -36,8 +36,6 @@ NO_FLOOR, BESIDE = (
     "no side of it that lies on metal faces the build direction",
     "lies beside or below the floor that the layers follow",
 )
-COARSER = 2.0
-"""How much farther apart the points are by which the nozzle is bounded, than for planes: each pose is decided here."""
 SPARE = 0.02
 """Share of a layer's height that is not worth another layer: the facets of a round floor are off by as much."""
 SLIVER = 0.05

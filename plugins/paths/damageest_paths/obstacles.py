@@ -19,6 +19,8 @@ from damageest_paths.trees import make_tree
 FINE, GROWTH = 0.4, 0.4
 """Longest edge of the obstacles' triangles, whose middles are the points: in bead widths near the deposit, and as a
 share of the distance from it."""
+COARSER = 2.0
+"""How much farther apart the points are for layers along the floor and for travel than for layers in planes."""
 MEMBERS = 8
 """Balls of one level of the tree, or points, that a ball of the next level holds."""
 ROOTS = 16

@@ -37,7 +37,8 @@ def order_passes(passes: Sequence[Pass], last: Pass | None, clearance: Clearance
     if not passes:
         return []
     first = [] if last is None else [last.reverse()]
-    cost = _measure_ways([*first, *passes], clearance, gap)
+    both = [*first, *passes]
+    cost = _measure_ways(both, clearance, gap)
     at = 0 if first else -1
     left, ordered = list(range(2 * len(first), len(cost))), []
     while left:
@@ -52,7 +53,6 @@ def order_passes(passes: Sequence[Pass], last: Pass | None, clearance: Clearance
         if gain <= LESS * passes[0].points.std():
             break
         ordered[low : high + 1] = [(end, begin) for begin, end in ordered[low : high + 1][::-1]]
-    both = [*first, *passes]
     return [both[begin // 2] if begin % 2 == 0 else both[begin // 2].reverse() for begin, _ in ordered]
 
 
