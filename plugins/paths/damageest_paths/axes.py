@@ -11,12 +11,11 @@ import numpy as np
 from damageest.artefacts import Flags, Floats
 from damageest.geometry.vectors import normalise
 from damageest_paths.clearance import Clearance
+from damageest_paths.pose_table import PoseTable
 from damageest_paths.turning import BLOCKED, Course, cost_poses, plan_course
 
 RING, AROUND = np.radians(20.0), 8
 """Difference of tilt between the rings of axes that are tried, and their number round the build direction."""
-SPARSE = 4
-"""Of the points of a pass, each fourth is looked at first with all axes."""
 ROOM = 1.5
 """Multiple of the distance needed that counts as room to spare."""
 BEST = 3
@@ -83,8 +82,9 @@ def choose_axes(
     """
     found = _measure([_keep(line, axes[first]) for line in lines], lines, clearance, limits)
     if len(axes) > 1 and not all(_is_free(one, limits) for one in found):
-        going = _share_axes(found, lines, axes, first, clearance, limits)
-        _let_turn(found, going, lines, axes, clearance, limits)
+        table = PoseTable(lines, axes, clearance, limits.needed, ROOM * limits.needed)
+        going = _share_axes(found, lines, table, first, clearance, limits)
+        _let_turn(found, going, lines, table, clearance, limits)
     return [_cut(one, limits) for one in found]
 
 
@@ -98,18 +98,15 @@ def _is_free(one: _Found, limits: Limits) -> bool:
 
 
 def _share_axes(
-    found: list[_Found], lines: Sequence[Floats], axes: Floats, first: int, clearance: Clearance, limits: Limits
+    found: list[_Found], lines: Sequence[Floats], table: PoseTable, first: int, clearance: Clearance, limits: Limits
 ) -> list[int]:
     """Replaces what was found for passes that one axis serves all along; gives the numbers of the others.
 
     Few axes serve all: between two of them the tool may have to leave a tight place and come back. Each is the one that
     serves the most of the passes that are left (Chvatal 1979), with room to spare if possible, near to ``first``.
     """
-    sparse = [np.append(line[:-1:SPARSE], line[-1:], axis=0) for line in lines]
-    _, high = _bound_all(np.concatenate(sparse), axes, clearance, limits)
-    starts = np.cumsum([0, *(len(each) for each in sparse[:-1])])
-    room = np.minimum.reduceat(high, starts, axis=0)
-    free, roomy = room >= limits.needed, room >= ROOM * limits.needed
+    axes, room = table.axes, table.find_room()
+    free, roomy = room >= table.needed, room >= table.room
     free[:, first] = [_is_free(one, limits) for one in found]
     turn = np.arccos(np.clip(axes @ axes[first], -1, 1))
     tries = np.full(len(lines), BEST)
@@ -130,16 +127,19 @@ def _share_axes(
 
 
 def _let_turn(
-    found: list[_Found], going: list[int], lines: Sequence[Floats], axes: Floats, clearance: Clearance, limits: Limits
+    found: list[_Found],
+    going: list[int],
+    lines: Sequence[Floats],
+    table: PoseTable,
+    clearance: Clearance,
+    limits: Limits,
 ) -> None:
     """Replaces what was found for passes by courses whose axis turns."""
     if not going:
         return
-    every = [np.append(lines[k][:-1:2], lines[k][-1:], axis=0) for k in going]
-    low, high = _bound_all(np.concatenate(every), axes, clearance, limits)
-    costs = cost_poses(low, high, axes, limits.needed, ROOM * limits.needed)
-    ends = np.cumsum([len(each) for each in every])[:-1]
-    cost = {k: _fill_in(own, len(lines[k])) for k, own in zip(going, np.split(costs, ends), strict=True)}
+    axes, cost = table.axes, {}
+    for k, (low, high) in zip(going, table.bound(going), strict=True):
+        cost[k] = _fill_in(cost_poses(low, high, axes, table.needed, table.room), len(lines[k]))
     for _ in range(ROUNDS):
         courses = [plan_course(lines[k], axes, cost[k], limits.rate) for k in going]
         for k, one in zip(going, _measure(courses, [lines[k] for k in going], clearance, limits), strict=True):
@@ -158,14 +158,6 @@ def _fill_in(costs: Floats, count: int) -> Floats:
     before, after = np.arange(count) // 2, (np.arange(count) + 1) // 2
     after[-1] = before[-1] = len(costs) - 1
     return np.maximum(costs[before], costs[after])
-
-
-def _bound_all(points: Floats, axes: Floats, clearance: Clearance, limits: Limits) -> tuple[Floats, Floats]:
-    """Bounds (N,M) of the distance at points (N,3) with each of the axes (M,3)."""
-    count = len(axes)
-    at, along = np.repeat(points, count, axis=0), np.tile(axes, (len(points), 1))
-    low, high = clearance.bound(at, along, ROOM * limits.needed)
-    return low.reshape(-1, count), high.reshape(-1, count)
 
 
 def _measure(courses: Sequence[Course], lines: Sequence[Floats], clearance: Clearance, limits: Limits) -> list[_Found]:

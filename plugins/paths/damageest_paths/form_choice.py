@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import Any, Literal, Protocol
 
 from damageest.artefacts import DepositPath
-from damageest_paths.assemble import MUCH_SUNK
 from damageest_paths.conformal import plan_conformal
 from damageest_paths.directions import Planner
+from damageest_paths.drafts import MUCH_SUNK, Draft
 from damageest_paths.frames import Frame
 from damageest_paths.planar import SHORT, SUNK, Surroundings, plan_planar
 from damageest_paths.process import Plan as LayerPlan
@@ -30,14 +30,14 @@ MOST_LEFT = 0.03
 
 
 class Plan(Protocol):
-    """Gives the path of a planner. ``along_normal``: where the job leaves the build direction to the planner, it is the
-    mean normal of the open side, and no other is tried."""
+    """Gives the draft of a planner. ``along_normal``: where the job leaves the build direction to the planner, it is
+    the mean normal of the open side, and no other is tried."""
 
-    def __call__(self, planner: Planner, along_normal: bool = False) -> DepositPath: ...
+    def __call__(self, planner: Planner, along_normal: bool = False) -> Draft: ...
 
 
-def plan_in_form(form: Form, plan: Plan, is_sink_given: bool = False) -> DepositPath:
-    """The path of a form. ``auto``: planes; where they lose much of the deposit because they are planes, as of the
+def plan_in_form(form: Form, plan: Plan, is_sink_given: bool = False) -> Draft:
+    """The draft of a form. ``auto``: planes; where they lose much of the deposit because they are planes, as of the
     crescent of a worn bore, surfaces along the floor if these lose half of all that planes lose, or less.
 
     ``is_sink_given``: whether the job says how deep beads may lie in intact metal.
@@ -48,21 +48,21 @@ def plan_in_form(form: Form, plan: Plan, is_sink_given: bool = False) -> Deposit
     if form == "auto" and _measure_steps(planar) > POOR:
         conformal = replace(plan(PLANNERS["conformal"], along_normal=True), layer_form="conformal")
         spilt = max(FARTHEST * planar.width, _measure_spill(planar))
-        is_better = len(conformal.points) and measure_lost(conformal) <= GAIN * measure_lost(planar)
+        is_better = not conformal.is_empty and measure_lost(conformal) <= GAIN * measure_lost(planar)
         if is_better and _measure_spill(conformal) <= spilt:
             return conformal
     return replace(planar if is_sink_given else _spare_metal(planar, plan), layer_form="planar")
 
 
-def _spare_metal(planar: DepositPath, plan: Plan) -> DepositPath:
-    """The path in planes; where much of its beads lies in intact metal, one of which less does, if that leaves little
+def _spare_metal(planar: Draft, plan: Plan) -> Draft:
+    """The draft in planes; where much of its beads lies in intact metal, one of which less does, if that leaves little
     of the deposit unfilled."""
     if _measure_sunk(planar) <= MUCH_SUNK:
         return planar
     for share in SPARING:
         sparing = plan(_make_sparing(share))
         left = (sparing.unreached_volume - planar.unreached_volume) / planar.deposit_volume
-        if not len(sparing.points) or left > MOST_LEFT:
+        if sparing.is_empty or left > MOST_LEFT:
             break
         if _measure_sunk(sparing) <= MUCH_SUNK:
             return sparing
@@ -78,30 +78,30 @@ def _make_sparing(share: float) -> Planner:
     return plan
 
 
-def measure_lost(path: DepositPath) -> float:
+def measure_lost(path: Draft | DepositPath) -> float:
     """What of the deposit is not filled, and what of the beads lies in intact metal beyond what is usual, as a share of
     the deposit."""
     return path.unreached_volume / path.deposit_volume + _measure_badly_filled(path)
 
 
-def _measure_steps(path: DepositPath) -> float:
+def _measure_steps(path: Draft | DepositPath) -> float:
     """As `measure_lost`, without what collides, is out of sight or stands on nothing: layers of another form would not
     reach that either, and to try them takes long."""
     thin = sum(item.volume for item in path.unreached if item.why in (SUNK, SHORT))
     return thin / path.deposit_volume + _measure_badly_filled(path)
 
 
-def _measure_badly_filled(path: DepositPath) -> float:
+def _measure_badly_filled(path: Draft | DepositPath) -> float:
     if path.fill is None:
         return 0.0
     return path.fill.gap / path.deposit_volume + max(_measure_sunk(path) - MUCH_SUNK, 0.0)
 
 
-def _measure_sunk(path: DepositPath) -> float:
+def _measure_sunk(path: Draft | DepositPath) -> float:
     """The volume of beads in intact metal, as a share of the deposit; 0 where they were not simulated."""
     return 0.0 if path.fill is None else path.fill.sunk / path.deposit_volume
 
 
-def _measure_spill(path: DepositPath) -> float:
+def _measure_spill(path: Draft | DepositPath) -> float:
     """How far beads reach out of the deposit; 0 where they were not simulated."""
     return 0.0 if path.fill is None else path.fill.spill_distance

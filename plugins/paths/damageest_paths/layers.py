@@ -175,8 +175,9 @@ class Layers(Path):
 
     def run(self, body: Solid, left: Solid | None, built: Solid | None, tolerance: float) -> DepositPath | None:
         """The path. Raises StageError where the nozzle, the fixture or the direction cannot be used."""
-        from damageest_paths.assemble import Speeds, Task, plan_path
+        from damageest_paths.assemble import Speeds, plan_moves
         from damageest_paths.directions import Planner, find_open_normal
+        from damageest_paths.drafts import Draft, Task, draft_path
         from damageest_paths.form_choice import plan_in_form
         from damageest_paths.process import Process
         from damageest_paths.sight import Beam
@@ -211,17 +212,17 @@ class Layers(Path):
         if self.fixture is not None:
             others.append(_read_mesh(self.fixture, "fixture", False))
         task, nozzle = Task(body, left, others, tolerance), self._make_nozzle()
-        speeds = Speeds(self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance, self.simulate)
+        speeds = Speeds(self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance)
 
-        def plan(planner: Planner, along_normal: bool = False) -> DepositPath:
+        def plan(planner: Planner, along_normal: bool = False) -> Draft:
             chosen = find_open_normal(body, left, tolerance) if along_normal and direction is None else direction
-            return plan_path(task, nozzle, self.standoff or self.width, process, speeds, chosen, planner)
+            return draft_path(task, nozzle, self.standoff or self.width, process, self.simulate, chosen, planner)
 
-        path = plan_in_form(self.layers, plan, self.penetration is not None)
-        if self.layers == "conformal" and not len(path.points):
-            why = "; ".join(item.why for item in path.unreached)
+        draft = plan_in_form(self.layers, plan, self.penetration is not None)
+        if self.layers == "conformal" and draft.is_empty:
+            why = "; ".join(item.why for item in draft.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")
-        return apply_table(path, self.process)
+        return apply_table(plan_moves(draft, speeds), self.process)
 
     def _make_nozzle(self) -> Any:
         from damageest_paths import nozzle

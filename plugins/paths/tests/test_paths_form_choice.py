@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pytest
 from damageest_evaluate.paths.check import measure_nozzle
-from damageest_paths import form_choice
-from damageest_paths.assemble import MUCH_SUNK
+from damageest_paths import assemble, form_choice
+from damageest_paths.drafts import MUCH_SUNK
 from damageest_paths.form_choice import MOST_LEFT, PLANNERS, POOR, measure_lost
+from damageest_paths.moves import Moves, join_passes
+from damageest_paths.process import Pass
 from manifold3d import CrossSection
 from path_cavities import pocket, stair
 
@@ -17,13 +22,27 @@ from tests.path_shapes import BLOCK, Loss, cut, dent, plan
 UP = (0.0, 0.0, 1.0)
 
 
+@pytest.fixture
+def joined(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The number of groups of each sequence of passes between which moves are planned."""
+    found: list[int] = []
+
+    def join(groups: Sequence[Sequence[Pass]], *rest: Any) -> Moves:
+        found.append(len(groups))
+        return join_passes(groups, *rest)
+
+    monkeypatch.setattr(assemble, "join_passes", join)
+    return found
+
+
 def plan_all(loss: Loss) -> dict[str, DepositPath]:
     return {form: plan(loss, direction=UP, axes=5, layers=form) for form in ("auto", "planar")}
 
 
-def test_where_planes_lose_much_layers_follow_the_floor() -> None:
+def test_where_planes_lose_much_layers_follow_the_floor(joined: list[int]) -> None:
     loss = dent()
     paths = plan_all(loss)
+    assert len(joined) == len(paths), "moves are planned for the form that is taken alone"
     assert measure_lost(paths["planar"]) > POOR
     assert paths["auto"].layer_form == "conformal"
     assert measure_lost(paths["auto"]) < measure_lost(paths["planar"]) / 2
