@@ -11,7 +11,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Mesh
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest_paths.fill import Line, list_lines
-from damageest_paths.floor import Floor, find_floor
+from damageest_paths.floor import Floor, list_floors
 from damageest_paths.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import COARSER, Obstacles
@@ -56,22 +56,29 @@ def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Proce
     nothing is planned, and the reason says why.
     """
     local, metal = frame.move(body), frame.move(around.metal)
-    floor = find_floor(local, metal, process)
-    if floor is None:
-        return Plan(frame, process.height, (), local, {NO_FLOOR: float(local.volume())})
     corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
+    plan = Plan(frame, process.height, (), local, {NO_FLOOR: float(local.volume())})
+    standing: Sweeps | None = None
+    for floor in list_floors(local, metal, process):
+        standing = standing or _gather_metal(metal, frame, around, corners, process)
+        thickest = float(floor.measure(to_arrays(local.refine_to_length(process.bead.width))[0]).distance.max())
+        count = max(1, int(np.ceil(thickest / process.height - SPARE)))
+        height = min(thickest / count, process.height)
+        work = _Work(local, _crop(metal, corners, process), floor, standing, process, height)
+        try:
+            work.build(count, corners)
+            return Plan(frame, height, tuple(work.passes), work.missing, work.reasons)
+        except NotFollowedError as error:
+            plan = Plan(frame, height, (), local, {str(error): float(local.volume())})
+    return plan
+
+
+def _gather_metal(metal: Any, frame: Frame, around: Surroundings, corners: Floats, process: Process) -> Sweeps:
+    """What the nozzle must not touch: the metal, a Manifold in local coordinates, and the other meshes."""
     meshes = [Mesh(*to_arrays(metal))]
     meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
     near = Obstacles(meshes, corners[0], corners[1], process.bead.width, coarser=COARSER)
-    standing = Sweeps(around.clearance.with_obstacles(near))
-    thickest = float(floor.measure(to_arrays(local.refine_to_length(process.bead.width))[0]).distance.max())
-    count = max(1, int(np.ceil(thickest / process.height - SPARE)))
-    work = _Work(local, _crop(metal, corners, process), floor, standing, process, min(thickest / count, process.height))
-    try:
-        work.build(count, corners)
-    except NotFollowedError as error:
-        return Plan(frame, work.height, (), local, {str(error): float(local.volume())})
-    return Plan(frame, work.height, tuple(work.passes), work.missing, work.reasons)
+    return Sweeps(around.clearance.with_obstacles(near))
 
 
 def _crop(metal: Any, corners: Floats, process: Process) -> Mesh:

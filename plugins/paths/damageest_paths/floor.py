@@ -6,6 +6,7 @@ goes on as a plane, so that a layer ends at a wall, or at an open side, as it li
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -17,8 +18,11 @@ from damageest.geometry.solids import to_arrays
 from damageest.geometry.vectors import normalise
 from damageest_paths.process import Process
 
-STEEPEST = np.radians(75.0)
-"""Largest angle between the floor's normal and the build direction; what is steeper is a wall."""
+STEEPEST, ROUND = np.radians(75.0), np.radians(80.0)
+"""Largest angles between the floor's normal and the build direction: where it is flat, and where it is round. What is
+steeper is a wall."""
+TURNS = 0.2
+"""Least standard deviation of the angles of a round piece between both, in shares of the range; 0.29: evenly spread."""
 PROBE = 0.15
 """Share of the bead's width or height by which metal is thick where a face lies on it: slivers do not count."""
 EDGE = 0.5
@@ -75,10 +79,13 @@ def find_shares(triangles: Floats, places: Floats) -> Floats:
     return np.asarray(share / share.sum(axis=1, keepdims=True))
 
 
-def find_floor(body: Any, metal: Any, process: Process) -> Floor | None:
-    """The floor of a deposit, a Manifold in local coordinates, on the metal; None where nothing of it is floor."""
+def list_floors(body: Any, metal: Any, process: Process) -> Iterator[Floor]:
+    """Floors of a deposit, a Manifold in local coordinates, on the metal; none where nothing of it is floor.
+
+    The first goes on where it is round; the other, if that makes a difference, does not.
+    """
     if metal.is_empty():
-        return None
+        return
     width = process.bead.width
     vertices, faces = to_arrays(body.refine_to_length(EDGE * width))
     mesh = Mesh(vertices, faces)
@@ -89,11 +96,23 @@ def find_floor(body: Any, metal: Any, process: Process) -> Floor | None:
     near = np.flatnonzero(sound)
     near = near[distance_to_mesh(middle[near], standing) < deep]
     on_metal[near] = is_inside(middle[near] + deep * mesh.face_normals[near], standing)
-    is_floor = on_metal & (-mesh.cross[:, 2] > 2 * area * np.cos(STEEPEST))
-    is_floor = _drop_specks(faces, on_metal, is_floor, area, SPECK * width**2)
-    if not is_floor.any():
-        return None
-    return make_floor(vertices, faces[is_floor][:, ::-1], width)
+    angle = np.arccos(np.clip(-mesh.cross[:, 2] / np.maximum(2 * area, 1e-300), -1, 1))
+    flat = on_metal & (angle < STEEPEST)
+    round_ = _find_round(faces, on_metal & ~flat & (angle < ROUND), angle, area)
+    for is_floor in (flat | round_, flat) if round_.any() else (flat,):
+        kept = _drop_specks(faces, on_metal, is_floor, area, SPECK * width**2)
+        if kept.any():
+            yield make_floor(vertices, faces[kept][:, ::-1], width)
+
+
+def _find_round(faces: Ints, steep: Flags, angle: Floats, area: Floats) -> Flags:
+    """Which of the ``steep`` faces (F,) lie in pieces that are round: a wall that leans has one angle."""
+    piece = _label(_find_neighbours(faces), steep)
+    weight = area * steep
+    total = np.maximum(np.bincount(piece, weights=weight), 1e-300)
+    mean = np.bincount(piece, weights=weight * angle) / total
+    spread = np.sqrt(np.bincount(piece, weights=weight * (angle - mean[piece]) ** 2) / total)
+    return np.asarray(steep & (spread >= TURNS * (ROUND - STEEPEST))[piece])
 
 
 def make_floor(vertices: Floats, faces: Ints, width: float) -> Floor:
@@ -117,7 +136,7 @@ def _find_normals(mesh: Mesh, on_rim: Flags, radius: float) -> Floats:
     for corner in range(3):
         np.add.at(normals, mesh.faces[:, corner], mesh.cross)
     rim = np.flatnonzero(on_rim)
-    smooth = np.flatnonzero(mesh.face_normals[:, 2] > np.cos(STEEPEST))
+    smooth = np.flatnonzero(mesh.face_normals[:, 2] > np.cos(ROUND))
     tree = cKDTree(mesh.triangles[smooth].mean(axis=1))
     for vertex, near in zip(rim, tree.query_ball_point(mesh.vertices[rim], radius, return_sorted=True), strict=True):
         total = mesh.cross[smooth[near]].sum(axis=0)
@@ -127,20 +146,12 @@ def _find_normals(mesh: Mesh, on_rim: Flags, radius: float) -> Floats:
 
 def _drop_specks(faces: Ints, on_metal: Flags, is_floor: Flags, area: Floats, smallest: float) -> Flags:
     """Whether each face (F,) is floor, where small pieces of wall, and of floor, are like what is round them."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    owner = np.repeat(np.arange(len(faces)), 3)
-    order = np.lexsort([edges[:, 1], edges[:, 0]])
-    same = (edges[order][1:] == edges[order][:-1]).all(axis=1)
-    first, second = owner[order][:-1][same], owner[order][1:][same]
+    pairs = _find_neighbours(faces)
+    first, second = pairs
     found = is_floor.copy()
     for kind in (True, False):
         mine = on_metal & (found == kind)
-        linked = mine[first] & mine[second]
-        graph = coo_matrix((np.ones(linked.sum()), (first[linked], second[linked])), (len(faces), len(faces)))
-        _, piece = connected_components(graph, directed=False)
+        piece = _label(pairs, mine)
         small = mine & (np.bincount(piece, weights=area * mine)[piece] < smallest)
         if not kind:  # not where it is on the border
             border = np.zeros(len(faces), bool)
@@ -148,3 +159,23 @@ def _drop_specks(faces: Ints, on_metal: Flags, is_floor: Flags, area: Floats, sm
             small &= ~border[piece]
         found[small] = not kind
     return found & on_metal
+
+
+def _find_neighbours(faces: Ints) -> tuple[Ints, Ints]:
+    """The two faces (K,) of each edge that faces (F,3) share."""
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort([edges[:, 1], edges[:, 0]])
+    same = (edges[order][1:] == edges[order][:-1]).all(axis=1)
+    return owner[order][:-1][same], owner[order][1:][same]
+
+
+def _label(pairs: tuple[Ints, Ints], chosen: Flags) -> Ints:
+    """The number of the piece of each of the faces (F,), where the ``chosen`` ones that are neighbours make one."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    first, second = pairs
+    linked = chosen[first] & chosen[second]
+    graph = coo_matrix((np.ones(linked.sum()), (first[linked], second[linked])), (len(chosen), len(chosen)))
+    return np.asarray(connected_components(graph, directed=False)[1])

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from damageest_paths.clearance import Clearance
-from damageest_paths.floor import Floor, find_floor
+from damageest_paths.floor import Floor, list_floors
 from damageest_paths.frames import Frame, make_frame
 from damageest_paths.nozzle import Cone, make_nozzle
 from damageest_paths.planar import Surroundings
@@ -53,6 +53,20 @@ def stair() -> Loss:
     return cut(BLOCK, tool)
 
 
+def crescent() -> Loss:
+    """A shaft about the y axis that is worn on its upper side, by 1 at most: the floor is round up to its border."""
+    shaft, left = (_lay(Manifold.cylinder(LONG, 18, 18, 256)).translate((0, 0, z)) for z in (0, -1))
+    return cut(shaft, Manifold.cube((60, 60, 60), True) - left)
+
+
+def funnel() -> Loss:
+    """A pocket 3 deep with a flat floor, whose walls lean by 12 degrees."""
+    half = np.array([9.0, 6.0])
+    wider = 1 + 4 * np.tan(np.radians(12)) / half
+    floor = CrossSection.square(tuple(2 * half), True)
+    return cut(BLOCK, Manifold.extrude(floor, 4, 0, 0, tuple(wider)).translate((0, 0, -3)))
+
+
 def tip() -> Loss:
     """The tip of a blade, its end round about the y axis and its stub round too."""
     x = np.linspace(-1, 1, 41)
@@ -90,7 +104,7 @@ def prepare(loss: Loss, **options: Any) -> Scene:
     origin = loss.lost.bounds.mean(axis=0)
     body, metal = to_manifold(loss.lost, origin), to_manifold(loss.left, origin)
     process, frame = make_process(**options), make_frame((0.0, 0.0, 1.0), origin)
-    floor = find_floor(frame.move(body), frame.move(metal), process)
+    floor = next(list_floors(frame.move(body), frame.move(metal), process), None)
     assert floor is not None
     return Scene(body, Surroundings(metal, (), Clearance(NOZZLE, 3.0)), frame, floor, process)
 

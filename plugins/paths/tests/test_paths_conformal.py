@@ -12,11 +12,12 @@ from damageest_paths.planar import plan_planar
 from damageest_paths.process import Pass, Plan
 from damageest_paths.regions import measure_length
 from manifold3d import Manifold
-from path_cavities import BALL, BORE, DEPTH, bowl, groove, pocket, prepare, stair, tip
+from path_cavities import BALL, BORE, DEPTH, bowl, crescent, funnel, groove, pocket, prepare, stair, tip
 
 from damageest.artefacts import Floats
 from damageest.geometry.distance import distance_to_edges
 from tests.path_shapes import Loss, cut
+from tests.path_shapes import plan as plan_whole
 
 MAKERS = {"groove": groove, "bowl": bowl, "pocket": pocket, "tip": tip}
 
@@ -129,6 +130,23 @@ def test_nothing_hangs_in_the_air() -> None:
     # 4 wide, of which as much is held as the layer is high
     assert hanging == pytest.approx(10 * 3 * 1, rel=0.15)
     assert plan.missing_volume == pytest.approx(sum(plan.reasons.values()))
+
+
+def test_a_round_floor_is_followed_as_far_as_it_is_not_upright() -> None:
+    beads = {"width": 1.0, "height": 0.35, "machine": {"tilt": 80}}
+    path = plan_whole(crescent(), direction=(0.0, 0.0, 1.0), axes=5, layers="conformal", **beads)
+    assert path.unreached_volume < 0.004 * path.deposit_volume
+    assert path.fill is not None
+    assert path.fill.filled > 0.995
+
+
+def test_walls_that_lean_are_no_floor() -> None:
+    """The floor alone is followed: layers up the walls too would leave a quarter unfilled."""
+    scene = prepare(funnel())
+    plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+    assert plan.passes
+    tops = {one.layer: np.unique(np.round(one.points[:, 2], 2)) for one in plan.passes}
+    assert all(len(heights) == 1 for heights in tops.values())
 
 
 def test_a_floor_with_a_step_is_refused() -> None:
