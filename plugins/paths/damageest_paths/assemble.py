@@ -49,7 +49,7 @@ def plan_moves(draft: Draft, speeds: Speeds) -> DepositPath:
         section=np.array([plan.height * process.bead.step for plan in plans]),
         standoff=clearance.standoff,
         deposit_volume=task.body.volume,
-        nozzle=draft.nozzle.mesh,
+        nozzle=clearance.nozzle.mesh,
         clearance=np.inf if tightest is None else tightest.gap,
         travel_clearance=moves.gap,
         tightest=_find_tightest(tightest, origin),

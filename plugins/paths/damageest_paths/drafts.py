@@ -46,7 +46,6 @@ class Draft:
     """
 
     task: Task
-    nozzle: Nozzle
     process: Process
     origin: Floats
     around: Surroundings
@@ -103,7 +102,7 @@ def draft_path(
     missing = gather_missing(plans)
     solid = None if missing is None else to_solid(missing, origin)
     fill = _simulate(task, groups, plans, solid, origin, process) if is_simulated and any(groups) else None
-    return Draft(task, nozzle, process, origin, around, plans, groups, solid, fill)
+    return Draft(task, process, origin, around, plans, groups, solid, fill)
 
 
 def _take_metal(left: Solid | None, origin: Floats) -> Any:

@@ -40,19 +40,19 @@ class PoseTable:
         for stride in WAVES:
             rows = np.concatenate([self._list_rows(k, stride) for k in range(len(counts))])
             line = np.searchsorted(self._ends, rows, side="right") - 1
-            row, column = np.nonzero(least[line] >= self.needed)
-            self._look(rows[row], column)
-            found = np.where(least[line] >= self.needed, self._high[rows], np.inf)
-            np.minimum.at(least, line, found)
+            is_open = least[line] >= self.needed
+            self._look(rows, is_open)
+            np.minimum.at(least, line, np.where(is_open, self._high[rows], np.inf))
         return least
 
     def bound(self, chosen: Sequence[int]) -> list[tuple[Floats, Floats]]:
         """Two bounds (K,M) at the points of each of the ``chosen`` passes. A pose between two that are not free is not
         looked at: it has the bounds of the one before."""
-        for number, stride in enumerate(STRIDES):
-            asked = [self._ask(k, stride, number == 0) for k in chosen]
-            rows, columns = (np.concatenate(each) for each in zip(*asked, strict=True))
-            self._look(rows, columns)
+        for stride in STRIDES:
+            if stride != STRIDES[0]:
+                for k in chosen:
+                    self._fill_shut(k, stride)
+            self._look(np.concatenate([self._list_rows(k, stride) for k in chosen]))
         return [
             (self._low[self._ends[k] : self._ends[k + 1]], self._high[self._ends[k] : self._ends[k + 1]])
             for k in chosen
@@ -63,24 +63,20 @@ class PoseTable:
         start, stop = self._ends[line], self._ends[line + 1]
         return np.append(np.arange(start, stop - 1, stride), stop - 1)
 
-    def _ask(self, line: int, stride: int, is_first: bool) -> tuple[Ints, Ints]:
-        """The rows and columns (K,) that are to be looked at in a pass at a stride; the others are filled in."""
-        rows = self._list_rows(line, stride)
-        if not is_first:
-            wider = self._list_rows(line, 2 * stride)
-            inner = np.setdiff1d(rows, wider)
-            place = np.searchsorted(wider, inner)
-            before, after = wider[place - 1], wider[place]
-            is_shut = (self._high[before] < self.needed) & (self._high[after] < self.needed)
-            is_shut &= np.isnan(self._high[inner])
-            for table in (self._low, self._high):
-                table[inner] = np.where(is_shut, table[before], table[inner])
-            rows = inner
-        row, column = np.nonzero(np.isnan(self._high[rows]))
-        return rows[row], column
+    def _fill_shut(self, line: int, stride: int) -> None:
+        """Fills in the poses of a pass at a stride that lie between two that are not free."""
+        wider = self._list_rows(line, 2 * stride)
+        inner = np.setdiff1d(self._list_rows(line, stride), wider)
+        place = np.searchsorted(wider, inner)
+        before, after = wider[place - 1], wider[place]
+        is_shut = (self._high[before] < self.needed) & (self._high[after] < self.needed)
+        is_shut &= np.isnan(self._high[inner])
+        for table in (self._low, self._high):
+            table[inner] = np.where(is_shut, table[before], table[inner])
 
-    def _look(self, rows: Ints, columns: Ints) -> None:
-        unknown: Flags = np.isnan(self._high[rows, columns])
-        rows, columns = rows[unknown], columns[unknown]
-        low, high = self._clearance.bound(self._points[rows], self.axes[columns], self.room)
-        self._low[rows, columns], self._high[rows, columns] = low, high
+    def _look(self, rows: Ints, wanted: Flags | bool = True) -> None:
+        """Bounds the poses of rows (K,) that are ``wanted`` (K,M) and not known yet."""
+        row, column = np.nonzero(wanted & np.isnan(self._high[rows]))
+        own = rows[row]
+        low, high = self._clearance.bound(self._points[own], self.axes[column], self.room)
+        self._low[own, column], self._high[own, column] = low, high
