@@ -26,9 +26,11 @@ WAY = 6.0
 """Bead widths of travel that a pass more costs, where a ring beside rows is compared with pieces of it."""
 NEARER = 0.85
 """Share of a step from a ring to the border of the rows within it: their ends are round."""
-BESIDE, WITHIN = 0.9, 0.02
-"""Share of half a bead's width within which a line that follows the border of the free region lies beside a gap, and
-bead widths that it lies within that border."""
+BESIDE = 0.9
+"""Share of half a bead's width within which a line that follows the border of the free region lies beside a gap."""
+WITHIN, CLOSE = 0.02, 0.002
+"""Bead widths that such a line lies within that border. Where none covers the gap: one that is closer, as far beside
+what it may lie on."""
 DOUBLED, SHARP = 0.75, np.radians(60.0)
 """Share of its length times the bead's width that a line covers at most where it comes back beside itself, and the turn
 at a corner at which it is cut there."""
@@ -87,26 +89,37 @@ def _fill_beside(region: Any, lines: Sequence[Line], bead: Bead, free: Any, shor
     """Pieces of the border of the free region that cover gaps in which no row may lie: tips of the region beside metal.
     Of pieces that cover the same the one that covers most is taken."""
     gaps = _list_gaps(region, lines, bead)
-    within = free ^ (region if firm is None else unite_regions([region, firm]))
-    rings = _read_rings(shift_border(within, -WITHIN * bead.width), bead) if gaps else []
+    if not gaps:
+        return []
+    held = region if firm is None else unite_regions([region, firm])
+    wide = free ^ shift_border(held, WITHIN * bead.width)
+    borders = [_read_border(free ^ held, WITHIN, bead), _read_border(wide, CLOSE, bead)]
+    covered = shift_border(cover([line.points for line in lines], bead.width), WITHIN * bead.width)
     found: list[Line] = []
     for gap in gaps:
-        near, rest = shift_border(gap, bead.width / 2 * BESIDE), gap
-        pieces = [
-            Line(part, "gap")
-            for ring in rings
-            for piece in cut_ring(ring, near, bead.width)
-            for part in _split_doubled(piece, bead)
-        ]
-        left = _finish(pieces, region, bead, free, shortest)
-        while left:
-            gains = [float((rest ^ cover([line.points], bead.width)).area()) for line in left]
-            best = int(np.argmax(np.round(gains, 9)))
-            if gains[best] <= SLIVER * bead.width**2:
-                break
-            found.append(left.pop(best))
-            rest -= cover([found[-1].points], bead.width)
+        rest = gap
+        # next to what is covered, tips and strips along a hole may be too narrow for WITHIN; a strip alone is left out
+        for rings in borders[:1] if (gap ^ covered).is_empty() else borders:
+            near = shift_border(rest, bead.width / 2 * BESIDE)
+            pieces = [piece for ring in rings for piece in cut_ring(ring, near, bead.width)]
+            parts = [Line(part, "gap") for piece in pieces for part in _split_doubled(piece, bead)]
+            chosen = _choose_most(_finish(parts, region, bead, free, shortest), rest, bead)
+            rest -= cover([line.points for line in chosen], bead.width)
+            found += chosen
     return found
+
+
+def _choose_most(lines: Sequence[Line], gap: Any, bead: Bead) -> list[Line]:
+    """The lines that cover a gap: the one that covers most, then the one that covers most of the rest, and so on."""
+    left, chosen = list(lines), list[Line]()
+    while left:
+        gains = [float((gap ^ cover([line.points], bead.width)).area()) for line in left]
+        best = int(np.argmax(np.round(gains, 9)))
+        if gains[best] <= SLIVER * bead.width**2:
+            break
+        chosen.append(left.pop(best))
+        gap = gap - cover([chosen[-1].points], bead.width)
+    return chosen
 
 
 def _split_doubled(line: Floats, bead: Bead) -> list[Floats]:
@@ -241,11 +254,17 @@ def _find_rings(region: Any, bead: Bead) -> list[Floats]:
     return rings
 
 
-def _read_rings(region: Any, bead: Bead) -> list[Floats]:
-    """The outlines of a region as rings with corners not farther apart than the bead's width."""
-    polygons = region.simplify(bead.width / 100).to_polygons()
+def _read_rings(region: Any, bead: Bead, off: float = 0.01) -> list[Floats]:
+    """The outlines of a region as rings with corners not farther apart than the bead's width; they are up to ``off``
+    bead widths beside the outlines."""
+    polygons = region.simplify(off * bead.width).to_polygons()
     rings = [np.asarray(ring, dtype=np.float64) for ring in polygons]
     return [_refine(ring, bead.width) for ring in rings if len(ring) > 2 and measure_length(_close(ring)) > bead.width]
+
+
+def _read_border(region: Any, within: float, bead: Bead) -> list[Floats]:
+    """The outlines of a region, shrunk by ``within`` bead widths, as rings that do not leave it."""
+    return _read_rings(shift_border(region, -within * bead.width), bead, within / 2)
 
 
 def _refine(ring: Floats, longest: float) -> Floats:

@@ -13,7 +13,7 @@ from damageest.geometry.solids import to_arrays
 from damageest_paths.aims import Aims, find_aims, find_sink
 from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
-from damageest_paths.fill import Kind, Line, list_lines
+from damageest_paths.fill import SLIVER, WITHIN, Kind, Line, list_lines
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.order import order_passes
@@ -95,7 +95,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         lost = _share_out((held ^ aims.reached) - done, causes)
         left = {
             UNSUPPORTED: wanted - held,
-            SUNK: held - aims.flush,
+            SUNK: unite_regions([held - aims.flush, _find_narrow(held ^ aims.reached, free, firm, width)]),
             SHADED: unite_regions([held ^ (aims.flush - aims.reached), lost[1]]),
             COLLIDES: lost[0],
             SHORT: lost[2],
@@ -119,6 +119,16 @@ def _find_hanging(held: Any, wanted: Any, aims: Aims, process: Process) -> Any:
         return make_region([])
     reach = process.bead.width / 2
     return held ^ (shift_border(aims.free ^ wanted, reach) - shift_border(aims.free ^ held, reach))
+
+
+def _find_narrow(region: Any, free: Any, firm: Any, width: float) -> Any:
+    """The pieces of a region that no bead covers whose middle lies well in the regions ``free``, None for everywhere,
+    and ``firm``: strips beside metal, where the middle would lie too far beside what is to be filled or what holds."""
+    if free is None:
+        return make_region([])
+    off = WITHIN * width
+    rest = region - shift_border(shift_border(free ^ firm, -off), width / 2 + off)
+    return unite_regions([piece for piece in list_pieces(rest) if piece.area() > SLIVER * width**2])
 
 
 def _share_out(gaps: Any, causes: Sequence[Any]) -> list[Any]:

@@ -113,3 +113,37 @@ def test_a_strip_narrower_than_half_a_bead_beside_a_wall_is_covered(angle: float
     assert not list_lines(region, "zigzag", BEAD, angle, free)
     for line in lines:
         assert (cover([line], 1e-3) - free).area() < 1e-3
+
+
+FREE = [
+    (0.83, 0.0), (1.07, 0.44), (1.03, 0.52), (0.98, 0.93), (0.85, 1.37), (0.7, 1.59), (0.42, 1.75), (-0.08, 1.71),
+    (-0.5, 1.61), (-1.35, 1.51), (-0.42, 1.49), (-0.27, 1.44), (-0.15, 1.35), (-0.05, 1.24), (0.01, 1.1), (0.04, 0.95),
+    (-0.01, 0.69), (-0.03, 0.36), (0.01, 0.27), (0.18, 0.15), (0.4, -0.05), (0.62, -0.15),
+]  # fmt: skip
+REGION = [
+    (0.49, -0.18), (1.47, 0.28), (1.59, 0.74), (1.55, 1.1), (1.34, 1.71), (1.16, 1.96), (0.99, 2.11), (0.57, 2.32),
+    (0.42, 2.34), (-0.13, 2.3), (-0.58, 2.2), (-1.35, 2.12), (-1.65, 2.03), (-1.77, 1.93), (-1.86, 1.81), (-1.92, 1.66),
+    (-1.94, 1.51), (-1.92, 1.35), (-1.86, 1.21), (-1.76, 1.09), (-1.64, 1.0), (-1.49, 0.94), (-1.31, 0.92),
+    (-1.14, 0.96), (-1.13, 0.92), (-0.56, 0.91), (-0.6, 0.74), (-0.62, 0.28), (-0.48, -0.07), (-0.11, -0.39),
+]  # fmt: skip
+"""Where the middle of a bead 1.2 wide may lie in a layer of a bearing's housing, which ends in a tip, and what such
+beads cover of the deposit."""
+
+
+def test_a_tapering_tip_of_the_free_region_is_covered() -> None:
+    bead, free, region = Bead(1.2, 0.84), make_region([np.array(FREE)]), make_region([np.array(REGION)])
+    lines = [line.points for line in list_lines(region, "zigzag", bead, 0.0, free, 0.6, region)]
+    tip = region - CrossSection.square((6, 6)).translate((-1, -2))
+    assert (tip - cover(lines, bead.width)).area() < 0.05 * tip.area()
+    for line in lines:
+        assert (cover([line], 1e-3) - free).area() < 1e-3
+
+
+def test_a_strip_between_a_hole_and_metal_is_covered() -> None:
+    """The middle of a bead may lie on 0.01 only, between what metal keeps it from and a hole of the region."""
+    hole = CrossSection.square((2.5, 2.5)).translate((0.51, 2.0))
+    region = CrossSection.square((6, 7)) - hole
+    free = CrossSection.square((5, 6)).translate((0.5, 0.5)) - hole.offset(-0.1)
+    lines = [line.points for line in list_lines(region, "zigzag", BEAD, np.pi / 2, free, 0.5, region)]
+    strip = CrossSection.square((0.51, 2.5)).translate((0, 2.0))
+    assert (strip - cover(lines, BEAD.width)).area() < 0.05 * strip.area()

@@ -131,6 +131,21 @@ def test_a_wider_beam_keeps_away_from_a_wall() -> None:
     assert any("line of sight" in item.why for item in wide.unreached)
 
 
+@pytest.mark.parametrize("rise", [3, 10])
+def test_a_strip_too_narrow_beside_a_wall_is_listed(rise: float) -> None:
+    """The middle of a bead would lie beside the strip: it is no gap of what is reachable. What is next to it is filled;
+    where the wall keeps the nozzle away, what its overhang would hold of a bead is no gap either."""
+    lost = Manifold.cube((0.7, 24, 3)).translate((0, -12, 0)) + Manifold.cube((10, 10, 3)).translate((0, 2, 0))
+    wall = Manifold.cube((10, 40, rise + 10)).translate((-10, -20, -10))
+    wall += Manifold.cube((30, 40, 10)).translate((0, -20, -10))
+    path = plan(cut(wall + lost, lost), direction=(0.0, 0.0, 1.0), axes=3)
+    assert path.fill is not None
+    assert path.fill.filled > 0.995
+    narrow = 0.7 * (24 - 10) * 3
+    thin = [each.volume for each in path.unreached if "so thin over intact metal" in each.why]
+    assert 0.75 * narrow < sum(thin) < 2 * narrow
+
+
 def test_over_build_is_said() -> None:
     path = plan(corner(), direction=(0.6, 0.48, 0.64))
     assert path.surplus_volume > 0.1 * path.deposit_volume
