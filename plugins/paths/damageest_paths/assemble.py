@@ -102,6 +102,7 @@ def _choose_travel(task: Task, clearance: Clearance, speeds: Speeds, process: Pr
     return Travel(
         2 * width if speeds.hop is None else speeds.hop, far + 10 * width, np.zeros(3), process.gap, speeds.feed,
         speeds.fast, find_corners(vertices), above, speeds.hop is None,
+        process.gap + width if process.axes == 5 else None,
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.geometry.transforms import turn_to_axis
 from damageest.geometry.vectors import measure_to_sphere
 from damageest_paths.clearance import Clearance
 from damageest_paths.network import Network, measure_way
@@ -16,6 +17,12 @@ from damageest_paths.process import Pass
 
 MOST_EXITS = 12
 """Passes whose axes, and places, are tried where the tool cannot leave along its own axis, as in a bore."""
+SIDES = 24
+"""Directions at a right angle to the tool axis in which the tool may leave."""
+RISES = (1.0, 4.0)
+"""Hops by which it is lifted before that."""
+SHORTER = 0.7
+"""Share of the way along the axis that such a way is long at most."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +30,8 @@ class Travel:
     """``hop``: how far the tool is lifted along its axis between passes; ``stays``: whether it is not where the way is
     free without. ``safe``: a distance from ``centre`` (3,) at which the nozzle is clear of everything. ``corners``
     (N,3): of the hull of everything, and ``above``: how far beyond it along the tool axis the nozzle is clear, measured
-    to the point that it works on. ``gap``: distance to keep. ``feed``, ``fast``: speeds of deposition and of travel, in
+    to the point that it works on; ``beside``: how far from it all of the nozzle is clear sideways, None where the tool
+    is not to leave that way. ``gap``: distance to keep. ``feed``, ``fast``: speeds of deposition and of travel, in
     lengths a minute."""
 
     hop: float
@@ -35,6 +43,7 @@ class Travel:
     corners: Floats
     above: float
     stays: bool = True
+    beside: float | None = None
 
 
 class Exit(NamedTuple):
@@ -102,7 +111,11 @@ def find_exit(
 def leave(
     point: Floats, axis: Floats, exits: Sequence[Exit], network: Network, clearance: Clearance, travel: Travel
 ) -> tuple[Floats, Floats, float]:
-    """As `find_exit`, to above everything; where no such way is clear, over poses from which one is."""
+    """As `find_exit`, to above everything; where that is shorter, sideways to beside everything; where no such way is
+    clear, over poses from which one is."""
+    aside = _leave_sideways(point, axis, clearance, travel)
+    if aside is not None:
+        return aside
     way, axes, gap = find_exit(point, axis, exits, clearance, travel)
     if gap >= travel.gap / 2:
         return way, axes, gap
@@ -113,3 +126,29 @@ def leave(
         if last >= travel.gap / 2:
             return np.vstack([found.points, out]), np.vstack([found.axes, along]), min(last, found.gap)
     return way, axes, gap
+
+
+def _leave_sideways(
+    point: Floats, axis: Floats, clearance: Clearance, travel: Travel
+) -> tuple[Floats, Floats, float] | None:
+    """As `leave`: lifted a little, then at a right angle to the axis, until a plane across that direction parts all of
+    the nozzle from everything. So nothing is met either where the tool goes on along its axis. The shortest clear way;
+    None where none is, or the one along the axis is hardly longer."""
+    if travel.beside is None:
+        return None
+    turn = turn_to_axis(axis)
+    angle = np.arange(SIDES) * 2 * np.pi / SIDES
+    sides = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)]) @ turn.T
+    nozzle = point + clearance.standoff * axis + clearance.nozzle.mesh.vertices @ turn.T
+    far = (travel.corners @ sides.T).max(axis=0) + travel.beside - (nozzle @ sides.T).min(axis=0)
+    most = SHORTER * float(np.linalg.norm(_lift(point, axis, travel) - point))
+    tried = sorted((rise * travel.hop + max(far[k], 0.0), rise, k) for rise in RISES for k in range(SIDES))
+    for length, rise, k in tried:
+        if length > most:
+            break
+        lifted = point + rise * travel.hop * axis
+        way, axes = np.array([lifted, lifted + max(far[k], 0.0) * sides[k]]), np.tile(axis, (3, 1))
+        gap = measure_way(np.vstack([point, way]), axes, clearance, travel.gap)
+        if gap >= travel.gap / 2:
+            return way, axes[1:], gap
+    return None
