@@ -64,7 +64,9 @@ class DepositPath(Checked):
     conformal where the layers follow the floor of the cavity; empty where not known. ``around`` (4,): centre and radius
     of a ball that holds all that the tool must not touch; ``free_ends`` (K,): whether the tool can leave it straight
     along its axis from the end of each pass. Both None where not known,
-    the second also where the tool axis is the same everywhere.
+    the second also where the tool axis is the same everywhere. ``dwell`` (N,): seconds that the tool stands at each
+    point, with the process off; None: nowhere. ``bead_sizes`` (N,2): width and height of the bead of the move that ends
+    there, as its settings make it; None: ``width`` and ``heights``, with which the path was planned.
     """
 
     points: Floats
@@ -96,11 +98,13 @@ class DepositPath(Checked):
     layer_form: str = ""
     around: Floats | None = None
     free_ends: Flags | None = None
+    dwell: Floats | None = None
+    bead_sizes: Floats | None = None
     _dtypes: ClassVar[dict[str, Any]] = {
         "points": np.float64, "axes": np.float64, "normals": np.float64, "feed": np.float64, "on": np.bool_,
         "layer": np.int64, "number": np.int64, "part": np.int64, "directions": np.float64, "heights": np.float64,
         "section": np.float64, "tightest": np.float64, "setup": np.float64, "values": np.float64,
-        "around": np.float64, "free_ends": np.bool_,
+        "around": np.float64, "free_ends": np.bool_, "dwell": np.float64, "bead_sizes": np.float64,
     }  # fmt: skip
     _ranges: ClassVar[dict[str, Range]] = {
         "width": (0.0, MOST), "standoff": (0.0, MOST), "deposit_volume": (0.0, MOST),
@@ -134,6 +138,12 @@ class DepositPath(Checked):
         if self.values is not None:
             require_shape("values", self.values, count, len(self.channels))
             require_finite("values", self.values)
+        for name, shape in (("dwell", (count,)), ("bead_sizes", (count, 2))):
+            if (own := getattr(self, name)) is not None:
+                require_shape(name, own, *shape)
+                require_finite(name, own)
+                if count and own.min() < 0:
+                    raise ArtefactError(f"{name}: not all 0 or more")
         with np.errstate(over="ignore"):
             is_unit = np.allclose(np.linalg.norm(self.axes, axis=1), 1, atol=1e-6)
         if not is_unit:
@@ -175,8 +185,20 @@ class DepositPath(Checked):
 
     @property
     def minutes(self) -> float:
-        """Time of all moves at their feeds, without acceleration."""
-        return float((self.moves / self.feed).sum()) if len(self.points) else 0.0
+        """Time of all moves at their feeds, without acceleration, and of all waits."""
+        return float((self.moves / self.feed).sum()) + self.wait_minutes if len(self.points) else 0.0
+
+    @property
+    def wait_minutes(self) -> float:
+        """Time that the tool waits between beads."""
+        return 0.0 if self.dwell is None else float(self.dwell.sum()) / 60
+
+    @property
+    def sizes(self) -> Floats:
+        """Width and height (N,2) of the bead of each move."""
+        heights = self.heights[self.part - 1]
+        planned = np.column_stack([np.full(len(heights), self.width), heights])
+        return planned if self.bead_sizes is None else self.bead_sizes
 
     @property
     def passes(self) -> int:

@@ -46,6 +46,7 @@ class PathReport(JsonModel):
     length: float = Field(description="of all passes")
     travel: float = Field(description="length of the moves between them")
     minutes: float
+    wait_minutes: float = Field(description="of these, waits for neighbouring beads to cool down")
     bead_volume: float = Field(description="volume that the passes add: length by section")
     deposit_volume: float
     surplus_volume: float = Field(description="volume that the passes add beyond what of the deposit is reached")

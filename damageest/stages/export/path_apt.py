@@ -13,7 +13,8 @@ TO_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
 def write_apt(file: Path, path: DepositPath, settings: PathSettings) -> None:
     """Millimetres or inches. Deposition stands between INSERT/DEPOSIT ON and INSERT/DEPOSIT OFF. The first point is
-    approached in rapid traverse. A channel of the process is INSERT/ with its name and value, where that changes."""
+    approached in rapid traverse. A channel of the process is INSERT/ with its name and value, where that changes;
+    DELAY/ has the seconds of a wait."""
     word, factor, speed = UNITS.get(settings.unit) or ("MM", TO_MM[settings.unit], "MMPM")
     lines = [f"PARTNO {settings.title.upper()}", f"UNITS/{word}", "MULTAX/ON", "LOADTL/1"]
     lines += [f"$$ {text}" for text in describe_setup(path, factor)]
@@ -37,5 +38,7 @@ def write_apt(file: Path, path: DepositPath, settings: PathSettings) -> None:
             lines.append(f"FEDRAT/{feed * factor:.6g},{speed}")
         numbers = [*(path.points[k] * factor), *path.axes[k]]
         lines.append("GOTO/" + ",".join(f"{value + 0.0:.6f}" for value in numbers))
+        if path.dwell is not None and path.dwell[k] > 0:
+            lines.append(f"DELAY/{path.dwell[k]:.3f}")
     lines += ["INSERT/DEPOSIT OFF"] if on else []
     file.write_text("\n".join([*lines, "FINI"]) + "\n", encoding="utf-8")

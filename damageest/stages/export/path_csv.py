@@ -9,20 +9,21 @@ import numpy as np
 from damageest.artefacts import DepositPath
 from damageest.stages.export import PathSettings
 
-HEAD = "x,y,z,i,j,k,feed,on,layer,pass,part,width,height,kind"
+HEAD = "x,y,z,i,j,k,feed,on,layer,pass,part,width,height,kind,dwell"
 
 
 def write_csv(file: Path, path: DepositPath, settings: PathSettings) -> None:
     """Point (x, y, z), tool axis (i, j, k), feed in lengths a minute, on (1: the move to this point deposits), layer,
-    pass, part of the deposit, width and height of the bead, kind of the pass, and a column for each channel of the
-    process. Lengths in the job's unit."""
+    pass, part of the deposit, width and height of the bead, kind of the pass, dwell (seconds at the point), and a
+    column for each channel of the process. Lengths in the job's unit."""
     rows = [",".join([HEAD, *path.channels])]
     values = np.empty((len(path.points), 0)) if path.values is None else path.values
-    columns = np.column_stack([path.points, path.axes, path.feed, path.heights[path.part - 1]])
+    dwell = np.zeros(len(path.points)) if path.dwell is None else path.dwell
+    columns = np.column_stack([path.points, path.axes, path.feed, path.sizes, dwell])
     numbers = np.column_stack([path.on, path.layer, path.number, path.part]).tolist()
     for row, (on, layer, number, part), given in zip(columns, numbers, values, strict=True):
         text = ",".join(f"{value:.6f}" for value in row[:6] + 0.0)
         kind = path.kinds[number - 1] if path.kinds else ""
-        text += f",{row[6]:.6g},{on},{layer},{number},{part},{path.width:.6g},{row[7]:.6g},{kind}"
+        text += f",{row[6]:.6g},{on},{layer},{number},{part},{row[7]:.6g},{row[8]:.6g},{kind},{row[9]:.3f}"
         rows.append(",".join([text, *(f"{value:.6g}" for value in given)]))
     file.write_text("\n".join(rows) + "\n", encoding="utf-8")

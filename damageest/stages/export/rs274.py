@@ -80,11 +80,14 @@ def _write_moves(
             text += f" {rotary[0]}{moves.angles[k, 0] + 0.0:.5f} C{moves.angles[k, 1] + 0.0:.5f}"
         if k == 0:
             lines += [text, "G93"] if is_timed else [text]
-            continue
-        value = 1 / max(moves.minutes[k], 1e-6) if is_timed else path.feed[number] * factor
-        speed = " F" + f"{value:.4f}".rstrip("0").rstrip(".")
-        lines.append(text + (speed if speed != feed or is_timed else ""))
-        feed = speed
+        else:
+            value = 1 / max(moves.minutes[k], 1e-6) if is_timed else path.feed[number] * factor
+            speed = " F" + f"{value:.4f}".rstrip("0").rstrip(".")
+            lines.append(text + (speed if speed != feed or is_timed else ""))
+            feed = speed
+        is_last = k + 1 == len(moves.move) or moves.move[k + 1] != number
+        if path.dwell is not None and is_last and path.dwell[number] > 0:
+            lines.append(f"G4 P{path.dwell[number]:.3f}")
     lines += [options["off"]] if on else []
     return [*lines, "G94"] if is_timed and lines else lines
 

@@ -78,9 +78,10 @@ def list_path(site: Site, unit: str) -> list[tuple[str, str]]:
         return []
     share = path.unreached_volume / path.deposit_volume
     along = " along the floor" if path.layer_form == "conformal" else ""
+    waits = f" and {format_number(path.wait_minutes, 3)} min of waits" if path.wait_minutes else ""
     rows = [
         ("passes", f"{path.passes} in {path.layers} layers{along}, {format_number(path.length)} {unit}"),
-        ("time of the passes", f"{format_number(path.minutes, 3)} min, travel included"),
+        ("time of the passes", f"{format_number(path.minutes, 3)} min, travel{waits} included"),
         ("not reached", f"{format_number(path.unreached_volume, 3)} {unit}³, {format_share(share)} of the deposit"),
     ]
     if path.clearance < float("inf"):

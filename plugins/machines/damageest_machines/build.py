@@ -33,7 +33,7 @@ def build_program(path: DepositPath, settings: PathSettings, machine: Machine) -
     if machine.post.tcp == "table" and machine.rotary:
         moves, at = _follow_table(machine, moves, at, standoff)
     exact = find_exact(moves.on)
-    minutes = measure_minutes(machine, moves, at, exact)
+    minutes = measure_minutes(machine, moves, at, exact) + path.wait_minutes
     title = settings.title.encode("ascii", "replace").decode().replace("\n", " ")
     name = machine.post.program.replace("{site}", str(settings.site))
     return Program(machine, path, settings, moves, at, name, title, exact, minutes, (*notes, *at.notes))

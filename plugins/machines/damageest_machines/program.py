@@ -45,6 +45,13 @@ class Program:
     minutes: float
     notes: tuple[str, ...]
 
+    def find_wait(self, k: int) -> float:
+        """Seconds that the tool waits at the end of a move for the beads beside to cool down."""
+        source = int(self.moves.source[k])
+        if self.path.dwell is None or source < 0 or not self.moves.is_end[k]:
+            return 0.0
+        return float(self.path.dwell[source])
+
     def list_steps(self) -> Iterator[Step]:
         """All that the program does between its first and its last move, in order. Channels are set before the
         deposition is switched on, and where they change; it is on for the moves that deposit, and for no other."""
@@ -69,6 +76,8 @@ class Program:
             if moves.on[k] and not was_on:
                 yield from _switch(process.on)
             yield Step("move", k)
+            if (waited := self.find_wait(k)) > 0:
+                yield Step("wait", seconds=waited)
         if len(moves.points) and moves.on[-1]:
             yield from _switch(process.off)
 

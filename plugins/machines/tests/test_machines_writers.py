@@ -100,3 +100,36 @@ def test_a_parser_of_krl_by_others_takes_the_program(machine: str, tmp_path: Pat
     found = subprocess.run([*command, "a.src"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert found.stdout == "a.src: 0 syntax errors\n", found.stderr
     assert subprocess.run([*command, "wrong.src"], cwd=tmp_path, capture_output=True, check=False).returncode
+
+
+WAITS = {
+    "krl": r"^WAIT SEC ([\d.]+)$", "rapid": r"^\s*WaitTime ([\d.]+);$", "fanuc": r"WAIT ([\d.]+)\(sec\)",
+    "sinumerik": r"G4 F([\d.]+)$", "heidenhain": r"CYCL DEF 9.1 DWELL ([\d.]+)$", "linuxcnc": r"^G4 P([\d.]+)$",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("form", "machine"), PAIRS)
+def test_the_tool_waits_before_passes_beside_hot_beads(form: str, machine: str, tmp_path: Path) -> None:
+    """Each wait comes once, with the process off; points and process are as without, and the time is longer by it."""
+    path = make_path("tilted")
+    dwell = np.zeros(len(path.points))
+    starts = np.flatnonzero(~path.on[:-1] & path.on[1:])[1::3]
+    dwell[starts] = 7.25 + np.arange(len(starts))
+    plain, _ = write(form, machine, path, tmp_path)
+    text, _ = write(form, machine, replace(path, dwell=dwell), tmp_path)
+    found, short = (
+        [float(word) for word in re.findall(WAITS[form], each.replace("\r", ""), re.MULTILINE)]
+        for each in (text, plain)
+    )
+    assert sorted(set(found) - set(short)) == dwell[starts].tolist()
+    assert len(found) == len(short) + len(starts)
+    off = compare(path, read(form, machine, text))
+    assert off.point < 1e-3
+    if form != "fanuc":  # its comments are short
+        assert minutes(text) == pytest.approx(minutes(plain) + dwell.sum() / 60, abs=0.11)
+
+
+def minutes(text: str) -> float:
+    found = re.search(r"about ([\d.]+) min", text)
+    assert found
+    return float(found.group(1))

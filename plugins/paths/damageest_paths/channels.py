@@ -1,15 +1,13 @@
-"""What the process is given besides its place: power, powder or wire, gas and speed, by layer and kind of pass."""
+"""What the process is given besides its place: power, powder or wire, gas and speed, by layer, pass and place."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, StringConstraints
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
-from damageest.artefacts import DepositPath
+from damageest.artefacts import Flags, Floats
 from damageest.options import Options
 
 SPEED = "speed"
@@ -19,8 +17,25 @@ KINDS = {"contour": ("ring", "rim"), "fill": ("row", "spiral", "gap")}
 Name = Annotated[str, StringConstraints(pattern="^[a-z][a-z0-9_]*$")]
 
 
+class Span(Options):
+    """Values from ``least`` to below ``most``."""
+
+    least: float = Field(0.0, ge=0, description="smallest value")
+    most: float | None = Field(None, gt=0, description="the value from which on the row does not hold; default: none")
+
+    @model_validator(mode="after")
+    def _check_order(self) -> Span:
+        if self.most is not None and self.most <= self.least:
+            raise ValueError(f"most ({self.most:g}) has to be above least ({self.least:g})")
+        return self
+
+    def holds(self, values: Floats) -> Flags:
+        """Whether each of the values (N,) is within."""
+        return np.asarray((values >= self.least) & (values < (np.inf if self.most is None else self.most)))
+
+
 class Setting(Options):
-    """One row of the table of the process: what is set, and on which passes."""
+    """One row of the table of the process: what is set, and on which passes and places of them."""
 
     layer: Annotated[int, Field(ge=1)] | tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = Field(
         None, description="number of the layer, or [first, last]; 1 lies on the part's own metal; default: all"
@@ -29,6 +44,17 @@ class Setting(Options):
         None, description="of the pass; contour: ring and rim, fill: row, spiral and gap; default: all"
     )
     first: bool = Field(False, description="only the first pass of a layer")
+    radius: Span | None = Field(
+        None, description="{least, most}: where the pass bends with such a radius, over two bead widths; default: all"
+    )
+    thickness: Span | None = Field(
+        None, description="{least, most}: where the finished metal is so wide, across the layer's normal; default: all"
+    )
+    rest: Span | None = Field(
+        None,
+        description="{least, most}: where so many seconds passed since the bead of another pass was laid beside or "
+        "below; places without such a bead count as cold; default: all",
+    )
     set: dict[Name, float] = Field(
         min_length=1, description="values by name, as power, powder, wire, gas; speed is the feed, in lengths a minute"
     )
@@ -36,7 +62,12 @@ class Setting(Options):
     @property
     def is_general(self) -> bool:
         """Whether it holds for all passes."""
-        return self.layer is None and self.kind is None and not self.first
+        return self == Setting(set=self.set)
+
+    @property
+    def is_local(self) -> bool:
+        """Whether it may hold for a part of a pass only."""
+        return not (self.radius is None and self.thickness is None and self.rest is None)
 
 
 def check_table(table: tuple[Setting, ...]) -> tuple[Setting, ...]:
@@ -44,39 +75,12 @@ def check_table(table: tuple[Setting, ...]) -> tuple[Setting, ...]:
     general = {name for row in table if row.is_general for name in row.set}
     open_names = sorted({name for row in table for name in row.set} - general - {SPEED})
     if open_names:
-        raise ValueError(
-            f"{', '.join(open_names)}: has no value for all passes; begin with a row without layer, kind and first"
-        )
+        raise ValueError(f"{', '.join(open_names)}: has no value for all passes; begin with a row that only has set")
     if any(row.set.get(SPEED, 1.0) <= 0 for row in table):
         raise ValueError("speed: has to be above 0")
+    if any(row.rest is not None and SPEED in row.set for row in table):
+        raise ValueError("speed: may not depend on rest, which depends on the speed")
     return table
 
 
 ProcessTable = Annotated[tuple[Setting, ...], AfterValidator(check_table)]
-
-
-def apply_table(path: DepositPath, table: Sequence[Setting]) -> DepositPath:
-    """The path with its channels, in the order in which the table names them, and with the speeds of the table. Of rows
-    that hold for a pass, the last counts. Travel keeps its speed, and has the values of the pass that it leads to."""
-    names = list(dict.fromkeys(name for row in table for name in row.set if name != SPEED))
-    if not table or not len(path.points):
-        return path
-    feed = path.feed.copy()
-    values = np.zeros((len(feed), len(names)))
-    kinds = np.array(path.kinds or ("row",) * path.passes)[path.number - 1]
-    places = np.stack([path.part, path.layer], axis=1)
-    firsts = {tuple(place): int(number) for place, number in zip(places[::-1], path.number[::-1], strict=True)}
-    is_first = np.array([firsts[tuple(place)] for place in places]) == path.number
-    for row in table:
-        low, high = row.layer if isinstance(row.layer, tuple) else (row.layer or 1, row.layer or path.layer.max())
-        own = (path.layer >= low) & (path.layer <= high)
-        if row.kind is not None:
-            own &= np.isin(kinds, KINDS.get(row.kind, (row.kind,)))
-        if row.first:
-            own &= is_first
-        for name, value in row.set.items():
-            if name == SPEED:
-                feed[own & path.on] = value
-            else:
-                values[own, names.index(name)] = value
-    return replace(path, feed=feed, channels=tuple(names), values=values if names else None)

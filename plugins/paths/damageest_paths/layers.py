@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from damageest.artefacts import DepositPath, Floats, Mesh, Solid, Vector
 from damageest.errors import StageError
 from damageest.options import Options
 from damageest.stages import JobPath
 from damageest.stages.path import Path
-from damageest_paths.channels import ProcessTable, apply_table
+from damageest_paths.calibration import Trials, complete_size, relax_size
+from damageest_paths.channels import ProcessTable
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -87,7 +88,7 @@ class Layers(Path):
         "the cavity, that is what of the deposit lies on metal and is less than 75 degrees steep; auto: planar, or "
         "conformal where planes lose more than 7 % of the deposit as planes, and it half or less of what they lose",
     )
-    width: Length = Field(description="of a bead")
+    width: Length = Field(description="of a bead; may be left out with calibration, as height")
     feed: Length = Field(description="speed of deposition, in lengths a minute")
     nozzle: Nozzle = Field(
         description="{tip_radius, cone_angle, length, body_radius}: a flat tip, a cone of this angle (degrees) between "
@@ -151,10 +152,27 @@ class Layers(Path):
     sites: tuple[int, ...] = Field((), description="numbers of the sites that are built up first, in this order")
     process: ProcessTable = Field(
         (),
-        description="table of the process: rows {layer, kind, first, set: {power: .., powder: .., speed: ..}}; of rows "
-        "that hold for a pass, the last counts",
+        description="table of the process: rows {layer, kind, first, radius, thickness, rest, set: {power: .., powder: "
+        ".., speed: ..}}; of rows that hold for a place, the last counts",
+    )
+    interpass: float = Field(
+        0.0,
+        ge=0,
+        description="least seconds between laying a bead and one of another pass beside or on it: the tool waits",
+    )
+    calibration: Trials = Field(
+        (),
+        description="rows {set: {speed: .., power: ..}, width, height}: beads that were laid and measured; width and "
+        "height of beads follow from them, and are told in the path's files",
     )
     simulate: bool = Field(True, description="compare the union of the beads with the deposit, on voxels")
+
+    model_config = ConfigDict(json_schema_extra=relax_size)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _complete_size(cls, values: Any) -> Any:
+        return complete_size(values)
 
     @model_validator(mode="after")
     def _check_standoff(self) -> Layers:
@@ -180,6 +198,7 @@ class Layers(Path):
         from damageest_paths.drafts import Draft, Task, draft_path
         from damageest_paths.form_choice import plan_in_form
         from damageest_paths.process import Process
+        from damageest_paths.settings import add_sizes, apply_table
         from damageest_paths.sight import Beam
         from damageest_paths.stripes import Bead
 
@@ -222,7 +241,8 @@ class Layers(Path):
         if self.layers == "conformal" and draft.is_empty:
             why = "; ".join(item.why for item in draft.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")
-        return apply_table(plan_moves(draft, speeds), self.process)
+        path = apply_table(plan_moves(draft, speeds), self.process, self.interpass, body, left)
+        return add_sizes(path, self.calibration)
 
     def _make_nozzle(self) -> Any:
         from damageest_paths import nozzle

@@ -92,10 +92,12 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         done = cover([one.points[:, :2] for one in made], width)
         causes = [cover(dropped, width), cover(shaded, width), short if made else wanted]
         held -= _find_hanging(held, wanted, aims, process)
-        lost = _share_out((held ^ aims.reached) - done, causes)
+        gaps = (held ^ aims.reached) - done
+        lost = _share_out(gaps, causes)
+        narrow = _find_narrow(gaps - unite_regions(lost), free, firm, width)
         left = {
             UNSUPPORTED: wanted - held,
-            SUNK: unite_regions([held - aims.flush, _find_narrow(held ^ aims.reached, free, firm, width)]),
+            SUNK: unite_regions([held - aims.flush, narrow]),
             SHADED: unite_regions([held ^ (aims.flush - aims.reached), lost[1]]),
             COLLIDES: lost[0],
             SHORT: lost[2],

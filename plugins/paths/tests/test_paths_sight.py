@@ -144,6 +144,8 @@ def test_a_strip_too_narrow_beside_a_wall_is_listed(rise: float) -> None:
     narrow = 0.7 * (24 - 10) * 3
     thin = [each.volume for each in path.unreached if "so thin over intact metal" in each.why]
     assert 0.75 * narrow < sum(thin) < 2 * narrow
+    listed = path.unreached_volume / path.deposit_volume
+    assert path.fill.of_deposit + listed + path.fill.gap / path.deposit_volume == pytest.approx(1, abs=0.02)
 
 
 def test_over_build_is_said() -> None:
