@@ -29,7 +29,11 @@ def make_path(kind: str) -> DepositPath:
     else:
         path = plan(corner(), simulate=False, direction=(0.6, 0.48, 0.64), axes=5)
     power = np.where(path.layer == 1, 1500.0, 1200.0)
-    return replace(path, channels=("power", "gas"), values=np.stack([power, np.full(len(power), 12.5)], axis=1))
+    values = np.stack([power, np.full(len(power), 12.5)], axis=1)
+    starts = np.flatnonzero(~path.on[:-1] & path.on[1:])[1::3]
+    dwell = np.zeros(len(path.points))
+    dwell[starts] = 7.25 + np.arange(len(starts))
+    return replace(path, channels=("power", "gas"), values=values, dwell=dwell)
 
 
 @pytest.mark.parametrize(("form", "machine"), [*PAIRS, *STRAIGHT])
@@ -80,6 +84,9 @@ def test_linuxcnc_reads_its_programs(machine: str, kind: str, tmp_path: Path) ->
     moves = re.findall(r"STRAIGHT_(?:FEED|TRAVERSE)\((.*?)\)", found)
     words = re.findall(r"^(?:G\d+ )*X(\S+) Y(\S+) Z(\S+)", text, re.MULTILINE)
     assert "PROGRAM_END" in found
+    assert path.dwell is not None
+    waits = [float(word) for word in re.findall(r"DWELL\(([\d.]+)\)", found)]
+    assert set(path.dwell[path.dwell > 0]) <= set(waits)
     assert found.count("SET_AUX_OUTPUT_BIT(0)") == found.count("CLEAR_AUX_OUTPUT_BIT(0)") == path.passes
     assert found.count("SET_AUX_OUTPUT_VALUE(0,") == len(np.unique(path.layer[path.on] == 1))
     places = np.array([[float(word) for word in move.split(",")[:3]] for move in moves])
@@ -112,21 +119,20 @@ WAITS = {
 def test_the_tool_waits_before_passes_beside_hot_beads(form: str, machine: str, tmp_path: Path) -> None:
     """Each wait comes once, with the process off; points and process are as without, and the time is longer by it."""
     path = make_path("tilted")
-    dwell = np.zeros(len(path.points))
-    starts = np.flatnonzero(~path.on[:-1] & path.on[1:])[1::3]
-    dwell[starts] = 7.25 + np.arange(len(starts))
-    plain, _ = write(form, machine, path, tmp_path)
-    text, _ = write(form, machine, replace(path, dwell=dwell), tmp_path)
+    assert path.dwell is not None
+    waits = path.dwell[path.dwell > 0]
+    plain, _ = write(form, machine, replace(path, dwell=None), tmp_path)
+    text, _ = write(form, machine, path, tmp_path)
     found, short = (
         [float(word) for word in re.findall(WAITS[form], each.replace("\r", ""), re.MULTILINE)]
         for each in (text, plain)
     )
-    assert sorted(set(found) - set(short)) == dwell[starts].tolist()
-    assert len(found) == len(short) + len(starts)
+    assert sorted(set(found) - set(short)) == waits.tolist()
+    assert len(found) == len(short) + len(waits) > len(short)
     off = compare(path, read(form, machine, text))
     assert off.point < 1e-3
     if form != "fanuc":  # its comments are short
-        assert minutes(text) == pytest.approx(minutes(plain) + dwell.sum() / 60, abs=0.11)
+        assert minutes(text) == pytest.approx(minutes(plain) + waits.sum() / 60, abs=0.11)
 
 
 def minutes(text: str) -> float:
