@@ -127,7 +127,7 @@ class _Work:
             for patch in patches:
                 self._fill_patch(patch, number, reach, held - lean, around)
             before = self.passes[-1] if self.passes else None
-            self.passes += order_passes(self.layer, before, self.standing.clearance, self.process.gap)
+            self.passes += order_passes(self.layer, before, self.standing.clearance, self.process)
         self._add_rest()
 
     def _lay_out(self, count: int, grid: Grid) -> list[tuple[Sheet, Floats, list[Patch]]]:

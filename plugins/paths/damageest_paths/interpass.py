@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,8 @@ from scipy.spatial import KDTree
 
 from damageest.artefacts import DepositPath, Floats, Ints
 from damageest_paths.places import find_middles
+from damageest_paths.process import Cooling, Pass, measure_along
+from damageest_paths.regions import resample
 
 BESIDE, BELOW, ABOVE = 1.1, 1.5, 0.5
 """How far beside, in bead widths, and below and above, in heights of a layer, beads are neighbours."""
@@ -24,9 +27,29 @@ def measure_rest(path: DepositPath) -> Floats:
     return found
 
 
+def bound_waits(passes: Sequence[Pass], cooling: Cooling, reach: float) -> Floats:
+    """Seconds (2 N,2 N) from the end of one pass to the beginning of another that is laid next, so that beads of both
+    nearer than ``reach`` have the time to cool down; 0 where none are. The start of pass k is 2 k, its end 2 k + 1, and
+    which of them is named says how the pass is run."""
+    lines = [resample(one.points, reach / 2)[0] for one in passes]
+    numbers = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
+    along = [measure_along(line) for line in lines]
+    ends = np.concatenate([np.stack([one, one[-1] - one], axis=1) for one in along])  # the way to start and end
+    tree = KDTree(np.concatenate(lines))
+    first, second = tree.query_pairs(reach, output_type="ndarray").T
+    near = numbers[first] != numbers[second]
+    first, second = np.concatenate([[first[near], second[near]], [second[near], first[near]]], axis=1)
+    least = np.full((2 * len(lines), 2 * len(lines)), np.inf)
+    for begin in (0, 1):
+        for end in (0, 1):
+            way = ends[first, begin] + ends[second, end]
+            np.minimum.at(least, (2 * numbers[first] + begin, 2 * numbers[second] + end), way)
+    return np.maximum(cooling.seconds - 60 * least / cooling.feed, 0.0)
+
+
 def add_waits(path: DepositPath, least: float) -> DepositPath:
     """The path with waits at the starts of passes, so that between laying neighbouring beads of two passes there are
-    ``least`` seconds. Waits are as short as that permits; the order of the passes stays."""
+    ``least`` seconds. Waits are as short as that permits in the order that the passes have."""
     earlier, later = _pair_neighbours(path)
     if not least or not len(later):
         return path

@@ -197,11 +197,12 @@ class Layers(Path):
         from damageest_paths.directions import Planner, find_open_normal
         from damageest_paths.drafts import Draft, Task, draft_path
         from damageest_paths.form_choice import plan_in_form
-        from damageest_paths.process import Process
+        from damageest_paths.process import Cooling, Process
         from damageest_paths.settings import add_sizes, apply_table
         from damageest_paths.sight import Beam
         from damageest_paths.stripes import Bead
 
+        fast = self.travel_feed or 5 * self.feed
         process = Process(
             height=self.height,
             bead=Bead(self.width, (1 - self.overlap) * self.width),
@@ -221,6 +222,7 @@ class Layers(Path):
                 float(np.radians(self.incidence)),
             ),
             sink=self.penetration,
+            cooling=Cooling(self.interpass, self.feed, fast) if self.interpass else None,
         )
         direction: Floats | None = None
         if self.direction == "normal":
@@ -231,7 +233,7 @@ class Layers(Path):
         if self.fixture is not None:
             others.append(_read_mesh(self.fixture, "fixture", False))
         task, nozzle = Task(body, left, others, tolerance), self._make_nozzle()
-        speeds = Speeds(self.feed, self.travel_feed or 5 * self.feed, self.travel_clearance)
+        speeds = Speeds(self.feed, fast, self.travel_clearance)
 
         def plan(planner: Planner, along_normal: bool = False) -> Draft:
             chosen = find_open_normal(body, left, tolerance) if along_normal and direction is None else direction

@@ -10,7 +10,8 @@ from scipy.spatial.distance import cdist
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.vectors import normalise
 from damageest_paths.clearance import Clearance
-from damageest_paths.process import Pass
+from damageest_paths.interpass import BELOW, BESIDE, bound_waits
+from damageest_paths.process import Pass, Process
 
 LESS = 1e-6
 """Share of the extent of a pass by which the ways have to become shorter where passes are put in another order."""
@@ -26,19 +27,23 @@ ROUND = 0.5
 """Reaches of the nozzle that a way which is not free counts as in addition: it leads out of a bore, and in again."""
 
 
-def order_passes(passes: Sequence[Pass], last: Pass | None, clearance: Clearance, gap: float) -> list[Pass]:
+def order_passes(passes: Sequence[Pass], last: Pass | None, clearance: Clearance, process: Process) -> list[Pass]:
     """The passes of one layer, some of them the other way round, so that the ways between them are short.
 
     Each is the nearest to the end of the one before, the ``last`` of the layers below for the first; then stretches of
     the sequence are run the other way round as long as that makes the ways shorter (2-opt, Croes 1958). A turn of the
     tool counts as a way too. Where it turns far, as from one mouth of a bore to the other, and the straight way between
-    two passes does not keep half the ``gap``, a way round counts.
+    two passes does not keep half of the process's gap, a way round counts. Where beads have to cool down, the time that
+    the tool would wait between two passes counts as the way that it makes in it.
     """
     if not passes:
         return []
     first = [] if last is None else [last.reverse()]
     both = [*first, *passes]
-    cost = _measure_ways(both, clearance, gap)
+    cost = _measure_ways(both, clearance, process.gap)
+    if process.cooling is not None:
+        waits = bound_waits(both, process.cooling, float(np.hypot(BESIDE * process.bead.width, BELOW * process.height)))
+        cost = np.maximum(cost, waits * process.cooling.fast / 60)
     at = 0 if first else -1
     left, ordered = list(range(2 * len(first), len(cost))), []
     while left:

@@ -88,7 +88,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
         short = cover([line.points for line in lines if measure_length(line.points) < process.shortest], width)
         made, dropped, shaded = choice.place(long, top, number)
-        made = order_passes(made, passes[-1] if passes else None, clearance, process.gap)
+        made = order_passes(made, passes[-1] if passes else None, clearance, process)
         done = cover([one.points[:, :2] for one in made], width)
         causes = [cover(dropped, width), cover(shaded, width), short if made else wanted]
         held -= _find_hanging(held, wanted, aims, process)

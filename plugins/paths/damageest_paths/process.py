@@ -17,6 +17,16 @@ Axes = Literal[3, "3+2", 5]
 
 
 @dataclass(frozen=True)
+class Cooling:
+    """The least ``seconds`` between laying neighbouring beads of two passes; ``feed`` and ``fast``: speeds of
+    deposition and of travel, in lengths a minute."""
+
+    seconds: float
+    feed: float
+    fast: float
+
+
+@dataclass(frozen=True)
 class Process:
     """Lengths in the job's unit, angles in radians.
 
@@ -25,7 +35,7 @@ class Process:
     to keep. ``tilt``: largest of the tool axis against the build direction. ``extend``: how far a pass begins before
     its start and goes on beyond its end. ``turn_rate``: largest turn of the tool axis per length along a pass.
     ``is_trial``: few axes are tried. ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact metal; None:
-    the share ``sink_share`` of the height of a layer.
+    the share ``sink_share`` of the height of a layer. ``cooling``: see `Cooling`; None: beads need not cool down.
     """
 
     height: float
@@ -44,6 +54,7 @@ class Process:
     beam: Beam | None = None
     sink: float | None = None
     sink_share: float = 0.45
+    cooling: Cooling | None = None
 
     @property
     def step(self) -> float:

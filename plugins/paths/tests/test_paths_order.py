@@ -7,7 +7,8 @@ from damageest_paths.clearance import Clearance
 from damageest_paths.nozzle import Cone, make_nozzle
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.order import order_passes
-from damageest_paths.process import Pass
+from damageest_paths.process import Pass, Process
+from damageest_paths.stripes import Bead
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
@@ -18,6 +19,7 @@ from damageest.geometry.vectors import normalise
 
 GAP = 0.2
 NOZZLE = make_nozzle(Cone(0.5, 2.0, 25.0, 0.3))
+PROCESS = Process(1.0, Bead(2.0, 1.4), "zigzag", 0.0, 0.0, 0.0, 1.0, GAP, 5, 1.0)
 
 
 def make_pass(ends: Floats, axis: Floats) -> Pass:
@@ -31,7 +33,7 @@ def test_each_pass_comes_once(seed: int, count: int, has_last: bool) -> None:
     up = np.array([0.0, 0, 1])
     passes = [make_pass(rng.uniform(-10, 10, (2, 3)), up) for _ in range(count)]
     last = make_pass(np.eye(3)[:2], up) if has_last else None
-    ordered = order_passes(passes, last, Clearance(NOZZLE, 2.0), GAP)
+    ordered = order_passes(passes, last, Clearance(NOZZLE, 2.0), PROCESS)
     wanted = sorted(sorted(map(tuple, one.points.tolist())) for one in passes)
     assert sorted(sorted(map(tuple, one.points.tolist())) for one in ordered) == wanted
 
@@ -47,7 +49,7 @@ def test_passes_on_one_side_of_a_wall_come_together() -> None:
             passes.append(make_pass(ends, np.array([0.0, side, 1.0])))
 
     def count_changes(clearance: Clearance) -> int:
-        sides = [float(np.sign(one.points[0, 1])) for one in order_passes(passes, None, clearance, GAP)]
+        sides = [float(np.sign(one.points[0, 1])) for one in order_passes(passes, None, clearance, PROCESS)]
         return int(np.count_nonzero(np.diff(sides)))
 
     assert count_changes(Clearance(NOZZLE, 2.0, near)) == 1

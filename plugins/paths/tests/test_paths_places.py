@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from damageest_paths.calibration import Trial, predict_beads
-from damageest_paths.interpass import measure_rest
+from damageest_paths.interpass import add_waits, measure_rest
 from damageest_paths.layers import Layers
 from damageest_paths.places import cut_moves, measure_radius, measure_widths
 from hypothesis import given, settings
@@ -121,16 +121,27 @@ def test_the_time_since_the_neighbour_is_that_of_all_pairs() -> None:
 def test_neighbours_have_the_time_to_cool_down(least: float) -> None:
     before, path = plan_rings(), plan_rings(interpass=least)
     assert path.dwell is not None
-    assert np.array_equal(path.points, before.points)
     assert measure_rest(cut_moves(before)[0]).min() < least
     cool, _ = cut_moves(path)
     cool = replace(cool, dwell=spread_waits(path, cool))
     assert measure_rest(cool).min() == pytest.approx(least, abs=1e-6)
     assert not path.dwell[path.on].any()
-    assert path.minutes == pytest.approx(before.minutes + path.dwell.sum() / 60)
+    assert path.minutes == pytest.approx(replace(path, dwell=None).minutes + path.dwell.sum() / 60)
     assert any("cool down" in note for note in path.notes)
     # no wait is longer than that after the bead before
     assert path.dwell.max() <= least
+
+
+@pytest.mark.parametrize("pattern", ["zigzag", "contour"])
+@pytest.mark.parametrize("loss", [dent, wall, pad])
+def test_the_order_of_passes_leaves_beads_time(loss: Any, pattern: str) -> None:
+    """Against the order with the shortest ways, with waits in it."""
+    short = plan(loss(), direction=UP, simulate=False, pattern=pattern)
+    cool = plan(loss(), direction=UP, simulate=False, pattern=pattern, interpass=20.0)
+    assert cool.length == pytest.approx(short.length, rel=1e-6)
+    waited = add_waits(cut_moves(short)[0], 20.0)
+    assert cool.minutes < 0.95 * waited.minutes
+    assert cool.travel > short.travel
 
 
 def spread_waits(path: DepositPath, cool: DepositPath) -> Floats:
