@@ -16,14 +16,21 @@ from damageest_paths.regions import resample
 BESIDE, BELOW, ABOVE = 1.1, 1.5, 0.5
 """How far beside, in bead widths, and below and above, in heights of a layer, beads are neighbours."""
 
+SPACING = 0.25
+"""Bead widths between the places of a pass at which times are compared, where its moves are shorter."""
+
 
 def measure_rest(path: DepositPath) -> Floats:
     """Seconds (N,) from laying the last bead of another pass that lies beside or below each move that deposits, to that
-    move; inf where there is none, and on travel. Of a path whose moves are not longer than its beads are wide."""
-    earlier, later = _pair_neighbours(path)
+    move; inf where there is none, and on travel. Of a path whose moves are not longer than its beads are wide; where
+    they are much shorter, several have the time of the first of them."""
+    chosen = _choose_moves(path)
+    earlier, later = _pair_neighbours(path, chosen)
     times = _find_times(path)
     found = np.full(len(times), np.inf)
     np.minimum.at(found, later, times[later] - times[earlier])
+    own = np.flatnonzero(path.on)
+    found[own] = found[chosen[np.searchsorted(chosen, own, side="right") - 1]]
     return found
 
 
@@ -50,7 +57,7 @@ def bound_waits(passes: Sequence[Pass], cooling: Cooling, reach: float) -> Float
 def add_waits(path: DepositPath, least: float) -> DepositPath:
     """The path with waits at the starts of passes, so that between laying neighbouring beads of two passes there are
     ``least`` seconds. Waits are as short as that permits in the order that the passes have."""
-    earlier, later = _pair_neighbours(path)
+    earlier, later = _pair_neighbours(path, _choose_moves(path))
     if not least or not len(later):
         return path
     times = _find_times(path)
@@ -76,9 +83,16 @@ def _find_times(path: DepositPath) -> Floats:
     return np.asarray(np.cumsum(spent + waited) - waited - spent / 2)
 
 
-def _pair_neighbours(path: DepositPath) -> tuple[Ints, Ints]:
-    """The moves (K,) that deposit, and later moves (K,) of other passes that deposit beside or on them."""
+def _choose_moves(path: DepositPath) -> Ints:
+    """Moves (K,) that deposit: the first of each pass, and those at which it is a share of the bead's width longer."""
     own = np.flatnonzero(path.on)
+    place = np.floor(np.cumsum(path.moves[own]) / (SPACING * path.width))
+    is_new = np.diff(place, prepend=-1) + np.diff(path.number[own], prepend=0) > 0
+    return np.asarray(own[is_new])
+
+
+def _pair_neighbours(path: DepositPath, own: Ints) -> tuple[Ints, Ints]:
+    """Of ``own`` moves (N,): some (K,), and later ones (K,) of other passes that deposit beside or on them."""
     if len(own) < 2:
         return own[:0], own[:0]
     places = find_middles(path)[own]

@@ -24,12 +24,15 @@ def cut_moves(path: DepositPath) -> tuple[DepositPath, Flags]:
     rows = np.repeat(np.arange(len(counts)), counts)
     share = np.concatenate([np.arange(1, count + 1) / count for count in counts])[:, None]
     before = np.maximum(rows - 1, 0)
-    columns = {name: getattr(path, name)[rows] for name in ("feed", "on", "layer", "number", "part")}
+    names = ("feed", "on", "layer", "number", "part", "values", "bead_sizes", "dwell")
+    columns = {name: own[rows] for name in names if (own := getattr(path, name)) is not None}
     points, axes, normals = (
         own[before] + share * (own[rows] - own[before]) for own in (path.points, path.axes, path.normals)
     )
     axes, normals = (own / np.linalg.norm(own, axis=1, keepdims=True) for own in (axes, normals))
     is_end = share[:, 0] == 1
+    if path.dwell is not None:
+        columns["dwell"] = np.where(is_end, columns["dwell"], 0.0)
     points[is_end], axes[is_end], normals[is_end] = path.points, path.axes, path.normals
     return replace(path, points=points, axes=axes, normals=normals, **columns), is_end
 
@@ -86,8 +89,9 @@ def measure_widths(path: DepositPath, body: Solid, left: Solid | None) -> Floats
         pass_ = np.flatnonzero(path.number[own] == number)
         known = pass_[within[pass_]]
         if len(known):
-            nearest = known[np.abs(pass_[:, None] - known).argmin(axis=1)]
-            least[pass_] = least[nearest]
+            after = np.searchsorted(known, pass_)
+            before, after = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
+            least[pass_] = least[np.where(np.abs(pass_ - before) < np.abs(after - pass_), before, after)]
         else:
             least[pass_] = path.width
     found[own] = least

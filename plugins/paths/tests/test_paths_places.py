@@ -113,8 +113,12 @@ def test_the_time_since_the_neighbour_is_that_of_all_pairs() -> None:
         for name in ("points", "axes", "normals", "feed", "on", "layer", "number", "part")
     }
     path = replace(path, **own, kinds=path.kinds[:6], free_ends=None)
-    assert np.allclose(measure_rest(path), find_rest(path))
-    assert np.isfinite(find_rest(path)).any()
+    found, expected = measure_rest(path), find_rest(path)
+    both = np.isfinite(found) & np.isfinite(expected)
+    assert both.sum() > 50
+    assert (np.isfinite(found) == np.isfinite(expected)).mean() > 0.97
+    # places are a quarter of a bead apart at most: 0.5 long at 10 a second
+    assert np.abs(found - expected)[both].max() < 0.3
 
 
 @pytest.mark.parametrize("least", [5.0, 40.0])
@@ -122,9 +126,7 @@ def test_neighbours_have_the_time_to_cool_down(least: float) -> None:
     before, path = plan_rings(), plan_rings(interpass=least)
     assert path.dwell is not None
     assert measure_rest(cut_moves(before)[0]).min() < least
-    cool, _ = cut_moves(path)
-    cool = replace(cool, dwell=spread_waits(path, cool))
-    assert measure_rest(cool).min() == pytest.approx(least, abs=1e-6)
+    assert measure_rest(cut_moves(path)[0]).min() == pytest.approx(least, abs=1e-6)
     assert not path.dwell[path.on].any()
     assert path.minutes == pytest.approx(replace(path, dwell=None).minutes + path.dwell.sum() / 60)
     assert any("cool down" in note for note in path.notes)
@@ -142,19 +144,6 @@ def test_the_order_of_passes_leaves_beads_time(loss: Any, pattern: str) -> None:
     waited = add_waits(cut_moves(short)[0], 20.0)
     assert cool.minutes < 0.95 * waited.minutes
     assert cool.travel > short.travel
-
-
-def spread_waits(path: DepositPath, cool: DepositPath) -> Floats:
-    """The waits (N,) of a path at the same points of one whose moves were cut."""
-    assert path.dwell is not None
-    found = np.zeros(len(cool.points))
-    rows = np.flatnonzero(path.dwell > 0)
-    for k in rows:
-        same = np.flatnonzero(
-            (np.abs(cool.points - path.points[k]).max(axis=1) < 1e-12) & (cool.number == path.number[k])
-        )
-        found[same[~cool.on[same]][0]] = path.dwell[k]
-    return found
 
 
 def test_the_last_row_that_holds_for_a_place_counts() -> None:
