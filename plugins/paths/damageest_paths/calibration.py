@@ -44,23 +44,32 @@ def _check_trials(trials: tuple[Trial, ...]) -> tuple[Trial, ...]:
 Trials = Annotated[tuple[Trial, ...], AfterValidator(_check_trials)]
 
 
+def check_reach(trials: Sequence[Trial], settings: Mapping[str, Floats]) -> None:
+    """Raises ValueError where a name that the trials set is missing in ``settings``, values (N,) by name, or a value is
+    beyond the trials: nothing is known there."""
+    for name in trials[0].set:
+        if name not in settings:
+            raise ValueError(f"the trials set {name}, which process does not: add a row for all passes")
+        known, values = [trial.set[name] for trial in trials], settings[name]
+        slack = 1e-9 * max(abs(value) for value in known)
+        wrong = values[(values < min(known) - slack) | (values > max(known) + slack)]
+        if len(wrong):
+            raise ValueError(
+                f"{name} {wrong[0]:g} is beyond the trials, which have {min(known):g} to {max(known):g}: lay more"
+            )
+
+
 def predict_beads(trials: Sequence[Trial], settings: Mapping[str, Floats]) -> Floats:
     """Width and height (N,2) of beads with ``settings``, values (N,) by name, linear between the trials.
 
-    Raises ValueError where a name of the trials is not set, and for settings beyond the trials: nothing is known there.
+    Raises ValueError as `check_reach`, and for settings that lie outside of the trials together.
     """
+    check_reach(trials, settings)
     names = sorted(trials[0].set)
-    if missing := [name for name in names if name not in settings]:
-        raise ValueError(f"the trials set {', '.join(missing)}, which process does not: add a row for all passes")
     known = np.array([[trial.set[name] for name in names] for trial in trials])
     sizes = np.array([[trial.width, trial.height] for trial in trials])
     asked = np.column_stack([settings[name] for name in names])
     low, high = known.min(axis=0), known.max(axis=0)
-    for name, values, least, most in zip(names, asked.T, low, high, strict=True):
-        slack = 1e-9 * max(abs(least), abs(most))
-        wrong = values[(values < least - slack) | (values > most + slack)]
-        if len(wrong):
-            raise ValueError(f"{name} {wrong[0]:g} is beyond the trials, which have {least:g} to {most:g}: lay more")
     varied = high > low
     if not varied.any():
         return np.tile(sizes[0], (len(asked), 1))

@@ -12,8 +12,8 @@ from damageest.errors import StageError
 from damageest.options import Options
 from damageest.stages import JobPath
 from damageest.stages.path import Path
-from damageest_paths.calibration import Trials, complete_size, relax_size
-from damageest_paths.channels import ProcessTable
+from damageest_paths.calibration import Trials, check_reach, complete_size, relax_size
+from damageest_paths.channels import SPEED, ProcessTable
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -173,6 +173,16 @@ class Layers(Path):
     @classmethod
     def _complete_size(cls, values: Any) -> Any:
         return complete_size(values)
+
+    @model_validator(mode="after")
+    def _check_calibration(self) -> Layers:
+        if self.calibration:
+            values: dict[str, list[float]] = {SPEED: [self.feed]}
+            for row in self.process:
+                for name, value in row.set.items():
+                    values.setdefault(name, []).append(value)
+            check_reach(self.calibration, {name: np.array(each) for name, each in values.items()})
+        return self
 
     @model_validator(mode="after")
     def _check_standoff(self) -> Layers:
