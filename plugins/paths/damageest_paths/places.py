@@ -11,6 +11,7 @@ from damageest.geometry.distance import is_inside
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.geometry.transforms import turn_to_axis
+from damageest.geometry.vectors import normalise
 from damageest_paths.process import measure_along
 
 CHORDS = 8
@@ -29,7 +30,7 @@ def cut_moves(path: DepositPath) -> tuple[DepositPath, Flags]:
     points, axes, normals = (
         own[before] + share * (own[rows] - own[before]) for own in (path.points, path.axes, path.normals)
     )
-    axes, normals = (own / np.linalg.norm(own, axis=1, keepdims=True) for own in (axes, normals))
+    axes, normals = normalise(axes), normalise(normals)
     is_end = share[:, 0] == 1
     if path.dwell is not None:
         columns["dwell"] = np.where(is_end, columns["dwell"], 0.0)
