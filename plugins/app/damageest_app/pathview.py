@@ -38,7 +38,8 @@ class PathPlay:
         points = np.column_stack([table[name] for name in "xyz"])
         way = np.linalg.norm(np.diff(points, axis=0), axis=1)
         feed = np.maximum(table["feed"][1:], 1e-9)
-        minutes = np.concatenate([[0.0], np.cumsum(way / feed)])
+        waits = np.array([float(row.get("dwell") or 0.0) for row in rows]) / 60
+        minutes = np.concatenate([[0.0], np.cumsum(way / feed + waits[:-1])])
         axes = np.column_stack([table[name] for name in "ijk"])
         setup = path.with_name(f"{path.stem}.setup.json")
         if setup.is_file():

@@ -104,6 +104,9 @@ def test_a_path_is_laid_in_the_time_that_its_feeds_take(tmp_path: Path) -> None:
     (tmp_path / "path.csv").write_text(head + "\n".join(rows) + "\n")
     play = PathPlay.read(tmp_path / "path.csv")
     assert play.minutes == pytest.approx([0, 1, 1.02, 2.02])
+    waits = [head.strip() + ",dwell", *(f"{row},{wait}" for row, wait in zip(rows, (0, 0, 30, 0), strict=True))]
+    (tmp_path / "waits.csv").write_text("\n".join(waits) + "\n")
+    assert PathPlay.read(tmp_path / "waits.csv").minutes == pytest.approx([0, 1, 1.02, 2.52])
     assert play.at(0.5) == 1
     assert play.share_of_layer(1) == pytest.approx(1 / 2.02)
     pieces, layers = play.list_passes(3)

@@ -91,7 +91,7 @@ def read_neutral(form: str, path: DepositPath, unit: str, folder: Path) -> tuple
         write_csv(file, path, settings)
         lines = [line.split(",") for line in file.read_text().splitlines()]
         rows = np.array([[float(word) for word in [*line[:6], line[7]]] for line in lines[1:]])
-        values = np.array([[float(word) for word in line[14:]] for line in lines[1:]])
+        values = np.array([[float(word) for word in line[14:-1]] for line in lines[1:]])
         assert np.allclose(values, path.values)
         return check_table(rows, path, UNITS[unit])
     if form == "json":

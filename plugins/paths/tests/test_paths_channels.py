@@ -39,8 +39,8 @@ def test_each_pass_has_what_the_last_row_that_holds_for_it_says(tmp_path: Path) 
     assert (path.feed[~path.on] == 3000.0).all()
     write_csv(tmp_path / "a.csv", path, PathSettings("mm", "a"))
     lines = [line.split(",") for line in (tmp_path / "a.csv").read_text().splitlines()]
-    assert lines[0][-2:] == ["power", "powder"]
-    assert np.array_equal(np.array([line[-2:] for line in lines[1:]], float), path.values)
+    assert lines[0][-3:] == ["power", "powder", "dwell"]
+    assert np.array_equal(np.array([line[-3:-1] for line in lines[1:]], float), path.values)
     write_apt(tmp_path / "a.apt", path, PathSettings("mm", "a"))
     given, found = {}, []
     for line in (tmp_path / "a.apt").read_text().splitlines():
