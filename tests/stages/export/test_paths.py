@@ -38,7 +38,7 @@ def make_path(tilted: bool) -> DepositPath:
 
 def read_csv(file: Path) -> Floats:
     lines = file.read_text().splitlines()
-    assert lines[0] == HEAD
+    assert lines[0] == f"{HEAD},dwell"
     return np.array([[float(word) for word in line.split(",")[:13]] for line in lines[1:]])
 
 
