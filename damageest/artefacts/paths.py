@@ -191,7 +191,12 @@ class DepositPath(Checked):
     @property
     def wait_minutes(self) -> float:
         """Time that the tool waits between beads."""
-        return 0.0 if self.dwell is None else float(self.dwell.sum()) / 60
+        return float(self.waits.sum()) / 60
+
+    @property
+    def waits(self) -> Floats:
+        """Seconds (N,) that the tool stands at each point."""
+        return np.zeros(len(self.points)) if self.dwell is None else self.dwell
 
     @property
     def sizes(self) -> Floats:

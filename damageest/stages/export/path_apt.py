@@ -18,7 +18,7 @@ def write_apt(file: Path, path: DepositPath, settings: PathSettings) -> None:
     word, factor, speed = UNITS.get(settings.unit) or ("MM", TO_MM[settings.unit], "MMPM")
     lines = [f"PARTNO {settings.title.upper()}", f"UNITS/{word}", "MULTAX/ON", "LOADTL/1"]
     lines += [f"$$ {text}" for text in describe_setup(path, factor)]
-    feed, on, layer = 0.0, False, 0
+    feed, on, layer, waits = 0.0, False, 0, path.waits
     given: dict[str, str] = {}
     for k in range(len(path.points)):
         if path.layer[k] != layer:
@@ -38,7 +38,7 @@ def write_apt(file: Path, path: DepositPath, settings: PathSettings) -> None:
             lines.append(f"FEDRAT/{feed * factor:.6g},{speed}")
         numbers = [*(path.points[k] * factor), *path.axes[k]]
         lines.append("GOTO/" + ",".join(f"{value + 0.0:.6f}" for value in numbers))
-        if path.dwell is not None and path.dwell[k] > 0:
-            lines.append(f"DELAY/{path.dwell[k]:.3f}")
+        if waits[k] > 0:
+            lines.append(f"DELAY/{waits[k]:.3f}")
     lines += ["INSERT/DEPOSIT OFF"] if on else []
     file.write_text("\n".join([*lines, "FINI"]) + "\n", encoding="utf-8")

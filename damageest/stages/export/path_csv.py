@@ -18,8 +18,7 @@ def write_csv(file: Path, path: DepositPath, settings: PathSettings) -> None:
     process, and dwell (seconds at the point). Lengths in the job's unit."""
     rows = [",".join([HEAD, *path.channels, "dwell"])]
     values = np.empty((len(path.points), 0)) if path.values is None else path.values
-    dwell = np.zeros(len(path.points)) if path.dwell is None else path.dwell
-    columns = np.column_stack([path.points, path.axes, path.feed, path.sizes, dwell])
+    columns = np.column_stack([path.points, path.axes, path.feed, path.sizes, path.waits])
     numbers = np.column_stack([path.on, path.layer, path.number, path.part]).tolist()
     for row, (on, layer, number, part), given in zip(columns, numbers, values, strict=True):
         text = ",".join(f"{value:.6f}" for value in row[:6] + 0.0)

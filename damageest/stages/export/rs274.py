@@ -66,7 +66,7 @@ def _write_moves(
     lines: list[str] = []
     power = f" S{options['power']}" if options["power"] else ""
     words = {True: options["on"] + power, False: options["off"]}
-    on, feed, layer = False, "", 0
+    on, feed, layer, waits = False, "", 0, path.waits
     for k, number in enumerate(moves.move.tolist()):
         if path.layer[number] != layer:
             layer = int(path.layer[number])
@@ -86,8 +86,8 @@ def _write_moves(
             lines.append(text + (speed if speed != feed or is_timed else ""))
             feed = speed
         is_last = k + 1 == len(moves.move) or moves.move[k + 1] != number
-        if path.dwell is not None and is_last and path.dwell[number] > 0:
-            lines.append(f"G4 P{path.dwell[number]:.3f}")
+        if is_last and waits[number] > 0:
+            lines.append(f"G4 P{waits[number]:.3f}")
     lines += [options["off"]] if on else []
     return [*lines, "G94"] if is_timed and lines else lines
 

@@ -27,8 +27,7 @@ def add_path(stage: Stage, site: Site) -> None:
     ends = np.flatnonzero(path.on)
     kinds, number = np.unique(np.stack([path.part[ends], path.layer[ends]]), axis=1, return_inverse=True)
     count = kinds.shape[1]
-    waits = 0.0 if path.dwell is None else path.dwell / 60
-    minutes = np.cumsum(path.moves / path.feed + waits)
+    minutes = np.cumsum(path.moves / path.feed + path.waits / 60)
     for k in range(count):
         own = ends[number.ravel() == k]
         points = np.concatenate([path.points[own - 1], path.points[own]])

@@ -30,7 +30,7 @@ def write_json(file: Path, path: DepositPath, settings: PathSettings) -> Sequenc
     columns: dict[str, Any] = {
         "point": path.points, "axis": path.axes, "normal": path.normals, "feed": path.feed, "on": path.on,
         "layer": path.layer, "pass": path.number, "part": path.part, "bead": path.sizes,
-        "dwell": np.zeros(len(path.points)) if path.dwell is None else path.dwell,
+        "dwell": path.waits,
     }  # fmt: skip
     head["path"] = {name: _round(values) for name, values in columns.items()}
     head["path"]["kind"] = [path.kinds[number - 1] if path.kinds else "" for number in path.number.tolist()]

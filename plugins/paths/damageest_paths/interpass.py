@@ -62,7 +62,7 @@ def add_waits(path: DepositPath, least: float) -> DepositPath:
         return path
     times = _find_times(path)
     pairs = np.stack([path.number[later], path.number[earlier]], axis=1)
-    (passes, number) = np.unique(pairs, axis=0, return_inverse=True)
+    passes, number = np.unique(pairs, axis=0, return_inverse=True)
     gap = np.full(len(passes), np.inf)
     np.minimum.at(gap, number.ravel(), times[later] - times[earlier])
     shift = np.zeros(path.passes + 1)  # of all times of a pass, by the waits before it
@@ -79,8 +79,7 @@ def add_waits(path: DepositPath, least: float) -> DepositPath:
 def _find_times(path: DepositPath) -> Floats:
     """The time (N,) of the middle of each move, in seconds."""
     spent = 60 * path.moves / path.feed
-    waited = np.zeros(len(spent)) if path.dwell is None else path.dwell
-    return np.asarray(np.cumsum(spent + waited) - waited - spent / 2)
+    return np.asarray(np.cumsum(spent + path.waits) - path.waits - spent / 2)
 
 
 def _choose_moves(path: DepositPath) -> Ints:
