@@ -23,6 +23,9 @@ CHUNK = 1024
 """Poses that are bounded at once, so that intermediate arrays fit in the processor's cache."""
 STRIDES = (16, 4, 1)
 """Of the poses of a pass, each sixteenth is measured first, then those in between for which it does not decide."""
+CLOSE = 0.1
+"""Share of the needed distance by which a pose may keep more and yet count as one that does not keep it, where the
+bounds do not decide: then an exact distance is not worth its time."""
 MOST_RANKS = 1 << 30
 
 
@@ -75,11 +78,17 @@ class Clearance:
         return [replace(self, nozzle=body, standoff=self.beam.lift, beam=None) for body in bodies]
 
     def find_shaded(self, points: Floats, axes: Floats) -> Flags:
-        """Whether something stands in the beam (N,) at poses along a path, ``points`` and ``axes`` (N,3)."""
+        """Whether something stands in the beam (N,) at poses along a path, ``points`` and ``axes`` (N,3).
+
+        Poses between which the beam moves by little are not looked at; they are shaded where one beside them is.
+        """
         shaded = np.zeros(len(points), bool)
         for each in self.beams:
             assert self.beam is not None
-            shaded |= each.measure_poses(points, axes, self.beam.needed) < self.beam.needed
+            chosen = _choose_poses(each.measure_way(points, axes), self.beam.spacing)
+            found = each.measure_poses(points[chosen], axes[chosen], self.beam.needed) < self.beam.needed
+            after = np.searchsorted(chosen, np.arange(len(points)))
+            shaded |= found[after] | found[np.searchsorted(chosen, np.arange(len(points)), side="right") - 1]
         return shaded
 
     @property
@@ -139,7 +148,8 @@ class Clearance:
         return np.maximum(low - self.detail, 0.0), np.maximum(high - self.detail, 0.0)
 
     def measure_poses(self, points: Floats, axes: Floats, needed: float) -> Floats:
-        """For each pose (N,) a distance that the nozzle keeps at least; below ``needed`` only where it really is.
+        """For each pose (N,) a distance that the nozzle keeps at least; below ``needed`` only where it really is, or
+        where it is more by less than the share `CLOSE`.
 
         ``points``, ``axes`` (N,3): as in `bound`. 0 where something stands in the beam.
         """
@@ -151,8 +161,7 @@ class Clearance:
 
     def _measure_body(self, points: Floats, axes: Floats, needed: float) -> Floats:
         """As `measure_poses`, without the beam."""
-        moves = np.linalg.norm(np.diff(points, axis=0), axis=1) + self.bound_turns(axes)
-        far = np.concatenate([[0.0], np.cumsum(moves)])
+        far = self.measure_way(points, axes)
         found = np.full(len(points), -np.inf)
         for stride in STRIDES:
             own = np.arange(0, len(points), stride)
@@ -169,7 +178,7 @@ class Clearance:
         near: list[Ints] = []
         low, high = self._bound_body(points, axes, needed, near)
         found = np.where(high < needed, high, low)
-        undecided = np.flatnonzero((low < needed) & (high >= needed))
+        undecided = np.flatnonzero((low < needed) & (high >= (1 + CLOSE) * needed))
         if not len(undecided):
             return found
         ranks = self._list_ranks(near, undecided, len(points))
@@ -192,11 +201,28 @@ class Clearance:
         ends = np.searchsorted(pose, np.arange(count + 1))
         return [rank[ends[k] : ends[k + 1]] for k in chosen]
 
+    def measure_way(self, points: Floats, axes: Floats) -> Floats:
+        """How far (N,) any point of the nozzle has moved at most at each of poses that follow each other along a path,
+        ``points`` and ``axes`` (N,3)."""
+        moves = np.linalg.norm(np.diff(points, axis=0), axis=1) + self.bound_turns(axes)
+        return np.concatenate([[0.0], np.cumsum(moves)])
+
     def bound_turns(self, axes: Floats) -> Floats:
         """How far (N-1,) any point of the nozzle moves at most while its axis turns from each of ``axes`` (N,3) to the
         next about the point it works on."""
         chord = np.linalg.norm(np.diff(axes, axis=0), axis=1)
         return np.asarray(2 * np.arcsin(np.clip(chord / 2, 0, 1)) * self.reach)
+
+
+def _choose_poses(far: Floats, spacing: float) -> Ints:
+    """The first and the last pose of a way, and of those between as few as keep a ``spacing`` at most where the way
+    ``far`` (N,) to each permits it."""
+    number = np.arange(len(far))
+    after = np.maximum(np.searchsorted(far, far + spacing, side="right") - 1, number + 1).tolist()
+    chosen = [0]
+    while chosen[-1] < len(far) - 1:
+        chosen.append(after[chosen[-1]])
+    return np.array(chosen)
 
 
 def _carry_over(found: Floats, far: Floats, known: Ints, needed: float) -> Floats:

@@ -43,6 +43,10 @@ SLIVER = 0.05
 GROWN, DEEPER = 0.1, 0.5
 """Shares of a bead's width and height by which layers are taken to be wider and deeper when it is looked for: below a
 crease of the floor it is farther than one height to the layer below."""
+FIRST = 2.0
+"""Layer heights by which the first layer is taken to reach down: to the floor wherever that is."""
+ROUGH = 0.02
+"""Share of a bead's width within which the borders of what has no bead are simplified."""
 THIN = 0.01
 """Share of the layer height up to which what reaches into a layer is left out."""
 
@@ -67,7 +71,7 @@ def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Proce
         work = _Work(local, _crop(metal, corners, process), floor, standing, process, height)
         try:
             work.build(count, corners)
-            return Plan(frame, height, tuple(work.passes), work.missing, work.reasons)
+            return Plan(frame, height, tuple(work.passes), *work.join_missing())
         except NotFollowedError as error:
             plan = Plan(frame, height, (), local, {str(error): float(local.volume())})
     return plan
@@ -93,7 +97,8 @@ def _crop(metal: Any, corners: Floats, process: Process) -> Mesh:
 @dataclass(eq=False)
 class _Work:
     """What is planned of a body. ``near``: the metal round it. ``stack``: triangles of the layers below that are not
-    covered by another."""
+    covered by another. ``missing``: what has no bead, in pieces that hardly overlap; ``volumes``: theirs by
+    reason."""
 
     body: Any
     near: Mesh
@@ -103,8 +108,8 @@ class _Work:
     height: float
     passes: list[Pass] = field(default_factory=list)
     layer: list[Pass] = field(default_factory=list)
-    missing: Any = None
-    reasons: dict[str, float] = field(default_factory=dict)
+    missing: list[Any] = field(default_factory=list)
+    volumes: dict[str, float] = field(default_factory=dict)
     stack: list[tuple[Sheet, Floats]] = field(default_factory=list)
     covered: list[Any] = field(default_factory=list)
 
@@ -153,7 +158,7 @@ class _Work:
         for piece in rest.decompose():
             # thin skins are where a layer's border is not exact
             if piece.volume() > max(smallest, SLIVER * self.height * piece.surface_area()):
-                self._add_piece(piece, BESIDE)
+                self._add_piece(piece, {BESIDE: 1.0})
 
     def _gather_top(self, grid: Grid) -> Mesh:
         """The sheets of all layers as a mesh, as far as beads lie under them and no other layer on them."""
@@ -175,7 +180,8 @@ class _Work:
         held = wanted ^ patch.draw_region(support, process)
         wider = shift_border(wanted, GROWN * process.bead.width)
         if not wider.is_empty():
-            self.covered.append(patch.fill_below(wider, self.height * (1 + DEEPER), process))
+            deep = self.height * (1 + DEEPER) if layer else FIRST * self.height
+            self.covered.append(patch.fill_below(wider, deep, process.bead.width / 2))
         angle = process.angle + layer * process.turn
         lines = list_lines(held, process.pattern, process.bead, angle, None, process.shortest)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
@@ -192,8 +198,7 @@ class _Work:
         for why, lines_left in dropped.items():
             left_out[why] = cover(lines_left, process.bead.width) ^ gaps
             gaps -= left_out[why]
-        for why, region in left_out.items():
-            self._add_missing(patch, region, layer, why)
+        self._add_missing(patch, left_out, layer)
 
     def _place(
         self, patch: Patch, line: Line, layer: int, around: Sequence[Sweeps]
@@ -219,19 +224,35 @@ class _Work:
             left.append((SHADED if free else COLLIDES, places[a:b]))
         return [places[run.start : run.stop] for run in runs], left
 
-    def _add_missing(self, patch: Patch, region: Any, layer: int, why: str) -> None:
-        if region.is_empty():
-            return
-        # the first layer reaches down to the floor wherever that is
-        drop = self.height * (2 if layer == 0 else 1)
-        self._add_piece(self.body ^ patch.fill_below(region, drop, self.process), why)
+    def _add_missing(self, patch: Patch, regions: dict[str, Any], layer: int) -> None:
+        """Adds what has no bead below regions of the plane, by reason."""
+        from manifold3d import CrossSection, OpType
 
-    def _add_piece(self, piece: Any, why: str) -> None:
-        if self.missing is not None:
-            piece = piece - self.missing
+        width = self.process.bead.width
+        areas = {why: region.area() for why, region in regions.items()}
+        whole = CrossSection.batch_boolean(list(regions.values()), OpType.Add).simplify(ROUGH * width)
+        if whole.is_empty() or sum(areas.values()) <= 0:
+            return
+        piece = self.body ^ patch.fill_below(whole, self.height * (1 if layer else FIRST), width / 2)
+        self._add_piece(piece, areas)
+
+    def _add_piece(self, piece: Any, shares: dict[str, float]) -> None:
+        """Adds a piece, with its volume by reason in these proportions."""
         if piece.volume() > 0:
-            self.reasons[why] = self.reasons.get(why, 0.0) + piece.volume()
-            self.missing = _renew(piece if self.missing is None else self.missing + _renew(piece))
+            each = piece.volume() / sum(shares.values())
+            for why, share in shares.items():
+                self.volumes[why] = self.volumes.get(why, 0.0) + each * share
+            self.missing.append(_renew(piece))
+
+    def join_missing(self) -> tuple[Any, dict[str, float]]:
+        """All that is missing, as a Manifold, None for nothing; and the volume by reason."""
+        from manifold3d import Manifold, OpType
+
+        if not self.missing:
+            return None, {}
+        whole = _renew(Manifold.batch_boolean(self.missing, OpType.Add))
+        share = whole.volume() / sum(self.volumes.values())
+        return whole, {why: share * volume for why, volume in self.volumes.items()}
 
 
 def _renew(body: Any) -> Any:

@@ -10,10 +10,10 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
-from damageest_paths.conformal import BESIDE
+from damageest_paths.conformal import BESIDE, plan_conformal
 from damageest_paths.frames import Frame, make_frame, make_unit
 from damageest_paths.obstacles import draw_passes
-from damageest_paths.planar import SUNK, Surroundings
+from damageest_paths.planar import SUNK, Surroundings, plan_planar
 from damageest_paths.process import Plan, Process
 
 ENOUGH = 1e-3
@@ -22,10 +22,17 @@ NO_REASON = {SUNK: 0.1, BESIDE: 0.01}
 """Shares of a body's volume up to which what is missing for a reason asks for no other direction: what is too thin
 over metal for a bead is so with all of them, and layers along the floor follow it with each."""
 MOST_PARTS, MOST_DIRECTIONS = 4, 6
+MOST_LEFT = 0.9
+"""Share of what is missing that another plan may leave."""
+HALF = 0.5
+"""Share of a body that layers along the floor may leave if what is left shall be planned again."""
 COARSE = 2.0
 """Factor of layer height and bead width for the trials of directions."""
 ROUGH = 0.1
 """Share of the layer height within which the body is simplified for these trials."""
+CLEARLY = 0.5
+"""Share of what layers in planes lose with the first direction, up to which they may lose with another so that layers
+along the floor are planned for that one."""
 ALIKE = np.cos(np.radians(5.0))
 Planner = Callable[[Any, Frame, Surroundings, Process], Plan]
 
@@ -71,14 +78,23 @@ def choose_direction(
     volume = float(body.volume())
     if len(directions) == 1 or _measure_worth(first, volume) <= ENOUGH * volume:
         return first
-    coarse = process.coarsen(COARSE)
-    rough = body.simplify(ROUGH * process.height)
-    trials = [planner(rough, make_frame(one, origin), around, coarse).missing_volume for one in directions]
-    order = np.argsort(np.round(np.array(trials) / volume, 3), kind="stable")
-    if order[0] == 0:
+    # layers along a floor take long: where the first direction has some, the others are tried in planes
+    in_planes = planner is plan_conformal and bool(first.passes)
+    lost = _try_directions(body, origin, directions, around, process, plan_planar if in_planes else planner)
+    best = int(np.argmin(lost))
+    if best == 0 or lost[best] > (CLEARLY if in_planes else 1.0) * lost[0]:
         return first
-    best = planner(body, make_frame(directions[order[0]], origin), around, process)
-    return best if best.missing_volume < first.missing_volume else first
+    other = planner(body, make_frame(directions[best], origin), around, process)
+    return other if other.missing_volume < first.missing_volume else first
+
+
+def _try_directions(
+    body: Any, origin: Floats, directions: Sequence[Floats], around: Surroundings, process: Process, planner: Planner
+) -> Floats:
+    """The share of a body that is lost with each of the directions (N,), by trials with larger beads."""
+    coarse, rough = process.coarsen(COARSE), body.simplify(ROUGH * process.height)
+    lost = [planner(rough, make_frame(one, origin), around, coarse).missing_volume for one in directions]
+    return np.asarray(np.round(np.array(lost) / float(body.volume()), 3))
 
 
 def _measure_worth(plan: Plan, volume: float) -> float:
@@ -109,8 +125,18 @@ def plan_parts(
             Mesh(mesh.vertices @ plan.frame.turn, mesh.faces) for plan in plans for mesh in _draw_plan(plan, process)
         ]
         there = replace(around, metal=standing, others=[*around.others, *beads])
-        plan = choose_direction(left_local, origin, within, there, process, planner)
-        if plan.missing_volume > 0.9 * plans[-1].missing_volume:
+        if planner is plan_conformal:
+            if plans[-1].missing_volume > HALF * volume:
+                break
+            # the direction of the plan before is not planned again: what is left is what it does not reach
+            lost = _try_directions(left_local, origin, within, there, process, plan_planar)
+            if lost.min() > MOST_LEFT:
+                break
+            within_best = [within[int(np.argmin(lost))]]
+            plan = choose_direction(left_local, origin, within_best, there, process, planner)
+        else:
+            plan = choose_direction(left_local, origin, within, there, process, planner)
+        if plan.missing_volume > MOST_LEFT * plans[-1].missing_volume:
             break
         plans.append(plan)
     return plans

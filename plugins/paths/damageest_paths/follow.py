@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +20,11 @@ SHARES = (0.67, 0.33, 0.0)
 """Shares of the normal's tilt that are tried."""
 ROOM = 1.5
 """Multiple of the clearance that counts as room to spare."""
-SPARSE, BEST = 5, 4
-"""Points of a pass at which all ways to hold the tool are tried first, and how many of these are tried all along."""
+EVERY, LEAST, MOST = 2.0, 5, 80
+"""Distance in bead widths of the points of a pass at which all ways to hold the tool are tried first, and how many they
+are at least and at most."""
+BEST = 3
+"""Ways that are tried all along after the first, at most."""
 STILL = 1e-3
 """Angle in radians between the axes at two points up to which the tool does not count as turning."""
 STRAIGHT = 0.002
@@ -83,19 +85,10 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
     number of points of a run.
     """
     ways, around = list_ways(normals, process), LeastGauge(parts)
-    tried = [_measure(points, ways[0], normals, around, process)]
+    tried = [_measure(points, ways[0], normals, around, process, np.ones(len(points) - 1, bool))]
     if not (tried[0].gaps >= process.gap).all() and len(ways) > 1:
-        sparse = np.unique(np.linspace(0, len(points) - 1, SPARSE).round().astype(int))
-        rest = np.array([way[sparse] for way in ways[1:]])
-        places = np.tile(points[sparse], (len(rest), 1))
-        room = [part.clearance.bound(places, rest.reshape(-1, 3), ROOM * process.gap)[1] for part in parts]
-        room = np.min(room, axis=0).reshape(len(rest), -1)
-        free = (room >= process.gap).sum(axis=1)
-        narrow = room.min(axis=1) < ROOM * process.gap
-        for k in np.lexsort([np.arange(len(rest)), narrow, -free])[:BEST]:
-            if not free[k]:
-                break
-            tried.append(_measure(points, ways[k + 1], normals, around, process))
+        for k, chosen in _choose_ways(points, normals, ways, parts, process):
+            tried.append(_measure(points, ways[k], normals, around, process, chosen))
             if (tried[-1].gaps >= process.gap).all():
                 tried = tried[-1:]
                 break
@@ -110,6 +103,40 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
     return found
 
 
+def _choose_ways(
+    points: Floats, normals: Floats, ways: Sequence[Floats], parts: Sequence[Sweeps], process: Process
+) -> list[tuple[int, Flags]]:
+    """The numbers of the ways to hold the tool, each (N,3), that are worth a trial after the first, by some points of
+    the pass: that which is free at most of them, then those that are free where the ones before are not. And the
+    stretches (N-1,) of each that may be free: those beside a point where it is."""
+    count = int(np.clip(measure_along(points)[-1] / (EVERY * process.bead.width), LEAST, MOST))
+    sparse = np.unique(np.linspace(0, len(points) - 1, count).round().astype(int))
+    axes = np.array([way[sparse] for way in ways])
+    places = np.tile(points[sparse], (len(axes), 1))
+    room = [part.clearance.bound(places, axes.reshape(-1, 3), ROOM * process.gap)[1] for part in parts]
+    room = np.min(room, axis=0).reshape(len(axes), -1)
+    room[[_find_oblique(axis, normals[sparse], process) for axis in axes]] = 0.0
+    free, narrow = room >= process.gap, room.min(axis=1) < ROOM * process.gap
+    chosen: list[int] = []
+    open_ = np.ones(len(sparse), bool)
+    while len(chosen) < BEST:
+        worth = free[:, open_].sum(axis=1)
+        worth[[0, *chosen]] = 0
+        best = int(np.lexsort([np.arange(len(ways)), narrow, -worth])[0])
+        if not worth[best]:
+            break
+        chosen.append(best)
+        open_ = ~free[[0, *chosen]].any(axis=0)
+    return [(k, np.repeat(free[k, :-1] | free[k, 1:], np.diff(sparse))) for k in chosen]
+
+
+def _find_oblique(axes: Floats, normals: Floats, process: Process) -> Flags:
+    """Whether the tool stands too obliquely (N,) on the layer."""
+    if process.beam is None:
+        return np.zeros(len(axes), bool)
+    return np.asarray(np.einsum("ij,ij->i", axes, normals) < np.cos(process.beam.incidence) - STILL)
+
+
 class _Try(NamedTuple):
     """Tool ``axes`` (N,3) along a pass; the least distance ``gaps`` (N-1,) between each two points, and pose and axis
     (N-1,3) where it is."""
@@ -120,27 +147,31 @@ class _Try(NamedTuple):
     turned: Floats
 
 
-def _measure(points: Floats, axes: Floats, normals: Floats, around: Gauge, process: Process) -> _Try:
-    """The gaps along a way; 0 where the tool would turn too fast, or stand too obliquely on the layer."""
-    moves = np.linalg.norm(np.diff(points, axis=0), axis=1) + around.bound_turns(axes)
-    counts = np.maximum(np.ceil(moves / process.step - 1e-9).astype(int), 1)
-    share = np.concatenate([*(np.arange(count) / count for count in counts), [1.0]])[:, None]
-    number = np.append(np.repeat(np.arange(len(counts)), counts), len(counts) - 1)
-    poses = (1 - share) * points[number] + share * points[number + 1]
-    turned = (1 - share) * axes[number] + share * axes[number + 1]
-    turned = normalise(turned)
-    gaps = around.measure_poses(poses, turned, process.gap)
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    # the last pose of each stretch is the first of the next
-    least = np.minimum(np.minimum.reduceat(gaps, starts[:-1]), gaps[starts[1:]])
+def _measure(points: Floats, axes: Floats, normals: Floats, around: Gauge, process: Process, chosen: Flags) -> _Try:
+    """The gaps along a way on the ``chosen`` stretches (N-1,); 0 on others, and where the tool would turn too fast, or
+    stand too obliquely on the layer."""
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    angle = np.linalg.norm(np.diff(axes, axis=0), axis=1)
-    least[angle > process.turn_rate * length + STILL] = 0.0
-    if process.beam is not None:
-        oblique = np.einsum("ij,ij->i", axes, normals) < np.cos(process.beam.incidence) - STILL
-        least[oblique[1:] | oblique[:-1]] = 0.0
-    where = np.array([low + int(np.argmin(gaps[low : high + 1])) for low, high in pairwise(starts)])
-    return _Try(axes, least, poses[where], turned[where])
+    is_fast = np.linalg.norm(np.diff(axes, axis=0), axis=1) > process.turn_rate * length + STILL
+    oblique = _find_oblique(axes, normals, process)
+    which = np.flatnonzero(chosen & ~is_fast & ~oblique[1:] & ~oblique[:-1])
+    found = _Try(axes, np.zeros(len(length)), points[:-1].copy(), axes[:-1].copy())
+    if not len(which):
+        return found
+    counts = np.maximum(np.ceil((length + around.bound_turns(axes))[which] / process.step - 1e-9).astype(int), 1)
+    # the last pose of a stretch is the first of the next, where that is measured too
+    many = counts + np.append(np.diff(which) > 1, True)
+    starts = np.cumsum(many) - many
+    number = np.repeat(np.arange(len(which)), many)
+    share = ((np.arange(len(number)) - starts[number]) / counts[number])[:, None]
+    here = which[number]
+    poses = (1 - share) * points[here] + share * points[here + 1]
+    turned = normalise((1 - share) * axes[here] + share * axes[here + 1])
+    gaps = around.measure_poses(poses, turned, process.gap)
+    # where the next stretch has it, its first pose counts too
+    stops = starts + counts
+    where = np.array([low + int(np.argmin(gaps[low : high + 1])) for low, high in zip(starts, stops, strict=True)])
+    found.gaps[which], found.poses[which], found.turned[which] = gaps[where], poses[where], turned[where]
+    return found
 
 
 def _cut(free: Flags, least: int) -> list[tuple[int, int, int]]:

@@ -26,7 +26,12 @@ class LeastGauge:
 
     def measure_poses(self, points: Floats, axes: Floats, needed: float) -> Floats:
         """As `Clearance.measure_poses`."""
-        return np.asarray(np.min([part.measure_poses(points, axes, needed) for part in self.parts], axis=0))
+        found = self.parts[0].measure_poses(points, axes, needed)
+        for part in self.parts[1:]:
+            open_ = np.flatnonzero(found >= needed)
+            if len(open_):
+                found[open_] = np.minimum(found[open_], part.measure_poses(points[open_], axes[open_], needed))
+        return np.asarray(found)
 
     def bound_turns(self, axes: Floats) -> Floats:
         """As `Clearance.bound_turns`."""

@@ -46,9 +46,9 @@ class Patch:
         inside = faces[~is_outside]
         return make_region([vertices[loop, :2] for loop in _trace_border(inside)]).simplify(process.bead.width / 200)
 
-    def fill_below(self, region: Any, drop: float, process: Process) -> Any:
-        """What lies up to ``drop`` below a region, as a Manifold in local coordinates."""
-        block = region.extrude(drop).refine_to_length(process.bead.width / 2)
+    def fill_below(self, region: Any, drop: float, edge: float) -> Any:
+        """What lies up to ``drop`` below a region, as a Manifold in local coordinates with edges up to ``edge``."""
+        block = region.extrude(drop).refine_to_length(edge)
 
         def bend(places: Floats) -> Floats:
             points, _, upward = self.tree.find(np.ascontiguousarray(places[:, :2]), exact=False)

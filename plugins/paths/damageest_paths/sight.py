@@ -13,6 +13,9 @@ SLACK = 0.05
 """Share of its radius by which the beam that is checked is thinner, so that a bead may lie flush against a wall."""
 LIFT, NEED = 0.05, 0.02
 """Shares of the beam's radius: how far above the bead the check begins, and the distance that it asks for."""
+SPACING = 0.5
+"""Share of its radius by which it moves at most from one pose that is checked to the next: it is round, so that what
+stands between both reaches into it by 3 % of the radius at most, less than `SLACK`."""
 BEGIN = np.radians(45.0)
 """Half the angle of the cone with which the beam that is checked begins: a tilted beam that is as wide as the bead at
 the bead meets the metal beside it, where it melts."""
@@ -39,6 +42,11 @@ class Beam:
     def needed(self) -> float:
         """The distance that has to be free round the bodies of `draw`."""
         return NEED * self.radius
+
+    @property
+    def spacing(self) -> float:
+        """The way by which it may move between two poses at which it is checked."""
+        return SPACING * self.radius
 
     def draw(self, standoff: float) -> Sequence[Nozzle]:
         """Bodies that the beam fills from `lift` above the bead up to the tip: a cylinder with a pointed end, and where

@@ -105,9 +105,11 @@ def bound_sweeps(
             kept = value < wanted
             np.minimum.at(found, pose[~kept], value[~kept])
             # a pose at which a place on an obstacle is too near needs no other
-            surface = measure_points(level.one[ball[kept]], tips[kept], axes[pose[kept]], profile, clearance.endless)
+            which, one = pose[kept], level.one[ball[kept]]
+            surface = measure_points(one, tips[kept], axes[which], profile, clearance.endless)
+            far = np.linalg.norm(one - points[which], axis=1) + np.maximum(surface, 0.0)
             hit = np.zeros(len(points), bool)
-            hit[pose[kept][surface - shift[pose[kept]] < wanted]] = True
+            hit[which[surface - turn[which] * far - shift[which] < wanted]] = True
             found[hit] = -np.inf
             pose, ball = pose[kept][~hit[pose[kept]]], ball[kept][~hit[pose[kept]]]
             ball = list_members(ball)
