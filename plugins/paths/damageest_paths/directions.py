@@ -18,6 +18,8 @@ from damageest_paths.process import Plan, Process
 
 ENOUGH = 1e-3
 """Share of a body's volume below which what is missing is not worth another direction."""
+LITTLE = 0.05
+"""The same for layers along a floor."""
 NO_REASON = {SUNK: 0.1, BESIDE: 0.01}
 """Shares of a body's volume up to which what is missing for a reason asks for no other direction: what is too thin
 over metal for a bead is so with all of them, and layers along the floor follow it with each."""
@@ -76,10 +78,10 @@ def choose_direction(
     larger beads. At least one direction is needed."""
     first = planner(body, make_frame(directions[0], origin), around, process)
     volume = float(body.volume())
-    if len(directions) == 1 or _measure_worth(first, volume) <= ENOUGH * volume:
-        return first
     # layers along a floor take long: where the first direction has some, the others are tried in planes
     in_planes = planner is plan_conformal and bool(first.passes)
+    if len(directions) == 1 or _measure_worth(first, volume) <= (LITTLE if in_planes else ENOUGH) * volume:
+        return first
     lost = _try_directions(body, origin, directions, around, process, plan_planar if in_planes else planner)
     best = int(np.argmin(lost))
     if best == 0 or lost[best] > (CLEARLY if in_planes else 1.0) * lost[0]:

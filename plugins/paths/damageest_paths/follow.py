@@ -20,10 +20,10 @@ SHARES = (0.67, 0.33, 0.0)
 """Shares of the normal's tilt that are tried."""
 ROOM = 1.5
 """Multiple of the clearance that counts as room to spare."""
-EVERY, LEAST, MOST = 2.0, 5, 80
+EVERY, LEAST, MOST = 3.0, 5, 40
 """Distance in bead widths of the points of a pass at which all ways to hold the tool are tried first, and how many they
 are at least and at most."""
-BEST = 3
+BEST = 6
 """Ways that are tried all along after the first, at most."""
 STILL = 1e-3
 """Angle in radians between the axes at two points up to which the tool does not count as turning."""
@@ -120,9 +120,9 @@ def _choose_ways(
     chosen: list[int] = []
     open_ = np.ones(len(sparse), bool)
     while len(chosen) < BEST:
-        worth = free[:, open_].sum(axis=1)
+        worth, new = free.sum(axis=1), free[:, open_].sum(axis=1)
         worth[[0, *chosen]] = 0
-        best = int(np.lexsort([np.arange(len(ways)), narrow, -worth])[0])
+        best = int(np.lexsort([np.arange(len(ways)), narrow, -worth, -new * (worth > 0)])[0])
         if not worth[best]:
             break
         chosen.append(best)
