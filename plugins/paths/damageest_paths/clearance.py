@@ -80,15 +80,20 @@ class Clearance:
     def find_shaded(self, points: Floats, axes: Floats) -> Flags:
         """Whether something stands in the beam (N,) at poses along a path, ``points`` and ``axes`` (N,3).
 
-        Poses between which the beam moves by little are not looked at; they are shaded where one beside them is.
+        Poses between which the beam moves by little are as both beside them are; they are looked at where these differ.
         """
         shaded = np.zeros(len(points), bool)
         for each in self.beams:
             assert self.beam is not None
+            needed, numbers = self.beam.needed, np.arange(len(points))
             chosen = _choose_poses(each.measure_way(points, axes), self.beam.spacing)
-            found = each.measure_poses(points[chosen], axes[chosen], self.beam.needed) < self.beam.needed
-            after = np.searchsorted(chosen, np.arange(len(points)))
-            shaded |= found[after] | found[np.searchsorted(chosen, np.arange(len(points)), side="right") - 1]
+            found = each.measure_poses(points[chosen], axes[chosen], needed) < needed
+            before, after = (np.searchsorted(chosen, numbers, side="right") - 1, np.searchsorted(chosen, numbers))
+            own = found[before]
+            differ = np.flatnonzero(own != found[after])
+            if len(differ):
+                own[differ] = each.measure_poses(points[differ], axes[differ], needed) < needed
+            shaded |= own
         return shaded
 
     @property
