@@ -33,8 +33,8 @@ COARSE = 2.0
 ROUGH = 0.1
 """Share of the layer height within which the body is simplified for these trials."""
 CLEARLY = 0.5
-"""Share of what layers in planes lose with the first direction, up to which they may lose with another so that layers
-along the floor are planned for that one."""
+"""Share of what layers along a floor lose with the first direction, up to which planes may lose with another so that
+layers along the floor are planned for that one."""
 ALIKE = np.cos(np.radians(5.0))
 Planner = Callable[[Any, Frame, Surroundings, Process], Plan]
 
@@ -84,7 +84,8 @@ def choose_direction(
         return first
     lost = _try_directions(body, origin, directions, around, process, plan_planar if in_planes else planner)
     best = int(np.argmin(lost))
-    if best == 0 or lost[best] > (CLEARLY if in_planes else 1.0) * lost[0]:
+    # planes may lose far less than layers along the floor with the same direction, so the two are not compared closely
+    if best == 0 or (in_planes and lost[best] * volume > CLEARLY * first.missing_volume):
         return first
     other = planner(body, make_frame(directions[best], origin), around, process)
     return other if other.missing_volume < first.missing_volume else first

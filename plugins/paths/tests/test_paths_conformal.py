@@ -16,7 +16,8 @@ from path_cavities import BALL, BORE, DEPTH, bowl, crescent, funnel, groove, poc
 
 from damageest.artefacts import Floats
 from damageest.geometry.distance import distance_to_edges
-from tests.path_shapes import Loss, cut
+from damageest.geometry.solids import to_solid
+from tests.path_shapes import BLOCK, Loss, cut
 from tests.path_shapes import plan as plan_whole
 
 MAKERS = {"groove": groove, "bowl": bowl, "pocket": pocket, "tip": tip}
@@ -130,6 +131,21 @@ def test_nothing_hangs_in_the_air() -> None:
     # 4 wide, of which as much is held as the layer is high
     assert hanging == pytest.approx(10 * 3 * 1, rel=0.15)
     assert plan.missing_volume == pytest.approx(sum(plan.reasons.values()))
+
+
+def test_of_the_build_directions_that_is_taken_which_fills_far_more() -> None:
+    """A notch in the edge of a block, with a wall before it: along the mean normal of its open sides the nozzle meets
+    the wall, from above it reaches most."""
+    notch = Manifold.cube((14, 16, 9)).translate((12, -8, -6))
+    wall = Manifold.cube((6, 60, 40)).translate((34, -30, -20)) + Manifold.cube((60, 60, 10)).translate((-20, -30, -30))
+    lost, left = to_solid(BLOCK ^ notch), to_solid(BLOCK - notch + wall)
+    assert lost is not None
+    assert left is not None
+    paths = [plan_whole(Loss(lost, left), layers="conformal", axes=5, direction=d) for d in ("normal", "auto")]
+    shares = [path.unreached_volume / path.deposit_volume for path in paths]
+    assert shares[0] > 0.4
+    assert shares[1] < 0.1
+    assert paths[1].directions[0] == pytest.approx([0, 0, 1])
 
 
 def test_a_round_floor_is_followed_as_far_as_it_is_not_upright() -> None:
