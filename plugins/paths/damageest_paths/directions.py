@@ -75,10 +75,13 @@ def choose_direction(
     body: Any, origin: Floats, directions: Sequence[Floats], around: Surroundings, process: Process, planner: Planner
 ) -> Plan:
     """The plan of the direction that fills most of a body: the first that fills all of it; else the best by trials with
-    larger beads. At least one direction is needed."""
+    larger beads. At least one direction is needed.
+
+    Layers along a floor take long: the first direction is kept where it leaves `LITTLE`, others are tried in planes.
+    """
     first = planner(body, make_frame(directions[0], origin), around, process)
     volume = float(body.volume())
-    # layers along a floor take long: where the first direction has some, the others are tried in planes
+    # where the first direction has no such layers, it is to be seen whether another has some
     in_planes = planner is plan_conformal and bool(first.passes)
     if len(directions) == 1 or _measure_worth(first, volume) <= (LITTLE if in_planes else ENOUGH) * volume:
         return first
@@ -112,6 +115,7 @@ def plan_parts(
     """Plans for the whole body, each for what the ones before have left, with a direction of its own.
 
     With 3 axes there is one plan. With more, the directions of later plans lie within the machine's tilt of the first.
+    Layers along a floor get another plan where the first fills half, and trials in planes reach something of the rest.
     """
     plans = [choose_direction(body, origin, directions, around, process, planner)]
     if process.axes == 3:
@@ -131,12 +135,10 @@ def plan_parts(
         if planner is plan_conformal:
             if plans[-1].missing_volume > HALF * volume:
                 break
-            # the direction of the plan before is not planned again: what is left is what it does not reach
             lost = _try_directions(left_local, origin, within, there, process, plan_planar)
             if lost.min() > MOST_LEFT:
                 break
-            within_best = [within[int(np.argmin(lost))]]
-            plan = choose_direction(left_local, origin, within_best, there, process, planner)
+            plan = planner(left_local, make_frame(within[int(np.argmin(lost))], origin), there, process)
         else:
             plan = choose_direction(left_local, origin, within, there, process, planner)
         if plan.missing_volume > MOST_LEFT * plans[-1].missing_volume:
