@@ -167,7 +167,7 @@ def _measure(courses: Sequence[Course], lines: Sequence[Floats], clearance: Clea
         np.concatenate([course.axes for course in courses]),
         np.concatenate([np.append(course.joined, False) for course in courses]),
     )
-    moves = np.linalg.norm(np.diff(points, axis=0), axis=1) + clearance.bound_turns(axes)
+    moves = clearance.bound_moves(points, axes)
     turning = joined[:-1] & (np.abs(np.diff(axes, axis=0)).max(axis=1, initial=0.0) > 1e-9)
     counts = np.append(np.where(turning, np.ceil(moves / limits.step - 1e-9), 1).astype(int), 1)
     place = np.repeat(np.arange(len(points)), counts)

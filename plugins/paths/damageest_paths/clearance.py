@@ -86,9 +86,9 @@ class Clearance:
         for each in self.beams:
             assert self.beam is not None
             needed, numbers = self.beam.needed, np.arange(len(points))
-            chosen = _choose_poses(each.measure_way(points, axes), self.beam.spacing)
+            chosen = _choose_poses(_add_up(each.bound_moves(points, axes)), self.beam.spacing)
             found = each.measure_poses(points[chosen], axes[chosen], needed) < needed
-            before, after = (np.searchsorted(chosen, numbers, side="right") - 1, np.searchsorted(chosen, numbers))
+            before, after = np.searchsorted(chosen, numbers, side="right") - 1, np.searchsorted(chosen, numbers)
             own = found[before]
             differ = np.flatnonzero(own != found[after])
             if len(differ):
@@ -166,7 +166,7 @@ class Clearance:
 
     def _measure_body(self, points: Floats, axes: Floats, needed: float) -> Floats:
         """As `measure_poses`, without the beam."""
-        far = self.measure_way(points, axes)
+        far = _add_up(self.bound_moves(points, axes))
         found = np.full(len(points), -np.inf)
         for stride in STRIDES:
             own = np.arange(0, len(points), stride)
@@ -206,17 +206,21 @@ class Clearance:
         ends = np.searchsorted(pose, np.arange(count + 1))
         return [rank[ends[k] : ends[k + 1]] for k in chosen]
 
-    def measure_way(self, points: Floats, axes: Floats) -> Floats:
-        """How far (N,) any point of the nozzle has moved at most at each of poses that follow each other along a path,
-        ``points`` and ``axes`` (N,3)."""
-        moves = np.linalg.norm(np.diff(points, axis=0), axis=1) + self.bound_turns(axes)
-        return np.concatenate([[0.0], np.cumsum(moves)])
+    def bound_moves(self, points: Floats, axes: Floats) -> Floats:
+        """How far (N-1,) any point of the nozzle moves at most from each pose of a path to the next, ``points`` and
+        ``axes`` (N,3)."""
+        return np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1) + self.bound_turns(axes))
 
     def bound_turns(self, axes: Floats) -> Floats:
         """How far (N-1,) any point of the nozzle moves at most while its axis turns from each of ``axes`` (N,3) to the
         next about the point it works on."""
         chord = np.linalg.norm(np.diff(axes, axis=0), axis=1)
         return np.asarray(2 * np.arcsin(np.clip(chord / 2, 0, 1)) * self.reach)
+
+
+def _add_up(moves: Floats) -> Floats:
+    """The way (N,) to each pose of a path, from the moves (N-1,) between them."""
+    return np.concatenate([[0.0], np.cumsum(moves)])
 
 
 def _choose_poses(far: Floats, spacing: float) -> Ints:

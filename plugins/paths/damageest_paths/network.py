@@ -226,7 +226,7 @@ def measure_way(points: Floats, axes: Floats, clearance: Clearance, gap: float) 
     _, most = clearance.bound(dense[some], turned[some], gap / 2)
     if most.min() < gap / 2:
         return float(most.min())
-    moves = np.linalg.norm(np.diff(dense, axis=0), axis=1) + clearance.bound_turns(turned)
+    moves = clearance.bound_moves(dense, turned)
     found = clearance.measure_poses(dense, turned, KEPT * gap)
     least = float(min(found.min(), np.min((found[1:] + found[:-1] - moves) / 2, initial=np.inf)))
     return least if found.min() >= KEPT * gap else min(least, BLOCKED * gap)

@@ -51,7 +51,7 @@ def _cut_forward(way: Way, clearance: Clearance, gap: float) -> Way:
 def _divide(way: Way, clearance: Clearance) -> tuple[Floats, Floats]:
     """The points (N,3) and axes (N,3) of a way with more places in between, as far apart as each other; a turn on the
     spot counts by how far the nozzle moves."""
-    moves = np.linalg.norm(np.diff(way.points, axis=0), axis=1) + clearance.bound_turns(way.axes)
+    moves = clearance.bound_moves(way.points, way.axes)
     along = np.concatenate([[0.0], np.cumsum(moves)])
     places = np.unique(np.concatenate([along, np.linspace(0, along[-1], PLACES + 1)]))
     points = np.column_stack([np.interp(places, along, column) for column in way.points.T])
