@@ -64,6 +64,21 @@ class ExactDepositReport(JsonModel):
     reason: str = Field(description="why it has facets; empty where it has CAD faces")
 
 
+class ExactMilledReport(JsonModel):
+    """Whether the metal that is milled off before deposition has the CAD's own faces in STEP."""
+
+    form: str = Field(description="of the surface that milling leaves, as that of the damage volume; none: facets")
+    faces: int
+    prepared_faces: int = Field(description="faces that milling leaves")
+    volume: float | None
+    distance: float | None = Field(description="95 % of the surface that milling leaves are as near to the mesh's")
+    farthest: float | None = Field(description="largest distance of these surfaces, both ways")
+    beyond: float | None = Field(description="share of that surface farther than a quarter of the tolerance")
+    seconds: float = Field(description="of the processor")
+    tried: list[str] = Field(description="what was refused before for the opened cavity, and why")
+    reason: str = Field(description="why it has facets; empty where it has CAD faces")
+
+
 class ExactReport(JsonModel):
     """Whether the solid in STEP has the CAD's own faces."""
 
@@ -80,6 +95,7 @@ class ExactReport(JsonModel):
     seconds: float = Field(description="of the processor")
     tried: list[str] = Field(description="what was refused before, and why")
     deposit: ExactDepositReport | None = Field(description="null where there is none beside the damage volume")
+    milled: ExactMilledReport | None = Field(description="null where the cavity was not opened before deposition")
 
 
 class ThicknessReport(JsonModel):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from damageest.artefacts import Floats, Mesh, Part, Solid, Vector
+from damageest.artefacts import Flags, Floats, Mesh, Part, Solid, Vector
 from damageest.errors import StageError
+from damageest.geometry.distance import signed_distance
 from damageest.geometry.rays import prepare_rays
 from damageest.geometry.refinement import halve_edges
 from damageest.geometry.skin import find_inner_faces
@@ -135,22 +137,29 @@ def _raise_room(damage: Mesh, part: Part, origin: Floats, turn: Floats, prepare:
     (3,) and ``turn`` (3,3): where that frame lies in the part's."""
     high, deep = float(damage.bounds[1, 2]), float(np.ptp(damage.bounds[:, 2])) + prepare.depth
     top, limit = high + tolerance / 4, high + deep
-    column = _open_floor(damage, prepare, tolerance, deep, top)
+
+    def is_free(places: Floats) -> Flags:
+        return np.asarray(signed_distance(origin + places @ turn, part)[0] > 0)
 
     def measure(one: _Column) -> Floats:
         low, high = (origin + places @ turn for places in one.place_between(top, limit))
         return _measure_metal(part, low, high, turn[2])
 
+    column = _open_floor(damage, is_free, prepare, tolerance, deep, top)
+
     if (measure(column) > 0).any():
         # metal that is higher than the damage stands over it, and is removed where it is not a wall
-        higher = _open_floor(damage, prepare, tolerance, deep + limit - top, limit)
+        higher = _open_floor(damage, is_free, prepare, tolerance, deep + limit - top, limit)
         if np.isfinite(measure(higher)).all():
             column = higher
     return column.raise_body()
 
 
-def _open_floor(damage: Mesh, prepare: Prepare, tolerance: float, deep: float, top: float) -> _Column:
-    """The column over the floor of the opened cavity up to the height ``top``, from which it is ``deep``."""
+def _open_floor(
+    damage: Mesh, is_free: Callable[[Floats], Flags], prepare: Prepare, tolerance: float, deep: float, top: float
+) -> _Column:
+    """The column over the floor of the opened cavity up to the height ``top``, from which it is ``deep``. ``is_free``:
+    whether places (N,3) lie outside the part."""
     from scipy import ndimage
 
     low, high = damage.bounds[:, :2]
@@ -160,7 +169,13 @@ def _open_floor(damage: Mesh, prepare: Prepare, tolerance: float, deep: float, t
     cell = max(min(tolerance, prepare.min_radius / FINE if prepare.min_radius else np.inf), size / NODES)
     nx, ny = (np.ceil((high - low + 2 * out) / cell).astype(int) + 5).tolist()
     corner = low - out - 2 * cell
-    floor = np.minimum(_lower_floor(damage, corner, (nx, ny), cell) - prepare.depth, top)
+    lowest, around = _lower_floor(damage, corner, (nx, ny), cell)
+    # outside the part it costs no metal, and the skin of the damage lies in the column all the way down
+    places = _Column(around, corner, cell, top).places
+    rim = np.flatnonzero(around.ravel() < lowest.ravel())
+    beside = rim[is_free(np.column_stack([places.reshape(-1, 2)[rim], around.ravel()[rim]]))]
+    lowest.ravel()[beside] = around.ravel()[beside]
+    floor = np.minimum(lowest - prepare.depth, top)
     cone: Any = -_draw_cone(deep / slope, cell, slope) if np.isfinite(slope) else np.zeros((1, 1))
     floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
     if prepare.min_radius > 0:
@@ -200,13 +215,18 @@ def _find_direction(damage: Solid, part: Part, prepare: Prepare) -> Floats:
     return np.asarray(normalise(total[None])[0])
 
 
-def _lower_floor(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float) -> Floats:
-    """The lowest place of a mesh in the cell round each node of a grid; infinite where there is none."""
+def _lower_floor(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float) -> tuple[Floats, Floats]:
+    """The lowest place of a mesh in the cell round each node of a grid, and in the cells that touch the node; infinite
+    where there is none."""
     fine = halve_edges(mesh, cell / 2).vertices
-    node = np.round((fine[:, :2] - corner) / cell).astype(int)
-    floor = np.full(shape, np.inf)
-    np.minimum.at(floor, (node[:, 0], node[:, 1]), fine[:, 2])
-    return floor
+    place = (fine[:, :2] - corner) / cell
+    first = np.floor(place).astype(int)
+    lowest, around = np.full(shape, np.inf), np.full(shape, np.inf)
+    np.minimum.at(lowest, tuple(np.round(place).astype(int).T), fine[:, 2])
+    for x in (0, 1):
+        for y in (0, 1):
+            np.minimum.at(around, (first[:, 0] + x, first[:, 1] + y), fine[:, 2])
+    return lowest, around
 
 
 def _draw_cone(radius: float, cell: float, slope: float) -> Floats:

@@ -57,7 +57,8 @@ class ExactForm:
     its inner surface are as near to the mesh's, both ways; ``farthest``: all of it; ``beyond``: the share of it that is
     farther than a quarter of the tolerance. What lies less deep than that below the skin counts as near. ``seconds`` of
     the processor. ``tried``: what was refused before it, and why. ``deposit``: how the deposit was written; None where
-    there is none beside the damage volume.
+    there is none beside the damage volume. ``milled``: how the metal that is milled off before deposition was written;
+    None where the cavity was not opened.
     """
 
     form: str
@@ -70,6 +71,29 @@ class ExactForm:
     seconds: float = 0.0
     tried: tuple[str, ...] = ()
     deposit: DepositForm | None = None
+    milled: MilledForm | None = None
+
+
+@dataclass(frozen=True)
+class MilledForm:
+    """How the metal was written that is milled off before deposition, and whose outer faces are the CAD's own.
+
+    ``form``: of the surface that milling leaves, ``none`` where the opened cavity has no exact form; ``distance``,
+    ``farthest``, ``beyond`` and ``tried``: of that surface; all as in `ExactForm`. ``faces`` of the solid, and how many
+    of them milling leaves, ``prepared_faces``. ``volume``. ``seconds`` of the processor. ``reason``: why it has facets;
+    empty where it has CAD faces.
+    """
+
+    form: str
+    faces: int = 0
+    prepared_faces: int = 0
+    volume: float | None = None
+    distance: float | None = None
+    farthest: float | None = None
+    beyond: float | None = None
+    seconds: float = 0.0
+    tried: tuple[str, ...] = ()
+    reason: str = ""
 
 
 @dataclass(frozen=True)

@@ -8,20 +8,23 @@ from pathlib import Path
 
 from damageest.artefacts import Floats
 from damageest.isolation import at_work
-from damageest.stages.export import Body, DepositForm
+from damageest.stages.export import Body, DepositForm, ExactForm
 from damageest_cadquery._assembly import Colour, NamedShape
-from damageest_cadquery._deposit import STOCK, ExactDeposit
+from damageest_cadquery._deposit import STOCK
 from damageest_cadquery._doubles import SHARED
-from damageest_cadquery._exact import Exact, scale_shape
+from damageest_cadquery._exact import scale_shape
 from damageest_cadquery._files import join_shapes, write_shapes
 from damageest_cadquery._left import FACET, cut_facets
+from damageest_cadquery._opened import FOUND
 from damageest_cadquery._planar import build_solid
 from damageest_cadquery._read import explore
 from damageest_cadquery._request import CadFacts, Request, name_file
+from damageest_cadquery._sites import Solved, describe_exact
 from damageest_cadquery._solids import StockError
 from damageest_cadquery._split import Piece
 
 INNER: Colour = (215, 50, 40)
+PREPARED: Colour = (235, 150, 60)
 TOP: Colour = (40, 130, 205)
 SIDE: Colour = (140, 185, 225)
 PLAIN: Colour = (150, 155, 165)
@@ -29,16 +32,33 @@ PLAIN: Colour = (150, 155, 165)
 
 @dataclass(eq=False)
 class Writing:
-    """What was written so far. ``reasons``: by site, why it has no exact form; ``exact``: sites whose file has one;
-    ``forms``: of deposits by site; ``notes``: what is to be said of files."""
+    """What was written so far. ``solved``: what was found, by site; ``faults``: why files of it were not written, by
+    the stem of the file; ``notes``: what is to be said of files."""
 
     request: Request
     facts: CadFacts
-    reasons: dict[int, tuple[str, ...]]
-    forms: dict[int, DepositForm | None]
-    exact: list[int] = field(default_factory=list)
+    solved: Mapping[int, Solved]
+    faults: dict[str, str] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+
+    def describe(self, number: int) -> ExactForm:
+        """What is to be said of a site's solids, as they were written."""
+        found = self.solved[number]
+        deposit, milled = found.deposit_form, found.milled_form
+        if fault := self.faults.get(f"deposit/site-{number}"):
+            assert found.deposit is not None
+            origins = [origin for piece in found.deposit.pieces for origin in piece.origins]
+            faces = [face for face, kind in origins if kind == STOCK and face >= 0]
+            deposit = DepositForm(reason=StockError(fault, faces).describe(self.facts.names))
+        if (fault := self.faults.get(f"milled/site-{number}")) and milled is not None:
+            milled = replace(milled, faces=0, prepared_faces=0, volume=None, reason=fault)
+        fault = self.faults.get(f"damage/site-{number}", self.faults.get(f"doubtful/site-{number}", ""))
+        if found.exact is None or fault:
+            said = ExactForm("none", tried=(*found.tried, fault) if fault else found.tried)
+        else:
+            said = describe_exact(found.exact, self.request.enlarged)
+        return replace(said, deposit=deposit, milled=milled)
 
     def save(self, stem: str, name: str, shapes: Sequence[NamedShape]) -> tuple[Sequence[NamedShape], str]:
         """Writes a file; gives its shapes as they were written, none where there is no file, and why."""
@@ -59,33 +79,20 @@ class Writing:
         return done.made, ""
 
 
-def write_all(
-    writing: Writing, found: Mapping[int, Exact], deposits: Mapping[int, ExactDeposit], rest: Sequence[Piece]
-) -> None:
+def write_all(writing: Writing, rest: Sequence[Piece]) -> None:
     """Writes the exact solids, and the assembly of all."""
-    request, facts = writing.request, writing.facts
-    stems = {number: f"damage/site-{number}" for number in found}
-    stems |= {site.number: f"doubtful/site-{site.number}" for site in request.sites if not site.accepted}
-    names = {number: stem.replace("/", " ") for number, stem in stems.items()}
-    sites = {
-        stems[number]: _name(exact.pieces, names[number], request.bodies[stems[number]].colour, facts, names[number])
-        for number, exact in found.items()
-    }
-    stock = {}
-    for number, deposit in deposits.items():
-        stem, name = f"deposit/site-{number}", f"deposit site-{number}"
-        stock[stem] = _name(deposit.pieces, name, request.bodies[stem].colour, facts, f"damage site-{number}")
-    left, size = _find_left(writing, found, rest), 1 / request.enlarged
+    request = writing.request
+    shapes = _list_shapes(writing)
+    left, size = _find_left(writing, rest), 1 / request.enlarged
     for place, T in request.places.items():
         here: dict[str, NamedShape] = {}
-        for stem, shape in {**sites, **stock}.items():
+        for stem, shape in shapes.items():
             made, fault = writing.save(f"{place}{stem}", shape.name, [_move(shape, T, size)])
             here.update((stem, each) for each in made)
             if fault:
-                _take_fault(writing, stem, fault, deposits)
-        writing.exact = [number for number in found if number not in writing.reasons]
+                writing.faults[stem] = f"read back, {fault}"
         union = (
-            [_move(shape, T, size) for shape in _gather_lost(request, sites)]
+            [_move(shape, T, size) for shape in _gather_lost(request, shapes)]
             if any(s.accepted for s in request.sites)
             else []
         )
@@ -96,23 +103,32 @@ def write_all(
             writing.save(f"{place}result", "result", everything)
 
 
-def _take_fault(writing: Writing, stem: str, fault: str, deposits: Mapping[int, ExactDeposit]) -> None:
-    """Notes that a file with CAD faces could not be written."""
-    folder, _, number = stem.partition("/site-")
-    if folder == "deposit":
-        pieces = deposits[int(number)].pieces
-        faces = [face for piece in pieces for face, kind in piece.origins if kind == STOCK and face >= 0]
-        error = StockError(f"read back, {fault}", faces)
-        writing.forms[int(number)] = DepositForm(reason=error.describe(writing.facts.names))
-    else:
-        writing.reasons[int(number)] = (*writing.reasons.get(int(number), ()), f"read back, {fault}")
+def _list_shapes(writing: Writing) -> dict[str, NamedShape]:
+    """The exact solids of all sites, by the stems of their files."""
+    bodies, facts, shapes = writing.request.bodies, writing.facts, {}
+    accepted = {site.number: site.accepted for site in writing.request.sites}
+    for number, found in writing.solved.items():
+        stem = f"damage/site-{number}" if accepted[number] else f"doubtful/site-{number}"
+        name = stem.replace("/", " ")
+        if found.exact is not None:
+            shapes[stem] = _name(found.exact.pieces, name, bodies[stem].colour, facts, name)
+        inner, inner_colour = name, INNER
+        if found.milled_form is not None:
+            inner, inner_colour = f"prepared site-{number}", PREPARED
+        solids = {"deposit": found.deposit, "milled": found.milled}
+        for stem, solid in ((f"{kind}/site-{number}", solid) for kind, solid in solids.items()):
+            if solid is not None:
+                body = bodies[stem]
+                shapes[stem] = _name(solid.pieces, body.name, body.colour, facts, inner, inner_colour, name)
+    return shapes
 
 
-def _find_left(writing: Writing, found: Mapping[int, Exact], rest: Sequence[Piece]) -> list[NamedShape]:
+def _find_left(writing: Writing, rest: Sequence[Piece]) -> list[NamedShape]:
     """What is left of each solid of the CAD file. Where an accepted site has no exact form, the solids that it touches
     have facets; empty where these cannot be made."""
     request = writing.request
     accepted = [site for site in request.sites if site.accepted]
+    found = [number for number, each in writing.solved.items() if each.exact is not None]
     if not accepted or not {"damage", "undamaged"} <= set(request.bodies):
         return []
     if len({piece.owner for piece in rest}) == 1 and not any(site.number in found for site in accepted):
@@ -188,8 +204,17 @@ def _collect(
     return found
 
 
-def _name(pieces: Sequence[Piece], name: str, colour: Colour, facts: CadFacts, inner: str) -> NamedShape:
-    """One shape of pieces, whose faces have the names and colours of the CAD faces that they come from."""
+def _name(
+    pieces: Sequence[Piece],
+    name: str,
+    colour: Colour,
+    facts: CadFacts,
+    inner: str,
+    inner_colour: Colour = INNER,
+    damage: str = "",
+) -> NamedShape:
+    """One shape of pieces, whose faces have the names and colours of the CAD faces that they come from. ``inner``: how
+    those inside the part are called; ``damage``: those that metal to mill off has in common with the damage volume."""
     names, colours = [], []
     for piece in pieces:
         for number, tool in piece.origins:
@@ -201,12 +226,16 @@ def _name(pieces: Sequence[Piece], name: str, colour: Colour, facts: CadFacts, i
                 names.append(f"{inner} inner at {facts.names[number]}")
                 colours.append(INNER)
                 continue
+            if tool == FOUND:
+                names.append(f"{damage} inner {number + 1}")
+                colours.append(INNER)
+                continue
             if tool == FACET:
                 names.append("facet")
                 colours.append(PLAIN)
                 continue
             names.append(facts.names[number] if number >= 0 else f"{inner} inner {tool + 1}")
-            colours.append((facts.colours[number] or PLAIN) if number >= 0 else INNER)
+            colours.append((facts.colours[number] or PLAIN) if number >= 0 else inner_colour)
     return NamedShape(name, join_shapes([piece.shape for piece in pieces]), colour, names, colours)
 
 

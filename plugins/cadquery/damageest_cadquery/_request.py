@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from damageest.artefacts import DisplacementField, Floats, Part
-from damageest.stages.export import Body, DepositForm, ExactForm
+from damageest.artefacts import Deposit, DisplacementField, Floats, Part
+from damageest.stages.export import Body, DepositForm, ExactForm, MilledForm
 from damageest_cadquery._assembly import Colour
 from damageest_cadquery._exact import SiteInput
 
@@ -59,19 +59,30 @@ def name_site(number: int) -> str:
     return f"site {number}"
 
 
-def name_form(number: int, form: str) -> str:
-    """``form``: of a damage volume, as it is tried: of recognised shapes and splines the kind alone."""
+def name_form(whose: str, form: str) -> str:
+    """``form``: of a damage volume or an opened cavity, as it is tried: of recognised shapes and splines the kind
+    alone."""
     kind = form.split()[0]
-    return f"{kind if kind in ('shapes', 'spline') else form} for site {number}"
+    return f"{kind if kind in ('shapes', 'spline') else form} for {whose}"
 
 
 def limit_form(seconds: float) -> float:
-    """How long a form of a damage volume may take of the ``seconds`` of a site: others are to be tried after it."""
+    """How long a form of a damage volume or an opened cavity may take of the ``seconds`` of a site: others are to be
+    tried after it."""
     return seconds / 2
 
 
 def name_deposit(number: int) -> str:
     return f"deposit of site {number}"
+
+
+def name_opened(number: int) -> str:
+    """The cavity that is opened before deposition; its forms are those of this name."""
+    return f"the opened cavity of site {number}"
+
+
+def name_milled(number: int) -> str:
+    return f"metal to mill off at site {number}"
 
 
 def name_crossed(number: int) -> str:
@@ -93,6 +104,19 @@ class CadFacts:
     solids: Sequence[str]
 
 
-def describe_missing(site: SiteInput) -> DepositForm | None:
-    """What to say of a deposit whose damage volume has no exact form; None where there is no deposit."""
-    return None if site.deposit is None else DepositForm(reason="its damage volume has facets too")
+def describe_none(site: SiteInput, why: str) -> ExactForm:
+    """What to say of a site where nothing has an exact form."""
+    return ExactForm("none", tried=(why,), deposit=describe_missing(site), milled=describe_unmilled(site))
+
+
+def describe_missing(site: SiteInput, what: str = "damage volume") -> DepositForm | None:
+    """What to say of a deposit whose damage volume, or opened cavity, has no exact form; None where there is no
+    deposit."""
+    return None if site.deposit is None else DepositForm(reason=f"its {what} has facets too")
+
+
+def describe_unmilled(site: SiteInput, tried: Sequence[str] = ()) -> MilledForm | None:
+    """What to say of metal to mill off whose cavity has no exact form; None where the cavity was not opened."""
+    opened = isinstance(site.deposit, Deposit) and site.deposit.milled is not None
+    why = tried[-1] if tried else "its damage volume has facets too"
+    return MilledForm("none", tried=tuple(tried), reason=why) if opened else None

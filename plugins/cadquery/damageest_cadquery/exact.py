@@ -17,16 +17,25 @@ from damageest.geometry.units import MILLIMETRES
 from damageest.io.files import shorten_error
 from damageest.isolation import Limits, ProcessError, call_isolated, find_place
 from damageest.result import Result
-from damageest.stages.export import Body, ExactForm, ExportedFiles
+from damageest.stages.export import Body, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._read import read
-from damageest_cadquery._request import ADAPTING, WHOLE, Made, Request, describe_missing, limit_form, name_site
+from damageest_cadquery._request import (
+    ADAPTING,
+    WHOLE,
+    Made,
+    Request,
+    describe_none,
+    limit_form,
+    name_site,
+)
 from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
 from damageest_cadquery._step import OWNER
 from damageest_cadquery._worker import make_exact, write_part
 
 Given = TypeVar("Given")
 NO_FIELD = "the part was adapted to the scan by a stage that gives no field, so its CAD faces cannot follow"
+OF_SITE = ("damage", "deposit", "milled")
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
 WORKER = "damageest_cadquery exact"
@@ -69,8 +78,8 @@ def write_exact(
             break
     forms = dict(made.forms)
     for site in request.sites:
-        why = (request.skipped.get(name_site(site.number), "the process for exact solids stopped"),)
-        forms.setdefault(site.number, ExactForm("none", tried=why, deposit=describe_missing(site)))
+        why = request.skipped.get(name_site(site.number), "the process for exact solids stopped")
+        forms.setdefault(site.number, describe_none(site, why))
     notes = tuple(
         f"site-{number}.step has facets, not the faces of the CAD file: {form.tried[-1] if form.tried else 'unknown'}"
         for number, form in sorted(forms.items())
@@ -80,6 +89,11 @@ def write_exact(
         f"deposit/site-{number}.step has facets, not offsets of the CAD's faces: {form.deposit.reason}"
         for number, form in sorted(forms.items())
         if form.deposit is not None and form.deposit.reason
+    )
+    notes += tuple(
+        f"milled/site-{number}.step has facets, not the faces of the CAD file: {form.milled.reason}"
+        for number, form in sorted(forms.items())
+        if form.milled is not None and form.milled.reason
     )
     if isinstance(done, Made):
         notes += made.notes
@@ -143,7 +157,12 @@ def _scale_deposit(deposit: Solid, factor: float) -> Solid:
         return scaled
     heights = tuple((number, height * factor if height > 0 else height) for number, height in scaled.heights)
     volume, overlap = scaled.stock_volume * factor**3, scaled.overlap * factor
-    return replace(scaled, cavity=None, heights=heights, stock_volume=volume, overlap=overlap)
+    cavity, milled, opening = (
+        None if body is None else _scale(body, factor) for body in (scaled.cavity, scaled.milled, scaled.opening)
+    )
+    return replace(
+        scaled, cavity=cavity, milled=milled, opening=opening, heights=heights, stock_volume=volume, overlap=overlap
+    )
 
 
 def _scale(mesh: Any, factor: float) -> Any:
@@ -175,7 +194,7 @@ def _run(request: Request, work: Callable[..., Given], **more: str) -> Given | t
             )  # fmt: skip
         except ProcessError as error:
             what = find_place(error) or WHOLE
-            allowed = limit_form(request.seconds) if " for site " in what else request.seconds
+            allowed = limit_form(request.seconds) if " for " in what else request.seconds
             late = f"OpenCASCADE took longer than {allowed:g} s"
             return what, late if error.why == "time" else f"OpenCASCADE stopped ({error.message})"
         except Exception as error:  # OpenCASCADE's exceptions share no base of their own
@@ -185,18 +204,18 @@ def _run(request: Request, work: Callable[..., Given], **more: str) -> Given | t
 def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
     """A ``cadquery.Shape`` with the CAD's own faces, in the part's frame and the result's unit.
 
-    ``what``: part, undamaged, or damage or deposit of a ``site``; where no allowance adds to it, the deposit is the
-    damage volume. It is made in a process of its own, as for files. Raises
+    ``what``: part, undamaged, or damage, deposit or milled of a ``site``; where no allowance adds to it, the deposit is
+    the damage volume. It is made in a process of its own, as for files. Raises
     ValueError for another name or site, InputError where the part has no CAD faces or no exact form passes the checks.
     """
-    if what not in ("part", "undamaged", "damage", "deposit"):
-        raise ValueError(f"no '{what}' as CadQuery; there are: part, undamaged, damage, deposit")
+    if what not in ("part", "undamaged", *OF_SITE):
+        raise ValueError(f"no '{what}' as CadQuery; there are: part, undamaged, {', '.join(OF_SITE)}")
     known = {each.id: each for each in result.sites}
-    if what in ("damage", "deposit") and site not in known:
+    if what in OF_SITE and site not in known:
         raise ValueError(f"there is no site {site}; there are: {', '.join(map(str, known)) or 'none'}")
-    if what == "deposit" and site is not None:
+    if what in ("deposit", "milled") and site is not None:
         known[site].mesh("deposit")  # raises where it was refused
-        what = "damage" if known[site].deposit is None else what
+        what = "damage" if what == "deposit" and known[site].deposit is None else what
     if not result.part.cad_scale:
         raise InputError("the part is a mesh: only a part from STEP, IGES or BREP has CAD faces")
     if result.adapted is not None and result.adapted.field is None:
@@ -213,11 +232,14 @@ def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
             bodies[stem] = Body(stem, each.damage, (0, 0, 0))
             if each.deposit is not None:
                 bodies[f"deposit/site-{each.id}"] = Body("deposit", each.deposit, (0, 0, 0))
+            if isinstance(each.deposit, Deposit) and each.deposit.milled is not None:
+                bodies[f"milled/site-{each.id}"] = Body("to be milled", each.deposit.milled, (0, 0, 0))
         if result.undamaged is not None and result.damage is not None:
             bodies["undamaged"] = Body("undamaged", result.undamaged, (0, 0, 0))
             bodies["damage"] = Body("damage", result.damage, (0, 0, 0))
         done = write_exact(Path(place), chosen, bodies, {"": None}, LIMIT, assembly=False)
-        folders = {"damage": ("damage/", "doubtful/"), "deposit": ("deposit/",), "undamaged": ("undamaged.step",)}
+        folders = {"damage": ("damage/", "doubtful/"), "undamaged": ("undamaged.step",)}
+        folders |= {name: (f"{name}/",) for name in ("deposit", "milled")}
         wanted = [name for name in done.files if name.startswith(folders[what])]
         if not wanted:
             raise InputError(f"{what} has no exact form; take as_trimesh ({'; '.join(done.notes)})")
